@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+# How everything in this tree is compiled and linked.
+
+get_property(HALCYON_MULTI_CONFIG GLOBAL PROPERTY GENERATOR_IS_MULTI_CONFIG)
+if(NOT CMAKE_BUILD_TYPE AND NOT HALCYON_MULTI_CONFIG)
+    set(CMAKE_BUILD_TYPE Release CACHE STRING "Debug, Release, RelWithDebInfo or MinSizeRel" FORCE)
+endif()
+set(CMAKE_CXX_FLAGS_RELEASE "-O2" CACHE STRING "" FORCE)  # assertions stay: they are cheap and never in a hot loop
+set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g -fno-omit-frame-pointer" CACHE STRING "" FORCE)
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_C_STANDARD 11)
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
+set(HALCYON_COMPONENT_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/components")
+
+# No fused multiply-add behind our back: the same netlist gives the same bytes on every machine.
+add_compile_options(-Wall -Wextra -Wpedantic "$<$<COMPILE_LANGUAGE:CXX>:-Wconversion;-Wshadow>" -ffp-contract=off)
+if(HALCYON_WERROR)
+    add_compile_options(-Werror)
+endif()
+if(HALCYON_SANITIZE)
+    add_compile_options("-fsanitize=${HALCYON_SANITIZE}" -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
+    add_link_options("-fsanitize=${HALCYON_SANITIZE}")
+endif()
+
+# ccache: the same object for the same text, wherever the tree lies.
+find_program(HALCYON_CCACHE ccache)
+if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+    set(HALCYON_LAUNCHER env "CCACHE_BASEDIR=${PROJECT_SOURCE_DIR}" CCACHE_SLOPPINESS=pch_defines,time_macros "${HALCYON_CCACHE}")
+    set(CMAKE_C_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
+endif()
+find_program(HALCYON_MOLD mold)
+if(HALCYON_MOLD)
+    add_link_options(-fuse-ld=mold)
+endif()
+
+# The real-time guard: clang 19's runtime archive works with g++ when it is linked whole into the program.
+if(HALCYON_RT_GUARD)
+    find_program(HALCYON_CLANG NAMES clang++-19 clang-19 REQUIRED)
+    execute_process(COMMAND "${HALCYON_CLANG}" -print-resource-dir OUTPUT_VARIABLE HALCYON_CLANG_RESOURCES
+                    OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+    find_library(HALCYON_RTSAN_ARCHIVE NAMES "libclang_rt.rtsan-${CMAKE_SYSTEM_PROCESSOR}.a"
+                 PATHS "${HALCYON_CLANG_RESOURCES}/lib/linux" NO_DEFAULT_PATH REQUIRED)
+    add_compile_definitions(HALCYON_RT_GUARD=1)
+    add_library(halcyon_rtsan INTERFACE)
+    target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)
+endif()
+
+# halcyon_folder(NAME DEPENDENCY...): the library halcyon_NAME from all sources in runtime/NAME.
+function(halcyon_folder name)
+    file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/${name}/*.cpp")
+    if(sources)
+        set(scope PUBLIC)
+        add_library(halcyon_${name} STATIC ${sources})
+    else()
+        set(scope INTERFACE)
+        add_library(halcyon_${name} INTERFACE)
+    endif()
+    target_include_directories(halcyon_${name} ${scope} "${PROJECT_SOURCE_DIR}/runtime")
+    target_link_libraries(halcyon_${name} ${scope} ${ARGN})
+endfunction()
+
+# Where the program looks for plugins; included by the one source that builds the search path.
+file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/paths.hpp" @ONLY CONTENT [[
+// SPDX-License-Identifier: MIT
+// Written by CMake: what the program knows about where it was built and where it will be installed.
+#pragma once
+
+#include <string_view>
+
+namespace hal::paths {
+inline constexpr std::string_view version = "@PROJECT_VERSION@";
+inline constexpr std::string_view build_components = "@HALCYON_COMPONENT_OUTPUT_DIRECTORY@";
+inline constexpr std::string_view install_components = "@CMAKE_INSTALL_FULL_LIBDIR@/halcyon/components";
+inline constexpr std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk";
+inline constexpr std::string_view install_includes = "@CMAKE_INSTALL_FULL_INCLUDEDIR@";
+}  // namespace hal::paths
+]])
+include_directories("${PROJECT_BINARY_DIR}/generated")
