@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Where a text came from: files, shell lines, and places in them.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <string_view>
+
+namespace hal {
+
+/// A half-open byte range in one source. `source` 0 is "nowhere" (made by the runtime itself).
+struct Span {
+    std::uint32_t source = 0, begin = 0, end = 0;
+    bool known() const { return source != 0; }
+};
+
+/// Line and column as people count them: from 1, columns in characters (UTF-8).
+struct Place {
+    std::uint32_t line = 0, column = 0;
+};
+
+/// All texts of a session, for as long as spans may point into them. Not synchronised: one user at a time.
+class Sources {
+public:
+    struct Source {
+        std::string name;  ///< as messages print it: a path, "<shell>", "<commandline>", "<stdin>"
+        std::string text;
+    };
+
+    /// Adds a text and returns its number. Texts of the shell (`keep` false) share one recycled entry per line.
+    std::uint32_t add(std::string name, std::string text);
+    const Source& get(std::uint32_t source) const;
+    std::string_view text(Span span) const;
+    Place place(Span span) const;
+    /// The whole line that `span` begins on, without its end of line.
+    std::string_view line(Span span) const;
+    /// "file:line" or "file:line:column"
+    std::string location(Span span, bool column = true) const;
+
+private:
+    std::deque<Source> sources_;
+};
+
+}  // namespace hal

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// The one table of HAL types. Everything that depends on a type goes through visit() or through a row of it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "hal/abi.h"
+
+namespace hal {
+
+struct TypeRow {
+    hal_type type;
+    const char* name;     ///< as netlists and `show` write it
+    const char* newer;    ///< the second dialect's name (LinuxCNC 2.10), "" if the same
+    char letter;          ///< in sampler/streamer cfg= strings
+    bool number;          ///< can be written as a literal
+};
+
+inline constexpr std::array<TypeRow, 7> types{{
+    {HAL_TYPE_BIT, "bit", "bool", 'b', true},
+    {HAL_TYPE_FLOAT, "float", "real", 'f', true},
+    {HAL_TYPE_S32, "s32", "si32", 's', true},
+    {HAL_TYPE_U32, "u32", "ui32", 'u', true},
+    {HAL_TYPE_S64, "s64", "sint", 'l', true},
+    {HAL_TYPE_U64, "u64", "uint", 'k', true},
+    {HAL_TYPE_PORT, "port", "", 'p', false},
+}};
+
+inline constexpr const TypeRow& row(hal_type type) { return types[static_cast<std::size_t>(type)]; }
+inline constexpr const char* name(hal_type type) { return row(type).name; }
+/// The type of either dialect's name, or nothing.
+std::optional<hal_type> type_named(std::string_view name);
+
+/// Calls `action` with a reference to the member of `value` that `type` selects (a hal_port* for port).
+template <class Action>
+decltype(auto) visit(hal_type type, const hal_value& value, Action&& action) {
+    switch (type) {
+    case HAL_TYPE_BIT: return action(value.bit);
+    case HAL_TYPE_FLOAT: return action(value.real);
+    case HAL_TYPE_S32: return action(value.s32);
+    case HAL_TYPE_U32: return action(value.u32);
+    case HAL_TYPE_S64: return action(value.s64);
+    case HAL_TYPE_U64: return action(value.u64);
+    case HAL_TYPE_PORT: break;
+    }
+    return action(value.u64);
+}
+
+inline const char* name(hal_dir dir) {
+    static constexpr const char* names[] = {"IN", "OUT", "I/O", "RW"};
+    return names[static_cast<std::size_t>(dir)];
+}
+
+/// The value a text stands for. On failure the string says why: "is not a number", "is out of range for s32 (…)".
+struct Parsed {
+    hal_value value{};
+    std::string problem;  ///< empty: good
+};
+Parsed parse_value(hal_type type, std::string_view text);
+
+/// As `getp` prints it: decimal, floats `%.7g`, bits TRUE/FALSE.
+std::string format_value(hal_type type, const hal_value& value);
+/// So that reading it back gives the same value: floats with all digits (`save`).
+std::string format_exact(hal_type type, const hal_value& value);
+
+/// Durations as people type them: "10s", "250ms", "50us", "100ns", "1000" (ns when `bare_ns`, else seconds), "2min".
+std::optional<std::int64_t> parse_duration_ns(std::string_view text, bool bare_ns);
+/// "1.50 ms", "12 us", "10 s"
+std::string format_duration(double ns);
+
+}  // namespace hal

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+#include "execute/core.hpp"
+
+#include <cmath>
+#include <ctime>
+
+// The real-time guard: the sanitizer's runtime defines these when the program is built with it.
+extern "C" {
+[[gnu::weak]] void __rtsan_realtime_enter();
+[[gnu::weak]] void __rtsan_realtime_exit();
+}
+
+namespace hal {
+namespace {
+thread_local Core* current_core = nullptr;
+
+struct Guard {
+    Guard() noexcept { if (__rtsan_realtime_enter) __rtsan_realtime_enter(); }
+    ~Guard() { if (__rtsan_realtime_exit) __rtsan_realtime_exit(); }
+};
+}  // namespace
+
+std::int64_t monotonic_ns() noexcept {
+    timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * 1'000'000'000LL + now.tv_nsec;
+}
+
+Core* Core::current() noexcept { return current_core; }
+
+Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, const std::atomic<bool>& running, bool measure)
+    : id_(id), period_ns_(period_ns), pins_(pins), board_(board), running_(running), measure_(measure) {
+    info_.size = sizeof info_;
+    info_.period_ns = period_ns;
+    info_.period_s = static_cast<double>(period_ns) * 1e-9;
+}
+
+std::int64_t Core::time() const noexcept { return measure_ ? monotonic_ns() : 0; }
+
+void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
+    current_core = this;
+    const Guard guard;
+    const std::int64_t begin = time();
+    info_.start_ns = due_ns;
+    if (measure_) wakeup.add(woke_ns - due_ns);
+    drain_writes();
+    if (plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel)) take(offered);
+    if (plan_) {
+        import();
+        if (running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed)) run();
+        else if (!safe_) make_safe();
+        const std::int64_t took = time() - begin;
+        pins_.wakeup->slot->s32 = static_cast<std::int32_t>(measure_ ? woke_ns - due_ns : 0);
+        account(took);
+        publish();
+        answer();
+    }
+    ++info_.number;
+    cycles.store(cycles.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+}
+
+void Core::service() noexcept {
+    drain_writes();
+    if (plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel)) take(offered);
+    if (plan_) answer();
+}
+
+void Core::skip(std::uint64_t periods) noexcept {
+    info_.number += periods;
+    missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_relaxed);
+    pins_.missed->slot->u32 = static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed));
+}
+
+void Core::take(plan::Plan* plan) noexcept {
+    // All old places are read before any new one is written or rebound: a value may move within one image.
+    for (std::size_t i = 0; i < plan->carries.size(); ++i) {
+        const plan::Carry& carry = plan->carries[i];
+        plan->scratch[i] = carry.from ? carry.from->raw : carry.value.raw;
+    }
+    for (const plan::Rebind& rebind : plan->rebinds) rebind.pin->slot = rebind.slot;
+    for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
+    plan_ = plan;
+    sampled_ = 0;
+    if (!plan->init.empty()) init_done_ = false;
+    taken_.store(plan->epoch, std::memory_order_release);
+}
+
+void Core::drain_writes() noexcept {
+    for (Write write; writes_.pop(write);) __atomic_store_n(&write.to->raw, write.value.raw, __ATOMIC_RELAXED);
+}
+
+void Core::import() noexcept {
+    for (plan::Import& from : plan_->imports) {
+        plan::Channel& channel = *from.channel;
+        if (!(channel.middle.load(std::memory_order_acquire) & plan::Channel::fresh)) continue;
+        channel.front = channel.middle.exchange(channel.front, std::memory_order_acq_rel) & 3;
+        const hal_value* values = channel.buffers[channel.front].get();
+        for (std::size_t i = 0; i < from.to.size(); ++i) *from.to[i] = values[i];
+    }
+    for (const plan::CellImport& from : plan_->cell_imports) from.to->raw = __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED);
+}
+
+void Core::publish() noexcept {
+    for (plan::Export& to : plan_->exports) {
+        plan::Channel& channel = *to.channel;
+        hal_value* values = channel.buffers[channel.back].get();
+        for (std::size_t i = 0; i < to.from.size(); ++i) values[i] = *to.from[i];
+        channel.back = channel.middle.exchange(channel.back | plan::Channel::fresh, std::memory_order_acq_rel) & 3;
+    }
+}
+
+void Core::answer() noexcept {
+    Observation* const wish = observation_.exchange(nullptr, std::memory_order_acq_rel);
+    if (!wish) return;
+    for (std::size_t i = 0; i < wish->count; ++i) wish->to[i].raw = __atomic_load_n(&wish->from[i]->raw, __ATOMIC_RELAXED);
+    wish->cycle = info_.number;
+    wish->done.store(true, std::memory_order_release);
+}
+
+void Core::run() noexcept {
+    safe_ = false;
+    in_function_ = true;
+    if (setjmp(recover) == 0) {
+        if (!init_done_ && !plan_->init.empty()) {
+            // initf: a cycle of its own, so that the cyclic functions start on a fresh period
+            initialising_ = true;
+            run_steps(plan_->init_steps.data(), plan_->init_steps.data() + plan_->init_steps.size());
+            initialising_ = false;
+            init_done_ = true;
+        } else if (const auto& functions = plan_->functions; !functions.empty()) {
+            const plan::Step* const steps = plan_->steps.data();
+            if (!measure_) {
+                run_steps(steps, steps + functions.back().end);
+            } else if (profile_every.load(std::memory_order_relaxed)) {
+                for (const plan::Function& function : functions) run_timed(function, steps);
+            } else {
+                const plan::Function& function = functions[sampled_];
+                sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
+                run_steps(steps, steps + function.begin);
+                run_timed(function, steps);
+                run_steps(steps + function.end, steps + functions.back().end);
+            }
+        }
+        in_function_ = false;
+    } else {
+        // An exception left a noexcept function; the terminate handler jumped back here.
+        in_function_ = false;
+        raise({HAL_FAULT_EXCEPTION, current_function(), info_.number, info_.start_ns, 0.0, nullptr, nullptr});
+        initialising_ = false;
+        stopped_.store(true, std::memory_order_release);
+        make_safe();
+    }
+}
+
+void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
+    // Instances are small and lie in a row, but after a millisecond elsewhere the caches are cold: ask for the one
+    // eight steps ahead. The compiler pads the array so that reading ahead stays inside it.
+    for (const plan::Step* step = first; step != last; ++step) {
+        __builtin_prefetch(step[8].self);
+        current_ = step;
+        step->step(step->self, &info_);
+    }
+}
+
+void Core::run_timed(const plan::Function& function, const plan::Step* steps) noexcept {
+    const std::int64_t begin = monotonic_ns();
+    run_steps(steps + function.begin, steps + function.end);
+    const auto took = static_cast<std::int32_t>(monotonic_ns() - begin);
+    plan::FunctionTimes& times = *function.times;
+    times.time.slot->s32 = took;
+    const bool more = took > times.tmax.slot->s32;
+    if (more) times.tmax.slot->s32 = took;
+    times.tmax_increased.slot->bit = more;
+    times.samples.store(times.samples.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    times.total_ns.store(times.total_ns.load(std::memory_order_relaxed) + static_cast<std::uint64_t>(took), std::memory_order_relaxed);
+}
+
+void Core::account(std::int64_t busy_ns) noexcept {
+    pins_.beat->slot->u32 += 1;
+    if (!measure_) return;
+    busy.add(busy_ns);
+    const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
+    pins_.time->slot->s32 = took;
+    const bool more = took > pins_.tmax->slot->s32;
+    if (more) pins_.tmax->slot->s32 = took;
+    pins_.tmax_increased->slot->bit = more;
+    const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
+    const bool in_budget = budget == 0 || busy_ns <= budget;
+    if (!in_budget) {
+        overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        if (in_budget_) raise({HAL_FAULT_BUDGET, 0, info_.number, info_.start_ns, static_cast<double>(busy_ns), nullptr, nullptr});
+    }
+    in_budget_ = in_budget;  // a row of overruns is one fault
+}
+
+void Core::make_safe() noexcept {
+    safe_ = true;
+    if (!plan_) return;
+    for (const plan::Safe& safe : plan_->safe) __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
+    for (const plan::Step& step : plan_->emergency) step.step(step.self, &info_);
+}
+
+void Core::raise(FaultEvent event) noexcept {
+    board_.count(event, id_);
+    faults_.push(event);  // when full the newest is lost but counted
+}
+
+std::uint32_t Core::current_function() const noexcept {
+    if (!plan_ || !current_) return 0;
+    const bool init = initialising_;
+    const auto at = static_cast<std::uint32_t>(current_ - (init ? plan_->init_steps.data() : plan_->steps.data()));
+    for (const plan::Function& function : init ? plan_->init : plan_->functions)
+        if (at >= function.begin && at < function.end) return function.id;
+    return 0;
+}
+
+void check_finite(void* self, const hal_cycle* cycle) {
+    auto& check = *static_cast<plan::FiniteCheck*>(self);
+    if (const double value = check.pin->slot->real; !std::isfinite(value)) [[unlikely]] {
+        check.pin->slot->real = check.instead.real;
+        if (!check.bad) static_cast<Core*>(check.sink)->raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, nullptr});
+        check.bad = true;
+    } else {
+        check.bad = false;
+    }
+}
+
+}  // namespace hal

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// One real-time thread's work, without the operating-system thread: the cycle, the inbox, the statistics. The same
+// code runs under the real and the virtual clock. Reading this file and core.cpp explains a cycle.
+#pragma once
+
+#include <csetjmp>
+#include <atomic>
+#include <cstdint>
+
+#include "execute/faults.hpp"
+#include "execute/histogram.hpp"
+#include "hal/abi.h"
+#include "hal/queue.hpp"
+#include "plan/plan.hpp"
+
+namespace hal {
+
+/// A value for a pin or slot of this thread, put in the queue by the session.
+struct Write {
+    hal_value* to;
+    hal_value value;
+};
+
+/// A wish to see values of this thread, all of one finished cycle. The session fills it, the thread answers it.
+struct Observation {
+    const hal_value* const* from = nullptr;
+    hal_value* to = nullptr;
+    std::size_t count = 0;
+    std::uint64_t cycle = 0;              ///< which cycle it was; written by the thread
+    std::atomic<bool> done{false};
+};
+
+/// Where the thread tells of itself; the model's pins.
+struct ThreadPins {
+    hal_pin *time, *tmax, *tmax_increased, *beat, *missed, *wakeup;
+};
+
+class Core {
+public:
+    Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, const std::atomic<bool>& running, bool measure);
+
+    // --- by the thread --------------------------------------------------------------------------------------------
+    /// One cycle that was due at `due_ns` and woke at `woke_ns`. [realtime]
+    void cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept;
+    /// Takes a new plan and writes, answers an observation: between two cycles. [realtime]
+    void service() noexcept;
+    /// Periods that passed unserved. [realtime]
+    void skip(std::uint64_t periods) noexcept;
+    /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
+    void make_safe() noexcept;
+    void raise(FaultEvent event) noexcept;
+
+    // --- by the session ---------------------------------------------------------------------------------------------
+    /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
+    void offer(plan::Plan* plan) { inbox_.store(plan, std::memory_order_release); }
+    /// Takes an unanswered plan back. False when the thread has it already.
+    bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
+    std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
+    bool write(const Write& write) { return writes_.push(write); }
+    std::size_t unwritten() const { return writes_.size(); }
+    void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
+    bool withdraw(Observation* observation) { return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel); }
+    bool next_fault(FaultEvent& event) { return faults_.pop(event); }
+    void clear_stop() { stopped_.store(false, std::memory_order_release); }
+
+    std::uint32_t id() const { return id_; }
+    std::int64_t period_ns() const { return period_ns_; }
+    std::atomic<std::int64_t> budget_ns{0};
+    std::atomic<bool> profile_every{false};
+    Histogram wakeup, busy;                                       ///< written by the thread
+    std::atomic<std::uint64_t> cycles{0}, missed{0}, overruns{0}; ///< written by the thread
+    bool stopped_by_fault() const { return stopped_.load(std::memory_order_acquire); }
+
+    /// For crash and terminate handlers: the core whose functions run on this thread, if any.
+    static Core* current() noexcept;
+    std::uint32_t current_function() const noexcept;
+    std::uint64_t cycle_number() const noexcept { return info_.number; }
+    bool in_function() const noexcept { return in_function_; }
+    std::jmp_buf recover;                                         ///< where an exception that left a function comes back to
+
+private:
+    void take(plan::Plan* plan) noexcept;
+    void drain_writes() noexcept;
+    void import() noexcept;
+    void publish() noexcept;
+    void answer() noexcept;
+    void run() noexcept;
+    void run_timed(const plan::Function& function, const plan::Step* steps) noexcept;
+    void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
+    void account(std::int64_t busy_ns) noexcept;
+    std::int64_t time() const noexcept;
+
+    const std::uint32_t id_;
+    const std::int64_t period_ns_;
+    const ThreadPins pins_;
+    FaultBoard& board_;
+    const std::atomic<bool>& running_;
+    const bool measure_;                  // false under the virtual clock: times are 0, so runs are identical
+    std::atomic<plan::Plan*> inbox_{nullptr};         // written by the session, emptied by the thread
+    std::atomic<std::uint64_t> taken_{0};             // written by the thread
+    std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
+    std::atomic<bool> stopped_{false};                // set by the thread, cleared by the session
+    Queue<Write> writes_{4096};                       // session to thread
+    Queue<FaultEvent> faults_{256};                   // thread to session
+    plan::Plan* plan_ = nullptr;          // the rest is the thread's own
+    hal_cycle info_{};
+    const plan::Step* volatile current_ = nullptr;
+    bool volatile in_function_ = false, initialising_ = false;
+    bool safe_ = true, init_done_ = false;
+    std::size_t sampled_ = 0;
+    bool in_budget_ = true;
+};
+
+/// The step the compiler puts behind a function with a declared-finite output; `self` is a plan::FiniteCheck whose
+/// sink is the Core. [realtime]
+void check_finite(void* self, const hal_cycle* cycle);
+
+/// CLOCK_MONOTONIC in ns. [any]
+std::int64_t monotonic_ns() noexcept;
+
+}  // namespace hal

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// All threads of one instance and the clock they share. [setup] throughout: the session calls it from one thread.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "execute/core.hpp"
+
+namespace hal {
+
+struct CoreOptions {
+    std::int64_t period_ns = 0;
+    int cpu = -1;             ///< -1: an isolated CPU if there is one, else the last
+    int priority = 0;         ///< SCHED_FIFO priority; 0: not a real-time policy
+    bool deadline = false;    ///< SCHED_DEADLINE with runtime `budget` (or half the period)
+    std::int64_t spin_ns = -1;
+    std::int64_t budget_ns = 0;
+    bool profile_every = false;
+};
+
+/// What a thread got from the system.
+struct Granted {
+    enum class Policy { fifo, deadline, other } policy = Policy::other;
+    int priority = 0, cpu = -1;
+    bool refused = false;     ///< asked for a real-time policy, not allowed
+};
+
+class Executor {
+public:
+    /// `virtual_clock`: no operating-system threads; cycles run in advance().
+    explicit Executor(bool virtual_clock);
+    ~Executor();
+    Executor(const Executor&) = delete;
+
+    /// A new thread, which serves its inbox at once. Returns its core; it lives until remove().
+    Core& add(const CoreOptions& options, ThreadPins pins);
+    /// Ends a thread after making its outputs safe. False when it did not end within `timeout_ns` (it is then left alone).
+    bool remove(Core& core, std::int64_t timeout_ns);
+
+    void start() { running_.store(true, std::memory_order_release); }
+    void stop() { running_.store(false, std::memory_order_release); }
+    bool running() const { return running_.load(std::memory_order_acquire); }
+
+    /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the time-out;
+    /// their plans have been withdrawn.
+    std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns);
+    /// Waits for all observations. False when a thread did not answer; its observation is withdrawn.
+    bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns);
+    /// Queues a write; waits when the queue is full. False when the thread does not drain it.
+    bool write(Core& core, const Write& write, std::int64_t timeout_ns);
+
+    /// Virtual clock: runs every cycle due within the next `ns`, fastest thread first at equal instants.
+    /// Real clock: waits so long.
+    void advance(std::int64_t ns);
+    std::int64_t now_ns() const;
+    bool is_virtual() const { return virtual_; }
+
+    Granted granted(const Core& core) const;
+    std::int64_t spin_ns(const Core& core) const;
+    /// Page faults in the thread's cycles since its 100th.
+    std::uint64_t page_faults(const Core& core) const;
+    FaultBoard& board() { return board_; }
+
+    /// Memory locking and the CPU's sleep states, once per process. Returns what was refused: "memory locking", …
+    static std::vector<std::string> prepare_process();
+
+    /// Calls make_safe() of all cores: for crash handlers. async-signal-safe.
+    static void make_all_safe() noexcept;
+
+private:
+    struct Runner;
+    void call(Runner& runner);       // gets its attention now rather than at its next cycle, where that is possible
+    Runner& runner(const Core& core) const;
+    const bool virtual_;
+    std::atomic<bool> running_{false};
+    FaultBoard board_;
+    std::vector<std::unique_ptr<Runner>> runners_;  // fastest first
+    std::int64_t epoch_ns_ = 0;      // all deadlines are epoch + k * period
+    std::int64_t virtual_now_ns_ = 0;
+    std::uint32_t next_id_ = 1;
+};
+
+}  // namespace hal

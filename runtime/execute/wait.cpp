@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#include "execute/wait.hpp"
+
+#include <algorithm>
+#include <climits>
+#include <ctime>
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "execute/core.hpp"
+
+namespace hal {
+namespace {
+
+timespec to_timespec(std::int64_t ns) noexcept { return {ns / 1'000'000'000, ns % 1'000'000'000}; }
+
+void relax() noexcept {
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    asm volatile("yield");
+#endif
+}
+
+std::int64_t spin(std::int64_t deadline_ns) noexcept {
+    std::int64_t now = monotonic_ns();
+    while (now < deadline_ns) {
+        relax();
+        now = monotonic_ns();
+    }
+    return now;
+}
+
+}  // namespace
+
+std::int64_t Wait::until(std::int64_t deadline_ns) const noexcept {
+    const timespec at = to_timespec(deadline_ns - spin_ns);
+    while (monotonic_ns() < deadline_ns - spin_ns) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+    return spin(deadline_ns);
+}
+
+std::int64_t Wait::until(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept {
+    const timespec at = to_timespec(deadline_ns - spin_ns);
+    while (monotonic_ns() < deadline_ns - spin_ns) {
+        // FUTEX_WAIT_BITSET takes an absolute CLOCK_MONOTONIC time
+        syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET_PRIVATE, heard, &at, nullptr, FUTEX_BITSET_MATCH_ANY);
+        if (bell.load(std::memory_order_acquire) != heard) return monotonic_ns();
+    }
+    return spin(deadline_ns);
+}
+
+void Wait::ring(std::atomic<std::uint32_t>& bell) noexcept {
+    bell.fetch_add(1, std::memory_order_release);
+    syscall(SYS_futex, &bell, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
+}
+
+std::int64_t Wait::default_spin_ns(std::int64_t period_ns) noexcept { return std::min<std::int64_t>(period_ns * 2 / 5, 150'000); }
+
+}  // namespace hal

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// Edits of the model as one transaction: every rule a single edit can break is checked here, with the place of every
+// word; everything done can be undone. LinuxCNC's rules (DESIGN section 4, "Kept from LinuxCNC exactly").
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "base/diagnostic.hpp"
+#include "model/model.hpp"
+
+namespace hal {
+
+/// A word of a command with its place.
+struct Word {
+    std::string_view text;
+    Span span;
+};
+
+/// The arrow written before a pin in a `net` line.
+enum class Arrow { none, to_pin, from_pin, both };
+
+class Edit {
+public:
+    explicit Edit(Model& model) : model_(model) {}
+    Edit(const Edit&) = delete;
+
+    Diagnostics* diagnostics = nullptr;  ///< where problems of the next edits go
+
+    // --- signals and links ----------------------------------------------------------------------------------------
+    Signal* add_signal(Word name, hal_type type, Span typed_at);
+    bool remove_signal(Word name);
+    bool remove_all_signals();
+    /// Links a pin to a signal; refuses what the rules refuse. A pin that is on this signal already is accepted.
+    bool link(Pin& pin, Signal& signal, Word pin_word, Arrow arrow);
+    void unlink(Pin& pin);
+
+    // --- values ---------------------------------------------------------------------------------------------------
+    bool set_pin(Word name, Word value);
+    bool set_signal(Word name, Word value);
+
+    // --- functions and threads ------------------------------------------------------------------------------------
+    Thread* add_thread(Word name, const ThreadOptions& options);
+    bool remove_thread(Word name);
+    /// `position` as addf has it: appended (-1 or none), n from the front, -n from the end, never 0.
+    bool add_function(Word function, Word thread, int position, Span position_at, bool init);
+    bool remove_function(Word function, Word thread);
+    void take_from_thread(Function& function);
+
+    // --- names ------------------------------------------------------------------------------------------------------
+    bool alias(Word kind, Word name, Word second);
+    bool unalias(Word kind, Word second);
+
+    // --- components and instances -----------------------------------------------------------------------------------
+    Component& add_component(std::string name, Span at);
+    /// Takes an instance with its pins and functions into the indices; reports names that are taken.
+    bool add_instance(Component& component, std::unique_ptr<Instance> instance, std::vector<std::unique_ptr<Function>> functions);
+    /// A shared function gets one more instance.
+    void extend_function(Function& function, const plan::Step& step, Instance& instance);
+    void remove_instance(Instance& instance);
+    void remove_component(Component& component);
+    void add_time_pins(Function& function);
+
+    // --- look-ups that report ---------------------------------------------------------------------------------------
+    Pin* pin(Word name);
+    Signal* signal(Word name);
+    Function* function(Word name);
+    Thread* thread(Word name);
+
+    // --- what the transaction did -----------------------------------------------------------------------------------
+    bool structural() const { return structural_; }
+    bool changed() const { return structural_ || !pin_values.empty() || !signal_values.empty() || !undo_.empty(); }
+    void undo();
+    /// Forgets how to undo; what was removed is handed over to be destroyed after the threads have let go of it.
+    struct Removed {
+        std::vector<std::unique_ptr<Instance>> instances;
+        std::vector<std::unique_ptr<Function>> functions;
+        std::vector<std::unique_ptr<Component>> components;
+        std::vector<std::unique_ptr<Signal>> signals;
+        std::vector<std::unique_ptr<Thread>> threads;
+    };
+    Removed& removed() { return removed_; }
+    const std::vector<Instance*>& added_instances() const { return added_instances_; }
+
+    // New values of what the threads own now; for the compiler (structural) or the write queues (not).
+    std::unordered_map<Pin*, hal_value> pin_values;
+    std::unordered_map<Signal*, hal_value> signal_values;
+    std::unordered_map<Signal*, Pin*> inherited;  ///< a signal that takes the value the pin has
+
+private:
+    bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
+    bool name_free(std::string_view name, Span at, const char* what);
+    void keep_value(Pin& pin);
+    void on_undo(std::function<void()> action) { undo_.push_back(std::move(action)); }
+
+    Model& model_;
+    std::vector<std::function<void()>> undo_;
+    Removed removed_;
+    std::vector<Instance*> added_instances_;
+    bool structural_ = false;
+};
+
+/// The types of `type` have a conversion component: "conv_s32_float", or empty.
+std::string conversion(hal_type from, hal_type to);
+
+}  // namespace hal

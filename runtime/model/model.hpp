@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// The graph as data: components, instances, pins, signals, functions, threads, aliases, each with the span that made
+// it. Edited by model/edit, checked by model/check, compiled by model/compile. Not synchronised: the session owns it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "base/source.hpp"
+#include "base/types.hpp"
+#include "plan/plan.hpp"
+
+namespace hal {
+
+struct Component;
+struct Instance;
+struct Function;
+struct Signal;
+struct Thread;
+
+struct Pin {
+    std::string name;                ///< full name
+    std::string alias;               ///< second name, or empty
+    hal_type type = HAL_TYPE_BIT;
+    hal_dir dir = HAL_DIR_IN;
+    std::uint32_t flags = 0;         ///< HAL_PIN_…
+    const char* doc = "";            ///< these three live in the model's pool of texts
+    const char* unit = "";
+    hal_value initial{}, safe{};
+    hal_pin* memory = nullptr;       ///< in the instance
+    Instance* instance = nullptr;    ///< nullptr: a pin of a thread or of a function's times
+    Function* function = nullptr;    ///< the one function that uses it, or nullptr: all of the instance
+    Thread* of_thread = nullptr;     ///< pins of a thread itself
+    Signal* signal = nullptr;
+    Span linked_at;
+    bool arrow_in = false, arrow_out = false;  ///< the arrow written before it said "reads" / "writes"
+    std::uint32_t id = 0;
+    // Where it is now (set by the compiler when a plan has been taken; nullptr home: the session owns it).
+    Thread* home = nullptr;
+};
+
+struct Signal {
+    std::string name;
+    hal_type type = HAL_TYPE_BIT;
+    std::vector<Pin*> pins;          ///< in order of linking
+    Pin* writer = nullptr;           ///< the OUT pin
+    std::uint32_t readers = 0, ios = 0;
+    hal_value value{};               ///< kept here while no thread writes it (sets, inherited values)
+    std::unique_ptr<hal_port, void (*)(hal_port*)> port{nullptr, [](hal_port*) {}};
+    Span made, typed;                ///< who made it; what gave it its type
+    std::size_t index = 0;           ///< in Model::signals
+    // Where it is now.
+    Thread* home = nullptr;          ///< the writing thread, or nullptr
+    hal_value* slot = nullptr;       ///< in home's image, a shared cell, or the session's own (&value)
+    std::vector<std::pair<Thread*, hal_value*>> copies;  ///< reading threads' slots
+    std::shared_ptr<hal_value> cell; ///< when I/O pins of several threads share it
+};
+
+struct Function {
+    std::string name;
+    const char* doc = "";
+    std::vector<plan::Step> steps;   ///< one, or one per instance of a shared function
+    std::vector<Instance*> instances;///< whose steps these are, in the same order
+    Component* component = nullptr;
+    bool shared = false;
+    Thread* thread = nullptr;
+    bool init = false;               ///< placed by initf rather than addf
+    Span added;
+    std::vector<Pin*> finite;        ///< declared-finite outputs it may write
+    std::vector<std::unique_ptr<Pin>> pins;  ///< its .time, .tmax, .tmax-increased
+    std::unique_ptr<plan::FunctionTimes> times = std::make_unique<plan::FunctionTimes>();
+    std::uint32_t id = 0;
+};
+
+struct Instance {
+    std::string name;
+    Component* component = nullptr;
+    void* memory = nullptr;
+    std::shared_ptr<void> storage;   ///< the block several instances of one loadrt share
+    std::vector<std::unique_ptr<char[]>> allocations;
+    std::vector<std::unique_ptr<Pin>> pins;
+    std::vector<Function*> functions;
+    std::vector<plan::Step> emergency;
+    std::vector<std::pair<std::string, hal_stream*>> streams;
+    bool constructed = false, started = false;
+    Span loaded;
+};
+
+/// A component that is loaded: a plugin, or one the runtime provides itself (`threads`).
+struct Component {
+    std::string name;                ///< as loadrt was given it
+    const hal_component* plugin = nullptr;  ///< nullptr: built in
+    std::shared_ptr<void> library;
+    std::string path;
+    std::vector<std::string> arguments;     ///< one text per loadrt, for `save`
+    std::vector<std::unique_ptr<Instance>> instances;
+    std::vector<std::unique_ptr<Function>> functions;
+    std::uint32_t next_number = 0;   ///< of the next unnamed instance
+    std::uint32_t id = 0;
+    std::int64_t process = 0;        ///< of a loadusr component: its process
+    Span loaded;
+};
+
+enum class Policy { fifo, deadline, other };
+
+struct ThreadOptions {
+    std::int64_t period_ns = 0;
+    int cpu = -1;                    ///< -1: the runtime chooses
+    Policy policy = Policy::fifo;
+    int priority = 0;                ///< 0: by rate
+    std::int64_t spin_ns = -1;       ///< hybrid wait: spin this long before the deadline; -1: the default
+    std::int64_t budget_ns = 0;      ///< execution time that counts as a fault; 0: none
+    bool profile_every = false;      ///< time every function in every cycle
+};
+
+struct Thread {
+    std::string name;
+    ThreadOptions options;
+    std::vector<Function*> functions, init;
+    bool init_done = false;
+    std::vector<std::unique_ptr<Pin>> pins;
+    hal_pin time{}, tmax{}, tmax_increased{}, beat{}, missed{}, wakeup{};  ///< memory of `pins`
+    std::uint32_t id = 0;            ///< the executor's number; 0 until it runs
+    Span made;
+};
+
+/// Name to object; keys view the object's own name, which never changes.
+template <class T>
+using Index = std::unordered_map<std::string_view, T*>;
+
+struct Model {
+    std::vector<std::unique_ptr<Component>> components;
+    std::vector<std::unique_ptr<Signal>> signals;   ///< unordered: erased by swapping with the last
+    std::vector<std::unique_ptr<Thread>> threads;   ///< fastest first
+    Index<Component> component;
+    Index<Instance> instance;
+    Index<Pin> pin;                                  ///< by name and by alias
+    Index<Signal> signal;
+    Index<Function> function;
+    Index<Thread> thread;
+
+    Pin* find_pin(std::string_view name) const;
+    Signal* find_signal(std::string_view name) const;
+    Function* find_function(std::string_view name) const;
+    Thread* find_thread(std::string_view name) const;
+    Instance* find_instance(std::string_view name) const;
+    Component* find_component(std::string_view name) const;  ///< `-` and `_` are the same here
+
+    std::vector<const Pin*> sorted_pins() const;             ///< by name; aliases not repeated
+    std::vector<const Signal*> sorted_signals() const;
+    std::vector<const Function*> sorted_functions() const;
+
+    /// Keeps a text for as long as the model lives; equal texts share.
+    const char* keep(std::string_view text);
+
+    std::uint32_t next_id = 1;
+
+private:
+    struct Texts;
+    std::shared_ptr<Texts> texts_;
+};
+
+/// The thread whose functions use this pin now, or nullptr. Follows Pin::function, else the instance's functions.
+Thread* thread_of(const Pin& pin);
+
+}  // namespace hal

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Text to commands and back: LinuxCNC's .hal syntax (facts: linuxcnc-hal.md 2.3) plus name ranges and sets.
+// Knows no component and no pin; DESIGN section 4, step 1.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/diagnostic.hpp"
+#include "base/source.hpp"
+
+namespace hal {
+
+/// A word as the command sees it: after substitution, quotes kept as LinuxCNC keeps them. `span` is where it stands
+/// in the source; a substituted or expanded word points at the text it came from.
+struct Token {
+    std::string text;
+    Span span;
+};
+
+/// One logical line: continuation lines joined, comment gone, arrows still among the arguments.
+struct Command {
+    Token name;
+    std::vector<Token> args;
+    Span span;  ///< from the first to the last token
+};
+
+/// An INI file as LinuxCNC reads it: `[SECTION]`, `KEY = value`, `#` and `;` comments, repeated keys keep all values.
+class Ini {
+public:
+    /// Reads a file. Problems go to `diagnostics` (with places in the INI file itself).
+    static Ini read(Sources& sources, const std::string& path, Diagnostics& diagnostics);
+    /// First value of the key; an empty section searches all, as `[]KEY` does.
+    std::optional<std::string> get(std::string_view section, std::string_view key) const;
+    /// All values of a repeated key, in order (`[HAL]HALFILE`).
+    std::vector<std::string> all(std::string_view section, std::string_view key) const;
+    /// Every "[SECTION]KEY" there is, for suggestions.
+    std::vector<std::string> names() const;
+    bool empty() const { return entries_.empty(); }
+
+private:
+    struct Entry {
+        std::string section, key, value;
+    };
+    std::vector<Entry> entries_;
+};
+
+/// What `$NAME` and `[SECTION]KEY` are looked up in.
+struct Environment {
+    const Ini* ini = nullptr;
+    std::function<std::optional<std::string>(const std::string&)> variable;  ///< empty: the process environment
+};
+
+/// All commands of a source. Every problem is reported with its place; the faulty line gives no command and the rest
+/// is still parsed. Bounded work: time and memory are linear in the text.
+std::vector<Command> parse(const Sources& sources, std::uint32_t source, const Environment& environment, Diagnostics& diagnostics);
+
+/// A command with name ranges `[0..5]` and sets `{x,y,z}` as the plain commands it stands for. Ranges in the first
+/// argument (the thing the command is about) make a command per name, other arguments' ranges run along with it and
+/// must have as many names; where the first argument has none, ranges stand for the list of names, in place.
+/// `net j[0..2]-cmd traj.[0..2].out => pid.[0..2].command` is three commands, `net on s.on => pid.{x,y}.enable` is one.
+std::vector<Command> expand(const Command& command, Diagnostics& diagnostics);
+
+/// True for `=>`, `<=` and `<=>`.
+bool is_arrow(std::string_view word);
+
+/// The text with columns aligned within blocks, one blank between words, comments and blank lines kept (`hal fmt`).
+/// Formatting twice changes nothing; the commands it parses to are the same.
+std::string format(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics);
+
+}  // namespace hal

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// The execution plan: what one real-time thread runs, as plain data. Made by the compiler (model/compile), taken by
+// a thread (execute) at a cycle boundary, immutable after that but for the values in its image. No names, no strings.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "hal/abi.h"
+
+namespace hal::plan {
+
+/// The one call of the cycle's inner loop.
+struct Step {
+    hal_step step;
+    void* self;
+};
+
+/// Times of one HAL function. The pins are linkable like any other; written by the function's thread when it samples.
+struct FunctionTimes {
+    hal_pin time{};            ///< s32 out: last duration, ns
+    hal_pin tmax{};            ///< s32 param: longest duration, ns; setp 0 restarts it
+    hal_pin tmax_increased{};  ///< bit out: the last sample raised tmax
+    std::atomic<std::uint64_t> samples{0}, total_ns{0};  ///< written by the thread, read by the session
+    FunctionTimes() = default;
+};
+
+/// One HAL function of a thread: its row of steps (a shared function has one per instance, a finite check adds one).
+struct Function {
+    std::uint32_t begin, end;  ///< in Plan::steps
+    std::uint32_t id;          ///< the model's number of the function, for fault records
+    FunctionTimes* times;
+};
+
+/// `self` of the step that follows a function with a declared-finite output.
+struct FiniteCheck {
+    hal_pin* pin;
+    hal_value instead;       ///< written when the value is NaN or infinite
+    std::uint32_t pin_id;    ///< the model's number of the pin
+    void* sink;              ///< the core of the thread
+    bool bad = false;        ///< a row of bad values is one fault
+};
+
+/// A triple buffer of values from one thread to another. Written at the end of the writer's cycle, taken at the start
+/// of the reader's; the reader sees whole finished cycles only.
+///
+/// `middle` holds the index of the buffer that is nobody's, plus `fresh` when the writer has put a newer one there.
+///   1. writer fills back       2. writer swaps back <-> middle|fresh       (release)
+///   3. reader sees fresh       4. reader swaps front <-> middle            (acquire)
+/// If 2 happens again between 3 and 4, the reader gets the newer buffer; writer and reader never hold the same one.
+struct Channel {
+    static constexpr std::uint32_t fresh = 4;
+    explicit Channel(std::size_t values) : size(values) {
+        for (auto& buffer : buffers) buffer = std::make_unique<hal_value[]>(values);
+    }
+    std::size_t size;
+    std::unique_ptr<hal_value[]> buffers[3];
+    std::uint32_t back = 0;                ///< writer only
+    std::uint32_t front = 1;               ///< reader only
+    std::atomic<std::uint32_t> middle{2};
+};
+
+struct Export {
+    std::shared_ptr<Channel> channel;
+    std::vector<const hal_value*> from;
+};
+
+struct Import {
+    std::shared_ptr<Channel> channel;
+    std::vector<hal_value*> to;
+};
+
+/// A value copied from a cell that several threads write (I/O pins across threads) into a reader's slot.
+struct CellImport {
+    hal_value* to;
+    const hal_value* cell;
+};
+
+/// Done once, when the plan is taken: `*to = from ? *from : value`. All reads happen before all writes.
+struct Carry {
+    hal_value* to;
+    const hal_value* from;
+    hal_value value;
+};
+
+struct Rebind {
+    hal_pin* pin;
+    hal_value* slot;
+};
+
+/// A declared safe value of an output.
+struct Safe {
+    hal_pin* pin;
+    hal_value value;
+};
+
+struct Plan {
+    std::uint64_t epoch = 0;
+    std::vector<Step> steps;
+    std::vector<Function> functions;
+    std::vector<Function> init;              ///< run once, in a cycle of their own, before the first cyclic pass
+    std::vector<Step> init_steps;
+    std::vector<Import> imports;
+    std::vector<CellImport> cell_imports;
+    std::vector<Export> exports;
+    std::vector<Carry> carries;
+    std::vector<Rebind> rebinds;
+    std::vector<Safe> safe;
+    std::vector<Step> emergency;             ///< made safe by a call: instances of this thread with a hal::Emergency
+    std::unique_ptr<FiniteCheck[]> finite_checks;
+    std::unique_ptr<hal_value[]> image;      ///< the slots of this thread's signals, in order of first use
+    std::size_t image_size = 0;
+    std::vector<std::shared_ptr<void>> keep; ///< what must outlive the plan: cells shared between threads
+    std::vector<std::uint64_t> scratch;      ///< room for the carries' reads, so that taking the plan allocates nothing
+};
+
+}  // namespace hal::plan

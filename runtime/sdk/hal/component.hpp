@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: MIT
+// What a component author includes: Component, pins (In Out Io Param), Function, Cycle, HAL_COMPONENT.
+//
+// A pin, a function or a load argument is a member of the component; its constructor declares it, once.
+// Everything here is header-only glue over the C interface in hal/abi.h; nothing of it crosses that border.
+#pragma once
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "hal/abi.h"
+
+namespace hal {
+
+/// One run of a function. Cheap to copy; valid during the call only. [realtime]
+class Cycle {
+public:
+    explicit Cycle(const hal_cycle* cycle) noexcept : cycle_(cycle) {}
+    double seconds() const noexcept { return cycle_->period_s; }           ///< nominal period, s
+    std::int64_t period_ns() const noexcept { return cycle_->period_ns; }  ///< nominal period, ns
+    std::int64_t start_ns() const noexcept { return cycle_->start_ns; }    ///< when this cycle was due, runtime clock
+    std::uint64_t number() const noexcept { return cycle_->number; }       ///< cycles of the thread so far
+
+private:
+    const hal_cycle* cycle_;
+};
+static_assert(sizeof(Cycle) == sizeof(void*) && std::is_trivially_copyable_v<Cycle>, "passed in a register, like the pointer");
+
+/// A byte stream (LinuxCNC `port`): one writer, one reader, never blocks. Reads and writes are whole or not at all.
+class Port {
+public:
+    explicit Port(hal_port* port = nullptr) noexcept : port_(port) {}
+    std::size_t capacity() const noexcept { return port_ ? port_->capacity : 0; }
+    /// Bytes waiting. [any]
+    std::size_t readable() const noexcept { return port_ ? static_cast<std::size_t>(load(port_->head) - load(port_->tail)) : 0; }
+    /// Bytes of room. [any]
+    std::size_t writable() const noexcept { return capacity() - readable(); }
+    /// Copies `bytes` out without taking them; false when fewer are there. [realtime] reader
+    bool peek(void* to, std::size_t bytes) const noexcept {
+        if (readable() < bytes) return false;
+        for (std::size_t i = 0; i < bytes; ++i) static_cast<std::uint8_t*>(to)[i] = port_->data[(port_->tail + i) % port_->capacity];
+        return true;
+    }
+    /// Takes `bytes`; false, and nothing taken, when fewer are there. [realtime] reader
+    bool read(void* to, std::size_t bytes) const noexcept { return peek(to, bytes) && discard(bytes); }
+    bool discard(std::size_t bytes) const noexcept {
+        if (readable() < bytes) return false;
+        store(port_->tail, port_->tail + bytes);
+        return true;
+    }
+    /// Appends `bytes`; false, and nothing written, when there is no room. [realtime] writer
+    bool write(const void* from, std::size_t bytes) const noexcept {
+        if (writable() < bytes) return false;
+        for (std::size_t i = 0; i < bytes; ++i) port_->data[(port_->head + i) % port_->capacity] = static_cast<const std::uint8_t*>(from)[i];
+        store(port_->head, port_->head + bytes);
+        return true;
+    }
+
+private:
+    static std::uint64_t load(const std::uint64_t& v) noexcept { return __atomic_load_n(&v, __ATOMIC_ACQUIRE); }
+    static void store(std::uint64_t& v, std::uint64_t x) noexcept { __atomic_store_n(&v, x, __ATOMIC_RELEASE); }
+    hal_port* port_;
+};
+
+template <class T>
+concept PinType = std::same_as<T, bool> || std::same_as<T, double> || std::same_as<T, std::int32_t> || std::same_as<T, std::uint32_t> ||
+                  std::same_as<T, std::int64_t> || std::same_as<T, std::uint64_t> || std::same_as<T, Port>;
+
+/// What may follow a pin's documentation.
+template <PinType T>
+struct PinOptions {
+    T initial{};                        ///< value before anything is linked or set
+    const char* unit = "";              ///< "mm", "rad/s", "V" …
+    std::optional<T> safe = {};         ///< outputs: written on stop, unload, a stopping fault, end of process
+    bool finite = false;                ///< float outputs: NaN or infinity here is a fault
+};
+
+/// What may follow a function's documentation.
+struct FunctionOptions {
+    bool shared = false;  ///< one function per component that runs all instances (`encoder.update-counters`)
+};
+
+/// What may follow an argument's documentation.
+struct ArgumentOptions {
+    bool per_instance = false;  ///< a comma list with an element per instance (`step_type=0,2`)
+    std::int64_t min = INT64_MIN, max = INT64_MAX;
+};
+
+namespace detail {
+inline thread_local const hal_host* creating = nullptr;  // set while a constructor of this plugin runs
+
+template <class T>
+constexpr hal_type type_of() {
+    if constexpr (std::same_as<T, bool>) return HAL_TYPE_BIT;
+    else if constexpr (std::same_as<T, double>) return HAL_TYPE_FLOAT;
+    else if constexpr (std::same_as<T, std::int32_t>) return HAL_TYPE_S32;
+    else if constexpr (std::same_as<T, std::uint32_t>) return HAL_TYPE_U32;
+    else if constexpr (std::same_as<T, std::int64_t>) return HAL_TYPE_S64;
+    else if constexpr (std::same_as<T, std::uint64_t>) return HAL_TYPE_U64;
+    else return HAL_TYPE_PORT;
+}
+
+template <class T>
+hal_value to_value(T v) {
+    hal_value value{};
+    value.raw = 0;
+    if constexpr (std::same_as<T, Port>) value.port = nullptr;
+    else std::memcpy(&value, &v, sizeof v);
+    return value;
+}
+
+// A slot is written by one thread only, so these are plain moves; `Io` pins of several threads may share a
+// cell, so those go through the atomic builtins (the same instruction on every machine we run on).
+template <class T, bool Shared>
+T load(const hal_value* slot) noexcept {
+    if constexpr (std::same_as<T, Port>) return Port{slot->port};
+    else if constexpr (Shared) {
+        T v;
+        __atomic_load(reinterpret_cast<const T*>(slot), &v, __ATOMIC_RELAXED);
+        return v;
+    } else return *reinterpret_cast<const T*>(slot);
+}
+template <class T, bool Shared>
+void store(hal_value* slot, T v) noexcept {
+    if constexpr (Shared) __atomic_store(reinterpret_cast<T*>(slot), &v, __ATOMIC_RELAXED);
+    else *reinterpret_cast<T*>(slot) = v;
+}
+
+[[noreturn]] inline void refused() { throw std::runtime_error(""); }  // the host has recorded the reason already
+
+template <class T>
+void declare(hal_pin& pin, hal_dir dir, const char* name, const char* doc, const PinOptions<T>& options, const void* function) {
+    hal_pin_decl decl{};
+    decl.size = sizeof decl;
+    decl.type = type_of<T>();
+    decl.dir = dir;
+    decl.flags = (options.finite ? unsigned{HAL_PIN_FINITE} : 0u) | (options.safe ? unsigned{HAL_PIN_SAFE} : 0u);
+    decl.name = name;
+    decl.doc = doc;
+    decl.unit = options.unit;
+    decl.initial = to_value<T>(options.initial);
+    if (options.safe) decl.safe = to_value<T>(*options.safe);
+    decl.function = function;
+    pin.own = decl.initial;
+    pin.slot = &pin.own;
+    if (!creating->pin(creating, &decl, &pin)) refused();
+}
+}  // namespace detail
+
+/// Base of every component: empty, so that instances stay small. Derived classes write `using Component::Component;`.
+class Component {
+public:
+    explicit Component(const hal_host* host) { detail::creating = host; }
+    Component(const Component&) = delete;
+    Component& operator=(const Component&) = delete;
+};
+
+/// A function that can be added to a thread with `addf`. `step` must be a noexcept member taking a hal::Cycle.
+class Function {
+public:
+    template <std::derived_from<Component> C, class B>
+        requires std::derived_from<C, B>
+    Function(C& component, const char* name, void (B::*step)(Cycle) noexcept, const char* doc, FunctionOptions options = {}) {
+        declare(static_cast<B*>(&component), name, entry(step), doc, options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u);
+    }
+    Function(const Function&) = delete;
+    Function& operator=(const Function&) = delete;
+
+protected:
+    Function() = default;
+
+    // Itanium C++ ABI 2.3: a pointer to a non-virtual member function starts with the function's address, and the
+    // member takes `this` and the one-pointer Cycle in the registers of a hal_step's two arguments. Calling it
+    // directly saves a thunk per function and cycle.
+    template <class B>
+    static hal_step entry(void (B::*step)(Cycle) noexcept) {
+        static_assert(sizeof step == 2 * sizeof(void*));
+        std::uintptr_t words[2];
+        std::memcpy(words, &step, sizeof step);
+#if defined(__aarch64__)
+        const bool plain = words[1] == 0;
+#else
+        const bool plain = (words[0] & 1) == 0 && words[1] == 0;
+#endif
+        if (!plain) throw std::logic_error("a component's function must not be virtual");
+        return reinterpret_cast<hal_step>(words[0]);
+    }
+    void declare(void* self, const char* name, hal_step step, const char* doc, unsigned flags) {
+        const hal_function_decl decl{sizeof decl, flags, name, doc, step, self, this};
+        if (!detail::creating->function(detail::creating, &decl)) detail::refused();
+    }
+};
+
+/// What the host calls to make hardware outputs safe: on stop, unload, a stopping fault, the end of the process and in
+/// a crash handler. Must be async-signal-safe: it may write to devices and must not allocate, lock or log.
+class Emergency : Function {
+public:
+    template <std::derived_from<Component> C>
+    Emergency(C& component, void (C::*step)(Cycle) noexcept, const char* doc) {
+        declare(&component, "", entry(step), doc, HAL_FUNCTION_EMERGENCY);
+    }
+};
+
+/// An integer load argument: `loadrt logic inputs=6`.
+class Argument {
+public:
+    Argument(Component&, const char* name, std::int64_t fallback, const char* doc, ArgumentOptions options = {}) {
+        const std::string text = ask(name, std::to_string(fallback).c_str(), doc, options);
+        char* end = nullptr;
+        errno = 0;
+        value_ = std::strtoll(text.c_str(), &end, 0);
+        if (text.empty() || *end != '\0' || errno != 0) throw std::invalid_argument(std::string(name) + "=" + text + " is not a whole number");
+        if (value_ < options.min || value_ > options.max)
+            throw std::invalid_argument(std::string(name) + "=" + text + " is outside " + std::to_string(options.min) + " to " + std::to_string(options.max));
+    }
+    operator std::int64_t() const noexcept { return value_; }
+
+    static std::string ask(const char* name, const char* fallback, const char* doc, const ArgumentOptions& options) {
+        const hal_argument_decl decl{sizeof decl, options.per_instance ? unsigned{HAL_ARGUMENT_PER_INSTANCE} : 0u, name, doc, fallback};
+        const char* text = detail::creating->argument(detail::creating, &decl);
+        return text ? text : fallback;
+    }
+
+private:
+    std::int64_t value_;
+};
+
+/// A text load argument: `loadrt sampler cfg=ffb`. Valid as long as the component.
+class TextArgument {
+public:
+    TextArgument(Component&, const char* name, const char* fallback, const char* doc, ArgumentOptions options = {})
+        : text_(Argument::ask(name, fallback, doc, options)) {}
+    const std::string& get() const noexcept { return text_; }
+
+private:
+    std::string text_;
+};
+
+/// A floating-point load argument: `loadrt furuta arm_length=0.2`.
+class RealArgument {
+public:
+    RealArgument(Component&, const char* name, double fallback, const char* doc, ArgumentOptions options = {}) {
+        const std::string text = Argument::ask(name, std::to_string(fallback).c_str(), doc, options);
+        char* end = nullptr;
+        value_ = std::strtod(text.c_str(), &end);
+        if (text.empty() || *end != '\0' || !std::isfinite(value_)) throw std::invalid_argument(std::string(name) + "=" + text + " is not a number");
+    }
+    operator double() const noexcept { return value_; }
+
+private:
+    double value_;
+};
+
+namespace detail {
+template <PinType T, hal_dir Dir>
+class Pin {
+public:
+    Pin(Component&, const char* name, const char* doc, PinOptions<T> options = {}) { declare<T>(pin_, Dir, name, doc, options, nullptr); }
+    Pin(Component&, const Function& function, const char* name, const char* doc, PinOptions<T> options = {}) {
+        declare<T>(pin_, Dir, name, doc, options, &function);
+    }
+    Pin(const Pin&) = delete;
+
+    static constexpr bool shared = Dir == HAL_DIR_IO;
+    T get() const noexcept { return detail::load<T, shared>(pin_.slot); }
+    operator T() const noexcept { return get(); }
+    /// True while a signal is connected. [realtime]
+    bool linked() const noexcept { return pin_.slot != &pin_.own; }
+
+protected:
+    void put(T value) noexcept { detail::store<T, shared>(pin_.slot, value); }
+
+private:
+    hal_pin pin_;
+};
+}  // namespace detail
+
+/// An input: reads the signal it is linked to, or its own value (`setp`). Assigning to it does not compile.
+template <PinType T>
+class In : public detail::Pin<T, HAL_DIR_IN> {
+public:
+    using detail::Pin<T, HAL_DIR_IN>::Pin;
+    In& operator=(const In&) = delete;
+};
+
+/// A parameter: read by the component, set by `setp`, never linked.
+template <PinType T>
+class Param : public detail::Pin<T, HAL_DIR_PARAM> {
+public:
+    using detail::Pin<T, HAL_DIR_PARAM>::Pin;
+    Param& operator=(const Param&) = delete;
+};
+
+/// An output. Reading it gives what was last written.
+template <PinType T>
+class Out : public detail::Pin<T, HAL_DIR_OUT> {
+public:
+    using detail::Pin<T, HAL_DIR_OUT>::Pin;
+    Out& operator=(T value) noexcept { return this->put(value), *this; }
+    Out& operator=(const Out& other) noexcept { return this->put(other.get()), *this; }
+};
+
+/// Read and written by the component and by others (`index-enable`).
+template <PinType T>
+class Io : public detail::Pin<T, HAL_DIR_IO> {
+public:
+    using detail::Pin<T, HAL_DIR_IO>::Pin;
+    Io& operator=(T value) noexcept { return this->put(value), *this; }
+    Io& operator=(const Io& other) noexcept { return this->put(other.get()), *this; }
+};
+
+/// A row of pins. In `name` and `doc` a block of `#` stands for the index, padded with zeros to the block's width.
+template <class P, class T>
+class Pins {
+public:
+    Pins(Component& component, const char* name, std::int64_t count, const char* doc, PinOptions<T> options = {}) { make(component, nullptr, name, count, doc, options, 0); }
+    Pins(Component& component, const Function& function, const char* name, std::int64_t count, const char* doc, PinOptions<T> options = {}) {
+        make(component, &function, name, count, doc, options, 0);
+    }
+    /// The same, counting from `first` (LinuxCNC numbers some rows from 1).
+    Pins(Component& component, const char* name, std::int64_t count, std::int64_t first, const char* doc, PinOptions<T> options = {}) { make(component, nullptr, name, count, doc, options, first); }
+    std::size_t size() const noexcept { return size_; }
+    P& operator[](std::size_t i) noexcept { return pins_[i]; }
+    const P& operator[](std::size_t i) const noexcept { return pins_[i]; }
+    P* begin() noexcept { return pins_; }
+    P* end() noexcept { return pins_ + size_; }
+    const P* begin() const noexcept { return pins_; }
+    const P* end() const noexcept { return pins_ + size_; }
+
+    /// `pattern` with its block of `#` replaced by `index`. [setup]
+    static std::string numbered(const char* pattern, std::int64_t index) {
+        std::string name = pattern;
+        const auto at = name.find('#');
+        if (at == std::string::npos) return name;
+        const auto width = std::min(name.find_first_not_of('#', at), name.size()) - at;
+        std::string digits = std::to_string(index);
+        if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
+        return name.replace(at, width, digits);
+    }
+
+private:
+    void make(Component& component, const Function* function, const char* name, std::int64_t count, const char* doc, const PinOptions<T>& options, std::int64_t first) {
+        if (count < 0) throw std::invalid_argument(std::string("a negative number of pins ") + name);
+        size_ = static_cast<std::size_t>(count);
+        pins_ = static_cast<P*>(detail::creating->allocate(detail::creating, size_ * sizeof(P), alignof(P)));
+        if (size_ != 0 && pins_ == nullptr) throw std::bad_alloc();
+        for (std::size_t i = 0; i < size_; ++i) {
+            const std::string pin = numbered(name, first + static_cast<std::int64_t>(i)), text = numbered(doc, first + static_cast<std::int64_t>(i));
+            if (function) new (pins_ + i) P(component, *function, pin.c_str(), text.c_str(), options);
+            else new (pins_ + i) P(component, pin.c_str(), text.c_str(), options);
+        }
+    }
+    P* pins_ = nullptr;
+    std::size_t size_ = 0;
+};
+template <PinType T> using Ins = Pins<In<T>, T>;
+template <PinType T> using Outs = Pins<Out<T>, T>;
+template <PinType T> using Ios = Pins<Io<T>, T>;
+template <PinType T> using Params = Pins<Param<T>, T>;
+
+/// What a component says of itself as a whole: `static constexpr hal::Traits traits{.singleton = true};`
+struct Traits {
+    bool singleton = false;           ///< one instance, named like the component without a number
+    std::uint32_t default_count = 1;  ///< instances of a bare `loadrt`
+};
+
+namespace detail {
+template <class C>
+constexpr Traits traits_of() {
+    if constexpr (requires { C::traits; }) return C::traits;
+    else return {};
+}
+
+template <class Action>
+bool guarded(const hal_host* host, Action action) noexcept {
+    try {
+        action();
+        return true;
+    } catch (const std::exception& e) {
+        if (*e.what() != '\0') host->fail(host, e.what());
+    } catch (...) {
+        host->fail(host, "an exception that is not a std::exception");
+    }
+    return false;
+}
+
+template <std::derived_from<Component> C>
+constexpr hal_component component(const char* name, const char* summary, const char* doc = "") {
+    constexpr Traits traits = traits_of<C>();
+    return {
+        sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name, summary, doc,
+        traits.singleton ? unsigned{HAL_COMPONENT_SINGLETON} : 0u, traits.default_count, sizeof(C), alignof(C),
+        [](const hal_host* host, void* memory) { return guarded(host, [&] { new (memory) C(host); }); },
+        [](void* self, const hal_host* host) {
+            return guarded(host, [&] {
+                detail::creating = host;
+                if constexpr (requires(C& c) { c.start(*host); }) static_cast<C*>(self)->start(*host);
+                else if constexpr (requires(C& c) { c.start(); }) static_cast<C*>(self)->start();
+            });
+        },
+        [](void* self) {
+            if constexpr (requires(C& c) { c.stop(); }) {
+                static_assert(noexcept(std::declval<C&>().stop()), "stop() must be noexcept");
+                static_cast<C*>(self)->stop();
+            }
+        },
+        [](void* self) { static_cast<C*>(self)->~C(); },
+    };
+}
+}  // namespace detail
+
+/// Asks the host for an extension of the interface, or gives nullptr. In constructor and start() only. [setup]
+template <class Extension>
+const Extension* extension(const char* id) {
+    return static_cast<const Extension*>(detail::creating->extension(detail::creating, id));
+}
+
+}  // namespace hal
+
+/// HAL_COMPONENT(Type, "name", "one line of summary") or with a fourth argument: the manual's text, in Markdown.
+#define HAL_COMPONENT(Type, ...) extern "C" HAL_EXPORT constexpr hal_component hal_plugin = ::hal::detail::component<Type>(__VA_ARGS__);

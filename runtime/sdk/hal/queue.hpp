@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// How a cycle and an ordinary thread meet: a bounded queue and a latest-value mailbox. One writer thread, one reader
+// thread each; neither ever waits. The memory is taken in the constructor.
+#pragma once
+
+#include <atomic>
+#include <bit>
+#include <cstddef>
+#include <memory>
+#include <type_traits>
+
+namespace hal {
+
+/// A first-in first-out queue. `T` must be trivially copyable.
+///
+/// `head_` counts what was put in, `tail_` what was taken out, both for ever; index = count & mask.
+///   1. writer stores the item at head      2. writer publishes head + 1 (release)
+///   3. reader sees head (acquire), copies   4. reader publishes tail + 1 (release)
+/// The writer reuses a place only after 4, the reader reads it only after 2.
+template <class T>
+class Queue {
+    static_assert(std::is_trivially_copyable_v<T>);
+
+public:
+    /// Room for at least `capacity` items. [setup]
+    explicit Queue(std::size_t capacity) : mask_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity) - 1), items_(std::make_unique<T[]>(mask_ + 1)) {}
+
+    /// False, and nothing done, when full. [realtime] writer
+    bool push(const T& item) noexcept {
+        const auto head = head_.load(std::memory_order_relaxed);
+        if (head - tail_.load(std::memory_order_acquire) > mask_) return false;
+        items_[head & mask_] = item;
+        head_.store(head + 1, std::memory_order_release);
+        return true;
+    }
+    /// False when empty. [realtime] reader
+    bool pop(T& item) noexcept {
+        const auto tail = tail_.load(std::memory_order_relaxed);
+        if (tail == head_.load(std::memory_order_acquire)) return false;
+        item = items_[tail & mask_];
+        tail_.store(tail + 1, std::memory_order_release);
+        return true;
+    }
+    /// Items waiting, as either side sees it. [any]
+    std::size_t size() const noexcept { return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_acquire); }
+    std::size_t capacity() const noexcept { return mask_ + 1; }
+
+private:
+    const std::size_t mask_;
+    std::unique_ptr<T[]> items_;
+    alignas(64) std::atomic<std::size_t> head_{0};  // written by the writer
+    alignas(64) std::atomic<std::size_t> tail_{0};  // written by the reader
+};
+
+/// The newest value only: a triple buffer. Not for events: what is overwritten before it is read is gone.
+///   1. writer fills `back`   2. swaps back <-> middle, marking it fresh   3. reader swaps front <-> middle if fresh
+/// At every moment the three indices are different, so writer and reader never touch the same buffer.
+template <class T>
+class Mailbox {
+public:
+    explicit Mailbox(const T& initial = T{}) : buffers_{initial, initial, initial} {}
+
+    /// [realtime] writer
+    void put(const T& value) noexcept(std::is_nothrow_copy_assignable_v<T>) {
+        buffers_[back_] = value;
+        back_ = middle_.exchange(back_ | fresh, std::memory_order_acq_rel) & index;
+    }
+    /// The newest value; `true` in `changed` when it is newer than the last one got. [realtime] reader
+    const T& get(bool* changed = nullptr) noexcept {
+        const bool newer = middle_.load(std::memory_order_acquire) & fresh;
+        if (newer) front_ = middle_.exchange(front_, std::memory_order_acq_rel) & index;
+        if (changed) *changed = newer;
+        return buffers_[front_];
+    }
+
+private:
+    static constexpr unsigned fresh = 4, index = 3;
+    T buffers_[3];
+    unsigned back_ = 0;   // writer only
+    unsigned front_ = 1;  // reader only
+    std::atomic<unsigned> middle_{2};
+};
+
+}  // namespace hal

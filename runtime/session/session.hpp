@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+// One running machine: the model, the plugins, the threads, and edits as transactions. DESIGN section 4.
+// Only the shell, the tools and tests use it. Every member is [setup] and may be called from any one thread at a time
+// (callers hold Session::mutex).
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/diagnostic.hpp"
+#include "model/model.hpp"
+#include "netlist/netlist.hpp"
+
+namespace hal {
+
+class Executor;
+
+struct SessionOptions {
+    std::string name = "default";    ///< of the instance; its control socket carries it
+    bool virtual_clock = false;      ///< `hal sim`: threads run only in advance()
+    bool check_only = false;         ///< `hal check`: construct, but start nothing
+    bool unlimited = false;          ///< reserved for tests: no waiting for cycles
+    std::vector<std::string> plugin_path;  ///< searched first
+};
+
+/// One value read from the running machine.
+struct Reading {
+    hal_type type = HAL_TYPE_BIT;
+    hal_value value{};
+};
+
+/// What a thread has done so far, for `show thread`, the report at the end and the protocol.
+struct ThreadReport {
+    std::string name;
+    std::int64_t period_ns = 0;
+    std::uint64_t cycles = 0, missed = 0, overruns = 0;
+    double wakeup_p50_ns = 0, wakeup_p99_ns = 0, wakeup_max_ns = 0;  ///< lateness of the wake-up
+    double busy_p50_ns = 0, busy_p99_ns = 0, busy_max_ns = 0;        ///< execution time of the whole cycle
+    std::string policy;              ///< "SCHED_FIFO 98", "SCHED_OTHER (no privilege)", "virtual clock"
+    int cpu = -1;
+    std::uint64_t page_faults = 0;   ///< minor and major, in cycles after the first 100
+    bool faulted = false;            ///< stopped by a fault
+};
+
+/// One recorded fault, worded.
+struct FaultRecord {
+    std::uint64_t number = 0;
+    std::int64_t age_ns = 0;
+    std::uint64_t cycle = 0;
+    std::string thread, code, sentence;  ///< sentence: DESIGN section 7's run-time form
+};
+
+enum class Lock : unsigned { none = 0, load = 1, config = 2, params = 4, run = 8, tune = 3, all = 255 };
+
+class Session {
+public:
+    explicit Session(SessionOptions options = {});
+    ~Session();                      ///< stops threads, writes safe values, stops and destroys all instances
+    Session(const Session&) = delete;
+
+    std::mutex mutex;                ///< one edit or query at a time
+    Sources sources;
+    Ini ini;                         ///< what [SECTION]KEY is looked up in
+    const SessionOptions& options() const;
+    const Model& model() const;
+
+    // --- edits: one transaction at a time ---------------------------------------------------------------------
+    /// True for the commands apply() takes: loadrt unloadrt unload(of plugins) newthread delthread addf delf initf net
+    /// newsig delsig linkps linksp linkpp unlinkp setp sets alias unalias, and `NAME = VALUE`.
+    static bool edits(const Command& command);
+    /// Opens a transaction (if none is open) and elaborates one command into it. Problems go to `diagnostics`.
+    void apply(const Command& command, Diagnostics& diagnostics);
+    bool in_transaction() const;
+    /// Checks, starts new instances, compiles, swaps; or undoes everything. Returns true when it took effect.
+    /// With any error already in `diagnostics` it undoes. `quiet_notes` drops notes (stale reads) from the result.
+    bool commit(Diagnostics& diagnostics);
+    void abort();
+
+    // --- the machine --------------------------------------------------------------------------------------------
+    void start_threads();            ///< `start`
+    void stop_threads();             ///< `stop`: gates the functions, writes safe values
+    bool running() const;
+    /// Virtual clock: runs threads for so long. Real clock: waits until the fastest thread has done it (or `give_up`).
+    void advance_ns(std::int64_t ns);
+    void advance_cycles(std::uint64_t cycles);   ///< of the fastest thread
+    std::int64_t now_ns() const;     ///< the runtime's clock
+    /// Makes all outputs safe, for the end of the process. Idempotent.
+    void shut_down();
+
+    // --- values -----------------------------------------------------------------------------------------------------
+    /// Values of pins or signals by name; all that belong to one thread come from one finished cycle. An unknown name
+    /// gives nothing at its place.
+    std::vector<std::optional<Reading>> read(const std::vector<std::string>& names);
+    /// The same for objects of the model, without look-up.
+    std::vector<hal_value> read_pins(const std::vector<const Pin*>& pins);
+    std::vector<hal_value> read_signals(const std::vector<const Signal*>& signals);
+
+    // --- reports ----------------------------------------------------------------------------------------------------
+    std::vector<ThreadReport> thread_reports() const;
+    ThreadReport thread_report(const Thread& thread) const;
+    std::vector<FaultRecord> faults() const;
+    std::uint64_t fault_count() const;
+    void clear_faults();
+    /// What of real time is missing here and how to grant it; empty when nothing is. Said once by `hal run`.
+    std::vector<std::string> missing_privileges() const;
+    /// One line per signal: writer -> reader, cycles of delay and why (`show latency`).
+    std::vector<std::string> latency_lines() const;
+
+    // --- locks, streams, processes ----------------------------------------------------------------------------------
+    unsigned lock = 0;               ///< bits of Lock
+    hal_stream* find_stream(std::string_view name) const;
+    std::vector<std::string> stream_names() const;
+    /// Registers a process started by loadusr as a component, so that unloadusr and show find it.
+    void add_process(const std::string& name, std::int64_t pid, const Command& command);
+    void remove_process(std::string_view name);
+    /// The built-in pages for `hal doc`: constructs the component without starting it.
+    /// All plugin names that can be loaded, from the search path.
+    std::vector<std::string> available_components() const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace hal
