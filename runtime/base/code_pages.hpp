@@ -11,9 +11,129 @@ struct CodePage {
 };
 
 inline constexpr CodePage code_pages[] = {
+    {"alias-taken",
+     "A pin has at most one alias, and this one has an alias already.\n\n"
+     "Take the old one off with `unalias pin ALIAS`, then give the new one."},
+    {"bad-argument",
+     "A load argument has a value its component does not accept: not a number where one is needed, out of its limits, or a "
+     "list that does not fit the number of instances.\n\n"
+     "`hal doc COMPONENT` lists a component's arguments with their defaults and limits."},
+    {"bad-period",
+     "The period of a thread is a whole number of nanoseconds, at least 1000 (1 us): 1000000 is a millisecond.\n\n"
+     "Example: `newthread servo-thread 1000000`, or `loadrt threads name1=base period1=50000 name2=servo period2=1000000`."},
+    {"bad-plugin",
+     "The file was found but is not a usable component: it is not a shared library for this machine, it exports no symbol "
+     "`hal_plugin`, it was built for another major version of the interface, or its description is incomplete.\n\n"
+     "Rebuild it against the installed `hal/component.hpp`. `nm -D FILE` must show `hal_plugin`."},
+    {"bad-position",
+     "The third argument of addf is a place in the thread: 1 is the first, 2 the second, -1 the last, -2 the one before it. "
+     "0 means nothing, and a place must exist.\n\n"
+     "Without it the function is appended."},
+    {"bad-value",
+     "The text is not a value of the pin's or signal's type, or is outside its range. Nothing is rounded or wrapped "
+     "silently.\n\n"
+     "bit: TRUE FALSE 1 0 yes no on off. s32 u32 s64 u64: decimal, 0x hexadecimal, leading 0 octal. float: 1.5, -2e-3."},
+    {"construct-failed",
+     "The component refused to be made: its constructor gave the reason that is printed. Nothing of it is left behind.\n\n"
+     "`hal doc COMPONENT` shows its arguments."},
+    {"cross-thread-io",
+     "I/O pins of this signal stand in several threads: they share one cell, as in LinuxCNC, and its value may change in the "
+     "middle of a cycle. All other signals that cross threads are whole finished cycles."},
+    {"cyclic-order",
+     "`addf --auto` found a loop in the dataflow and had to cut it: the named signal is read one cycle late. Put the "
+     "functions in the order you want to cut it elsewhere."},
+    {"function-in-thread",
+     "A function runs in one thread, at one place. It was added a second time.\n\n"
+     "Move it with `delf FUNCTION THREAD` followed by addf."},
+    {"init-done",
+     "initf functions run once, in a cycle of their own before the first cyclic pass of their thread. This thread has made "
+     "that pass, so the function would never run."},
+    {"linked-set",
+     "A linked pin takes its value from its signal; setp would be overwritten at once, so it is refused.\n\n"
+     "Set the signal with sets (when nothing writes it), or unlink the pin with unlinkp first."},
+    {"missing-argument",
+     "A component cannot be loaded without this argument."},
+    {"name-taken",
+     "Pins, aliases, signals, functions, instances and threads have names of their own kind that stand for one thing; pins "
+     "and signals share one set of names. The name is in use.\n\n"
+     "Give instances names with `names=`, or choose another signal name."},
+    {"names-and-count",
+     "`names=` and `count=` (or `num_chan=`) both say how many instances there are; only one of them may be given."},
+    {"no-alias",
+     "unalias takes the alias of a pin; the named pin has none. `show alias` lists all aliases."},
+    {"no-such-component",
+     "No plugin of this name was found on the search path: HALCYON_PLUGIN_PATH, the user's plugin folder, the build tree, "
+     "the installation.\n\n"
+     "`hal doc` lists every component that can be loaded."},
+    {"no-such-function",
+     "There is no function of this name. Functions come with instances: `show funct` lists them, `hal doc COMPONENT` says "
+     "what each does."},
+    {"no-such-pin",
+     "There is no pin or parameter of this name. Pins come with instances: `show pin INSTANCE` lists them, `hal doc "
+     "COMPONENT` says what each does."},
+    {"no-such-signal",
+     "There is no signal of this name. Signals are made by net or newsig: `show sig` lists them."},
+    {"no-such-thread",
+     "There is no thread of this name. Threads are made by `newthread NAME PERIOD_NS` or `loadrt threads name1=… period1=…`; "
+     "`show thread` lists them."},
+    {"no-such-type",
+     "The type names are bit, float, s32, u32, s64, u64, port, and in the second dialect bool, real, si32, ui32, sint, uint."},
+    {"not-in-thread",
+     "delf takes a function out of the thread it is in. This one is not in the named thread."},
+    {"output-set",
+     "Only the component writes an output; setp on it would be overwritten in the next cycle.\n\n"
+     "To force a value downstream, unlink the output and set the signal: `unlinkp OUT`, `sets SIGNAL VALUE`."},
+    {"parameter-link",
+     "Parameters are set, not linked. In LinuxCNC's terms: setp works on it, net does not."},
+    {"period-multiple",
+     "All periods are multiples of the fastest thread's, so that the threads keep a fixed phase. Choose one that is, as the "
+     "help line says."},
+    {"pin-linked",
+     "A pin is in at most one signal. Unlink it first with unlinkp, or link the other pins to the signal it is in."},
+    {"port-sized",
+     "The buffer of a port signal is allocated once, by the first sets; its size does not change afterwards."},
+    {"signal-named-like-pin",
+     "net takes the signal's name first, then pins. The first name is a pin's, so the signal's name was probably forgotten.\n\n"
+     "`net SIGNAL pin pin …`"},
+    {"silent-thread",
+     "A thread did not take part in the edit within its time-out: one of its functions hangs, or the machine gives it no "
+     "time. The edit was withdrawn; nothing changed.\n\n"
+     "`show thread` and `show fault` say more; a thread that hangs ends only with the process."},
+    {"spread-pins",
+     "The functions of one instance run in different threads, and some of its pins belong to all its functions: they would "
+     "be read and written by two threads at once.\n\n"
+     "Put the functions into one thread. (Components made for several threads name the function that uses each pin.)"},
+    {"stale-read",
+     "The reader's function runs before the writer's in the same thread, so it sees the value of the cycle before: one cycle "
+     "old. Often that is wanted (a feedback loop has to be cut somewhere); if not, change the order with addf positions or "
+     "let `addf --auto` choose it."},
+    {"start-failed",
+     "The component could not acquire what it needs (a device, a socket, a file) and gave the reason that is printed. The "
+     "whole edit was undone."},
+    {"thread-refused",
+     "The operating system gave no thread, mostly because a limit on processes or memory is reached: see `ulimit -a`."},
+    {"two-readers",
+     "A port is a byte stream: what one reader takes is gone for the other. It has one writer and one reader."},
     {"two-writers",
      "A signal has one writer: one OUT pin, or any number of I/O pins, never both. A second output on the same signal "
      "would make its value depend on the order of functions.\n\nJoin two sources with sum2, or2 or mux2, or unlink the first one with unlinkp."},
+    {"type-mismatch",
+     "All pins of a signal have one type; nothing is converted silently. Insert a conv_ component between them, as the help "
+     "line says."},
+    {"unknown-argument",
+     "The component has no load argument of this name, and ignoring it could hide a mistake.\n\n"
+     "`hal doc COMPONENT` lists its arguments. All components take count=, names= and personality=."},
+    {"unthreaded-function",
+     "The instance is linked but none of its functions is in a thread, so its outputs never change. Add it with addf, or "
+     "unload the instance."},
+    {"writer-set",
+     "A signal with a writer gets its value from there in every cycle; sets would be overwritten at once, so it is refused.\n\n"
+     "Unlink the writer first, as the help line says."},
+    {"wrong-arguments",
+     "The command was given too few or too many words, or a word it does not know. `help COMMAND` shows how it is used."},
+    {"wrong-arrow",
+     "The arrow points against the pin's direction: `=>` stands before pins that read the signal, `<=` before the pin that "
+     "writes it. LinuxCNC ignores arrows, so this is only a warning; but one of the two, arrow or pin, is probably a slip."},
 };
 
 }  // namespace hal

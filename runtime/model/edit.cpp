@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: MIT
+// Components, instances, functions and threads.
+#include "model/edit.hpp"
+
+#include <algorithm>
+
+namespace hal {
+namespace {
+
+std::string quoted(std::string_view name) { return "'" + std::string(name) + "'"; }
+
+template <class T>
+auto owner(std::vector<std::unique_ptr<T>>& all, const T* one) {
+    return std::find_if(all.begin(), all.end(), [&](const auto& candidate) { return candidate.get() == one; });
+}
+
+std::unique_ptr<Pin> own_pin(Model& model, std::string name, hal_type type, hal_dir dir, hal_pin& memory, const char* doc, const char* unit) {
+    auto pin = std::make_unique<Pin>();
+    pin->name = std::move(name);
+    pin->type = type;
+    pin->dir = dir;
+    pin->doc = doc;
+    pin->unit = unit;
+    pin->memory = &memory;
+    pin->id = model.next_id++;
+    memory.slot = &memory.own;
+    return pin;
+}
+
+}  // namespace
+
+void Edit::undo() {
+    while (!undo_.empty()) {
+        undo_.back()();
+        undo_.pop_back();
+    }
+    pin_values.clear();
+    signal_values.clear();
+    inherited.clear();
+    added_instances_.clear();
+    structural_ = false;
+}
+
+bool Edit::name_free(std::string_view name, Span at, const char* what) {
+    if (model_.find_pin(name)) return fail("name-taken", at, "there is a pin " + quoted(name) + " already", what, "give the new instances other names: names=…");
+    if (model_.find_signal(name))
+        return fail("name-taken", at, "there is a signal " + quoted(name) + " already", what, "signals and pins share their names; rename the signal or the instance");
+    return true;
+}
+
+Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
+    if (const Thread* const there = model_.find_thread(name.text)) {
+        Diagnostic d{Severity::error, "name-taken", "there is a thread " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
+        if (there->made.known()) d.labels.push_back({there->made, "made here"});
+        diagnostics->add(std::move(d));
+        return nullptr;
+    }
+    for (const char* pin : {".time", ".tmax", ".tmax-increased", ".threadbeat", ".missed", ".wakeup"})
+        if (!name_free(std::string(name.text) + pin, name.span, "this thread's pin")) return nullptr;
+    auto owned = std::make_unique<Thread>();
+    Thread* const made = owned.get();
+    made->name = name.text;
+    made->options = options;
+    made->made = name.span;
+    const auto add = [&](const char* suffix, hal_type type, hal_dir dir, hal_pin& memory, const char* doc, const char* unit) {
+        auto pin = own_pin(model_, made->name + suffix, type, dir, memory, doc, unit);
+        pin->of_thread = made;
+        model_.pin.emplace(pin->name, pin.get());
+        made->pins.push_back(std::move(pin));
+    };
+    add(".time", HAL_TYPE_S32, HAL_DIR_OUT, made->time, "execution time of the last cycle", "ns");
+    add(".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, made->tmax, "longest execution time; set it to 0 to start again", "ns");
+    add(".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, made->tmax_increased, "the last cycle was the longest so far", "");
+    add(".threadbeat", HAL_TYPE_U32, HAL_DIR_OUT, made->beat, "counts cycles", "");
+    add(".missed", HAL_TYPE_U32, HAL_DIR_OUT, made->missed, "periods that passed unserved", "");
+    add(".wakeup", HAL_TYPE_S32, HAL_DIR_OUT, made->wakeup, "how late the last cycle began", "ns");
+    const auto place = std::upper_bound(model_.threads.begin(), model_.threads.end(), options.period_ns,
+                                        [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
+    model_.threads.insert(place, std::move(owned));
+    model_.thread.emplace(made->name, made);
+    on_undo([this, made] {
+        for (const auto& pin : made->pins) model_.pin.erase(pin->name);
+        model_.thread.erase(made->name);
+        model_.threads.erase(owner(model_.threads, made));
+    });
+    structural_ = true;
+    return made;
+}
+
+bool Edit::remove_thread(Word name) {
+    Thread* const leaving = thread(name);
+    if (!leaving) return false;
+    while (!leaving->functions.empty()) take_from_thread(*leaving->functions.back());
+    while (!leaving->init.empty()) take_from_thread(*leaving->init.back());
+    for (const auto& pin : leaving->pins) {
+        unlink(*pin);
+        model_.pin.erase(pin->name);
+        if (!pin->alias.empty()) model_.pin.erase(pin->alias);
+    }
+    model_.thread.erase(leaving->name);
+    const auto at = owner(model_.threads, leaving);
+    const auto position = at - model_.threads.begin();
+    removed_.threads.push_back(std::move(*at));
+    model_.threads.erase(at);
+    on_undo([this, leaving, position] {
+        const auto back = owner(removed_.threads, leaving);
+        model_.threads.insert(model_.threads.begin() + position, std::move(*back));
+        removed_.threads.erase(back);
+        model_.thread.emplace(leaving->name, leaving);
+        for (const auto& pin : leaving->pins) {
+            model_.pin.emplace(pin->name, pin.get());
+            if (!pin->alias.empty()) model_.pin.emplace(pin->alias, pin.get());
+        }
+    });
+    structural_ = true;
+    return true;
+}
+
+bool Edit::add_function(Word function_name, Word thread_name, int position, Span position_at, bool init) {
+    Function* const target = function(function_name);
+    Thread* const to = thread(thread_name);
+    if (!target || !to) return false;
+    if (target->thread) {
+        Diagnostic d{Severity::error, "function-in-thread", "function " + quoted(target->name) + " is in thread " + quoted(target->thread->name) + " already",
+                     {{function_name.span, "second time"}}, {}};
+        if (target->added.known()) d.labels.push_back({target->added, "added here"});
+        d.help.push_back("a function runs in one thread; take it out first: delf " + target->name + " " + target->thread->name);
+        diagnostics->add(std::move(d));
+        return false;
+    }
+    if (init && to->init_done)
+        return fail("init-done", function_name.span, "thread " + quoted(to->name) + " has made its first pass; functions of initf would never run",
+                    "too late", "add it before start, or with addf");
+    auto& row = init ? to->init : to->functions;
+    const auto size = static_cast<int>(row.size());
+    if (position == 0) return fail("bad-position", position_at, "position 0 means nothing: 1 is the first place, -1 the last", "", "leave it out to append");
+    const int index = position > 0 ? position - 1 : size + 1 + position;
+    if (index < 0 || index > size)
+        return fail("bad-position", position_at, "thread " + quoted(to->name) + " has " + std::to_string(size) + (size == 1 ? " function" : " functions") + ", so there is no position " + std::to_string(position),
+                    "", "positions 1 to " + std::to_string(size + 1) + " count from the front, -1 to -" + std::to_string(size + 1) + " from the end");
+    row.insert(row.begin() + index, target);
+    const Span before = target->added;
+    target->thread = to;
+    target->init = init;
+    target->added = function_name.span;
+    on_undo([target, to, init, before] {
+        auto& functions = init ? to->init : to->functions;
+        functions.erase(std::find(functions.begin(), functions.end(), target));
+        target->thread = nullptr;
+        target->added = before;
+    });
+    structural_ = true;
+    return true;
+}
+
+bool Edit::remove_function(Word function_name, Word thread_name) {
+    Function* const target = function(function_name);
+    Thread* const from = thread(thread_name);
+    if (!target || !from) return false;
+    if (target->thread != from)
+        return fail("not-in-thread", function_name.span, "function " + quoted(target->name) + " is not in thread " + quoted(from->name), "",
+                    target->thread ? "it is in thread " + target->thread->name : "it is in no thread");
+    take_from_thread(*target);
+    return true;
+}
+
+void Edit::take_from_thread(Function& function) {
+    Thread* const from = function.thread;
+    if (!from) return;
+    const bool init = function.init;
+    auto& row = init ? from->init : from->functions;
+    const auto at = std::find(row.begin(), row.end(), &function);
+    const auto position = at - row.begin();
+    row.erase(at);
+    function.thread = nullptr;
+    on_undo([&function, from, init, position] {
+        auto& functions = init ? from->init : from->functions;
+        functions.insert(functions.begin() + position, &function);
+        function.thread = from;
+        function.init = init;
+    });
+    structural_ = true;
+}
+
+Component& Edit::add_component(std::string name, Span at) {
+    auto owned = std::make_unique<Component>();
+    Component* const made = owned.get();
+    made->name = std::move(name);
+    made->loaded = at;
+    made->id = model_.next_id++;
+    model_.components.push_back(std::move(owned));
+    model_.component.emplace(made->name, made);
+    on_undo([this, made] {
+        model_.component.erase(made->name);
+        model_.components.erase(owner(model_.components, made));
+    });
+    return *made;
+}
+
+void Edit::add_time_pins(Function& function) {
+    plan::FunctionTimes& times = *function.times;
+    function.pins.push_back(own_pin(model_, function.name + ".time", HAL_TYPE_S32, HAL_DIR_OUT, times.time, "duration of the last sampled call", "ns"));
+    function.pins.push_back(own_pin(model_, function.name + ".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, times.tmax, "longest sampled call; set it to 0 to start again", "ns"));
+    function.pins.push_back(own_pin(model_, function.name + ".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, times.tmax_increased, "the last sample was the longest so far", ""));
+    for (const auto& pin : function.pins) pin->function = &function;
+}
+
+bool Edit::add_instance(Component& component, std::unique_ptr<Instance> owned, std::vector<std::unique_ptr<Function>> functions) {
+    Instance* const made = owned.get();
+    if (const Instance* const there = model_.find_instance(made->name)) {
+        Diagnostic d{Severity::error, "name-taken", "there is an instance " + quoted(made->name) + " already (" + there->component->name + ")", {{made->loaded, "second time"}}, {}};
+        if (there->loaded.known()) d.labels.push_back({there->loaded, "loaded here"});
+        d.help.push_back("give the new one another name: names=…");
+        diagnostics->add(std::move(d));
+        return false;
+    }
+    for (const auto& pin : made->pins)
+        if (!name_free(pin->name, made->loaded, "its pin")) return false;
+    for (const auto& function : functions)
+        if (model_.find_function(function->name))
+            return fail("name-taken", made->loaded, "there is a function " + quoted(function->name) + " already", "its function", "give the new instance another name: names=…");
+
+    for (const auto& pin : made->pins) model_.pin.emplace(pin->name, pin.get());
+    model_.instance.emplace(made->name, made);
+    component.instances.push_back(std::move(owned));
+    std::vector<Function*> new_functions;
+    for (auto& function : functions) {
+        new_functions.push_back(function.get());
+        model_.function.emplace(function->name, function.get());
+        for (const auto& pin : function->pins) model_.pin.emplace(pin->name, pin.get());
+        component.functions.push_back(std::move(function));
+    }
+    added_instances_.push_back(made);
+    const auto functions_before = component.functions.size() - new_functions.size();
+    on_undo([this, made, functions_before] {
+        Component& of = *made->component;
+        while (of.functions.size() > functions_before) {
+            for (const auto& pin : of.functions.back()->pins) model_.pin.erase(pin->name);
+            model_.function.erase(of.functions.back()->name);
+            removed_.functions.push_back(std::move(of.functions.back()));
+            of.functions.pop_back();
+        }
+        for (const auto& pin : made->pins) model_.pin.erase(pin->name);
+        model_.instance.erase(made->name);
+        removed_.instances.push_back(std::move(of.instances.back()));  // undone last first, so it is the last
+        of.instances.pop_back();
+    });
+    structural_ = true;
+    return true;
+}
+
+void Edit::extend_function(Function& function, const plan::Step& step, Instance& instance) {
+    function.steps.push_back(step);
+    function.instances.push_back(&instance);
+    on_undo([&function] {
+        function.steps.pop_back();
+        function.instances.pop_back();
+    });
+}
+
+void Edit::remove_instance(Instance& leaving) {
+    Component& component = *leaving.component;
+    for (const auto& pin : leaving.pins) {
+        unlink(*pin);
+        model_.pin.erase(pin->name);
+        if (!pin->alias.empty()) model_.pin.erase(pin->alias);
+    }
+    model_.instance.erase(leaving.name);
+    // functions of its own go; shared ones lose its steps, and go with the last instance
+    std::vector<std::pair<Function*, std::size_t>> gone;
+    struct Shrunk {
+        Function* function;
+        std::vector<plan::Step> steps;
+        std::vector<Instance*> instances;
+    };
+    auto shrunk = std::make_shared<std::vector<Shrunk>>();
+    for (Function* const function : leaving.functions) {
+        if (function->shared && function->instances.size() > 1) {
+            shrunk->push_back({function, function->steps, function->instances});
+            for (std::size_t i = function->instances.size(); i-- > 0;) {
+                if (function->instances[i] != &leaving) continue;
+                function->instances.erase(function->instances.begin() + static_cast<std::ptrdiff_t>(i));
+                function->steps.erase(function->steps.begin() + static_cast<std::ptrdiff_t>(i));
+            }
+            continue;
+        }
+        take_from_thread(*function);
+        for (const auto& pin : function->pins) {
+            unlink(*pin);
+            model_.pin.erase(pin->name);
+            if (!pin->alias.empty()) model_.pin.erase(pin->alias);
+        }
+        model_.function.erase(function->name);
+        const auto at = owner(component.functions, function);
+        gone.emplace_back(function, at - component.functions.begin());
+        removed_.functions.push_back(std::move(*at));
+        component.functions.erase(at);
+    }
+    const auto at = owner(component.instances, &leaving);
+    const auto position = at - component.instances.begin();
+    removed_.instances.push_back(std::move(*at));
+    component.instances.erase(at);
+    on_undo([this, &leaving, &component, position, gone, shrunk] {
+        const auto back = owner(removed_.instances, &leaving);
+        component.instances.insert(component.instances.begin() + position, std::move(*back));
+        removed_.instances.erase(back);
+        model_.instance.emplace(leaving.name, &leaving);
+        const auto restore = [&](const std::unique_ptr<Pin>& pin) {
+            model_.pin.emplace(pin->name, pin.get());
+            if (!pin->alias.empty()) model_.pin.emplace(pin->alias, pin.get());
+        };
+        for (const auto& pin : leaving.pins) restore(pin);
+        for (auto it = gone.rbegin(); it != gone.rend(); ++it) {
+            const auto from = owner(removed_.functions, it->first);
+            component.functions.insert(component.functions.begin() + static_cast<std::ptrdiff_t>(it->second), std::move(*from));
+            removed_.functions.erase(from);
+            model_.function.emplace(it->first->name, it->first);
+            for (const auto& pin : it->first->pins) restore(pin);
+        }
+        for (const auto& s : *shrunk) {
+            s.function->steps = s.steps;
+            s.function->instances = s.instances;
+        }
+    });
+    structural_ = true;
+}
+
+void Edit::remove_component(Component& leaving) {
+    while (!leaving.instances.empty()) remove_instance(*leaving.instances.back());
+    model_.component.erase(leaving.name);
+    const auto at = owner(model_.components, &leaving);
+    const auto position = at - model_.components.begin();
+    removed_.components.push_back(std::move(*at));
+    model_.components.erase(at);
+    on_undo([this, &leaving, position] {
+        const auto back = owner(removed_.components, &leaving);
+        model_.components.insert(model_.components.begin() + position, std::move(*back));
+        removed_.components.erase(back);
+        model_.component.emplace(leaving.name, &leaving);
+    });
+    structural_ = true;
+}
+
+}  // namespace hal

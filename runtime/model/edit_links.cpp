@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: MIT
+// Signals, links, values and aliases.
+#include "model/edit.hpp"
+
+#include <algorithm>
+
+namespace hal {
+namespace {
+
+template <class T>
+std::vector<std::string> names(const Index<T>& index) {
+    std::vector<std::string> all;
+    all.reserve(index.size());
+    for (const auto& [name, object] : index) all.emplace_back(name);
+    return all;
+}
+
+std::string quoted(std::string_view name) { return "'" + std::string(name) + "'"; }
+
+// "inputs of pos (pid): enable, command" for a name that begins with an instance's
+std::string pins_of_instance(const Model& model, std::string_view name) {
+    for (auto dot = name.rfind('.'); dot != std::string_view::npos && dot != 0; dot = name.rfind('.', dot - 1)) {
+        const Instance* const instance = model.find_instance(name.substr(0, dot));
+        if (!instance) continue;
+        std::vector<std::string> pins;
+        for (const auto& pin : instance->pins) pins.push_back(pin->name.substr(dot + 1));
+        return "pins of " + instance->name + " (" + instance->component->name + "): " + listed(pins, 16);
+    }
+    return {};
+}
+
+std::string nothing_yet(std::string_view kind) { return "there is no " + std::string(kind) + " yet"; }
+
+}  // namespace
+
+std::string conversion(hal_type from, hal_type to) {
+    if (from == to || !row(from).number || !row(to).number) return {};
+    if (from == HAL_TYPE_BIT || to != HAL_TYPE_BIT || from == HAL_TYPE_S32 || from == HAL_TYPE_U32)
+        return std::string("conv_") + name(from) + "_" + name(to);
+    return {};
+}
+
+bool Edit::fail(Code code, Span at, std::string message, std::string label, std::string help) {
+    diagnostics->error(code, at, std::move(message), std::move(label), std::move(help));
+    return false;
+}
+
+Pin* Edit::pin(Word name) {
+    if (Pin* const found = model_.find_pin(name.text)) return found;
+    std::string help = pins_of_instance(model_, name.text);
+    if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt makes instances with pins";
+    fail("no-such-pin", name.span, "there is no pin " + quoted(name.text), did_you_mean(name.text, names(model_.pin)), help);
+    return nullptr;
+}
+
+Signal* Edit::signal(Word name) {
+    if (Signal* const found = model_.find_signal(name.text)) return found;
+    const std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
+                             : model_.signal.empty()    ? nothing_yet("signal") + "; net makes signals"
+                                                        : "";
+    fail("no-such-signal", name.span, "there is no signal " + quoted(name.text), did_you_mean(name.text, names(model_.signal)), help);
+    return nullptr;
+}
+
+Function* Edit::function(Word name) {
+    if (Function* const found = model_.find_function(name.text)) return found;
+    std::string help;
+    if (const Instance* const instance = model_.find_instance(name.text)) {
+        std::vector<std::string> own;
+        for (const Function* function : instance->functions) own.push_back(function->name);
+        if (!own.empty()) help = "functions of " + instance->name + ": " + listed(own);
+    }
+    fail("no-such-function", name.span, "there is no function " + quoted(name.text), did_you_mean(name.text, names(model_.function)), help);
+    return nullptr;
+}
+
+Thread* Edit::thread(Word name) {
+    if (Thread* const found = model_.find_thread(name.text)) return found;
+    const std::string help = model_.threads.empty() ? "make one first: loadrt threads name1=servo-thread period1=1000000"
+                                                     : "threads: " + listed(names(model_.thread));
+    fail("no-such-thread", name.span, "there is no thread " + quoted(name.text), did_you_mean(name.text, names(model_.thread)), help);
+    return nullptr;
+}
+
+Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
+    if (const Signal* const there = model_.find_signal(name.text)) {
+        Diagnostic d{Severity::error, "name-taken", "there is a signal " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
+        if (there->made.known()) d.labels.push_back({there->made, "made here"});
+        diagnostics->add(std::move(d));
+        return nullptr;
+    }
+    if (model_.find_pin(name.text)) {
+        fail("signal-named-like-pin", name.span, "signal name " + quoted(name.text) + " is the name of a pin", "a pin",
+             "write the signal's name first: net SIGNAL " + std::string(name.text));
+        return nullptr;
+    }
+    auto owned = std::make_unique<Signal>();
+    Signal* const made = owned.get();
+    made->name = name.text;
+    made->type = type;
+    made->made = name.span;
+    made->typed = typed_at.known() ? typed_at : name.span;
+    made->slot = &made->value;
+    made->index = model_.signals.size();
+    model_.signals.push_back(std::move(owned));
+    model_.signal.emplace(made->name, made);
+    on_undo([this, made] {
+        model_.signal.erase(made->name);
+        std::swap(model_.signals[made->index], model_.signals.back());
+        model_.signals[made->index]->index = made->index;
+        model_.signals.pop_back();
+    });
+    return made;
+}
+
+bool Edit::remove_signal(Word name) {
+    Signal* const leaving = signal(name);
+    if (!leaving) return false;
+    while (!leaving->pins.empty()) unlink(*leaving->pins.back());
+    model_.signal.erase(leaving->name);
+    std::swap(model_.signals[leaving->index], model_.signals.back());
+    model_.signals[leaving->index]->index = leaving->index;
+    removed_.signals.push_back(std::move(model_.signals.back()));
+    model_.signals.pop_back();
+    signal_values.erase(leaving);
+    inherited.erase(leaving);
+    on_undo([this, leaving] {
+        auto at = std::find_if(removed_.signals.begin(), removed_.signals.end(), [&](const auto& s) { return s.get() == leaving; });
+        leaving->index = model_.signals.size();
+        model_.signals.push_back(std::move(*at));
+        removed_.signals.erase(at);
+        model_.signal.emplace(leaving->name, leaving);
+    });
+    structural_ = true;
+    return true;
+}
+
+bool Edit::remove_all_signals() {
+    while (!model_.signals.empty()) remove_signal({model_.signals.back()->name, {}});
+    return true;
+}
+
+bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
+    if (pin.signal == &signal) return true;
+    const auto refuse = [&](Code code, std::string message, std::string here, Span other, std::string there, std::string help) {
+        Diagnostic d{Severity::error, code, std::move(message), {{word.span, std::move(here)}}, {}};
+        if (other.known()) d.labels.push_back({other, std::move(there)});
+        if (!help.empty()) d.help.push_back(std::move(help));
+        diagnostics->add(std::move(d));
+        return false;
+    };
+    if (pin.dir == HAL_DIR_PARAM)
+        return refuse("parameter-link", quoted(word.text) + " is a parameter and cannot be linked", "parameter", {}, "",
+                      "set it: setp " + std::string(word.text) + " VALUE");
+    if (pin.signal)
+        return refuse("pin-linked", "pin " + quoted(word.text) + " is linked to signal " + quoted(pin.signal->name) + " already", "second signal",
+                      pin.linked_at, "first signal", "take it off first: unlinkp " + std::string(word.text));
+    if (pin.type != signal.type) {
+        const bool writes = pin.dir == HAL_DIR_OUT;
+        const std::string convert = writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
+        return refuse("type-mismatch",
+                      "signal " + quoted(signal.name) + " carries " + name(signal.type) + ", pin " + quoted(word.text) + " is " + name(pin.type),
+                      name(pin.type), signal.typed, "the signal became " + std::string(name(signal.type)) + " here",
+                      convert.empty() ? "" : "convert with " + convert + ": loadrt " + convert + " names=" + signal.name + "-conv");
+    }
+    if (pin.dir == HAL_DIR_OUT && signal.writer)
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer", "second output", signal.writer->linked_at, "first output",
+                      "a signal has one output pin; join two sources with sum2, or2 or mux2");
+    const auto io = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IO; });
+    if (pin.dir == HAL_DIR_OUT && signal.ios != 0)
+        return refuse("two-writers", "signal " + quoted(signal.name) + " has I/O pins already, so it can have no output", "output", (*io)->linked_at,
+                      "I/O pin", "I/O pins share a signal among themselves and with inputs only");
+    if (pin.dir == HAL_DIR_IO && signal.writer)
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it can have no I/O pin", "I/O pin", signal.writer->linked_at,
+                      "output", "I/O pins share a signal among themselves and with inputs only");
+    if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
+        const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IN; });
+        return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader", "second reader", (*reader)->linked_at, "first reader",
+                      "a byte stream has one writer and one reader");
+    }
+
+    // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the signal.
+    const bool unwritten = !signal.writer && signal.ios == 0;
+    if (pin.type != HAL_TYPE_PORT && unwritten && (pin.dir != HAL_DIR_IN || signal.readers == 0)) {
+        const auto before = signal_values.find(&signal);
+        const bool had = before != signal_values.end();
+        const hal_value old = had ? before->second : hal_value{};
+        Pin* const old_from = inherited.contains(&signal) ? inherited[&signal] : nullptr;
+        signal_values.erase(&signal);
+        inherited[&signal] = &pin;
+        on_undo([this, &signal, had, old, old_from] {
+            if (had) signal_values[&signal] = old;
+            if (old_from) inherited[&signal] = old_from;
+            else inherited.erase(&signal);
+        });
+    }
+    const Span linked_before = pin.linked_at;
+    signal.pins.push_back(&pin);
+    pin.signal = &signal;
+    pin.linked_at = word.span;
+    pin.arrow_in = arrow == Arrow::to_pin;
+    pin.arrow_out = arrow == Arrow::from_pin;
+    if (pin.dir == HAL_DIR_OUT) signal.writer = &pin;
+    if (pin.dir == HAL_DIR_IN) ++signal.readers;
+    if (pin.dir == HAL_DIR_IO) ++signal.ios;
+    on_undo([&pin, &signal, linked_before] {
+        signal.pins.erase(std::find(signal.pins.rbegin(), signal.pins.rend(), &pin).base() - 1);
+        pin.signal = nullptr;
+        pin.linked_at = linked_before;
+        if (pin.dir == HAL_DIR_OUT) signal.writer = nullptr;
+        if (pin.dir == HAL_DIR_IN) --signal.readers;
+        if (pin.dir == HAL_DIR_IO) --signal.ios;
+    });
+    structural_ = true;
+    return true;
+}
+
+void Edit::unlink(Pin& pin) {
+    Signal* const signal = pin.signal;
+    if (!signal) return;
+    const auto at = std::find(signal->pins.begin(), signal->pins.end(), &pin);
+    const auto position = at - signal->pins.begin();
+    signal->pins.erase(at);
+    pin.signal = nullptr;
+    if (pin.dir == HAL_DIR_OUT) signal->writer = nullptr;
+    if (pin.dir == HAL_DIR_IN) --signal->readers;
+    if (pin.dir == HAL_DIR_IO) --signal->ios;
+    // it keeps the signal's value, which may be one that this very transaction set
+    if (const auto set = signal_values.find(signal); set != signal_values.end()) pin_values[&pin] = set->second;
+    on_undo([signal, &pin, position] {
+        signal->pins.insert(signal->pins.begin() + position, &pin);
+        pin.signal = signal;
+        if (pin.dir == HAL_DIR_OUT) signal->writer = &pin;
+        if (pin.dir == HAL_DIR_IN) ++signal->readers;
+        if (pin.dir == HAL_DIR_IO) ++signal->ios;
+    });
+    structural_ = true;
+}
+
+void Edit::keep_value(Pin& pin) {
+    const hal_value before = *pin.memory->slot;
+    on_undo([&pin, before] { *pin.memory->slot = before; });
+}
+
+bool Edit::set_pin(Word name, Word value) {
+    Pin* const target = pin(name);
+    if (!target) return false;
+    const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
+    if (target->dir == HAL_DIR_OUT) return fail("output-set", name.span, "pin " + quoted(name.text) + " is an output: only its component writes it", "output");
+    if (target->signal) {
+        Diagnostic d{Severity::error, "linked-set", "pin " + quoted(name.text) + " takes its value from signal " + quoted(target->signal->name), {{name.span, "linked"}}, {}};
+        if (target->linked_at.known()) d.labels.push_back({target->linked_at, "linked here"});
+        d.help.push_back(target->signal->writer ? "the value comes from '" + target->signal->writer->name + "'; to set it by hand: unlinkp " + std::string(name.text)
+                                                : "set the signal: sets " + target->signal->name + " " + std::string(value.text));
+        diagnostics->add(std::move(d));
+        return false;
+    }
+    if (target->type == HAL_TYPE_PORT)
+        return fail("bad-value", value.span, "a port pin has no value to set", "", "link it and give the signal a buffer: sets SIGNAL BYTES");
+    const Parsed parsed = parse_value(target->type, value.text);
+    if (!parsed.problem.empty())
+        return fail("bad-value", value.span, quoted(value.text) + " " + parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
+    if (target->home) {
+        const auto before = pin_values.find(target);
+        const bool had = before != pin_values.end();
+        const hal_value old = had ? before->second : hal_value{};
+        on_undo([this, target, had, old] {
+            if (had) pin_values[target] = old;
+            else pin_values.erase(target);
+        });
+        pin_values[target] = parsed.value;
+    } else {
+        keep_value(*target);
+        *target->memory->slot = parsed.value;
+        pin_values.erase(target);
+    }
+    return true;
+}
+
+bool Edit::set_signal(Word name, Word value) {
+    Signal* const target = signal(name);
+    if (!target) return false;
+    if (target->type == HAL_TYPE_PORT) {
+        const Parsed bytes = parse_value(HAL_TYPE_U32, value.text);
+        if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30))
+            return fail("bad-value", value.span, quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)", "port signal");
+        if (target->port) return fail("port-sized", name.span, "port signal " + quoted(name.text) + " has its buffer already", "", "its size is fixed once set");
+        auto* const port = new hal_port{bytes.value.u32, 0, 0, 0, new std::uint8_t[bytes.value.u32]()};
+        target->port = {port, [](hal_port* p) { delete[] p->data; delete p; }};
+        target->value.port = port;
+        signal_values[target] = target->value;
+        on_undo([this, target] {
+            target->port.reset();
+            target->value.port = nullptr;
+            signal_values.erase(target);
+        });
+        structural_ = true;
+        return true;
+    }
+    if (target->writer) {
+        Diagnostic d{Severity::error, "writer-set", "signal " + quoted(name.text) + " is written by " + quoted(target->writer->name), {{name.span, "has a writer"}}, {}};
+        if (target->writer->linked_at.known()) d.labels.push_back({target->writer->linked_at, "linked here"});
+        d.help.push_back("to set it by hand, take the writer off first: unlinkp " + target->writer->name);
+        diagnostics->add(std::move(d));
+        return false;
+    }
+    const Parsed parsed = parse_value(target->type, value.text);
+    if (!parsed.problem.empty())
+        return fail("bad-value", value.span, quoted(value.text) + " " + parsed.problem, "signal " + quoted(name.text) + " is " + hal::name(target->type));
+    const auto before = signal_values.find(target);
+    const bool had = before != signal_values.end();
+    const hal_value old = had ? before->second : hal_value{};
+    Pin* const from = inherited.contains(target) ? inherited[target] : nullptr;
+    inherited.erase(target);
+    signal_values[target] = parsed.value;
+    on_undo([this, target, had, old, from] {
+        if (had) signal_values[target] = old;
+        else signal_values.erase(target);
+        if (from) inherited[target] = from;
+    });
+    return true;
+}
+
+bool Edit::alias(Word kind, Word name, Word second) {
+    if (kind.text != "pin" && kind.text != "param" && kind.text != "parameter")
+        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param", "alias pin NAME ALIAS");
+    Pin* const target = pin(name);
+    if (!target) return false;
+    if (!target->alias.empty())
+        return fail("alias-taken", name.span, quoted(name.text) + " has the alias " + quoted(target->alias) + " already", "", "take it off first: unalias " + std::string(kind.text) + " " + target->alias);
+    if (model_.find_pin(second.text)) return fail("name-taken", second.span, "there is a pin or alias " + quoted(second.text) + " already");
+    if (model_.find_signal(second.text)) return fail("name-taken", second.span, "there is a signal " + quoted(second.text) + " already");
+    target->alias = second.text;
+    model_.pin.emplace(target->alias, target);
+    on_undo([this, target] {
+        model_.pin.erase(target->alias);
+        target->alias.clear();
+    });
+    return true;
+}
+
+bool Edit::unalias(Word kind, Word second) {
+    if (kind.text != "pin" && kind.text != "param" && kind.text != "parameter")
+        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param", "unalias pin ALIAS");
+    Pin* const target = pin(second);
+    if (!target) return false;
+    if (target->alias.empty()) return fail("no-alias", second.span, quoted(second.text) + " has no alias");
+    const std::string old = target->alias;
+    model_.pin.erase(target->alias);
+    target->alias.clear();
+    on_undo([this, target, old] {
+        target->alias = old;
+        model_.pin.emplace(target->alias, target);
+    });
+    return true;
+}
+
+}  // namespace hal

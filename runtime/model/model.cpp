@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "model/model.hpp"
+
+#include <algorithm>
+#include <unordered_set>
+
+namespace hal {
+namespace {
+
+template <class T>
+T* find(const Index<T>& index, std::string_view name) {
+    const auto at = index.find(name);
+    return at == index.end() ? nullptr : at->second;
+}
+
+template <class T>
+std::vector<const T*> sorted(std::vector<const T*> all) {
+    std::sort(all.begin(), all.end(), [](const T* a, const T* b) { return a->name < b->name; });
+    return all;
+}
+
+}  // namespace
+
+struct Model::Texts {
+    std::unordered_set<std::string> all;
+};
+
+Pin* Model::find_pin(std::string_view name) const { return find(pin, name); }
+Signal* Model::find_signal(std::string_view name) const { return find(signal, name); }
+Function* Model::find_function(std::string_view name) const { return find(function, name); }
+Thread* Model::find_thread(std::string_view name) const { return find(thread, name); }
+Instance* Model::find_instance(std::string_view name) const { return find(instance, name); }
+
+Component* Model::find_component(std::string_view name) const {
+    if (Component* const exact = find(component, name)) return exact;
+    const auto same = [](char a, char b) { return a == b || (a == '-' && b == '_') || (a == '_' && b == '-'); };
+    for (const auto& candidate : components)
+        if (std::equal(name.begin(), name.end(), candidate->name.begin(), candidate->name.end(), same)) return candidate.get();
+    return nullptr;
+}
+
+std::vector<const Pin*> Model::sorted_pins() const {
+    std::vector<const Pin*> all;
+    all.reserve(pin.size());
+    for (const auto& [name, p] : pin)
+        if (name == p->name) all.push_back(p);
+    return sorted(std::move(all));
+}
+
+std::vector<const Signal*> Model::sorted_signals() const {
+    std::vector<const Signal*> all;
+    all.reserve(signals.size());
+    for (const auto& s : signals) all.push_back(s.get());
+    return sorted(std::move(all));
+}
+
+std::vector<const Function*> Model::sorted_functions() const {
+    std::vector<const Function*> all;
+    all.reserve(function.size());
+    for (const auto& [name, f] : function) all.push_back(f);
+    return sorted(std::move(all));
+}
+
+const char* Model::keep(std::string_view text) {
+    if (!texts_) texts_ = std::make_shared<Texts>();
+    return texts_->all.emplace(text).first->c_str();
+}
+
+Thread* thread_of(const Pin& pin) {
+    if (pin.of_thread) return pin.of_thread;
+    if (pin.function) return pin.function->thread;
+    if (pin.instance)
+        for (const Function* function : pin.instance->functions)
+            if (function->thread) return function->thread;
+    return nullptr;
+}
+
+}  // namespace hal
