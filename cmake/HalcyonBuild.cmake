@@ -41,13 +41,10 @@ if(HALCYON_MOLD)
     add_link_options(-fuse-ld=mold)
 endif()
 
-# The real-time guard: clang 19's runtime archive works with g++ when it is linked whole into the program.
+# The real-time guard: clang 19's runtime archive (Debian: libclang-rt-19-dev) works with g++ when it is linked whole into the program.
 if(HALCYON_RT_GUARD)
-    find_program(HALCYON_CLANG NAMES clang++-19 clang-19 REQUIRED)
-    execute_process(COMMAND "${HALCYON_CLANG}" -print-resource-dir OUTPUT_VARIABLE HALCYON_CLANG_RESOURCES
-                    OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
     find_library(HALCYON_RTSAN_ARCHIVE NAMES "libclang_rt.rtsan-${CMAKE_SYSTEM_PROCESSOR}.a"
-                 PATHS "${HALCYON_CLANG_RESOURCES}/lib/linux" NO_DEFAULT_PATH REQUIRED)
+                 PATHS /usr/lib/llvm-19/lib/clang/19/lib/linux NO_DEFAULT_PATH REQUIRED)
     add_compile_definitions(HALCYON_RT_GUARD=1)
     add_library(halcyon_rtsan INTERFACE)
     target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)

@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Plants one violation of each rule in a small tree and expects the checks to name exactly those."""
+import contextlib
+import io
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import files
+import includes
+import symbols
+
+SPDX = "// SPDX-License-Identifier: MIT\n"
+failures = []
+
+
+def run(check, *arguments):
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        status = check.main(*arguments)
+    return status, output.getvalue().splitlines()
+
+
+def expect(what, got, status, *places):
+    """`got` failed or passed as `status` says, with one line per place, each beginning with it."""
+    lines = got[1] if got[0] else []
+    if got[0] != status or len(lines) != len(places) or not all(line.startswith(p) for line, p in zip(lines, places)):
+        failures.append(f"{what}: expected {status} {places}, got {got}")
+
+
+def write(root, tree):
+    for name, text in tree.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+
+GOOD = {
+    "runtime/abi/hal/abi.h": SPDX,
+    "runtime/sdk/hal/component.hpp": SPDX + '#include "hal/abi.h"\n#include <string>\n',
+    "runtime/base/source.hpp": SPDX,
+    "runtime/plan/plan.hpp": SPDX + '#include "hal/abi.h"\n',
+    "runtime/model/model.hpp": SPDX + '#include "base/source.hpp"\n#include "plan/plan.hpp"\n',
+    "runtime/execute/executor.hpp": SPDX + '#include "plan/plan.hpp"\n',
+    "runtime/session/session.hpp": SPDX + '#include "execute/executor.hpp"\n#include "paths.hpp"\n#include <nlohmann/json.hpp>\n',
+    "drivers/link/link.hpp": SPDX,
+    "components/logic/not.cpp": SPDX + '#include "hal/component.hpp"\n#include "own.hpp"\n',
+    "components/logic/own.hpp": SPDX,
+    "components/canopen/301/master.cpp": SPDX + '#include "link/link.hpp"\n',
+    "tools/main.cpp": SPDX + '#include "session/session.hpp"\n#include <CLI/CLI.hpp>\n',
+}
+BAD_INCLUDES = {
+    "components/logic/or2.cpp": SPDX + '#include "link/link.hpp"\n',
+    "components/math/sum2.cpp": SPDX + '#include "../logic/own.hpp"\n#include "session/session.hpp"\n#include <fmt/core.h>\n',
+    "runtime/base/bad.hpp": SPDX + '#include "model/model.hpp"\n#include "nowhere.hpp"\n',
+    "runtime/execute/bad.cpp": SPDX + '  #  include "../model/model.hpp"\n',
+    "runtime/model/bad.cpp": SPDX + '\n#include "session/session.hpp"\n',
+}
+
+
+def check_includes(root):
+    write(root, GOOD)
+    expect("a tree that keeps the rules", run(includes, root), 0)
+    write(root, BAD_INCLUDES)
+    got = run(includes, root)
+    expect("forbidden includes", got, 1, "runtime/base/bad.hpp:2:", "runtime/base/bad.hpp:3:", "runtime/execute/bad.cpp:2:",
+           "runtime/model/bad.cpp:3:", "components/logic/or2.cpp:2:", "components/math/sum2.cpp:2:",
+           "components/math/sum2.cpp:3:", "components/math/sum2.cpp:4:")
+    for words in includes.BANS.values():
+        if not any(words in line for line in got[1]):
+            failures.append(f"no line says: {words}")
+
+
+def check_files(root):
+    readmes = {f"{folder}/README.md": "x\n" for folder in ("runtime", "runtime/base")} | {"README.md": "x\n"}
+    write(root, readmes | {"runtime/base/a.cpp": SPDX * 600})
+    expect("a tree with readmes", run(files, root), 0)
+    write(root, {"runtime/base/long.cpp": SPDX * 601, "runtime/base/z.py": "import sys\n", "tools/x.cpp": SPDX})
+    expect("long, unlicensed, undocumented", run(files, root), 1, "runtime/base/long.cpp: 601 lines", "runtime/base/z.py:1:",
+           "tools: has no README.md")
+
+
+def check_symbols(root):
+    write(root, {"components/logic/good.cpp": "int hal_plugin;\n", "components/logic/leaky.cpp": "int hal_plugin; int other;\n",
+                 "components/logic/absent.cpp": "", "build/components/placeholder": ""})
+    for name in ("good", "leaky"):
+        subprocess.run(["c++", "-shared", "-fPIC", "-o", root / f"build/components/{name}.so", root / f"components/logic/{name}.cpp"],
+                       check=True)
+    expect("plugins", run(symbols, root, root / "build"), 1, "absent.so: not built", "leaky.so exports")
+
+
+def check_clean_tree(root):
+    script = Path(__file__).parent / "clean_tree.sh"
+    git = ["git", "-c", "safe.directory=*", "-C", root]
+
+    def clean(*arguments):
+        return subprocess.run(["sh", script, root, *arguments], capture_output=True, text=True, check=False)
+
+    subprocess.run([*git, "init", "-q"], check=True)
+    write(root, {"known.txt": "x"})
+    before = root / ".git" / "before"
+    before.write_text(clean().stdout)
+    if clean(before).returncode != 0:
+        failures.append("a file that was there before counts as left behind")
+    write(root, {"left/behind.txt": "x"})
+    result = clean(before)
+    if result.returncode == 0 or "left/behind.txt" not in result.stdout or "known" in result.stdout:
+        failures.append(f"a file left behind: {result}")
+
+
+def main():
+    for check in (check_includes, check_files, check_symbols, check_clean_tree):
+        with tempfile.TemporaryDirectory() as folder:
+            check(Path(folder).resolve())
+    print("\n".join(failures) or "every planted violation was found")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

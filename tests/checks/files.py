@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""files.py ROOT: every folder of the tree has a README of about ten lines, every source its licence line and at most 600 lines."""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+MAX_LINES = 600
+MAX_README = 40  # a folder's README is read in a minute; the glossary and the root have more to say
+SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
+LONGER_READMES = {"README.md", "runtime/README.md", "tests/README.md"}
+# Folders whose parent's README speaks for them: data, one folder per case, and what only holds other folders' files.
+NO_README = ("runtime/abi/hal", "runtime/sdk/hal", "tests/netlists/", "tests/errors/", "tests/fuzz/", ".ci", "cmake", "docs/")
+
+
+def tracked(root):
+    """Files of the repository, or of an unpacked archive all files outside build/."""
+    command = ["git", "-c", "safe.directory=*", "-C", str(root), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    if (root / ".git").exists():
+        names = subprocess.run(command, check=True, capture_output=True).stdout.decode().split("\0")
+        return [Path(n) for n in names if n and (root / n).is_file()]
+    return [Path(d, f).relative_to(root) for d, _, files in os.walk(root) for f in files if "build" not in Path(d).relative_to(root).parts[:1]]
+
+
+def main(root):
+    errors = []
+    files = tracked(root)
+    for path in files:
+        if path.suffix not in SOURCES and path.name != "CMakeLists.txt":
+            continue
+        lines = (root / path).read_text(errors="replace").splitlines()
+        if len(lines) > MAX_LINES:
+            errors.append(f"{path}: {len(lines)} lines, {MAX_LINES} is the limit: split it")
+        if not any("SPDX-License-Identifier: MIT" in line for line in lines[:2]):
+            errors.append(f"{path}:1: the first line names the licence: SPDX-License-Identifier: MIT")
+    for folder in sorted({parent for path in files for parent in path.parents}):
+        name = folder.as_posix()
+        if name != "." and name.startswith(NO_README) and name + "/" not in NO_README:
+            continue
+        readme = folder / "README.md"
+        if readme not in files:
+            errors.append(f"{name}: has no README.md: what it is for, what it must not do, where to start reading")
+        elif readme.as_posix() not in LONGER_READMES and len((root / readme).read_text().splitlines()) > MAX_README:
+            errors.append(f"{readme}: longer than {MAX_README} lines")
+    print("\n".join(errors) if errors else f"{len(files)} files checked")
+    return 1 if errors else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).resolve()))
