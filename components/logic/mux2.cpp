@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Mux2 : hal::Component {
+    using Component::Component;
+    hal::In<bool>    sel{*this, "sel", "chooses the input"};
+    hal::In<double>  in0{*this, "in0", "goes to out while sel is FALSE"};
+    hal::In<double>  in1{*this, "in1", "goes to out while sel is TRUE"};
+    hal::Out<double> out{*this, "out", "the chosen input"};
+    hal::Function    run{*this, "", &Mux2::update, "computes out"};
+
+    void update(hal::Cycle) noexcept { out = sel ? in1 : in0; }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Mux2, "mux2", "Selects one of two values", R"(
+`out = sel ? in1 : in0`
+
+    loadrt mux2 names=speed
+    addf speed servo
+    setp speed.in0 10
+    setp speed.in1 2.5
+    net door-open  => speed.sel
+    net speed-cmd  <= speed.out
+)")

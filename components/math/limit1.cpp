@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Limit1 : hal::Component {
+    using Component::Component;
+    hal::In<double>  in{*this, "in", "the value to limit"};
+    hal::Out<double> out{*this, "out", "in, kept between min and max"};
+    hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Function    run{*this, "", &Limit1::update, "computes out"};
+
+    // Not std::clamp: min above max is the user's right, and then max wins.
+    void update(hal::Cycle) noexcept { out = std::min(std::max(in.get(), min.get()), max.get()); }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Limit1, "limit1", "Keeps a value between two limits", R"(
+`out = min(max(in, min), max)`
+
+When `min` is above `max`, `max` wins. An input that is not a number passes through unchanged, so that whoever
+consumes it can see the fault. `limit2` also limits the slope, `limit3` also the acceleration.
+
+    loadrt limit1 names=torque-limit
+    addf torque-limit servo
+    setp torque-limit.min -2.5
+    setp torque-limit.max 2.5
+    net torque-wanted => torque-limit.in
+    net torque        <= torque-limit.out
+)")
