@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Where the control socket of an instance is: $XDG_RUNTIME_DIR/halcyon/NAME.sock, else /tmp/halcyon-UID/NAME.sock.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hal {
+
+/// True for names an instance may have: 1 to 64 letters, digits, `-`, `_`, `.`, not beginning with a dot.
+bool good_instance_name(std::string_view name);
+
+/// The folder of the control sockets, without a final slash. Says nothing about whether it exists.
+std::string socket_folder();
+std::string socket_path(std::string_view name);
+/// The file beside the socket whose lock says that the instance lives; it holds the process id.
+std::string lock_path(std::string_view name);
+
+/// Names of the instances that run now and belong to this user, sorted.
+std::vector<std::string> running_instances();
+
+/// Which instance a tool means that was told `wanted` (may be empty): that one; else $HALCYON_INSTANCE; else the only one
+/// that runs; else "default".
+std::string instance_wanted(std::string_view wanted);
+
+}  // namespace hal
