@@ -9,7 +9,7 @@ from pathlib import Path
 MAX_LINES = 600
 MAX_README = 40  # a folder's README is read in a minute; the glossary and the root have more to say
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
-LONGER_READMES = {"README.md", "runtime/README.md", "tests/README.md"}
+LONGER_READMES = {"README.md", "runtime/README.md"}
 # Folders whose parent's README speaks for them: data, one folder per case, and what only holds other folders' files.
 NO_README = ("runtime/abi/hal", "runtime/sdk/hal", "tests/netlists/", "tests/errors/", "tests/fuzz/", ".ci", "cmake", "docs/")
 
