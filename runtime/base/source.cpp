@@ -6,12 +6,12 @@
 namespace hal {
 
 std::uint32_t Sources::add(std::string name, std::string text) {
-    sources_.push_back({std::move(name), std::move(text)});
+    sources_.push_back({.name = std::move(name), .text = std::move(text)});
     return static_cast<std::uint32_t>(sources_.size());
 }
 
 const Sources::Source& Sources::get(std::uint32_t source) const {
-    static const Source nowhere{"<runtime>", ""};
+    static const Source nowhere{.name = "<runtime>", .text = "", .line_starts = {0}};
     return source == 0 || source > sources_.size() ? nowhere : sources_[source - 1];
 }
 
@@ -20,19 +20,29 @@ std::string_view Sources::text(Span span) const {
     return span.begin <= span.end && span.end <= all.size() ? all.substr(span.begin, span.end - span.begin) : std::string_view{};
 }
 
+std::size_t Sources::line_index(const Source& source, std::uint32_t at) {
+    auto& starts = source.line_starts;
+    if (starts.empty()) {
+        starts.push_back(0);
+        for (auto stop = source.text.find('\n'); stop != std::string::npos; stop = source.text.find('\n', stop + 1))
+            starts.push_back(static_cast<std::uint32_t>(stop + 1));
+    }
+    return static_cast<std::size_t>(std::upper_bound(starts.begin(), starts.end(), at) - starts.begin()) - 1;
+}
+
 Place Sources::place(Span span) const {
-    const std::string_view before = std::string_view(get(span.source).text).substr(0, span.begin);
-    const auto start = before.rfind('\n');
-    const std::string_view row = start == std::string_view::npos ? before : before.substr(start + 1);
+    const Source& source = get(span.source);
+    const std::size_t line = line_index(source, span.begin);
+    const std::string_view row = std::string_view(source.text).substr(0, span.begin).substr(source.line_starts[line]);
     const auto characters = std::count_if(row.begin(), row.end(), [](char c) { return (c & 0xC0) != 0x80; });
-    return {static_cast<std::uint32_t>(std::count(before.begin(), before.end(), '\n') + 1), static_cast<std::uint32_t>(characters + 1)};
+    return {static_cast<std::uint32_t>(line + 1), static_cast<std::uint32_t>(characters + 1)};
 }
 
 std::string_view Sources::line(Span span) const {
-    const std::string_view all = get(span.source).text;
+    const Source& source = get(span.source);
+    const std::string_view all = source.text;
     if (span.begin > all.size()) return {};
-    const auto start = all.substr(0, span.begin).rfind('\n');
-    const auto first = start == std::string_view::npos ? 0 : start + 1;
+    const std::size_t first = source.line_starts[line_index(source, span.begin)];
     auto row = all.substr(first, all.find('\n', first) - first);
     if (!row.empty() && row.back() == '\r') row.remove_suffix(1);
     return row;

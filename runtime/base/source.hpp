@@ -6,6 +6,7 @@
 #include <deque>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace hal {
 
@@ -26,6 +27,7 @@ public:
     struct Source {
         std::string name;  ///< as messages print it: a path, "<shell>", "<commandline>", "<stdin>"
         std::string text;
+        mutable std::vector<std::uint32_t> line_starts = {};  ///< filled by the first question about a place
     };
 
     /// Adds a text and returns its number. Texts of the shell (`keep` false) share one recycled entry per line.
@@ -39,6 +41,8 @@ public:
     std::string location(Span span, bool column = true) const;
 
 private:
+    static std::size_t line_index(const Source& source, std::uint32_t at);
+
     std::deque<Source> sources_;
 };
 
