@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: MIT
+#include <numbers>
+
+#include "hal/component.hpp"
+
+namespace {
+
+/// `value` kept within ±|limit|; a limit of 0 is none.
+double limited(double value, double limit) {
+    const double bound = std::fabs(limit);
+    if (bound > 0.0) return value < -bound ? -bound : value > bound ? bound : value;  // not a number stays so
+    return value;
+}
+
+/// A gain that auto-tuning may set. It is an input: while a signal is linked, the signal has the say.
+class Gain : public hal::In<double> {
+public:
+    using In::In;
+    void tune(double value) noexcept {
+        if (!linked()) put(value);
+    }
+};
+
+struct alignas(64) Pid : hal::Component {
+    using Component::Component;
+    static constexpr hal::Traits traits{.default_count = 3};
+
+    hal::In<double>  command{*this, "command", "the wanted value"};
+    hal::In<double>  feedback{*this, "feedback", "the measured value"};
+    hal::Out<double> error{*this, "error", "command - feedback", {.finite = true}};
+    hal::Out<double> output{*this, "output", "the control effort", {.safe = 0.0}};
+    hal::In<bool>    enable{*this, "enable", "TRUE closes the loop; FALSE clears the integral and forces output to 0"};
+    hal::In<bool>    index_enable{*this, "index-enable", "in the cycle it falls, command and feedback jump: derivatives are held"};
+    hal::In<bool>    error_previous_target{*this, "error-previous-target", "error = command of the previous cycle - feedback", {.initial = true}};
+    hal::In<bool>    tune_mode{*this, "tune-mode", "TRUE opens the loop for auto-tuning: output is bias until tune-start"};
+    Gain             p_gain{*this, "Pgain", "proportional gain", {.initial = 1.0}};
+    Gain             i_gain{*this, "Igain", "integral gain"};
+    Gain             d_gain{*this, "Dgain", "derivative gain"};
+    hal::In<double>  ff0{*this, "FF0", "feed-forward of command"};
+    Gain             ff1{*this, "FF1", "feed-forward of the first derivative of command"};
+    hal::In<double>  ff2{*this, "FF2", "feed-forward of the second derivative of command"};
+    hal::In<double>  ff3{*this, "FF3", "feed-forward of the third derivative of command"};
+    hal::In<double>  bias{*this, "bias", "constant added to the output while enabled"};
+    hal::In<double>  deadband{*this, "deadband", "errors smaller than this count as 0; larger ones are reduced by it"};
+    hal::In<double>  max_error{*this, "maxerror", "limit on the error; 0 is none"};
+    hal::In<double>  max_error_i{*this, "maxerrorI", "limit on the integral of the error; 0 is none"};
+    hal::In<double>  max_error_d{*this, "maxerrorD", "limit on the derivative of the error; 0 is none"};
+    hal::In<double>  max_command_d{*this, "maxcmdD", "limit on the first derivative of command; 0 is none"};
+    hal::In<double>  max_command_dd{*this, "maxcmdDD", "limit on the second derivative of command; 0 is none"};
+    hal::In<double>  max_command_ddd{*this, "maxcmdDDD", "limit on the third derivative of command; 0 is none"};
+    hal::In<double>  max_output{*this, "maxoutput", "limit on the output; 0 is none"};
+    hal::In<double>  command_deriv{*this, "command-deriv", "derivative of command; estimated while unlinked"};
+    hal::In<double>  feedback_deriv{*this, "feedback-deriv", "derivative of feedback; estimated while unlinked"};
+    hal::Out<bool>   saturated{*this, "saturated", "TRUE while maxoutput limits the output"};
+    hal::Out<double> saturated_s{*this, "saturated-s", "how long saturated has been TRUE", {.unit = "s"}};
+    hal::Out<std::int32_t> saturated_count{*this, "saturated-count", "for how many cycles saturated has been TRUE"};
+
+    hal::Argument debug{*this, "debug", 0, "1 adds the pins errorI to ultimate-period", {.min = 0, .max = 1}};
+
+private:
+    // The memory of the loop stands beside the pins of every cycle, so that a cycle touches few cache lines.
+    double integral_ = 0.0, pushing_ = 0.0;
+    double last_command_ = 0.0, last_feedback_ = 0.0, last_e_ = 0.0;
+    double error_d_ = 0.0, feedback_d_ = 0.0, command_d_ = 0.0, command_dd_ = 0.0, command_ddd_ = 0.0;
+    bool has_previous_ = false, was_index_enable_ = false, tuning_ = false;
+
+public:
+    hal::Io<bool>            tune_start{*this, "tune-start", "set: starts auto-tuning; cleared when it ends"};
+    hal::Param<std::uint32_t> tune_type{*this, "tune-type", "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
+    hal::Param<std::uint32_t> tune_cycles{*this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
+    hal::Param<double>       tune_effort{*this, "tune-effort", "output swings between bias + this and bias - this", {.initial = 0.5}};
+
+    hal::Outs<double> error_i_out{*this, "errorI", debug, "integral of the error"};
+    hal::Outs<double> error_d_out{*this, "errorD", debug, "derivative of the error"};
+    hal::Outs<double> command_d_out{*this, "commandD", debug, "first derivative of command"};
+    hal::Outs<double> command_dd_out{*this, "commandDD", debug, "second derivative of command"};
+    hal::Outs<double> command_ddd_out{*this, "commandDDD", debug, "third derivative of command"};
+    hal::Outs<double> feedback_d_out{*this, "feedbackD", debug, "derivative of feedback"};
+    hal::Outs<double> ultimate_gain{*this, "ultimate-gain", debug, "gain at which the loop would oscillate, found by auto-tuning"};
+    hal::Outs<double> ultimate_period{*this, "ultimate-period", debug, "period of that oscillation", {.unit = "s"}};
+
+    hal::Function run{*this, "do-pid-calcs", &Pid::calculate, "one step of the loop"};
+
+    void calculate(hal::Cycle cycle) noexcept {
+        const double dt = cycle.seconds();
+        const bool at_index = was_index_enable_ & !index_enable;
+        was_index_enable_ = index_enable;
+
+        // The first cycle has no previous target, and at the index the previous one is in the old coordinates.
+        const bool use_previous = error_previous_target & has_previous_ & !at_index;
+        const double deviation = (use_previous ? last_command_ : command.get()) - feedback;
+        error = deviation;
+        const double e = beyond_deadband(limited(deviation, max_error));
+        if (has_previous_ & !at_index) differentiate(e, 1.0 / dt);
+        last_command_ = command;
+        last_feedback_ = feedback;
+        last_e_ = e;
+        has_previous_ = std::isfinite(last_command_ - last_feedback_);
+
+        if (enable & tune_mode) tune(deviation, dt);
+        else {
+            if (tuning_) stop_tuning();
+            if (enable) control(e, dt);
+            else shut(0.0);
+        }
+        if (debug != 0) publish_debug();
+    }
+
+private:
+    double beyond_deadband(double e) const {
+        const double band = std::fabs(deadband);
+        return e > band ? e - band : e < -band ? e + band : e * 0.0;  // 0, or still not a number
+    }
+
+    /// Estimates all derivatives, also while disabled, so that enabling causes no spike.
+    void differentiate(double e, double rate) {
+        const bool either_given = command_deriv.linked() | feedback_deriv.linked();
+        const double raw_command_d = command_deriv.linked() ? command_deriv.get() : (command - last_command_) * rate;
+        feedback_d_ = feedback_deriv.linked() ? feedback_deriv.get() : (feedback - last_feedback_) * rate;
+        error_d_ = limited(either_given ? raw_command_d - feedback_d_ : (e - last_e_) * rate, max_error_d);
+
+        const double command_d = limited(raw_command_d, max_command_d);
+        const double command_dd = limited((command_d - command_d_) * rate, max_command_dd);
+        command_ddd_ = limited((command_dd - command_dd_) * rate, max_command_ddd);
+        command_dd_ = command_dd;
+        command_d_ = command_d;
+    }
+
+    void control(double e, double dt) {
+        double integral = integral_;
+        if (e * pushing_ <= 0.0) integral = limited(integral + e * dt, max_error_i);  // while saturated, only what leads back out
+        const double wanted = bias + p_gain * e + i_gain * integral + d_gain * error_d_ + ff0 * command + ff1 * command_d_ + ff2 * command_dd_ + ff3 * command_ddd_;
+        const double given = limited(wanted, max_output);
+        if (!std::isfinite(wanted)) {
+            finish(0.0, 0.0, dt);
+            return;
+        }
+        integral_ = integral;
+        finish(given, wanted > given ? 1.0 : wanted < given ? -1.0 : 0.0, dt);
+    }
+
+    /// `pushing` is the direction in which the loop wants more than it may have: -1, 0 or 1.
+    void finish(double effort, double pushing, double dt) {
+        const bool limiting = pushing != 0.0;
+        pushing_ = pushing;
+        output = effort;
+        saturated = limiting;
+        saturated_s = limiting ? saturated_s + dt : 0.0;
+        saturated_count = limiting ? std::min(saturated_count.get(), INT32_MAX - 1) + 1 : 0;
+    }
+
+    /// No control: a constant output and a clear memory.
+    void shut(double effort) {
+        integral_ = 0.0;
+        finish(effort, 0.0, 0.0);
+    }
+
+    // Auto-tuning, the relay method of Åström and Hägglund (Automatica 20, 1984, doi:10.1016/0005-1098(84)90014-1): the
+    // output switches between bias ± h with the sign of the error, so that the loop oscillates at its ultimate
+    // frequency. With the amplitude a and the period T of the error, the ultimate gain is K = 4 h / (pi a), and
+    // Ziegler and Nichols' table gives
+    //     PID:      Pgain = 0.6 K,   Igain = Pgain / (T / 2),    Dgain = Pgain T / 8
+    //     PI, FF1:  Pgain = 0.45 K,  Igain = Pgain / (T / 1.2),  FF1 = 1
+    void tune(double deviation, double dt) {
+        if (tune_start && !tuning_) {
+            tuning_ = true;
+            direction_ = deviation >= 0.0 ? 1.0 : -1.0;
+            half_cycles_ = -settling_half_cycles;
+            peak_ = elapsed_ = amplitude_sum_ = time_sum_ = 0.0;
+        }
+        if (tuning_ && (!tune_start || !std::isfinite(deviation))) stop_tuning();
+        if (!tuning_) return shut(limited(bias, max_output));
+
+        elapsed_ += dt;
+        peak_ = std::max(peak_, direction_ * deviation);
+        if (direction_ * deviation < 0.0) {
+            if (half_cycles_ >= 0) {
+                amplitude_sum_ += peak_;
+                time_sum_ += elapsed_;
+            }
+            direction_ = -direction_;
+            peak_ = elapsed_ = 0.0;
+            if (++half_cycles_ >= static_cast<std::int64_t>(std::max<std::uint32_t>(tune_cycles, 1))) {
+                adopt(amplitude_sum_ / static_cast<double>(half_cycles_), 2.0 * time_sum_ / static_cast<double>(half_cycles_));
+                stop_tuning();
+                return shut(limited(bias, max_output));
+            }
+        }
+        shut(limited(bias + direction_ * std::fabs(tune_effort), max_output));
+    }
+
+    void adopt(double amplitude, double period) {
+        const double gain = 4.0 * std::fabs(tune_effort) / (std::numbers::pi * amplitude);
+        if (!std::isfinite(gain) || !(gain > 0.0) || !(period > 0.0)) return;
+        const bool with_ff1 = tune_type == 1;
+        p_gain.tune((with_ff1 ? 0.45 : 0.6) * gain);
+        i_gain.tune(with_ff1 ? 0.54 * gain / period : 1.2 * gain / period);
+        d_gain.tune(with_ff1 ? 0.0 : 0.075 * gain * period);
+        if (with_ff1) ff1.tune(1.0);
+        ultimate_gain_ = gain;
+        ultimate_period_ = period;
+    }
+
+    void stop_tuning() {
+        tuning_ = false;
+        tune_start = false;
+    }
+
+    void publish_debug() {
+        error_i_out[0] = integral_;
+        error_d_out[0] = error_d_;
+        command_d_out[0] = command_d_;
+        command_dd_out[0] = command_dd_;
+        command_ddd_out[0] = command_ddd_;
+        feedback_d_out[0] = feedback_d_;
+        ultimate_gain[0] = ultimate_gain_;
+        ultimate_period[0] = ultimate_period_;
+    }
+
+    static constexpr std::int64_t settling_half_cycles = 2;  // until the oscillation has its final shape
+
+    // While tuning: half cycles averaged (negative: still settling) and what was seen of the present one.
+    std::int64_t half_cycles_ = 0;
+    double direction_ = 1.0, peak_ = 0.0, elapsed_ = 0.0, amplitude_sum_ = 0.0, time_sum_ = 0.0;
+    double ultimate_gain_ = 0.0, ultimate_period_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Pid, "pid", "Proportional/integral/derivative controller with feed-forward, limits and auto-tuning", R"(
+    error     = command - feedback, limited to ±maxerror, reduced by deadband
+    errorI   += error * period, limited to ±maxerrorI, held while it would push further into saturation
+    errorD    = slope of error (of command-deriv and feedback-deriv when linked), limited to ±maxerrorD
+    commandD, commandDD, commandDDD = derivatives of command, limited to ±maxcmdD, ±maxcmdDD, ±maxcmdDDD
+    output    = bias + error * Pgain + errorI * Igain + errorD * Dgain
+              + command * FF0 + commandD * FF1 + commandDD * FF2 + commandDDD * FF3, limited to ±maxoutput
+
+A limit of 0 is no limit. With `error-previous-target` (the default) the error is taken against the target of the
+previous cycle, the one the feedback had time to follow. While an input is not a number `output` is 0; the integral
+and the derivatives survive.
+
+**Auto-tuning** measures the loop by the relay method and sets the gains after Ziegler and Nichols. Hold `command`
+still near the middle of the travel; set `tune-effort` small, `enable`, `tune-mode`, then `tune-start`. If the loop
+does not oscillate visibly, increase `tune-effort`. When `tune-start` has gone FALSE the gains are in place (gains that
+are linked to a signal are left to it) and `output` stays at `bias` until `tune-mode` is FALSE. Clearing `enable`,
+`tune-mode` or `tune-start` aborts.
+
+    loadrt pid names=pid.x
+    addf pid.x.do-pid-calcs servo
+    setp pid.x.Pgain 20
+    setp pid.x.FF1 1
+    setp pid.x.maxoutput 10
+    net x-command  => pid.x.command
+    net x-feedback => pid.x.feedback
+    net x-enable   => pid.x.enable
+    net x-velocity <= pid.x.output
+)")
