@@ -3,24 +3,31 @@
 #
 # Works in this tree and, after find_package(Halcyon), in any other. The target is component_NAME.
 
-function(add_hal_component name)
-    set(target "component_${name}")
-    add_library(${target} MODULE ${ARGN})
+# hal_component_options(TARGET): how the sources of a plugin are compiled.
+function(hal_component_options target)
     target_link_libraries(${target} PRIVATE Halcyon::sdk)
     target_compile_options(${target} PRIVATE -fno-plt "$<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>")
+    set_target_properties(${target} PROPERTIES
+        CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON DEFINE_SYMBOL "")
+endfunction()
+
+function(add_hal_component name)
+    include(GNUInstallDirs)
+    set(target "component_${name}")
+    add_library(${target} MODULE ${ARGN})
+    hal_component_options(${target})
     # The version script also hides the templates of libstdc++, which -fvisibility=hidden lets through.
     set(map "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/plugin.map")
     target_link_options(${target} PRIVATE "LINKER:--version-script=${map}")
     if(NOT (HALCYON_SANITIZE AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))  # there the sanitizer is in the program only
         target_link_options(${target} PRIVATE "LINKER:-z,defs")
     endif()
-    set_target_properties(${target} PROPERTIES
-        OUTPUT_NAME "${name}" PREFIX "" SUFFIX ".so"
-        CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON
-        LINK_DEPENDS "${map}")
+    set_target_properties(${target} PROPERTIES OUTPUT_NAME "${name}" PREFIX "" SUFFIX ".so" LINK_DEPENDS "${map}")
     if(HALCYON_COMPONENT_OUTPUT_DIRECTORY)
         set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${HALCYON_COMPONENT_OUTPUT_DIRECTORY}")
     endif()
-    include(GNUInstallDirs)
+    if(TARGET halcyon_precompiled)  # in this tree: the sdk's header is read once for all components
+        target_precompile_headers(${target} REUSE_FROM halcyon_precompiled)
+    endif()
     install(TARGETS ${target} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/halcyon/components")
 endfunction()
