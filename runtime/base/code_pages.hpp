@@ -18,6 +18,10 @@ inline constexpr CodePage code_pages[] = {
      "A load argument has a value its component does not accept: not a number where one is needed, out of its limits, or a "
      "list that does not fit the number of instances.\n\n"
      "`hal doc COMPONENT` lists a component's arguments with their defaults and limits."},
+    {"bad-ini-line",
+     "An INI file consists of `[SECTION]` lines, `KEY = value` lines, comments (`#` or `;` as the first character of a line), and "
+     "`#INCLUDE FILE`. A line that is none of these is ignored with this warning; a section name without its `]` too.\n\n"
+     "Included files may include others, up to 16 deep; deeper means that a file includes itself."},
     {"bad-period",
      "The period of a thread is a whole number of nanoseconds, at least 1000 (1 us): 1000000 is a millisecond.\n\n"
      "Example: `newthread servo-thread 1000000`, or `loadrt threads name1=base period1=50000 name2=servo period2=1000000`."},
@@ -29,19 +33,39 @@ inline constexpr CodePage code_pages[] = {
      "The third argument of addf is a place in the thread: 1 is the first, 2 the second, -1 the last, -2 the one before it. "
      "0 means nothing, and a place must exist.\n\n"
      "Without it the function is appended."},
+    {"bad-range",
+     "A name may contain a range or a set: `pid.[0..5].enable` stands for six names, `[00..11]` keeps leading zeros, `[5..0]` counts "
+     "down, `pid.{x,y,z}.enable` stands for three; several in one word are combined, the last one running fastest. The bounds are whole "
+     "numbers, a `{` has its `}`, a set is not empty and does not contain another, and a command stands for at most 1000000 names.\n\n"
+     "Nothing is expanded between quotes, nor in print, echo, help, loadusr and source."},
+    {"bad-reference",
+     "`$NAME` and `$(NAME)` stand for an environment variable, `[SECTION]KEY` and `[SECTION](KEY)` for a value of the INI file. Here "
+     "a `$` or `[` is followed by no name, or its bracket is not closed. Quotes do not protect them.\n\n"
+     "`[0..5]` is a range of names, and in show and list a `[` may be part of a pattern."},
     {"bad-value",
      "The text is not a value of the pin's or signal's type, or is outside its range. Nothing is rounded or wrapped "
      "silently.\n\n"
      "bit: TRUE FALSE 1 0 yes no on off. s32 u32 s64 u64: decimal, 0x hexadecimal, leading 0 octal. float: 1.5, -2e-3."},
+    {"binary-text",
+     "A netlist is plain text in UTF-8. This file contains a zero byte, or another control character outside of a comment, so it is "
+     "something else: a program, a picture, a text in UTF-16. Nothing of it was used.\n\n"
+     "`file FILE` says what it is; `iconv -f utf-16 -t utf-8` converts a text."},
     {"construct-failed",
      "The component refused to be made: its constructor gave the reason that is printed. Nothing of it is left behind.\n\n"
      "`hal doc COMPONENT` shows its arguments."},
+    {"continued-comment",
+     "A `\\` at the end of a line joins the next line to it before comments are looked for, as in LinuxCNC. A comment that ends in "
+     "`\\` therefore swallows the next line, and what stands there is not run.\n\n"
+     "Take the `\\` away, or write the comment behind the last line of the command."},
     {"cross-thread-io",
      "I/O pins of this signal stand in several threads: they share one cell, as in LinuxCNC, and its value may change in the "
      "middle of a cycle. All other signals that cross threads are whole finished cycles."},
     {"cyclic-order",
      "`addf --auto` found a loop in the dataflow and had to cut it: the named signal is read one cycle late. Put the "
      "functions in the order you want to cut it elsewhere."},
+    {"dos-line-endings",
+     "Lines of this file end in CR LF. They are read as if they ended in LF; this is said once per file.\n\n"
+     "`hal fmt` or `sed -i 's/\\r$//' FILE` converts the file."},
     {"function-in-thread",
      "A function runs in one thread, at one place. It was added a second time.\n\n"
      "Move it with `delf FUNCTION THREAD` followed by addf."},
@@ -51,6 +75,10 @@ inline constexpr CodePage code_pages[] = {
     {"linked-set",
      "A linked pin takes its value from its signal; setp would be overwritten at once, so it is refused.\n\n"
      "Set the signal with sets (when nothing writes it), or unlink the pin with unlinkp first."},
+    {"lone-carriage-return",
+     "A carriage return stands in the middle of a line. Such a line looks like several in an editor but is one for the netlist, so it "
+     "is refused; other lines with the same fault are not listed.\n\n"
+     "`tr '\\r' '\\n' < OLD > NEW` converts a file whose lines end in CR only."},
     {"missing-argument",
      "A component cannot be loaded without this argument."},
     {"name-taken",
@@ -92,6 +120,10 @@ inline constexpr CodePage code_pages[] = {
      "A pin is in at most one signal. Unlink it first with unlinkp, or link the other pins to the signal it is in."},
     {"port-sized",
      "The buffer of a port signal is allocated once, by the first sets; its size does not change afterwards."},
+    {"range-length",
+     "The ranges and sets of one command run along with each other, so each of them must stand for as many names as the one in the "
+     "first word: `net j[0..2]-cmd traj.[0..2].out => pid.{x,y,z}.command` is three commands.\n\n"
+     "When the first word has no range, ranges in the others are lists in place: `net on s.on => pid.{x,y,z}.enable` is one command."},
     {"signal-named-like-pin",
      "net takes the signal's name first, then pins. The first name is a pin's, so the signal's name was probably forgotten.\n\n"
      "`net SIGNAL pin pin …`"},
@@ -110,8 +142,14 @@ inline constexpr CodePage code_pages[] = {
     {"start-failed",
      "The component could not acquire what it needs (a device, a socket, a file) and gave the reason that is printed. The "
      "whole edit was undone."},
+    {"substitution-too-long",
+     "The values put in place of `$NAME` and `[SECTION]KEY` in one file are longer than 64 MB together. No machine needs that; a value is "
+     "wrong, or a reference stands in a generated file far too often."},
     {"thread-refused",
      "The operating system gave no thread, mostly because a limit on processes or memory is reached: see `ulimit -a`."},
+    {"too-many-errors",
+     "Of one file the first 20 malformed lines are shown, and how many more there are. They often have one cause: repair the first and "
+     "check again."},
     {"two-readers",
      "A port is a byte stream: what one reader takes is gone for the other. It has one writer and one reader."},
     {"two-writers",
@@ -123,6 +161,19 @@ inline constexpr CodePage code_pages[] = {
     {"unknown-argument",
      "The component has no load argument of this name, and ignoring it could hide a mistake.\n\n"
      "`hal doc COMPONENT` lists its arguments. All components take count=, names= and personality=."},
+    {"unreadable-file",
+     "The file cannot be read; the system's reason is part of the message. A file may be at most 1 GB."},
+    {"unset-ini-key",
+     "`[SECTION]KEY` and `[SECTION](KEY)` stand for a value of the INI file, `[]KEY` for the first KEY of any section. There is no such "
+     "value, or no INI file was given. Section and key are case-sensitive.\n\n"
+     "Give the file with `hal run --ini FILE.ini …`, with halcmd and halrun by `-i FILE.ini`."},
+    {"unset-variable",
+     "`$NAME` and `$(NAME)` stand for an environment variable, and this one is not set. A name may contain letters, digits, `.`, `_` and "
+     "`-`, so `$HOME-x` is the variable `HOME-x`; write `$(HOME)-x`. Quotes do not protect a `$`."},
+    {"unterminated-quote",
+     "A quote, ' or \", is opened and not closed before the end of the line. Quotes protect blanks and `#`; they stay in the word. There is "
+     "no escape character, but one kind of quote may stand inside the other: \"it's\".\n\n"
+     "An apostrophe in a comment does no harm."},
     {"unthreaded-function",
      "The instance is linked but none of its functions is in a thread, so its outputs never change. Add it with addf, or "
      "unload the instance."},

@@ -4,10 +4,10 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "base/diagnostic.hpp"
@@ -29,7 +29,11 @@ struct Command {
     Span span;  ///< from the first to the last token
 };
 
-/// An INI file as LinuxCNC reads it: `[SECTION]`, `KEY = value`, `#` and `;` comments, repeated keys keep all values.
+/// Reads a whole file (a pipe, too) into `sources`. What goes wrong is one error at `asked`, the place that named the file.
+std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked, Diagnostics& diagnostics);
+
+/// An INI file as LinuxCNC reads it: `[SECTION]`, `KEY = value`, `#` and `;` comments on lines of their own, `\` joins
+/// lines, `#INCLUDE file`, repeated keys keep all values.
 class Ini {
 public:
     /// Reads a file. Problems go to `diagnostics` (with places in the INI file itself).
@@ -43,10 +47,14 @@ public:
     bool empty() const { return entries_.empty(); }
 
 private:
+    friend class IniReader;
     struct Entry {
         std::string section, key, value;
     };
+    void add(std::string_view section, std::string_view key, std::string_view value);
+
     std::vector<Entry> entries_;
+    std::unordered_map<std::string, std::size_t> first_;  ///< "[SECTION]KEY" and "[]KEY" to the first entry
 };
 
 /// What `$NAME` and `[SECTION]KEY` are looked up in.
@@ -63,6 +71,9 @@ std::vector<Command> parse(const Sources& sources, std::uint32_t source, const E
 /// argument (the thing the command is about) make a command per name, other arguments' ranges run along with it and
 /// must have as many names; where the first argument has none, ranges stand for the list of names, in place.
 /// `net j[0..2]-cmd traj.[0..2].out => pid.[0..2].command` is three commands, `net on s.on => pid.{x,y}.enable` is one.
+/// In `key=value` they stand for a comma list: `names={x,y}-pid` is `names=x-pid,y-pid`. Several in one word are combined,
+/// the last one running fastest. What stands between quotes is left alone, and so is all of print, echo, help, loadusr
+/// and source. A faulty command gives none, and an error.
 std::vector<Command> expand(const Command& command, Diagnostics& diagnostics);
 
 /// True for `=>`, `<=` and `<=>`.
