@@ -62,6 +62,7 @@ void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
 void Core::service() noexcept {
     drain_writes();
     if (plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel)) take(offered);
+    if (!running_.load(std::memory_order_acquire) && !safe_) make_safe();
     if (plan_) answer();
 }
 
@@ -81,7 +82,6 @@ void Core::take(plan::Plan* plan) noexcept {
     for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
     plan_ = plan;
     sampled_ = 0;
-    if (!plan->init.empty()) init_done_ = false;
     taken_.store(plan->epoch, std::memory_order_release);
 }
 
@@ -121,12 +121,13 @@ void Core::run() noexcept {
     safe_ = false;
     in_function_ = true;
     if (setjmp(recover) == 0) {
-        if (!init_done_ && !plan_->init.empty()) {
+        const bool first = !passed_.load(std::memory_order_relaxed);
+        passed_.store(true, std::memory_order_release);
+        if (first && !plan_->init.empty()) {
             // initf: a cycle of its own, so that the cyclic functions start on a fresh period
             initialising_ = true;
-            run_steps(plan_->init_steps.data(), plan_->init_steps.data() + plan_->init_steps.size());
+            run_steps(plan_->init_steps.data(), plan_->init_steps.data() + plan_->init.back().end);
             initialising_ = false;
-            init_done_ = true;
         } else if (const auto& functions = plan_->functions; !functions.empty()) {
             const plan::Step* const steps = plan_->steps.data();
             if (!measure_) {

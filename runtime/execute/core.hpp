@@ -61,6 +61,8 @@ public:
     void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
     bool withdraw(Observation* observation) { return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel); }
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
+    /// True once the thread has made its first pass, so that initf functions have run.
+    bool passed() const { return passed_.load(std::memory_order_acquire); }
     void clear_stop() { stopped_.store(false, std::memory_order_release); }
 
     std::uint32_t id() const { return id_; }
@@ -100,13 +102,14 @@ private:
     std::atomic<std::uint64_t> taken_{0};             // written by the thread
     std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
     std::atomic<bool> stopped_{false};                // set by the thread, cleared by the session
+    std::atomic<bool> passed_{false};                 // set by the thread
     Queue<Write> writes_{4096};                       // session to thread
     Queue<FaultEvent> faults_{256};                   // thread to session
     plan::Plan* plan_ = nullptr;          // the rest is the thread's own
     hal_cycle info_{};
     const plan::Step* volatile current_ = nullptr;
     bool volatile in_function_ = false, initialising_ = false;
-    bool safe_ = true, init_done_ = false;
+    bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;
 };

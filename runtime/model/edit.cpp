@@ -205,7 +205,22 @@ void Edit::add_time_pins(Function& function) {
     for (const auto& pin : function.pins) pin->function = &function;
 }
 
-bool Edit::add_instance(Component& component, std::unique_ptr<Instance> owned, std::vector<std::unique_ptr<Function>> functions) {
+std::uint32_t Edit::take_number(Component& component) {
+    on_undo([&component] { --component.next_number; });
+    return component.next_number++;
+}
+
+void Edit::note_arguments(Component& component, std::string text) {
+    component.arguments.push_back(std::move(text));
+    on_undo([&component] { component.arguments.pop_back(); });
+}
+
+void Edit::reorder(Thread& thread, std::vector<Function*> functions) {
+    on_undo([&thread, before = thread.functions] { thread.functions = before; });
+    thread.functions = std::move(functions);
+}
+
+bool Edit::add_instance(Component& component, std::unique_ptr<Instance>& owned, std::vector<std::unique_ptr<Function>> functions) {
     Instance* const made = owned.get();
     if (const Instance* const there = model_.find_instance(made->name)) {
         Diagnostic d{Severity::error, "name-taken", "there is an instance " + quoted(made->name) + " already (" + there->component->name + ")", {{made->loaded, "second time"}}, {}};

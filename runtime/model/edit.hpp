@@ -59,7 +59,14 @@ public:
     // --- components and instances -----------------------------------------------------------------------------------
     Component& add_component(std::string name, Span at);
     /// Takes an instance with its pins and functions into the indices; reports names that are taken.
-    bool add_instance(Component& component, std::unique_ptr<Instance> instance, std::vector<std::unique_ptr<Function>> functions);
+    /// Leaves `instance` alone when it refuses.
+    bool add_instance(Component& component, std::unique_ptr<Instance>& instance, std::vector<std::unique_ptr<Function>> functions);
+    /// The number of the next unnamed instance.
+    std::uint32_t take_number(Component& component);
+    /// Puts a thread's functions into another order.
+    void reorder(Thread& thread, std::vector<Function*> functions);
+    /// `loadrt` arguments as they were written, for `save`.
+    void note_arguments(Component& component, std::string text);
     /// A shared function gets one more instance.
     void extend_function(Function& function, const plan::Step& step, Instance& instance);
     void remove_instance(Instance& instance);

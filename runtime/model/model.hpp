@@ -71,7 +71,6 @@ struct Function {
     Thread* thread = nullptr;
     bool init = false;               ///< placed by initf rather than addf
     Span added;
-    std::vector<Pin*> finite;        ///< declared-finite outputs it may write
     std::vector<std::unique_ptr<Pin>> pins;  ///< its .time, .tmax, .tmax-increased
     std::unique_ptr<plan::FunctionTimes> times = std::make_unique<plan::FunctionTimes>();
     std::uint32_t id = 0;
@@ -87,6 +86,7 @@ struct Instance {
     std::vector<Function*> functions;
     std::vector<plan::Step> emergency;
     std::vector<std::pair<std::string, hal_stream*>> streams;
+    std::vector<Pin*> finite;        ///< its declared-finite outputs
     bool constructed = false, started = false;
     Span loaded;
 };
@@ -123,6 +123,7 @@ struct Thread {
     ThreadOptions options;
     std::vector<Function*> functions, init;
     bool init_done = false;
+    Component* component = nullptr;  ///< `threads`, when loadrt made it; nullptr: newthread did
     std::vector<std::unique_ptr<Pin>> pins;
     hal_pin time{}, tmax{}, tmax_increased{}, beat{}, missed{}, wakeup{};  ///< memory of `pins`
     std::uint32_t id = 0;            ///< the executor's number; 0 until it runs

@@ -24,7 +24,6 @@ struct SessionOptions {
     std::string name = "default";    ///< of the instance; its control socket carries it
     bool virtual_clock = false;      ///< `hal sim`: threads run only in advance()
     bool check_only = false;         ///< `hal check`: construct, but start nothing
-    bool unlimited = false;          ///< reserved for tests: no waiting for cycles
     std::vector<std::string> plugin_path;  ///< searched first
 };
 
@@ -118,12 +117,12 @@ public:
     /// Registers a process started by loadusr as a component, so that unloadusr and show find it.
     void add_process(const std::string& name, std::int64_t pid, const Command& command);
     void remove_process(std::string_view name);
-    /// The built-in pages for `hal doc`: constructs the component without starting it.
     /// All plugin names that can be loaded, from the search path.
     std::vector<std::string> available_components() const;
 
-private:
     struct State;
+
+private:
     std::unique_ptr<State> state_;
 };
 

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: MIT
+#include "model/compile.hpp"
+
+#include <algorithm>
+#include <map>
+
+namespace hal {
+namespace {
+
+/// Steps that may be read ahead of the last one, see Core::run_steps.
+constexpr std::size_t read_ahead = 8;
+
+template <class Action>
+void for_all_pins(const Model& model, Action action) {
+    for (const auto& component : model.components) {
+        for (const auto& instance : component->instances)
+            for (const auto& pin : instance->pins) action(*pin);
+        for (const auto& function : component->functions)
+            for (const auto& pin : function->pins) action(*pin);
+    }
+    for (const auto& thread : model.threads)
+        for (const auto& pin : thread->pins) action(*pin);
+}
+
+class Compiler {
+public:
+    Compiler(const Model& model, const CompileInput& input) : model_(model), input_(input) {}
+
+    Compiled run() {
+        for (const auto& thread : model_.threads) {
+            auto plan = std::make_unique<plan::Plan>();
+            plan->epoch = input_.epoch;
+            plans_[thread.get()] = plan.get();
+            out_.plans.emplace_back(thread.get(), std::move(plan));
+        }
+        out_.places.resize(model_.signals.size());
+        for (const auto& signal : model_.signals) find_home(*signal);
+        for (auto& [thread, plan] : out_.plans) lay_out(*thread, *plan);
+        for (auto& [thread, plan] : out_.plans) steps(*thread, *plan);
+        for (auto& place : out_.places) connect(place);
+        for (const auto& [pair, at] : channels_) {
+            plan::Export& out = plans_[pair.first]->exports[at.first];
+            out.channel = plans_[pair.second]->imports[at.second].channel = std::make_shared<plan::Channel>(out.from.size());
+        }
+        for_all_pins(model_, [this](Pin& pin) { bind(pin); });
+        for (auto& [thread, plan] : out_.plans) plan->scratch.resize(plan->carries.size());
+        for (const auto& wish : unknown_) out_.unknowns.push_back({&plans_[wish.plan]->carries[wish.index], wish.from, wish.owner});
+        return std::move(out_);
+    }
+
+private:
+    bool excluded(const Function* function) const { return input_.without && input_.without->contains(function); }
+
+    Thread* thread_for(const Pin& pin) const {
+        if (pin.of_thread) return pin.of_thread;
+        if (pin.function) return excluded(pin.function) ? nullptr : pin.function->thread;
+        for (const Function* function : pin.instance->functions)
+            if (function->thread && !excluded(function)) return function->thread;
+        return nullptr;
+    }
+
+    // Values live with their writer: an OUT pin's thread, the thread of all I/O pins, or a cell they share.
+    void find_home(Signal& signal) {
+        Compiled::Place& place = out_.places[signal.index];
+        place = {&signal, nullptr, nullptr, {}, nullptr};
+        if (signal.writer) {
+            place.home = thread_for(*signal.writer);
+        } else if (signal.ios != 0) {
+            bool several = false;
+            for (const Pin* pin : signal.pins) {
+                if (pin->dir != HAL_DIR_IO) continue;
+                Thread* const thread = thread_for(*pin);
+                if (!thread) continue;
+                several = several || (place.home && place.home != thread);
+                place.home = thread;
+            }
+            if (several) {
+                place.home = nullptr;
+                place.cell = signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
+                place.slot = place.cell.get();
+            }
+        }
+    }
+
+    // For a cell made now, before any thread takes part: what the session knows.
+    hal_value known_value(const Signal& signal) const {
+        if (const auto at = input_.signal_values->find(const_cast<Signal*>(&signal)); at != input_.signal_values->end()) return at->second;
+        if (const auto at = input_.inherited->find(const_cast<Signal*>(&signal)); at != input_.inherited->end()) return *at->second->memory->slot;
+        return *signal.slot;
+    }
+
+    // Slots in the order in which the cycle first meets them.
+    void lay_out(Thread& thread, plan::Plan& plan) {
+        std::vector<Compiled::Place*> wanted;
+        const auto want = [&](const Pin& pin) {
+            if (!pin.signal || thread_for(pin) != &thread) return;
+            Compiled::Place& place = out_.places[pin.signal->index];
+            if (place.cell && pin.dir == HAL_DIR_IO) return;
+            const bool there = place.home == &thread ? place.slot != nullptr
+                                                     : std::any_of(place.copies.begin(), place.copies.end(), [&](const auto& c) { return c.first == &thread; });
+            if (there) return;
+            static hal_value pending;  // a mark until the image exists
+            if (place.home == &thread) place.slot = &pending;
+            else place.copies.emplace_back(&thread, &pending);
+            wanted.push_back(&place);
+        };
+        for (const auto* row : {&thread.init, &thread.functions})
+            for (const Function* function : *row) {
+                if (excluded(function)) continue;
+                for (const Instance* instance : function->instances)
+                    for (const auto& pin : instance->pins) want(*pin);
+                for (const auto& pin : function->pins) want(*pin);
+            }
+        for (const auto& pin : thread.pins) want(*pin);
+
+        plan.image_size = wanted.size();
+        plan.image = std::make_unique<hal_value[]>(wanted.size());
+        for (std::size_t i = 0; i < wanted.size(); ++i) {
+            hal_value* const slot = &plan.image[i];
+            if (wanted[i]->home == &thread) {
+                wanted[i]->slot = slot;
+            } else {
+                for (auto& [reader, copy] : wanted[i]->copies)
+                    if (reader == &thread) copy = slot;
+            }
+        }
+    }
+
+    void steps(Thread& thread, plan::Plan& plan) {
+        std::size_t checks = 0;
+        for (const auto* row : {&thread.init, &thread.functions})
+            for (const Function* function : *row)
+                for (const Instance* instance : function->instances) checks += instance->finite.size();
+        plan.finite_checks = std::make_unique<plan::FiniteCheck[]>(checks);
+        std::size_t check = 0;
+        std::unordered_set<const Instance*> met;
+        const auto fill = [&](const std::vector<Function*>& row, std::vector<plan::Step>& to, std::vector<plan::Function>& functions) {
+            for (Function* function : row) {
+                if (excluded(function)) continue;
+                const auto begin = static_cast<std::uint32_t>(to.size());
+                to.insert(to.end(), function->steps.begin(), function->steps.end());
+                for (const Instance* instance : function->instances)
+                    for (const Pin* pin : instance->finite) {
+                        if (pin->function && pin->function != function) continue;
+                        plan.finite_checks[check] = {pin->memory, pin->safe, pin->id, input_.core_of(thread), false};
+                        to.push_back({input_.check_finite, &plan.finite_checks[check++]});
+                    }
+                functions.push_back({begin, static_cast<std::uint32_t>(to.size()), function->id, function->times.get()});
+                for (const Instance* instance : function->instances)
+                    if (met.insert(instance).second) plan.emergency.insert(plan.emergency.end(), instance->emergency.begin(), instance->emergency.end());
+            }
+            to.insert(to.end(), read_ahead, plan::Step{nullptr, nullptr});
+        };
+        fill(thread.init, plan.init_steps, plan.init);
+        fill(thread.functions, plan.steps, plan.functions);
+    }
+
+    plan::Export& channel(Thread* from, Thread* to) {
+        auto [at, made] = channels_.try_emplace({from, to}, 0, 0);
+        plan::Plan& writer = *plans_[from];
+        plan::Plan& reader = *plans_[to];
+        if (made) {
+            at->second = {writer.exports.size(), reader.imports.size()};
+            writer.exports.emplace_back();
+            reader.imports.emplace_back();
+        }
+        import_ = &reader.imports[at->second.second];
+        return writer.exports[at->second.first];
+    }
+
+    void connect(Compiled::Place& place) {
+        Signal& signal = *place.signal;
+        if (place.home) {
+            carry(signal, place.home, place.slot);
+        } else if (!place.cell) {
+            place.slot = &signal.value;
+        }
+        if (place.cell) {
+            for (const auto& [thread, plan] : plans_) plan->keep.push_back(place.cell);
+        }
+        for (auto& [reader, slot] : place.copies) {
+            carry(signal, reader, slot);
+            if (place.cell) {
+                plans_[reader]->cell_imports.push_back({slot, place.cell.get()});
+            } else if (place.home) {
+                plan::Export& to = channel(place.home, reader);
+                to.from.push_back(place.slot);
+                import_->to.push_back(slot);
+            }
+        }
+    }
+
+    void carry(Signal& signal, Thread* thread, hal_value* to) {
+        const hal_value* from = nullptr;
+        hal_value value{};
+        if (const auto set = input_.signal_values->find(&signal); set != input_.signal_values->end()) {
+            value = set->second;
+        } else if (const auto given = input_.inherited->find(&signal); given != input_.inherited->end()) {
+            const Pin& pin = *given->second;
+            if (const auto pinned = input_.pin_values->find(given->second); pinned != input_.pin_values->end()) value = pinned->second;
+            else if (pin.home == thread) from = pin.memory->slot;
+            else if (!pin.home) value = *pin.memory->slot;
+            else return unknown(thread, to, pin.memory->slot, pin.home);
+        } else if (signal.cell) {
+            from = signal.cell.get();
+        } else if (signal.home == thread) {
+            from = signal.slot;
+        } else if (const auto copy = std::find_if(signal.copies.begin(), signal.copies.end(), [&](const auto& c) { return c.first == thread; });
+                   copy != signal.copies.end() && signal.home) {
+            from = copy->second;
+        } else if (!signal.home) {
+            value = signal.value;
+        } else {
+            return unknown(thread, to, signal.slot, signal.home);
+        }
+        plans_[thread]->carries.push_back({to, from, value});
+    }
+
+    void unknown(Thread* thread, hal_value* to, const hal_value* from, Thread* owner) {
+        unknown_.push_back({thread, plans_[thread]->carries.size(), from, owner});
+        plans_[thread]->carries.push_back({to, nullptr, {}});
+    }
+
+    void bind(Pin& pin) {
+        Thread* const thread = thread_for(pin);
+        if (thread != pin.home) out_.homes.emplace_back(&pin, thread);
+        plan::Plan* const plan = thread ? plans_[thread] : nullptr;
+        hal_value* slot = &pin.memory->own;
+        if (pin.signal) {
+            const Compiled::Place& place = out_.places[pin.signal->index];
+            if (!thread) slot = place.cell && pin.dir == HAL_DIR_IO ? place.slot : &pin.signal->value;
+            else if (place.cell && pin.dir == HAL_DIR_IO) slot = place.slot;
+            else if (place.home == thread) slot = place.slot;
+            else
+                for (const auto& [reader, copy] : place.copies)
+                    if (reader == thread) slot = copy;
+        } else if (const auto set = input_.pin_values->find(&pin); set != input_.pin_values->end() && plan) {
+            plan->carries.push_back({slot, nullptr, set->second});
+        } else if (pin.memory->slot != slot && plan) {
+            // an unlinked pin keeps the last value
+            if (pin.home == thread) plan->carries.push_back({slot, pin.memory->slot, {}});
+            else plan->carries.push_back({slot, nullptr, *pin.memory->slot});
+        }
+        if (pin.memory->slot != slot) (plan ? plan->rebinds : out_.session_rebinds).push_back({pin.memory, slot});
+        if (plan && (pin.flags & HAL_PIN_SAFE)) plan->safe.push_back({pin.memory, pin.safe});
+    }
+
+    struct Wish {
+        Thread* plan;
+        std::size_t index;
+        const hal_value* from;
+        Thread* owner;
+    };
+
+    const Model& model_;
+    const CompileInput& input_;
+    Compiled out_;
+    std::unordered_map<Thread*, plan::Plan*> plans_;
+    std::map<std::pair<Thread*, Thread*>, std::pair<std::size_t, std::size_t>> channels_;
+    plan::Import* import_ = nullptr;
+    std::vector<Wish> unknown_;
+};
+
+}  // namespace
+
+Compiled compile(const Model& model, const CompileInput& input) { return Compiler(model, input).run(); }
+
+std::unordered_set<const Function*> moving(const Model& model) {
+    std::unordered_set<const Function*> functions;
+    for_all_pins(model, [&](const Pin& pin) {
+        Thread* const to = thread_of(pin);
+        if (!pin.home || !to || pin.home == to) return;
+        if (pin.function) functions.insert(pin.function);
+        else if (pin.instance) functions.insert(pin.instance->functions.begin(), pin.instance->functions.end());
+    });
+    return functions;
+}
+
+}  // namespace hal

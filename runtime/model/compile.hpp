@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// From the model to a plan per thread. Pure: reads the model, changes nothing; the session applies the result.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "model/edit.hpp"
+#include "model/model.hpp"
+#include "plan/plan.hpp"
+
+namespace hal {
+
+struct CompileInput {
+    std::uint64_t epoch = 0;
+    /// Functions left out: those that move between threads, in the first of two swaps.
+    const std::unordered_set<const Function*>* without = nullptr;
+    /// New values of what threads own, and signals that take a pin's value (see Edit).
+    const std::unordered_map<Pin*, hal_value>* pin_values = nullptr;
+    const std::unordered_map<Signal*, hal_value>* signal_values = nullptr;
+    const std::unordered_map<Signal*, Pin*>* inherited = nullptr;
+    std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
+    hal_step check_finite = nullptr;
+};
+
+/// Where things will be once all threads have taken their plans.
+struct Compiled {
+    std::vector<std::pair<Thread*, std::unique_ptr<plan::Plan>>> plans;
+    struct Place {
+        Signal* signal;
+        Thread* home;
+        hal_value* slot;
+        std::vector<std::pair<Thread*, hal_value*>> copies;
+        std::shared_ptr<hal_value> cell;
+    };
+    std::vector<Place> places;                        ///< of every signal
+    std::vector<std::pair<Pin*, Thread*>> homes;      ///< of pins whose thread changes
+    std::vector<plan::Rebind> session_rebinds;        ///< of pins that no thread uses; done after the swap
+    /// Carries whose value another thread owns now: to be observed and filled in before the swap.
+    struct Unknown {
+        plan::Carry* carry;
+        const hal_value* from;
+        Thread* owner;
+    };
+    std::vector<Unknown> unknowns;
+};
+
+Compiled compile(const Model& model, const CompileInput& input);
+
+/// Functions whose instances move from one thread to another: they need two swaps. Empty: one is enough.
+std::unordered_set<const Function*> moving(const Model& model);
+
+}  // namespace hal

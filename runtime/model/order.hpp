@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include "base/diagnostic.hpp"
+#include "model/model.hpp"
+
+namespace hal {
+
+/// The functions in dataflow order: a writer before its readers, ties as given. Where the dataflow has a loop, the
+/// function that reads the fewest values too early comes first, and each such signal is said in a note.
+std::vector<Function*> dataflow_order(const std::vector<Function*>& functions, Span at, Diagnostics& diagnostics);
+
+}  // namespace hal

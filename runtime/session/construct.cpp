@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: MIT
+#include "session/construct.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <set>
+
+namespace hal {
+namespace {
+
+std::string dashed(std::string text) {
+    std::replace(text.begin(), text.end(), '_', '-');
+    return text;
+}
+
+std::vector<std::string> split(const std::string& text, char by) {
+    std::vector<std::string> parts;
+    std::size_t from = 0;
+    for (std::size_t at; (at = text.find(by, from)) != std::string::npos; from = at + 1) parts.push_back(text.substr(from, at - from));
+    parts.push_back(text.substr(from));
+    return parts;
+}
+
+struct DeclaredFunction {
+    std::string full, doc;
+    hal_step step;
+    void* self;
+    const void* identity;
+    bool shared;
+};
+
+/// What one constructor says while it runs.
+struct Construction {
+    Model& model;
+    const LoadRequest& request;
+    Instance& instance;
+    std::size_t number;                 // of this instance in the request
+    std::string personality;
+    std::vector<std::pair<std::unique_ptr<Pin>, const void*>> pins;  // with the identity of their function
+    std::vector<DeclaredFunction> functions;
+    std::set<std::string> asked, lists;  // arguments it asked for; those that are per instance
+    std::size_t list_length = 0;
+    std::vector<std::string> texts;      // keeps what argument() gave
+    std::string failure;
+};
+
+Construction& of(const hal_host* host) { return *static_cast<Construction*>(host->data); }
+
+bool refuse(Construction& c, std::string why) {
+    if (c.failure.empty()) c.failure = std::move(why);
+    return false;
+}
+
+bool declare_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+    Construction& c = of(host);
+    if (decl->size < sizeof *decl || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT || decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
+        return refuse(c, "it declares a pin that is none");
+    auto pin = std::make_unique<Pin>();
+    pin->name = c.instance.name + "." + decl->name;
+    pin->type = decl->type;
+    pin->dir = decl->dir;
+    pin->flags = decl->flags;
+    pin->doc = c.model.keep(decl->doc ? decl->doc : "");
+    pin->unit = c.model.keep(decl->unit ? decl->unit : "");
+    pin->initial = decl->initial;
+    pin->safe = decl->safe;
+    pin->memory = memory;
+    pin->instance = &c.instance;
+    pin->id = c.model.next_id++;
+    memory->own = decl->initial;
+    memory->slot = &memory->own;
+    if (decl->function && std::none_of(c.functions.begin(), c.functions.end(), [&](const auto& f) { return f.identity == decl->function; }))
+        return refuse(c, "pin '" + std::string(decl->name) + "' uses a function that is declared below it; move that member up");
+    c.pins.emplace_back(std::move(pin), decl->function);
+    return true;
+}
+
+bool declare_function(const hal_host* host, const hal_function_decl* decl) {
+    Construction& c = of(host);
+    if (decl->size < sizeof *decl || !decl->name || !decl->step) return refuse(c, "it declares a function that is none");
+    if (decl->flags & HAL_FUNCTION_EMERGENCY) {
+        c.instance.emergency.push_back({decl->step, decl->self});
+        return true;
+    }
+    const bool shared = decl->flags & HAL_FUNCTION_SHARED;
+    std::string full = shared ? dashed(c.instance.component->name) : c.instance.name;
+    if (*decl->name) full += std::string(".") + decl->name;
+    c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step, decl->self, decl->identity, shared});
+    return true;
+}
+
+const char* give_argument(const hal_host* host, const hal_argument_decl* decl) {
+    Construction& c = of(host);
+    c.asked.insert(decl->name);
+    if (std::strcmp(decl->name, "personality") == 0 && !c.personality.empty()) return c.personality.c_str();
+    const auto given = c.request.arguments.find(decl->name);
+    if (given == c.request.arguments.end()) return decl->fallback;
+    if (!(decl->flags & HAL_ARGUMENT_PER_INSTANCE)) return given->second.value.c_str();
+    const auto elements = split(given->second.value, ',');
+    c.lists.insert(decl->name);
+    c.list_length = std::max(c.list_length, elements.size());
+    if (c.number >= elements.size()) return decl->fallback;
+    c.texts.push_back(elements[c.number]);
+    return c.texts.back().c_str();
+}
+
+void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
+    Construction& c = of(host);
+    if (bytes > (std::size_t{1} << 32) || align > 64) return nullptr;
+    try {
+        // room to align by hand: arrays of char are aligned for any ordinary type only
+        c.instance.allocations.push_back(std::make_unique<char[]>(bytes + align));
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
+    const auto address = reinterpret_cast<std::uintptr_t>(c.instance.allocations.back().get());
+    return reinterpret_cast<void*>((address + align - 1) / align * align);
+}
+
+void record_failure(const hal_host* host, const char* reason) { refuse(of(host), reason ? reason : ""); }
+
+const void* no_extension(const hal_host*, const char*) { return nullptr; }
+
+// One instance: memory, constructor, declarations into the model.
+bool construct_one(Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics, std::unique_ptr<Instance> instance, Construction& c) {
+    const hal_host host{sizeof host, &c, declare_pin, declare_function, give_argument, allocate, record_failure, no_extension};
+    c.texts.reserve(request.arguments.size());  // pointers into it are handed out
+    if (!component.plugin->create(&host, instance->memory)) {
+        const std::string why = c.failure.empty() ? "it gave no reason" : c.failure;
+        for (const auto& [name, given] : request.arguments)
+            if (why.starts_with(name + "=")) {
+                diagnostics.error("bad-argument", given.at, "component '" + component.name + "': " + why, "", "hal doc " + component.name + " lists its arguments");
+                return false;
+            }
+        diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + why);
+        return false;
+    }
+    instance->constructed = true;
+    if (!c.failure.empty()) {
+        destroy_instance(*instance);
+        diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
+        return false;
+    }
+    std::vector<std::unique_ptr<Function>> own;
+    std::vector<std::pair<Function*, plan::Step>> extended;
+    std::map<const void*, Function*> by_identity;
+    for (const DeclaredFunction& decl : c.functions) {
+        Function* function = decl.shared ? c.model.find_function(decl.full) : nullptr;
+        if (function && function->shared && function->component == &component) {
+            extended.emplace_back(function, plan::Step{decl.step, decl.self});
+        } else {
+            auto made = std::make_unique<Function>();
+            function = made.get();
+            function->name = decl.full;
+            function->doc = c.model.keep(decl.doc);
+            function->steps.push_back({decl.step, decl.self});
+            function->instances.push_back(instance.get());
+            function->component = &component;
+            function->shared = decl.shared;
+            function->id = c.model.next_id++;
+            edit.add_time_pins(*function);
+            own.push_back(std::move(made));
+        }
+        by_identity[decl.identity] = function;
+        instance->functions.push_back(function);
+    }
+    for (auto& [pin, identity] : c.pins) {
+        if (identity) pin->function = by_identity[identity];
+        if (pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_FINITE)) instance->finite.push_back(pin.get());
+        instance->pins.push_back(std::move(pin));
+    }
+    std::set<std::string_view> names;
+    for (const auto& pin : instance->pins)
+        if (!names.insert(pin->name).second) {
+            const std::string twice = pin->name;
+            destroy_instance(*instance);
+            diagnostics.error("construct-failed", request.at, "component '" + component.name + "' declares pin '" + twice + "' twice");
+            return false;
+        }
+    Instance& made = *instance;
+    if (!edit.add_instance(component, instance, std::move(own))) {
+        destroy_instance(*instance);
+        return false;
+    }
+    for (const auto& [function, step] : extended) edit.extend_function(*function, step, made);
+    return true;
+}
+
+}  // namespace
+
+bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics) {
+    const hal_component& plugin = *component.plugin;
+    const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
+    const std::size_t stride = (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align;
+    const auto block = [&](std::size_t count) {
+        const std::align_val_t align{std::max<std::size_t>(plugin.instance_align, 64)};
+        void* const memory = ::operator new(count * stride, align);
+        std::memset(memory, 0, count * stride);
+        return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
+    };
+    bool known = singleton || !request.names.empty() || request.count >= 0;
+    std::size_t total = singleton ? 1 : !request.names.empty() ? request.names.size() : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
+    if (singleton && (request.names.size() > 1 || request.count > 1)) {
+        diagnostics.error("bad-argument", request.count_at.known() ? request.count_at : request.at, "component '" + component.name + "' has one instance only");
+        return false;
+    }
+    std::shared_ptr<void> storage = known ? block(std::max<std::size_t>(total, 1)) : block(1);
+    std::size_t in_block = 0;
+    std::set<std::string> asked;
+    for (std::size_t i = 0; !known || i < total; ++i) {
+        auto instance = std::make_unique<Instance>();
+        instance->component = &component;
+        instance->loaded = request.at;
+        instance->name = !request.names.empty() ? request.names[i] : singleton ? dashed(component.name) : dashed(component.name) + "." + std::to_string(edit.take_number(component));
+        instance->memory = static_cast<char*>(storage.get()) + in_block++ * stride;
+        instance->storage = storage;
+        Construction c{model, request, *instance, i, request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()], {}, {}, {}, {}, 0, {}, {}};
+        if (!construct_one(edit, component, request, diagnostics, std::move(instance), c)) return false;
+        asked.insert(c.asked.begin(), c.asked.end());
+        if (i == 0) {
+            for (const auto& [name, given] : request.arguments) {
+                if (c.asked.contains(name)) continue;
+                const std::vector<std::string> all(c.asked.begin(), c.asked.end());
+                diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", did_you_mean(name, all),
+                                  "its arguments: " + (all.empty() ? std::string() : listed(all) + ", ") + "names, count, personality");
+                return false;
+            }
+            if (!known) {
+                known = true;
+                total = c.list_length > 0 ? c.list_length : plugin.default_count;
+                if (total > 1) storage = block(total - 1);
+                in_block = 0;
+            } else if (c.list_length > total) {
+                const std::string& list = *c.lists.begin();
+                diagnostics.error("bad-argument", request.arguments.at(list).at,
+                                  "argument '" + list + "' lists " + std::to_string(c.list_length) + " values for " + std::to_string(total) + (total == 1 ? " instance" : " instances"));
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+namespace {
+struct Starting {
+    Instance& instance;
+    const hal_faults* faults;
+    std::string failure;
+};
+
+bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) {
+    static_cast<Starting*>(host->data)->instance.streams.emplace_back(name, stream);
+    return true;
+}
+constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};
+}  // namespace
+
+std::string start_instance(Instance& instance, const hal_faults* faults) {
+    Starting starting{instance, faults, {}};
+    const hal_host host{
+        sizeof host, &starting,
+        [](const hal_host* h, const hal_pin_decl*, hal_pin*) { static_cast<Starting*>(h->data)->failure = "pins are declared in the constructor, not in start"; return false; },
+        [](const hal_host* h, const hal_function_decl*) { static_cast<Starting*>(h->data)->failure = "functions are declared in the constructor, not in start"; return false; },
+        [](const hal_host*, const hal_argument_decl* decl) { return decl->fallback; },
+        [](const hal_host* h, std::size_t bytes, std::size_t) -> void* {
+            auto& allocations = static_cast<Starting*>(h->data)->instance.allocations;
+            allocations.push_back(std::make_unique<char[]>(bytes));
+            return allocations.back().get();
+        },
+        [](const hal_host* h, const char* reason) { static_cast<Starting*>(h->data)->failure = reason; },
+        [](const hal_host* h, const char* id) -> const void* {
+            if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
+            if (std::strcmp(id, "hal.faults/1") == 0) return static_cast<Starting*>(h->data)->faults;
+            return nullptr;
+        }};
+    instance.started = instance.component->plugin->start(instance.memory, &host);
+    if (instance.started) return {};
+    instance.streams.clear();
+    return starting.failure.empty() ? "it gave no reason" : starting.failure;
+}
+
+void stop_instance(Instance& instance) noexcept {
+    if (!instance.started) return;
+    instance.component->plugin->stop(instance.memory);
+    instance.streams.clear();
+    instance.started = false;
+}
+
+void destroy_instance(Instance& instance) noexcept {
+    stop_instance(instance);
+    if (instance.constructed) instance.component->plugin->destroy(instance.memory);
+    instance.constructed = false;
+}
+
+}  // namespace hal

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Hosting the C interface: makes instances of a component and takes their declarations into the model.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/diagnostic.hpp"
+#include "model/edit.hpp"
+#include "model/model.hpp"
+
+namespace hal {
+
+/// A load argument as it was given.
+struct GivenArgument {
+    std::string value;
+    Span at;
+};
+
+struct LoadRequest {
+    Span at;                                    ///< of the component's name
+    std::vector<std::string> names;             ///< names=; empty: numbered
+    std::int64_t count = -1;                    ///< count= or num_chan=; -1: not given
+    Span count_at;
+    std::vector<std::string> personalities;
+    std::map<std::string, GivenArgument> arguments;
+};
+
+/// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes with the commit.
+bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics);
+
+/// Starts one instance: it may acquire hardware. The reason of a refusal, or empty.
+std::string start_instance(Instance& instance, const hal_faults* faults);
+/// [setup] Not while a thread runs its functions.
+void stop_instance(Instance& instance) noexcept;
+void destroy_instance(Instance& instance) noexcept;
+
+}  // namespace hal

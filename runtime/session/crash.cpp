@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// The last resort: a crash signal or an exception inside a cycle. Outputs first, then a report, then the end.
+#include <atomic>
+#include <csetjmp>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <unistd.h>
+
+#include "session/state.hpp"
+
+namespace hal {
+namespace {
+
+std::atomic<Session::State*> watched{nullptr};
+
+void say(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
+
+void say(std::uint64_t number) noexcept {
+    char digits[24];
+    char* at = digits + sizeof digits;
+    *--at = '\0';
+    do *--at = static_cast<char>('0' + number % 10);
+    while (number /= 10);
+    say(at);
+}
+
+const char* signal_text(int signal) noexcept {
+    switch (signal) {
+    case SIGSEGV: return "segmentation fault";
+    case SIGBUS: return "bus error";
+    case SIGFPE: return "integer division by zero or overflow";
+    case SIGILL: return "illegal instruction";
+    default: return "abort";
+    }
+}
+
+// The process is dying: the model is read without a lock, by pointer only.
+void name_function(std::uint32_t id) noexcept {
+    if (const Session::State* const state = watched.load())
+        for (const auto& component : state->model.components)
+            for (const auto& function : component->functions)
+                if (function->id == id) {
+                    say(component->name.c_str());
+                    say(": function '");
+                    say(function->name.c_str());
+                    return say("'");
+                }
+    say("a function");
+}
+
+void on_signal(int signal) {
+    Executor::make_all_safe();
+    say("hal: ");
+    if (const Core* const core = Core::current(); core && core->in_function()) {
+        name_function(core->current_function());
+        say(" crashed (");
+        say(signal_text(signal));
+        say(") at cycle ");
+        say(core->cycle_number());
+    } else {
+        say("the program crashed outside of the cycle (");
+        say(signal_text(signal));
+        say(")");
+    }
+    say("; outputs were set to their safe values; the process ends\n");
+    raise(signal);  // SA_RESETHAND put the default action back
+}
+
+// A noexcept function let an exception out. The cycle goes on without the thread's functions.
+[[noreturn]] void on_terminate() {
+    if (Core* const core = Core::current(); core && core->in_function()) std::longjmp(core->recover, 1);
+    Executor::make_all_safe();
+    say("hal: an exception outside of the cycle was not caught; outputs were set to their safe values; the process ends\n");
+    std::abort();
+}
+
+}  // namespace
+
+void watch_for_crashes(Session::State* state) {
+    static const bool installed = [] {
+        std::set_terminate(on_terminate);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+        struct sigaction action{};
+        action.sa_handler = on_signal;
+        action.sa_flags = SA_RESETHAND | SA_NODEFER;
+        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL}) sigaction(signal, &action, nullptr);
+#endif
+        return true;
+    }();
+    (void)installed;
+    watched.store(state);
+}
+
+}  // namespace hal

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#include "session/plugins.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <dlfcn.h>
+#include <filesystem>
+#include <set>
+#include <sstream>
+
+#include "paths.hpp"
+
+namespace hal {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string user_folder() {
+    if (const char* data = std::getenv("XDG_DATA_HOME"); data && *data) return std::string(data) + "/halcyon/components";
+    if (const char* home = std::getenv("HOME"); home && *home) return std::string(home) + "/.local/share/halcyon/components";
+    return {};
+}
+
+// why a description cannot be used, or empty
+std::string problem_of(const hal_component& component) {
+    if (component.size < offsetof(hal_component, abi_minor) + sizeof component.abi_minor) return "its description is too short to be one";
+    if (component.abi_major != HAL_ABI_MAJOR)
+        return "it was built for version " + std::to_string(component.abi_major) + " of the component interface, this runtime has " + std::to_string(HAL_ABI_MAJOR);
+    if (component.size < sizeof component) return "its description has " + std::to_string(component.size) + " bytes, at least " + std::to_string(sizeof component) + " are needed";
+    if (!component.name || !*component.name || !component.summary || !component.doc) return "its description has no name, summary or doc";
+    if (!component.create || !component.start || !component.stop || !component.destroy) return "its description leaves out create, start, stop or destroy";
+    const std::size_t align = component.instance_align;
+    if (component.instance_size == 0 || component.instance_size > (1u << 30) || align == 0 || (align & (align - 1)) != 0 || align > 4096)
+        return "the size or alignment of its instances makes no sense";
+    return {};
+}
+
+}  // namespace
+
+Plugins::Plugins(std::vector<std::string> first) : path_(std::move(first)) {
+    const auto add = [this](std::string folder) {
+        if (!folder.empty() && std::find(path_.begin(), path_.end(), folder) == path_.end()) path_.push_back(std::move(folder));
+    };
+    if (const char* variable = std::getenv("HALCYON_PLUGIN_PATH")) {
+        std::istringstream folders(variable);
+        for (std::string folder; std::getline(folders, folder, ':');) add(folder);
+    }
+    add(user_folder());
+    // beside the program first, so that a moved tree finds its own
+    std::error_code none;
+    const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
+    for (const fs::path& folder : {program / "../components", program / "../lib/halcyon/components"})
+        if (fs::is_directory(folder, none)) add(fs::canonical(folder, none).string());
+    add(std::string(paths::build_components));
+    add(std::string(paths::install_components));
+}
+
+std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics& diagnostics) const {
+    std::string dashed(name), underlined(name);
+    std::replace(dashed.begin(), dashed.end(), '_', '-');
+    std::replace(underlined.begin(), underlined.end(), '-', '_');
+    std::string found;
+    if (name.find('/') == std::string_view::npos)
+        for (const std::string& folder : path_) {
+            for (const std::string& candidate : {std::string(name), underlined, dashed}) {
+                std::error_code none;
+                if (std::string file = folder + "/" + candidate + ".so"; fs::is_regular_file(file, none)) {
+                    found = std::move(file);
+                    break;
+                }
+            }
+            if (!found.empty()) break;
+        }
+    if (found.empty()) {
+        diagnostics.error("no-such-component", at, "there is no component '" + std::string(name) + "'", did_you_mean(name, available()), "hal doc lists all components");
+        return {};
+    }
+    const auto bad = [&](const std::string& why) {
+        diagnostics.error("bad-plugin", at, "'" + found + "' is not a usable component: " + why, "", "rebuild it against this version's hal/component.hpp");
+        return std::nullopt;
+    };
+    void* const library = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (!library) {
+        std::string why = dlerror();
+        if (why.starts_with(found + ": ")) why.erase(0, found.size() + 2);
+        return bad(why);
+    }
+    Plugin plugin{nullptr, std::shared_ptr<void>(library, [](void* handle) { dlclose(handle); }), found};
+    plugin.component = static_cast<const hal_component*>(dlsym(library, "hal_plugin"));
+    if (!plugin.component) return bad("it exports no symbol hal_plugin");
+    if (const std::string why = problem_of(*plugin.component); !why.empty()) return bad(why);
+    return plugin;
+}
+
+std::vector<std::string> Plugins::available() const {
+    std::set<std::string> names;
+    for (const std::string& folder : path_) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder, none))
+            if (entry.path().extension() == ".so") names.insert(entry.path().stem().string());
+    }
+    names.insert("threads");
+    return {names.begin(), names.end()};
+}
+
+}  // namespace hal

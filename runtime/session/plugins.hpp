@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/diagnostic.hpp"
+#include "hal/abi.h"
+
+namespace hal {
+
+struct Plugin {
+    const hal_component* component = nullptr;
+    std::shared_ptr<void> library;  ///< keeps it loaded
+    std::string path;
+};
+
+/// Finds and opens plugins. The only place that calls dlopen; only folders of the search path are looked in.
+class Plugins {
+public:
+    /// `first`: folders searched before HALCYON_PLUGIN_PATH, the user's folder, the build tree and the installation.
+    explicit Plugins(std::vector<std::string> first = {});
+    /// The plugin of that name (`-` and `_` are the same); nothing after reporting no-such-component or bad-plugin.
+    std::optional<Plugin> open(std::string_view name, Span at, Diagnostics& diagnostics) const;
+    /// Every name that open() would find, sorted.
+    std::vector<std::string> available() const;
+    const std::vector<std::string>& path() const { return path_; }
+
+private:
+    std::vector<std::string> path_;
+};
+
+}  // namespace hal

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: MIT
+#include "session/session.hpp"
+
+#include <algorithm>
+
+#include "model/check/check.hpp"
+#include "session/construct.hpp"
+#include "session/state.hpp"
+
+namespace hal {
+
+Session::State::State(SessionOptions o) : options(std::move(o)), plugins(options.plugin_path), executor(std::make_unique<Executor>(options.virtual_clock)) {
+    if (!options.virtual_clock && !options.check_only) refused = Executor::prepare_process();
+}
+
+Session::State::~State() = default;
+
+Session::Session(SessionOptions options) : state_(std::make_unique<State>(std::move(options))) {
+    if (!state_->options.check_only) watch_for_crashes(state_.get());
+}
+
+Session::~Session() {
+    shut_down();
+    watch_for_crashes(nullptr);
+}
+
+const SessionOptions& Session::options() const { return state_->options; }
+const Model& Session::model() const { return state_->model; }
+
+bool Session::edits(const Command& command) { return is_edit(command); }
+
+void Session::apply(const Command& command, Diagnostics& diagnostics) {
+    State& s = *state_;
+    if (!s.edit) {
+        s.edit = std::make_unique<Edit>(s.model);
+        s.commands = 0;
+    }
+    for (const auto& thread : s.model.threads)
+        if (const Core* const core = s.core(thread.get())) thread->init_done = core->passed();
+    Elaboration on{s.model, *s.edit, s.plugins, diagnostics, s.auto_orders};
+    for (const Command& plain : expand(command, diagnostics)) {
+        ++s.commands;
+        elaborate(on, plain);
+    }
+}
+
+bool Session::in_transaction() const { return state_->edit != nullptr; }
+
+void Session::State::destroy_removed() {
+    auto& removed = edit->removed();
+    for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) destroy_instance(**it);
+}
+
+void Session::State::undo_edit() {
+    edit->undo();
+    destroy_removed();
+    edit.reset();
+    auto_orders.clear();
+}
+
+void Session::abort() {
+    if (state_->edit) state_->undo_edit();
+}
+
+namespace {
+
+// What a single shell line may not yet have right (net comes before addf) is said for whole files only.
+void check_all(const Model& model, bool whole, Diagnostics& diagnostics) {
+    check_periods(model, diagnostics);
+    check_spread_pins(model, diagnostics);
+    check_arrows(model, diagnostics);
+    if (!whole) return;
+    check_unthreaded_functions(model, diagnostics);
+    check_cross_thread_io(model, diagnostics);
+    check_stale_reads(model, diagnostics);
+}
+
+}  // namespace
+
+bool Session::commit(Diagnostics& diagnostics) {
+    State& s = *state_;
+    if (!s.edit) return !diagnostics.failed();
+    if (diagnostics.failed()) return abort(), false;
+    if (!s.edit->structural()) {
+        // values only: straight into the threads' queues, whatever the size of the machine
+        bool written = true;
+        const auto write = [&](const Thread* thread, hal_value* to, hal_value value) {
+            if (Core* const core = s.core(thread)) written = s.executor->write(*core, {to, value}, answer_timeout_ns) && written;
+        };
+        for (const auto& [pin, value] : s.edit->pin_values) write(pin->home, pin->memory->slot, value);
+        for (const auto& [signal, value] : s.edit->signal_values) {
+            if (signal->cell) __atomic_store_n(&signal->cell->raw, value.raw, __ATOMIC_RELAXED);
+            else if (signal->home) write(signal->home, signal->slot, value);
+            else {
+                signal->value = value;
+                for (const auto& [thread, copy] : signal->copies) write(thread, copy, value);
+            }
+        }
+        if (!written) diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "", "show thread and show fault say more");
+        s.edit.reset();
+        return written;
+    }
+    apply_auto_order(s.model, *s.edit, s.auto_orders, diagnostics);
+    s.auto_orders.clear();
+    Diagnostics found;
+    check_all(s.model, s.commands > 1, found);
+    for (const Diagnostic& one : found.all()) {
+        // an old warning is not said again with every later edit
+        if (one.severity == Severity::error || s.reported.insert(one.message).second) diagnostics.add(one);
+    }
+    if (diagnostics.failed()) return abort(), false;
+    if (s.options.check_only) {
+        s.destroy_removed();
+        s.edit.reset();
+        return true;
+    }
+
+    std::vector<Instance*> started;
+    for (Instance* const instance : s.edit->added_instances()) {
+        if (!instance->constructed || s.model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
+        if (const std::string why = start_instance(*instance, &s.executor->board().shared); !why.empty())
+            diagnostics.error("start-failed", instance->loaded, "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
+        else
+            started.push_back(instance);
+    }
+    const bool good = !diagnostics.failed() && s.make_threads(diagnostics) && s.end_threads(s.edit->removed().threads, diagnostics) && s.synchronise(diagnostics);
+    if (!good) {
+        // Back to the model as it was. Threads that took the new plan take one of the old model again.
+        for (auto it = started.rbegin(); it != started.rend(); ++it) stop_instance(**it);
+        std::vector<std::unique_ptr<Instance>> gone;
+        s.edit->undo();
+        std::vector<std::unique_ptr<Thread>> unwanted;
+        std::vector<const Thread*> orphans;
+        for (const auto& [thread, core] : s.cores)
+            if (std::none_of(s.model.threads.begin(), s.model.threads.end(), [&, t = thread](const auto& one) { return one.get() == t; })) orphans.push_back(thread);
+        for (const Thread* const thread : orphans) {
+            if (s.executor->remove(*s.cores[thread], answer_timeout_ns)) s.cores.erase(thread);
+        }
+        Diagnostics ignored;
+        if (s.make_threads(ignored)) s.synchronise(ignored);
+        s.destroy_removed();
+        s.edit.reset();
+        return false;
+    }
+    s.destroy_removed();
+    s.edit.reset();
+    return true;
+}
+
+// --- the machine ----------------------------------------------------------------------------------------------------
+
+void Session::start_threads() {
+    for (const auto& [thread, core] : state_->cores) core->clear_stop();
+    state_->executor->start();
+}
+
+void Session::stop_threads() {
+    State& s = *state_;
+    if (!s.executor->running()) return;
+    s.executor->stop();
+    // every thread makes its outputs safe at the end of its next cycle; see it done
+    std::deque<Observation> observations;
+    std::vector<std::pair<Core*, Observation*>> wishes;
+    for (const auto& [thread, core] : s.cores) wishes.emplace_back(core, &observations.emplace_back());
+    s.executor->observe(wishes, answer_timeout_ns);
+}
+
+bool Session::running() const { return state_->executor->running(); }
+
+void Session::advance_ns(std::int64_t ns) { state_->executor->advance(ns); }
+
+void Session::advance_cycles(std::uint64_t cycles) {
+    State& s = *state_;
+    if (s.model.threads.empty()) return;
+    const Thread& fastest = *s.model.threads.front();
+    const Core* const core = s.core(&fastest);
+    const std::uint64_t wanted = core->cycles.load() + cycles;
+    s.executor->advance(static_cast<std::int64_t>(cycles) * fastest.options.period_ns);
+    // under the real clock periods may have been missed: cycles are what was asked for
+    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted && !s.executor->is_virtual(); ++turn) s.executor->advance(fastest.options.period_ns);
+}
+
+std::int64_t Session::now_ns() const { return state_->executor->now_ns(); }
+
+void Session::shut_down() {
+    State& s = *state_;
+    if (s.shut) return;
+    s.shut = true;
+    abort();
+    if (s.options.check_only) {
+        for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c)
+            for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) destroy_instance(**i);
+        return;
+    }
+    stop_threads();
+    bool all_ended = true;
+    for (const auto& [thread, core] : s.cores) all_ended = s.executor->remove(*core, answer_timeout_ns) && all_ended;
+    if (!all_ended) return;  // a function that hangs may still use its instance: leave everything as it is
+    s.cores.clear();
+    for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c)
+        for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) destroy_instance(**i);
+}
+
+// --- values ---------------------------------------------------------------------------------------------------------
+
+namespace {
+
+struct Source {
+    const hal_value* from;
+    const Thread* owner;   // nullptr: the session may read it itself
+};
+
+Source source(const Signal& signal) {
+    if (signal.cell || !signal.home) return {signal.slot, nullptr};
+    return {signal.slot, signal.home};
+}
+
+Source source(const Pin& pin) { return pin.signal ? source(*pin.signal) : Source{pin.memory->slot, pin.home}; }
+
+template <class Object>
+std::vector<hal_value> read_all(Session::State& s, const std::vector<const Object*>& objects) {
+    struct Group {
+        std::vector<const hal_value*> from;
+        std::vector<std::size_t> at;
+        std::vector<hal_value> to;
+        Observation wish;
+    };
+    std::vector<hal_value> values(objects.size());
+    std::map<Core*, Group> groups;
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        const Source from = source(*objects[i]);
+        Core* const core = from.owner ? s.core(from.owner) : nullptr;
+        if (!core) {
+            values[i].raw = __atomic_load_n(&from.from->raw, __ATOMIC_RELAXED);
+            continue;
+        }
+        groups[core].from.push_back(from.from);
+        groups[core].at.push_back(i);
+    }
+    std::vector<std::pair<Core*, Observation*>> wishes;
+    for (auto& [core, group] : groups) {
+        group.to.resize(group.from.size());
+        group.wish.from = group.from.data();
+        group.wish.to = group.to.data();
+        group.wish.count = group.from.size();
+        wishes.emplace_back(core, &group.wish);
+    }
+    if (!wishes.empty()) s.executor->observe(wishes, answer_timeout_ns);
+    for (auto& [core, group] : groups) {
+        const bool answered = group.wish.done.load();
+        for (std::size_t k = 0; k < group.at.size(); ++k) {
+            if (answered) values[group.at[k]] = group.to[k];
+            else values[group.at[k]].raw = __atomic_load_n(&group.from[k]->raw, __ATOMIC_RELAXED);  // it hangs: its memory stands still
+        }
+    }
+    return values;
+}
+
+}  // namespace
+
+std::vector<hal_value> Session::read_pins(const std::vector<const Pin*>& pins) { return read_all(*state_, pins); }
+std::vector<hal_value> Session::read_signals(const std::vector<const Signal*>& signals) { return read_all(*state_, signals); }
+
+std::vector<std::optional<Reading>> Session::read(const std::vector<std::string>& names) {
+    std::vector<std::optional<Reading>> readings(names.size());
+    std::vector<const Pin*> pins;
+    std::vector<const Signal*> signals;
+    std::vector<std::size_t> pin_at, signal_at;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (const Pin* const pin = model().find_pin(names[i])) {
+            readings[i] = Reading{pin->type, {}};
+            pins.push_back(pin);
+            pin_at.push_back(i);
+        } else if (const Signal* const signal = model().find_signal(names[i])) {
+            readings[i] = Reading{signal->type, {}};
+            signals.push_back(signal);
+            signal_at.push_back(i);
+        }
+    }
+    const auto pin_values = read_pins(pins), signal_values = read_signals(signals);
+    for (std::size_t k = 0; k < pins.size(); ++k) readings[pin_at[k]]->value = pin_values[k];
+    for (std::size_t k = 0; k < signals.size(); ++k) readings[signal_at[k]]->value = signal_values[k];
+    return readings;
+}
+
+// --- streams, processes -----------------------------------------------------------------------------------------------
+
+hal_stream* Session::find_stream(std::string_view name) const {
+    for (const auto& component : model().components)
+        for (const auto& instance : component->instances)
+            for (const auto& [stream_name, stream] : instance->streams)
+                if (stream_name == name) return stream;
+    return nullptr;
+}
+
+std::vector<std::string> Session::stream_names() const {
+    std::vector<std::string> names;
+    for (const auto& component : model().components)
+        for (const auto& instance : component->instances)
+            for (const auto& [name, stream] : instance->streams) names.push_back(name);
+    return names;
+}
+
+void Session::add_process(const std::string& name, std::int64_t pid, const Command& command) {
+    Edit once(state_->model);
+    Component& component = once.add_component(name, command.span);
+    component.process = pid;
+    std::string text;
+    for (const Token& token : command.args) text += (text.empty() ? "" : " ") + token.text;
+    component.arguments.push_back(std::move(text));
+}
+
+void Session::remove_process(std::string_view name) {
+    Edit once(state_->model);
+    if (Component* const component = state_->model.find_component(name); component && component->process != 0) once.remove_component(*component);
+}
+
+std::vector<std::string> Session::available_components() const { return state_->plugins.available(); }
+
+}  // namespace hal

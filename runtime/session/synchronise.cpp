@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// From an edited model to threads that run it: DESIGN section 4, steps 5 and 6.
+#include <algorithm>
+
+#include "session/state.hpp"
+
+namespace hal {
+
+Core* Session::State::core(const Thread* thread) const {
+    const auto at = cores.find(thread);
+    return at == cores.end() ? nullptr : at->second;
+}
+
+bool Session::State::make_threads(Diagnostics& diagnostics) {
+    if (options.check_only) return true;
+    // priorities fall with the rate, from 98 as LinuxCNC has it
+    int priority = 98;
+    for (const auto& thread : model.threads) {
+        const ThreadOptions& o = thread->options;
+        if (!cores.contains(thread.get())) {
+            CoreOptions wanted{o.period_ns, o.cpu, o.policy == Policy::fifo ? (o.priority ? o.priority : std::max(priority, 1)) : 0, o.policy == Policy::deadline, o.spin_ns, o.budget_ns, o.profile_every};
+            const ThreadPins pins{&thread->time, &thread->tmax, &thread->tmax_increased, &thread->beat, &thread->missed, &thread->wakeup};
+            try {
+                cores[thread.get()] = &executor->add(wanted, pins);
+            } catch (const std::exception& e) {
+                diagnostics.error("thread-refused", thread->made, "thread '" + thread->name + "' cannot be made: " + e.what());
+                return false;
+            }
+        }
+        --priority;
+    }
+    return true;
+}
+
+bool Session::State::end_threads(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics) {
+    for (const auto& owned : threads) {
+        Thread* const thread = owned.get();
+        Core* const leaving = core(thread);
+        if (!leaving) continue;
+        if (!executor->remove(*leaving, answer_timeout_ns)) {
+            diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' does not end: one of its functions hangs");
+            return false;
+        }
+        cores.erase(thread);
+        // it writes nothing any more: the session owns what it owned (its last plan's image stays until the swap)
+        for (const auto& signal : model.signals) {
+            if (signal->home == thread) {
+                signal->value = *signal->slot;
+                signal->home = nullptr;
+                signal->slot = &signal->value;
+            }
+            std::erase_if(signal->copies, [&](const auto& copy) { return copy.first == thread; });
+        }
+        for (const auto& component : model.components) {
+            for (const auto& instance : component->instances)
+                for (const auto& pin : instance->pins)
+                    if (pin->home == thread) pin->home = nullptr;
+            for (const auto& function : component->functions)
+                for (const auto& pin : function->pins)
+                    if (pin->home == thread) pin->home = nullptr;
+        }
+        for (const auto& pin : thread->pins) pin->home = nullptr;
+    }
+    return true;
+}
+
+bool Session::State::synchronise(Diagnostics& diagnostics) {
+    // A function must never be in two threads at once: first everything runs without the movers, then with them.
+    if (const auto movers = moving(model); !movers.empty() && !swap(movers, diagnostics)) return false;
+    return swap({}, diagnostics);
+}
+
+bool Session::State::swap(const std::unordered_set<const Function*>& without, Diagnostics& diagnostics) {
+    CompileInput input;
+    input.epoch = ++epoch;
+    input.without = &without;
+    input.pin_values = &edit->pin_values;
+    input.signal_values = &edit->signal_values;
+    input.inherited = &edit->inherited;
+    input.core_of = [this](const Thread& thread) -> void* { return core(&thread); };
+    input.check_finite = check_finite;
+    Compiled compiled = compile(model, input);
+    observe_unknowns(compiled);
+
+    std::vector<std::pair<Core*, plan::Plan*>> offers;
+    for (auto& [thread, plan] : compiled.plans) offers.emplace_back(core(thread), plan.get());
+    const std::vector<Core*> silent = executor->swap(offers, answer_timeout_ns);
+    settle(compiled, silent);
+    for (const Core* const hangs : silent)
+        for (const auto& [thread, one] : cores)
+            if (one == hangs)
+                diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' did not answer within " + format_duration(static_cast<double>(answer_timeout_ns)) + ": one of its functions hangs, or it gets no CPU time", "",
+                                  "show thread and show fault say more");
+    return silent.empty();
+}
+
+// Values that another thread owns: one coherent look into each such thread.
+void Session::State::observe_unknowns(Compiled& compiled) {
+    std::map<Core*, std::vector<Compiled::Unknown*>> by_owner;
+    for (auto& unknown : compiled.unknowns) {
+        if (Core* const owner = core(unknown.owner)) by_owner[owner].push_back(&unknown);
+        else unknown.carry->value = *unknown.from;
+    }
+    std::deque<Observation> observations;
+    std::deque<std::vector<const hal_value*>> from;
+    std::deque<std::vector<hal_value>> to;
+    std::vector<std::pair<Core*, Observation*>> wishes;
+    for (const auto& [owner, unknowns] : by_owner) {
+        auto& sources = from.emplace_back();
+        for (const auto* unknown : unknowns) sources.push_back(unknown->from);
+        auto& values = to.emplace_back(unknowns.size());
+        Observation& wish = observations.emplace_back();
+        wish.from = sources.data();
+        wish.to = values.data();
+        wish.count = sources.size();
+        wishes.emplace_back(owner, &wish);
+    }
+    if (wishes.empty()) return;
+    executor->observe(wishes, answer_timeout_ns);
+    std::size_t i = 0;
+    for (const auto& [owner, unknowns] : by_owner) {
+        for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k]->carry->value = to[i][k];
+        ++i;
+    }
+}
+
+// All threads that answered run the new plans; the old images are still there, and nobody writes them any more.
+void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent) {
+    const auto hangs = [&](const Thread* thread) { return thread && std::find(silent.begin(), silent.end(), core(thread)) != silent.end(); };
+    for (Compiled::Place& place : compiled.places) {
+        Signal& signal = *place.signal;
+        if (hangs(signal.home) || hangs(place.home)) continue;
+        if (!place.home && !place.cell) {
+            if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end()) signal.value = set->second;
+            else if (const auto from = edit->inherited.find(&signal); from != edit->inherited.end()) {
+                const auto pinned = edit->pin_values.find(from->second);
+                signal.value = pinned != edit->pin_values.end() ? pinned->second : *from->second->memory->slot;
+            } else if (signal.cell) signal.value.raw = __atomic_load_n(&signal.cell->raw, __ATOMIC_RELAXED);
+            else if (signal.home) signal.value = *signal.slot;
+        } else if (place.cell) {
+            if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end()) __atomic_store_n(&place.cell->raw, set->second.raw, __ATOMIC_RELAXED);
+        }
+    }
+    for (const plan::Rebind& rebind : compiled.session_rebinds) {
+        if (rebind.slot == &rebind.pin->own) rebind.pin->own = *rebind.pin->slot;
+        rebind.pin->slot = rebind.slot;
+    }
+    for (const auto& [pin, thread] : compiled.homes)
+        if (!hangs(pin->home) && !hangs(thread)) pin->home = thread;
+    for (Compiled::Place& place : compiled.places) {
+        if (hangs(place.signal->home) || hangs(place.home)) continue;
+        Signal& signal = *place.signal;
+        signal.home = place.home;
+        signal.slot = place.slot;
+        signal.copies = std::move(place.copies);
+        signal.cell = std::move(place.cell);
+    }
+    for (const auto& [pin, value] : edit->pin_values)
+        if (!pin->home) *pin->memory->slot = value;
+    // the values have been taken; a second swap of the same edit must not give them again
+    edit->pin_values.clear();
+    edit->signal_values.clear();
+    edit->inherited.clear();
+    for (auto& [thread, plan] : compiled.plans) {
+        if (hangs(thread)) continue;
+        plans[thread] = std::move(plan);
+    }
+    std::erase_if(plans, [&](const auto& entry) {
+        return std::none_of(model.threads.begin(), model.threads.end(), [&](const auto& thread) { return thread.get() == entry.first; });
+    });
+}
+
+}  // namespace hal
