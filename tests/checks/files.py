@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""files.py ROOT: every folder of the tree has a README of about ten lines, every source its licence line and at most 600 lines."""
+"""files.py ROOT: every folder has a README of about ten lines that names only files that exist; every source has its licence line and
+at most 600 lines."""
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +14,21 @@ SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
 LONGER_READMES = {"README.md", "runtime/README.md"}
 # Folders whose parent's README speaks for them: data, one folder per case, and what only holds other folders' files.
 NO_README = ("runtime/abi/hal", "runtime/sdk/hal", "tests/netlists/", "tests/errors/", "tests/fuzz/", ".ci", "cmake", "docs/")
+
+# What a page says is there: `file.ext` in backticks, and [links](to files).
+MENTIONED = re.compile(r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\]\((?!https?:|#)([^)#]+)[^)]*\)")
+
+
+def absent(root, page, files):
+    """(line number, name) of each file that `page` mentions and that is neither beside or below it, nor at that path
+    from the root or from where the sdk is included."""
+    near = [f.as_posix() for f in files if page.parent in f.parents]
+    for number, line in enumerate((root / page).read_text(errors="replace").splitlines(), 1):
+        for quoted, link in MENTIONED.findall(line):
+            name = quoted or link
+            exists = any((root / base / name).exists() for base in (page.parent, ".", "runtime/abi", "runtime/sdk"))
+            if not exists and not any(f.endswith("/" + name) for f in near if quoted):
+                yield number, name
 
 
 def tracked(root):
@@ -43,6 +60,9 @@ def main(root):
             errors.append(f"{name}: has no README.md: what it is for, what it must not do, where to start reading")
         elif readme.as_posix() not in LONGER_READMES and len((root / readme).read_text().splitlines()) > MAX_README:
             errors.append(f"{readme}: longer than {MAX_README} lines")
+    for page in files:
+        if page.name == "README.md":
+            errors += [f"{page}:{number}: mentions {name}, which does not exist" for number, name in absent(root, page, files)]
     print("\n".join(errors) if errors else f"{len(files)} files checked")
     return 1 if errors else 0
 
