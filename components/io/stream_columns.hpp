@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// What sampler and streamer share: a row of pins of several types, and the FIFO of records behind them.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "hal/component.hpp"
+
+namespace stream {
+
+constexpr std::string_view letters = "bfsulk";  // of the types below, as cfg= and hal_stream::types have them
+
+/// A pin of any type; the alternatives stand in the order of `letters`.
+using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::In<std::int32_t>, hal::In<std::uint32_t>, hal::In<std::int64_t>,
+                           hal::In<std::uint64_t>>;
+using AnyOut = std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>, hal::Out<std::uint32_t>,
+                            hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
+
+/// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO.
+template <class AnyPin>
+class Columns {
+public:
+    /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too large. [setup]
+    Columns(hal::Component& component, const std::string& cfg, std::int64_t depth, bool to_machine, const char* doc) {
+        if (cfg.empty()) throw std::invalid_argument("cfg= is empty: a letter per pin is needed, of b f s u l k");
+        constexpr std::size_t most_values = std::size_t{1} << 26;  // half a gigabyte
+        if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) 
+            throw std::invalid_argument("depth=" + std::to_string(depth) + " records of this cfg need more than 512 MB");
+        for (const char letter : cfg) add(component, letter, doc);
+        values_.resize(static_cast<std::size_t>(depth) * (cfg.size() + 1));
+        fifo_.size = sizeof fifo_;
+        fifo_.columns = static_cast<std::uint32_t>(cfg.size());
+        fifo_.depth = static_cast<std::uint32_t>(depth);
+        fifo_.to_machine = to_machine ? 1 : 0;
+        fifo_.types = types_.c_str();
+        fifo_.data = values_.data();
+    }
+
+    /// Makes the FIFO known to the programs outside as the instance's own name; a host without streams is all right.
+    /// In start(). [setup]
+    void publish(const hal_host& host) {
+        const auto* streams = hal::extension<hal_stream_host>("hal.stream/1");
+        if (streams != nullptr && !streams->publish(&host, "", &fifo_)) throw std::runtime_error("the stream could not be published");
+    }
+
+    hal_stream& fifo() noexcept { return fifo_; }
+    std::deque<AnyPin>& pins() noexcept { return pins_; }
+    /// The record with a running number: a value per column, then the sample number. [realtime]
+    hal_value* record(std::uint64_t number) noexcept { return &fifo_.data[number % fifo_.depth * (fifo_.columns + 1)]; }
+
+private:
+    void add(hal::Component& component, char letter, const char* doc) {
+        const char lower = letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
+        const std::string name = "pin." + std::to_string(pins_.size());
+        AnyPin& pin = pins_.emplace_back();
+        switch (letters.find(lower)) {
+            case 0: pin.template emplace<1>(component, name.c_str(), doc); break;
+            case 1: pin.template emplace<2>(component, name.c_str(), doc); break;
+            case 2: pin.template emplace<3>(component, name.c_str(), doc); break;
+            case 3: pin.template emplace<4>(component, name.c_str(), doc); break;
+            case 4: pin.template emplace<5>(component, name.c_str(), doc); break;
+            case 5: pin.template emplace<6>(component, name.c_str(), doc); break;
+            default: throw std::invalid_argument(std::string("cfg has the letter '") + letter + "'; it may have b f s u l k");
+        }
+        types_ += lower;
+    }
+
+    std::deque<AnyPin> pins_;
+    std::string types_;
+    std::vector<hal_value> values_;
+    hal_stream fifo_{};
+};
+
+}  // namespace stream

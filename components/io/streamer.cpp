@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+#include "stream_columns.hpp"
+
+namespace {
+
+struct Streamer : hal::Component {
+    using Component::Component;
+    enum ClockMode { free_running, falling, rising, both };
+
+    hal::TextArgument cfg{*this, "cfg", "f", "a letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
+    hal::Argument depth{*this, "depth", 4000, "records the FIFO holds", {.per_instance = true, .min = 1, .max = 1 << 26}};
+
+    stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true, "value of the newest record"};
+    hal::In<bool> enable{*this, "enable", "FALSE: the pins stay as they are", {.initial = true}};
+    hal::In<bool> clock{*this, "clock", "edges that take the next record, see clock-mode"};
+    hal::In<std::int32_t> clock_mode{*this, "clock-mode", "0: a record per cycle; per edge of clock: 1 falling, 2 rising, 3 both"};
+    hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO"};
+    hal::Out<bool> empty{*this, "empty", "TRUE: there was no record for this cycle", {.initial = true}};
+    hal::Io<std::int32_t> underruns{*this, "underruns", "times a record was due and there was none; may be set"};
+
+    hal::Function run{*this, "", &Streamer::play, "puts the next record on the pins"};
+
+    void start(const hal_host& host) { columns.publish(host); }
+
+    /// Consumer of the FIFO: reads the record, then writes tail (release). The producer outside writes head after filling.
+    void play(hal::Cycle) noexcept {
+        hal_stream& fifo = columns.fifo();
+        const std::uint64_t tail = fifo.tail;
+        std::uint64_t held = __atomic_load_n(&fifo.head, __ATOMIC_ACQUIRE) - tail;
+        empty = held == 0;
+        if (due() && enable) {
+            if (held > 0) {
+                read(columns.record(tail));
+                __atomic_store_n(&fifo.tail, tail + 1, __ATOMIC_RELEASE);
+                --held;
+            } else {
+                underruns = static_cast<std::int32_t>(static_cast<std::uint32_t>(underruns.get()) + 1);
+                __atomic_store_n(&fifo.lost, fifo.lost + 1, __ATOMIC_RELAXED);
+            }
+        }
+        waiting = static_cast<std::int32_t>(held);
+    }
+
+private:
+    bool due() noexcept {
+        const bool level = clock, before = was_clock_;
+        was_clock_ = level;
+        switch (clock_mode) {
+            case free_running: return true;
+            case falling: return before && !level;
+            case rising: return level && !before;
+            case both: return level != before;
+            default: return false;
+        }
+    }
+
+    void read(const hal_value* from) noexcept {
+        for (auto& pin : columns.pins()) {
+            std::visit([from](auto& p) {
+                if constexpr (requires { p.get(); }) p = hal::detail::load<decltype(p.get()), false>(from);
+            }, pin);
+            ++from;
+        }
+    }
+
+    bool was_clock_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Streamer, "streamer", "Plays records from a FIFO, which programs outside fill, to pins", R"(
+In every cycle in which a record is due, the next one goes from the FIFO to the pins; without one they stay as they are and
+`underruns` counts. `clock-mode` says when one is due: 0 in every cycle, 1 at falling, 2 at rising, 3 at both edges of `clock`.
+The number of pins is not limited.
+
+    loadrt streamer depth=2000 cfg=fb
+    addf streamer.0 servo-thread
+    net x-command  streamer.0.pin.0 => pid.0.command
+)")

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Supply : hal::Component {
+    using Component::Component;
+
+    hal::Param<bool> d{*this, "d", "source of q and _q"};
+    hal::Param<double> value{*this, "value", "source of variable and _variable"};
+    hal::Out<bool> q{*this, "q", "d"};
+    hal::Out<bool> not_q{*this, "_q", "the opposite of d"};
+    hal::Out<double> variable{*this, "variable", "value"};
+    hal::Out<double> negative{*this, "_variable", "-value"};
+
+    hal::Function run{*this, "update", &Supply::update, "copies the parameters to the outputs"};
+
+    void update(hal::Cycle) noexcept {
+        q = d;
+        not_q = !d;
+        variable = value;
+        negative = -value;
+    }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Supply, "supply", "Outputs that a user sets by hand", R"(
+`setp supply.0.value 3` puts 3 on `variable` and -3 on `_variable`; `setp supply.0.d 1` sets `q` and clears `_q`. Kept for
+netlists that have it: `setp` on an unlinked input and `sets` on a signal without writer do the same.
+
+    loadrt supply num_chan=1
+    addf supply.0.update servo-thread
+    net command  supply.0.variable => pid.0.command
+)")

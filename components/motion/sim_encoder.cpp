@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct SimEncoder : hal::Component {
+    using Component::Component;
+
+    hal::Function make{*this, "make-pulses", &SimEncoder::make_pulses, "makes the phases; in the fastest thread", {.shared = true}};
+    hal::Out<bool> phase_a{*this, make, "phase-A", "phase A: leads while speed is positive"};
+    hal::Out<bool> phase_b{*this, make, "phase-B", "phase B"};
+    hal::Out<bool> phase_z{*this, make, "phase-Z", "index, one count wide, once per turn"};
+    hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts", "counts since the start, four per pulse"};
+    hal::Param<std::uint32_t> pulses{*this, make, "ppr", "pulses per turn; four counts each", {.initial = 100}};
+
+    hal::Function run{*this, "update-speed", &SimEncoder::update_speed, "takes the speed; in the servo thread", {.shared = true}};
+    hal::In<double> speed{*this, run, "speed", "speed in user units per second"};
+    hal::Param<double> scale{*this, run, "scale", "user units per turn", {.initial = 1.0}};
+
+    void make_pulses(hal::Cycle cycle) noexcept {
+        const std::int64_t per_turn = 4 * static_cast<std::int64_t>(pulses);
+        // At most an edge per cycle: a faster shaft could not be told from a slower one.
+        const double step = turns_per_second_.load(std::memory_order_relaxed) * static_cast<double>(per_turn) * cycle.seconds();
+        place_ += step > 1.0 ? 1.0 : step < -1.0 ? -1.0 : step;
+        const double whole = std::floor(place_);
+        place_ -= whole;
+        count_ += static_cast<std::int64_t>(whole);
+
+        phase_a = ((count_ + 1) & 2) != 0;
+        phase_b = (count_ & 2) != 0;
+        phase_z = per_turn > 0 && count_ % per_turn == 0;
+        raw_counts = static_cast<std::int32_t>(count_);
+    }
+
+    void update_speed(hal::Cycle) noexcept {
+        const double turns = scale != 0.0 ? speed / scale : speed.get();
+        turns_per_second_.store(std::isfinite(turns) ? turns : 0.0, std::memory_order_relaxed);
+    }
+
+private:
+    std::atomic<double> turns_per_second_{0.0};  // update-speed writes, make-pulses reads
+    // make-pulses only
+    std::int64_t count_ = 0;
+    double place_ = 0.5;  // between two edges, 0 to 1
+};
+
+}  // namespace
+
+HAL_COMPONENT(SimEncoder, "sim_encoder", "A quadrature encoder that turns at a commanded speed", R"(
+Makes the phases an encoder of `ppr` pulses per turn shows while its shaft turns at `speed` / `scale` turns per second.
+`sim-encoder.update-speed` belongs into the servo thread, `sim-encoder.make-pulses` into the fastest; it makes at most an
+edge per period, so the speed is limited to 1 / (4 ppr T) turns per second.
+
+    loadrt sim_encoder num_chan=1
+    addf sim-encoder.make-pulses base-thread
+    addf sim-encoder.update-speed servo-thread
+    net A sim-encoder.0.phase-A => encoder.0.phase-A
+    net B sim-encoder.0.phase-B => encoder.0.phase-B
+)")

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "hal/component.hpp"
+#include "hal/queue.hpp"
+
+namespace {
+
+/// What `update-freq` asks of `make-pulses`.
+struct Order {
+    bool on = false;
+    double rate = 0.0;  // steps per period of make-pulses, signed
+    std::int64_t step_ns = 0, space_ns = 0, hold_ns = 0, setup_ns = 0;
+};
+
+/// The outputs of a motor with several phases: bit 0 is phase A. Full steps drive one phase or two neighbours, half
+/// steps alternate; bipolar ones are two bridges, A-B and C-D, that carry current where their two outputs differ.
+struct Sequence {
+    int phases;
+    int length;
+    std::array<std::uint8_t, 10> states;
+};
+constexpr int first_sequence = 2, user_type = 15;
+constexpr std::array<Sequence, 13> sequences{{
+    {2, 4, {0b00, 0b01, 0b11, 0b10}},                                                       // 2 quadrature
+    {3, 3, {0b001, 0b010, 0b100}},                                                          // 3 three phases, full step
+    {3, 6, {0b001, 0b011, 0b010, 0b110, 0b100, 0b101}},                                     // 4 three phases, half step
+    {4, 4, {0b0001, 0b0010, 0b0100, 0b1000}},                                               // 5 unipolar, one phase on
+    {4, 4, {0b0011, 0b0110, 0b1100, 0b1001}},                                               // 6 unipolar, two phases on
+    {4, 4, {0b0001, 0b0111, 0b1110, 0b1000}},                                               // 7 bipolar, one bridge on
+    {4, 4, {0b0101, 0b0110, 0b1010, 0b1001}},                                               // 8 bipolar, both bridges on
+    {4, 8, {0b0001, 0b0011, 0b0010, 0b0110, 0b0100, 0b1100, 0b1000, 0b1001}},               // 9 unipolar, half step
+    {4, 8, {0b0001, 0b0101, 0b0111, 0b0110, 0b1110, 0b1010, 0b1000, 0b1001}},               // 10 bipolar, half step
+    {5, 5, {0b00001, 0b00010, 0b00100, 0b01000, 0b10000}},                                  // 11 five phases, one on
+    {5, 5, {0b00011, 0b00110, 0b01100, 0b11000, 0b10001}},                                  // 12 five phases, two on
+    {5, 10, {0b00001, 0b00011, 0b00010, 0b00110, 0b00100, 0b01100, 0b01000, 0b11000, 0b10000, 0b10001}},  // 13 one or two
+    {5, 10, {0b00011, 0b00111, 0b00110, 0b01110, 0b01100, 0b11100, 0b11000, 0b11001, 0b10001, 0b10011}},  // 14 two or three
+}};
+
+struct Stepgen : hal::Component {
+    enum Type { step_dir, up_down };
+
+    hal::Argument type{*this, "step_type", 0, "waveform, 0 to 15; one number per instance", {.per_instance = true, .min = 0, .max = user_type}};
+    hal::TextArgument control{*this, "ctrl_type", "p", "p: position-cmd, v: velocity-cmd; one letter per instance", {.per_instance = true}};
+    hal::TextArgument user{*this, "user_step_type", "", "states of step type 15, numbers of up to 5 bits, at most 10 of them: 0x1,0x2,0x4"};
+
+    hal::Function make{*this, "make-pulses", &Stepgen::make_pulses, "makes the waveforms; in the fastest thread", {.shared = true}};
+    std::optional<hal::Out<bool>> first, second;  // step and dir, or up and down
+    hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts", "steps made since the start"};
+
+    hal::Function capture{*this, "capture-position", &Stepgen::capture_position, "publishes the position; in the servo thread, before the controller", {.shared = true}};
+    hal::Out<std::int32_t> counts{*this, capture, "counts", "steps made since the start"};
+    hal::Out<double> position_fb{*this, capture, "position-fb", "position in length units, finer than a step"};
+
+    hal::Function run{*this, "update-freq", &Stepgen::update_freq, "takes new commands; in the servo thread, after the controller", {.shared = true}};
+    hal::In<bool> enable{*this, run, "enable", "FALSE: no steps"};
+    std::optional<hal::In<double>> position_cmd, velocity_cmd;
+    hal::Io<double> position_scale{*this, run, "position-scale", "steps per length unit", {.initial = 1.0}};
+    hal::Param<double> max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: what the timing allows"};
+    hal::Param<double> max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: none"};
+    hal::Out<double> frequency{*this, run, "frequency", "steps per second asked for", {.unit = "Hz"}};
+    hal::Param<std::uint32_t> step_length{*this, run, "steplen", "length of a step pulse, or shortest time in a state", {.initial = 1, .unit = "ns"}};
+    std::optional<hal::Param<std::uint32_t>> step_space, dir_hold, dir_setup, dir_delay;
+
+    explicit Stepgen(const hal_host* host) : Component(host) {
+        if (control.get() != "p" && control.get() != "v") throw std::invalid_argument("ctrl_type=" + control.get() + " is neither p nor v");
+        const hal::PinOptions<bool> off{.safe = false};
+        const hal::PinOptions<std::uint32_t> one{.initial = 1, .unit = "ns"};
+        if (type == step_dir) {
+            first.emplace(*this, make, "step", "a pulse per step", off);
+            second.emplace(*this, make, "dir", "TRUE for steps backwards");
+        } else if (type == up_down) {
+            first.emplace(*this, make, "up", "a pulse per step forwards", off);
+            second.emplace(*this, make, "down", "a pulse per step backwards", off);
+        } else {
+            sequence_ = type == user_type ? user_sequence() : sequences[static_cast<std::size_t>(type - first_sequence)];
+            static constexpr std::array names{"phase-A", "phase-B", "phase-C", "phase-D", "phase-E"};
+            for (int i = 0; i < sequence_.phases; ++i)
+                phase_[static_cast<std::size_t>(i)].emplace(*this, make, names[static_cast<std::size_t>(i)], "one of the motor's phases", off);
+        }
+        if (type <= up_down) step_space.emplace(*this, run, "stepspace", "shortest time between step pulses; 0: a pulse in every period", one);
+        if (type == step_dir) {
+            dir_hold.emplace(*this, run, "dirhold", "from the end of a pulse to a change of dir", one);
+            dir_setup.emplace(*this, run, "dirsetup", "from a change of dir to the next pulse", one);
+        } else {
+            dir_delay.emplace(*this, run, "dirdelay", "between steps in opposite directions", one);
+        }
+        if (control.get() == "p") position_cmd.emplace(*this, run, "position-cmd", "commanded position in length units");
+        else velocity_cmd.emplace(*this, run, "velocity-cmd", "commanded speed in length units per second");
+    }
+
+    void make_pulses(hal::Cycle cycle) noexcept {
+        const std::int64_t tick_ns = cycle.period_ns();
+        tick_ns_.store(tick_ns, std::memory_order_relaxed);
+        const Order& wanted = orders_.get();
+        position_ += wanted.rate;
+        for (std::int64_t* timer : {&pulse_ns_, &space_ns_, &hold_ns_, &setup_ns_}) *timer = std::max<std::int64_t>(0, *timer - tick_ns);
+
+        if (pulse_ns_ == 0 && high_) {  // the pulse ends
+            high_ = false;
+            space_ns_ = wanted.space_ns;
+            hold_ns_ = wanted.hold_ns;
+        }
+        const std::int64_t due = static_cast<std::int64_t>(std::floor(position_ + 0.5)) - made_;
+        if (due != 0 && !high_ && wanted.on) advance(due > 0 ? 1 : -1, wanted);
+
+        show();
+        raw_counts = static_cast<std::int32_t>(made_);
+        made_out_.store(made_, std::memory_order_relaxed);
+        position_out_.store(position_, std::memory_order_relaxed);
+    }
+
+    void capture_position(hal::Cycle) noexcept {
+        counts = static_cast<std::int32_t>(made_out_.load(std::memory_order_relaxed));
+        position_fb = position_out_.load(std::memory_order_relaxed) / scale();
+    }
+
+    void update_freq(hal::Cycle cycle) noexcept {
+        if (position_scale == 0.0 || !std::isfinite(position_scale)) position_scale = 1.0;
+        scale_.store(position_scale, std::memory_order_relaxed);
+        const std::int64_t tick_ns = tick_ns_.load(std::memory_order_relaxed);
+        const double wanted = tick_ns > 0 && enable ? limited(command(cycle.seconds()), tick_ns, cycle.seconds()) : 0.0;
+        if (!enable && position_cmd) last_command_ = *position_cmd * position_scale;
+        frequency = wanted;
+        Order next;
+        next.on = enable;
+        next.rate = wanted * static_cast<double>(tick_ns) * 1e-9;
+        next.step_ns = step_length;
+        if (step_space) next.space_ns = *step_space;
+        if (dir_hold) next.hold_ns = *dir_hold;
+        if (dir_setup) next.setup_ns = *dir_setup;
+        if (dir_delay) next.hold_ns = *dir_delay;
+        orders_.put(next);
+    }
+
+private:
+    /// The speed in steps/s that the command asks for, before limits. For a position: the command's own speed, and on top
+    /// what closes the distance as fast as it can still be braked away: v = sqrt(2 a |e| + (a dt / 2)^2) - a dt / 2.
+    double command(double dt) noexcept {
+        if (velocity_cmd) return *velocity_cmd * position_scale;
+        const double target = *position_cmd * position_scale;
+        const double speed = (target - last_command_) / dt;
+        last_command_ = target;
+        const double distance = target - position_out_.load(std::memory_order_relaxed);
+        double closing = std::fabs(distance) / dt;
+        if (const double a = acceleration(); a > 0.0) {
+            const double half = 0.5 * a * dt;
+            closing = std::min(closing, std::sqrt(2.0 * a * std::fabs(distance) + half * half) - half);
+        }
+        return speed + std::copysign(closing, distance);
+    }
+
+    double limited(double wanted, std::int64_t tick_ns, double dt) noexcept {
+        if (!std::isfinite(wanted)) return 0.0;
+        const auto ticks = [&](std::int64_t ns) { return (ns + tick_ns - 1) / tick_ns; };  // times are met in whole periods
+        const std::int64_t shortest = type <= up_down ? std::max<std::int64_t>(1, ticks(step_length) + (*step_space > 0 ? ticks(*step_space) : 0))
+                                                      : std::max<std::int64_t>(1, ticks(step_length));
+        double highest = 1e9 / static_cast<double>(shortest * tick_ns);
+        if (const double asked = std::fabs(max_velocity * position_scale); asked > 0.0) highest = std::min(highest, asked);
+        if (const double a = acceleration(); a > 0.0) wanted = std::clamp(wanted, frequency - a * dt, frequency + a * dt);
+        return std::clamp(wanted, -highest, highest);
+    }
+
+    double acceleration() const noexcept { return std::fabs(max_acceleration * position_scale); }
+    double scale() const noexcept { return scale_.load(std::memory_order_relaxed); }
+
+    /// Makes one step in `direction` if the timing allows it now. A step that must wait is made later: none is lost.
+    void advance(int direction, const Order& wanted) noexcept {
+        if (direction != direction_) {
+            if (hold_ns_ > 0) return;
+            direction_ = direction;
+            setup_ns_ = wanted.setup_ns;
+        }
+        if (space_ns_ > 0 || setup_ns_ > 0) return;
+        made_ += direction;
+        high_ = true;
+        pulse_ns_ = wanted.step_ns;
+    }
+
+    void show() noexcept {
+        if (type == step_dir) {
+            *first = high_;
+            *second = direction_ < 0;
+        } else if (type == up_down) {
+            *first = high_ && direction_ > 0;
+            *second = high_ && direction_ < 0;
+        } else {
+            const std::int64_t place = made_ % sequence_.length;
+            const unsigned state = sequence_.states[static_cast<std::size_t>(place < 0 ? place + sequence_.length : place)];
+            for (int i = 0; i < sequence_.phases; ++i) *phase_[static_cast<std::size_t>(i)] = ((state >> i) & 1u) != 0;
+        }
+    }
+
+    Sequence user_sequence() const {
+        Sequence made{0, 0, {}};
+        const char* at = user.get().c_str();
+        unsigned used = 0;
+        while (*at != '\0') {
+            char* end = nullptr;
+            const long state = std::strtol(at, &end, 0);
+            if (end == at || (*end != ',' && *end != '\0') || state < 0 || state > 31 || made.length == 10)
+                throw std::invalid_argument("user_step_type=" + user.get() + " is not a list of up to 10 numbers from 0 to 31");
+            made.states[static_cast<std::size_t>(made.length++)] = static_cast<std::uint8_t>(state);
+            used |= static_cast<unsigned>(state);
+            at = *end == ',' ? end + 1 : end;
+        }
+        if (used == 0) throw std::invalid_argument("step_type=15 needs user_step_type=");
+        while (used >> made.phases != 0) ++made.phases;
+        return made;
+    }
+
+    Sequence sequence_{0, 1, {}};
+    std::array<std::optional<hal::Out<bool>>, 5> phase_;
+
+    hal::Mailbox<Order> orders_;            // update-freq writes, make-pulses reads
+    std::atomic<std::int64_t> tick_ns_{0};  // period of make-pulses: it writes, update-freq reads
+    std::atomic<std::int64_t> made_out_{0}; // make-pulses writes, capture-position reads
+    std::atomic<double> position_out_{0.0}; // make-pulses writes, the other two read
+    std::atomic<double> scale_{1.0};        // update-freq writes, capture-position reads
+    // make-pulses only
+    double position_ = 0.0;                 // where the motor should be, in steps
+    std::int64_t made_ = 0;                 // steps made
+    int direction_ = 1;
+    bool high_ = false;
+    std::int64_t pulse_ns_ = 0, space_ns_ = 0, hold_ns_ = 0, setup_ns_ = 0;  // what is left of each time
+    // update-freq only
+    double last_command_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Stepgen, "stepgen", "Step pulses in software: step and direction, up and down, motor phases", R"(
+`stepgen.make-pulses` makes the waveforms in the fastest thread; `stepgen.capture-position` and `stepgen.update-freq` belong
+into the servo thread, one before and one after what computes the command. The three may run on different processors.
+
+`position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a command that stands
+still: on top of the command's own speed, v = √(2 a e + (a T/2)²) - a T/2 for a distance e. `velocity-cmd` (ctrl_type=v) is
+followed within the same limits. Steps are whole periods of the fast thread apart, at most one per period; a step that has to
+wait for one of the times below is made later, none is lost. A step is made where the position passes the middle between two.
+
+| step_type | outputs | times used |
+| --- | --- | --- |
+| 0 | `step`, `dir` | steplen, stepspace, dirhold, dirsetup |
+| 1 | `up`, `down` | steplen, stepspace, dirdelay |
+| 2 | `phase-A`, `phase-B`: quadrature | steplen, dirdelay |
+| 3, 4 | three phases: full step, half step | steplen, dirdelay |
+| 5, 6 | four phases, unipolar full step: one phase on, two on | steplen, dirdelay |
+| 7, 8 | four phases, bipolar full step: one bridge on, both on | steplen, dirdelay |
+| 9, 10 | four phases, half step: unipolar, bipolar | steplen, dirdelay |
+| 11, 12 | five phases, full step: one phase on, two on | steplen, dirdelay |
+| 13, 14 | five phases, half step: one or two on, two or three on | steplen, dirdelay |
+| 15 | as `user_step_type` says: a number per state, bit 0 is phase A | steplen, dirdelay |
+
+All times are in nanoseconds and met in whole periods of the fast thread. With `stepspace` 0 a pulse may come in every period,
+for ports that take it back themselves.
+
+    loadrt stepgen step_type=0,0 ctrl_type=p,v
+    addf stepgen.make-pulses base-thread
+    addf stepgen.capture-position servo-thread
+    addf stepgen.update-freq servo-thread
+    setp stepgen.0.position-scale 800
+    setp stepgen.0.maxaccel 500
+)")

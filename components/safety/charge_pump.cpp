@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct ChargePump : hal::Component {
+    using Component::Component;
+    static constexpr hal::Traits traits{.singleton = true};
+
+    hal::Out<bool> out{*this, "out", "changes in every cycle", {.safe = false}};
+    hal::Out<bool> half{*this, "out-2", "changes in every second cycle", {.safe = false}};
+    hal::Out<bool> quarter{*this, "out-4", "changes in every fourth cycle", {.safe = false}};
+    hal::In<bool> enable{*this, "enable", "FALSE: the outputs are low", {.initial = true}};
+
+    hal::Function run{*this, "", &ChargePump::update, "the next half wave"};
+
+    void update(hal::Cycle) noexcept {
+        phase_ = enable ? phase_ + 1 : 0;
+        out = (phase_ & 1) != 0;
+        half = (phase_ & 2) != 0;
+        quarter = (phase_ & 4) != 0;
+    }
+
+private:
+    std::uint32_t phase_ = 0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(ChargePump, "charge_pump", "Square waves that prove that the thread runs", R"(
+A charge pump in an output stage keeps a relay closed only while it is fed a square wave: the machine falls into the safe
+state when the thread stops, whatever level the last output had. `out` has half the frequency of the thread, `out-2` and
+`out-4` a half and a quarter of that. `enable` FALSE stops the waves.
+
+    loadrt charge_pump
+    addf charge-pump servo-thread
+    net alive  charge-pump.out => parport.0.pin-16-out
+    net well   estop-latch.0.ok-out => charge-pump.enable
+)")

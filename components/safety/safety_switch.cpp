@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace {
+
+/// The values of pin `reason`; from `first_fault` on they are faults. Published: never renumber.
+enum Reason : std::uint32_t {
+    is_safe = 0,
+    contacts_open = 1,
+    waits_for_closing = 2,
+    waits_for_opening = 3,
+    waits_for_reset = 4,
+    button_down = 5,
+    first_fault = 10,
+    did_not_close = 10,
+    did_not_open = 11,
+    test_a_failed = 12,
+    test_b_failed = 13,
+    cross_short = 14,
+    button_stuck = 15,
+    bad_parameters = 16,
+};
+
+/// The parameters of a cycle in nanoseconds.
+struct Times {
+    std::int64_t discrepancy, debounce, filter, reset_min, reset_max, test_period, test_width, test_response;
+
+    static std::int64_t ns(double seconds) noexcept { return seconds >= 0.0 && seconds <= 1e6 ? std::llround(seconds * 1e9) : -1; }
+    /// Nothing negative or not a number, and both test pulses fit into their period.
+    bool sound(std::int64_t period_ns) const noexcept {
+        if (std::min({discrepancy, debounce, filter, reset_min, test_period, test_width, test_response}) < 0 || reset_max < reset_min) return false;
+        return test_period == 0 || (test_width >= period_ns && 2 * (test_width + test_response + period_ns) <= test_period);
+    }
+};
+
+/// One contact, freed of bouncing.
+struct Contact {
+    bool closed = false;
+    std::int64_t differs_ns = 0;
+
+    void follow(bool now, const Times& times, std::int64_t period_ns) noexcept {
+        if (now == closed) differs_ns = 0;
+        else if (differs_ns >= (now ? times.debounce : times.filter)) closed = now, differs_ns = 0;
+        else differs_ns += period_ns;
+    }
+};
+
+/// The test pulses on the two feeding outputs: one on A at the start of a test period, one on B half a period later.
+class PulseTest {
+public:
+    bool feed_a = true, feed_b = true;      // levels of the outputs
+    bool hides_a = false, hides_b = false;  // a pulse is what makes this contact look open
+
+    /// One cycle; gives the fault found or 0. `a` and `b` are the levels at the inputs.
+    std::uint32_t step(bool a, bool b, const Times& times, std::int64_t period_ns) noexcept {
+        if (times.test_period == 0) {
+            *this = PulseTest();
+            return 0;
+        }
+        std::uint32_t found = 0;
+        if (pulse_ns_ < 0) {
+            idle_ns_ += period_ns;
+            if (2 * idle_ns_ < times.test_period) return 0;
+            idle_ns_ = pulse_ns_ = 0;
+            on_b_ = !on_b_;
+            tested_was_high_ = on_b_ ? b : a;
+            other_was_high_ = on_b_ ? a : b;
+            other_dropped_ = false;
+            (on_b_ ? feed_b : feed_a) = false;
+            (on_b_ ? hides_b : hides_a) = tested_was_high_;
+            return 0;
+        }
+        idle_ns_ += period_ns;
+        pulse_ns_ += period_ns;
+        const bool tested = on_b_ ? b : a, other = on_b_ ? a : b;
+        bool& feed = on_b_ ? feed_b : feed_a;
+        if (!feed) {
+            other_dropped_ = other_dropped_ || (other_was_high_ && !other);
+            if (pulse_ns_ < times.test_width) return 0;
+            if (tested_was_high_ && tested) found = on_b_ ? test_b_failed : test_a_failed;
+            feed = true;
+        }
+        if (pulse_ns_ < times.test_width + times.test_response) return found;
+        if (other_dropped_ && other) found = cross_short;  // it came back with the pulse's end: it is fed by the same wire
+        hides_a = hides_b = false;
+        pulse_ns_ = -1;
+        return found;
+    }
+
+private:
+    std::int64_t idle_ns_ = 0, pulse_ns_ = -1;  // since the last pulse began; since this one did, or -1
+    bool on_b_ = true, tested_was_high_ = false, other_was_high_ = false, other_dropped_ = false;
+};
+
+struct SafetySwitch : hal::Component {
+    using Component::Component;
+
+    hal::In<bool> in_a{*this, "in-a", "contact A: TRUE while it conducts"};
+    hal::In<bool> in_b{*this, "in-b", "contact B: TRUE while it conducts"};
+    hal::In<bool> reset{*this, "reset", "the reset button"};
+    hal::Out<bool> safe{*this, "safe", "TRUE: the machine may move", {.safe = false}};
+    hal::Out<bool> fault{*this, "fault", "TRUE: the switch, its wiring, the button or a parameter is wrong"};
+    hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: pressing reset helps now"};
+    hal::Out<std::uint32_t> reason{*this, "reason", "why safe is FALSE: a code, see the table", {.initial = contacts_open}};
+    hal::Out<bool> test_a{*this, "test-a", "feeds contact A: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
+    hal::Out<bool> test_b{*this, "test-b", "feeds contact B: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
+
+    hal::Param<bool> antivalent{*this, "antivalent", "TRUE: safe is A conducting and B not; FALSE: both conducting"};
+    hal::Param<double> discrepancy_time{*this, "discrepancy-time", "longest time the contacts may disagree", {.initial = 0.5, .unit = "s"}};
+    hal::Param<double> debounce_time{*this, "debounce-time", "a contact has switched to safe when it has been there for so long", {.initial = 0.01, .unit = "s"}};
+    hal::Param<double> filter_time{*this, "filter-time", "a contact has left safe when it has been away for so long; adds to the reaction time", {.unit = "s"}};
+    hal::Param<std::uint32_t> reset_mode{*this, "reset-mode", "0: no reset needed; 1: on pressing; 2: on releasing after a press of proper length", {.initial = 2}};
+    hal::Param<double> reset_min{*this, "reset-min-time", "mode 2: shortest press", {.initial = 0.05, .unit = "s"}};
+    hal::Param<double> reset_max{*this, "reset-max-time", "mode 2: longest press; beyond it the button counts as stuck", {.initial = 3.0, .unit = "s"}};
+    hal::Param<double> test_period{*this, "test-period", "time between two test pulses on a contact; 0: none", {.unit = "s"}};
+    hal::Param<double> test_width{*this, "test-width", "length of a test pulse; longer than the way out and back", {.initial = 0.003, .unit = "s"}};
+    hal::Param<double> test_response{*this, "test-response", "how long after a test pulse an input may take to come back", {.initial = 0.003, .unit = "s"}};
+
+    hal::Function run{*this, "", &SafetySwitch::update, "watches contacts, wiring and button"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const std::int64_t period_ns = cycle.period_ns();
+        const Times times{Times::ns(discrepancy_time), Times::ns(debounce_time), Times::ns(filter_time), Times::ns(reset_min),
+                          Times::ns(reset_max), Times::ns(test_period), Times::ns(test_width), Times::ns(test_response)};
+        // The host wrote the safe value (stop, a fault): running again needs a reset like after opening.
+        if (state_ == is_safe && !safe) state_ = waits_for_reset;
+
+        const bool sound = times.sound(period_ns) && reset_mode <= 2;
+        const std::uint32_t broken = !sound ? std::uint32_t{bad_parameters} : test_.step(in_a, in_b, times, period_ns);
+        if (!test_.hides_a) a_.follow(in_a, times, period_ns);
+        if (!test_.hides_b) b_.follow(antivalent ? !in_b : in_b.get(), times, period_ns);
+
+        const bool accepted = press(times, period_ns);
+        if (broken != 0) state_ = broken;
+        else move(accepted, times, period_ns);
+
+        test_a = test_.feed_a;
+        test_b = test_.feed_b;
+        show(sound);
+    }
+
+private:
+    bool both_open() const noexcept { return !a_.closed && !b_.closed; }
+    bool both_closed() const noexcept { return a_.closed && b_.closed; }
+    bool latched() const noexcept { return state_ >= first_fault; }
+    /// Whether a reset would be taken.
+    bool resettable() const noexcept { return state_ == waits_for_reset || (latched() && both_open()); }
+
+    void enter(std::uint32_t state) noexcept {
+        state_ = state;
+        disagree_ns_ = 0;
+    }
+
+    /// The state machine, one cycle. Once a contact has opened, both must have been open before both may be closed.
+    void move(bool accepted, const Times& times, std::int64_t period_ns) noexcept {
+        switch (state_) {
+            case contacts_open:
+                if (both_closed()) enter(waits_for_reset);
+                else if (!both_open()) enter(waits_for_closing);
+                break;
+            case waits_for_closing:
+                if (both_closed()) enter(waits_for_reset);
+                else if (both_open()) enter(contacts_open);
+                else if ((disagree_ns_ += period_ns) > times.discrepancy) enter(did_not_close);
+                break;
+            case waits_for_reset:
+            case is_safe:
+                if (both_open()) enter(contacts_open);
+                else if (!both_closed()) enter(waits_for_opening);
+                else if (accepted) enter(is_safe);
+                break;
+            case waits_for_opening:
+                if (both_open()) enter(contacts_open);
+                else if ((disagree_ns_ += period_ns) > times.discrepancy) enter(did_not_open);
+                break;
+            default:
+                if (accepted && both_open()) enter(contacts_open);
+        }
+        if (state_ == waits_for_reset && reset_mode == 0) enter(is_safe);
+    }
+
+    /// Follows the button; true in the cycle a reset is given. A press counts only if it began when it could help.
+    bool press(const Times& times, std::int64_t period_ns) noexcept {
+        const bool down = reset, pressed = down && !was_down_, released = !down && was_down_;
+        was_down_ = down;
+        if (pressed) {
+            counts_ = resettable();
+            pressed_ns_ = 0;
+        } else if (down) {
+            pressed_ns_ = std::min(pressed_ns_ + period_ns, std::int64_t{1} << 60);
+        }
+        if (!resettable()) counts_ = false;
+        stuck_ = down && reset_mode == 2 && pressed_ns_ > times.reset_max;
+        if (reset_mode != 2) return pressed && counts_;
+        return released && counts_ && pressed_ns_ + period_ns >= times.reset_min && pressed_ns_ <= times.reset_max;
+    }
+
+    void show(bool sound) noexcept {
+        const bool useless = was_down_ && !(counts_ && reset_mode == 2);  // held, but this press gives no reset
+        std::uint32_t shown = state_;
+        if (stuck_ && !latched() && state_ != is_safe) shown = button_stuck;
+        else if (state_ == waits_for_reset && useless) shown = button_down;
+        safe = state_ == is_safe;
+        ready = sound && resettable() && !stuck_ && !useless;
+        reason = shown;
+        fault = shown >= first_fault;
+    }
+
+    PulseTest test_;
+    Contact a_, b_;
+    std::uint32_t state_ = contacts_open;
+    std::int64_t disagree_ns_ = 0, pressed_ns_ = 0;
+    bool was_down_ = false, counts_ = false, stuck_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(SafetySwitch, "safety_switch", "Two-channel safety input with reset, discrepancy time and test pulses", R"(
+Watches a switch with two contacts (door, emergency-stop button, light curtain, base that stands on its table) and says
+whether the machine may move. It follows the practice of two-channel safety relays: ISO 13849-1 (category 3 and 4: a single
+fault must not lose the function and is found at the next demand; clause 5.2.2: a manual reset acts when the button is let go),
+IEC 61496-1 (start and restart interlock, test pulses on outputs), IEC 60204-1 (9.2.3.4: reset does not start motion),
+PLCopen Safety Part 1 (SF_Equivalent, SF_Antivalent). It is software on one computer: it is no certified safety function.
+
+* **Contacts.** `antivalent` FALSE: both conduct while safe. TRUE: A conducts, B does not. `safe` goes FALSE in the cycle in which
+  either contact leaves its place (plus `filter-time`); they are safe again after `debounce-time`.
+* **Discrepancy.** They may disagree for `discrepancy-time`; longer is a fault. Once one has opened, both must open.
+* **Reset.** When both are closed, `reset-mode` 0 goes on at once (also at the start), 1 on pressing `reset`, 2 on releasing it after a press
+  between `reset-min-time` and `reset-max-time`. A press that began too early does not count. A stop or a fault of the runtime needs a reset as well.
+* **Test pulses.** With `test-period` above 0, `test-a` and `test-b` in turn go FALSE for `test-width`. Wire A from `test-a` and B from `test-b`.
+  A conducting contact must show its pulse (else it is shorted to the supply or to the other), and the other must not. A contact
+  that opens during its pulse is seen `test-response` after it: reaction time grows by `test-width` + `test-response`.
+* **Faults** stay until the cause is gone, both contacts have opened and `reset` was given; then both must close again.
+
+| reason | |
+| --- | --- |
+| 0 | safe |
+| 1 | both contacts open |
+| 2 | one closed, waiting for the other |
+| 3 | one opened, waiting for the other |
+| 4 | waiting for reset |
+| 5 | reset is held down: let go |
+| 10 | fault: one contact did not close in time |
+| 11 | fault: one contact did not open in time |
+| 12, 13 | fault: A or B did not follow its test pulse |
+| 14 | fault: the contacts are shorted to each other |
+| 15 | fault: reset is stuck (ends when it is let go) |
+| 16 | fault: a parameter makes no sense (negative, or test pulses that do not fit into test-period) |
+
+    loadrt safety_switch names=base-switch
+    addf base-switch servo-thread
+    setp base-switch.antivalent 1
+    net base-down   furuta.base-down   => base-switch.in-a
+    net base-lifted furuta.base-lifted => base-switch.in-b
+    net base-safe   base-switch.safe   => estop-latch.0.ok-in
+)")
