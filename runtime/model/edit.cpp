@@ -192,7 +192,9 @@ Component& Edit::add_component(std::string name, Span at) {
     model_.component.emplace(made->name, made);
     on_undo([this, made] {
         model_.component.erase(made->name);
-        model_.components.erase(owner(model_.components, made));
+        const auto at = owner(model_.components, made);
+        removed_.components.push_back(std::move(*at));  // its instances still have to be destroyed
+        model_.components.erase(at);
     });
     return *made;
 }

@@ -48,6 +48,7 @@ bool Edit::fail(Code code, Span at, std::string message, std::string label, std:
 Pin* Edit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
     std::string help = pins_of_instance(model_, name.text);
+    if (model_.find_signal(name.text)) help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
     if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt makes instances with pins";
     fail("no-such-pin", name.span, "there is no pin " + quoted(name.text), did_you_mean(name.text, names(model_.pin)), help);
     return nullptr;
