@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Debounce : hal::Component {
+    hal::Argument             size{*this, "cfg", 4, "filters in each group, a number per group", {.per_instance = true, .min = 1, .max = 100'000}};
+    hal::Ins<bool>            in{*this, "#.in", size, "noisy input of filter #"};
+    hal::Outs<bool>           out{*this, "#.out", size, "the last stable input of filter #"};
+    hal::Param<std::int32_t>  delay{*this, "delay", "cycles an input must hold before its output follows; up to 1 does not filter", {.initial = 5}};
+    hal::Function             run{*this, "", &Debounce::update, "samples all inputs of the group"};
+
+    explicit Debounce(const hal_host* host)
+        : Component(host), counts_(static_cast<std::int32_t*>(host->allocate(host, in.size() * sizeof(std::int32_t), alignof(std::int32_t)))) {
+        if (counts_ == nullptr) throw std::bad_alloc();
+    }
+
+    void update(hal::Cycle) noexcept {
+        const std::int32_t threshold = std::max(delay.get(), 1);
+        for (std::size_t i = 0; i < in.size(); ++i) {
+            std::int32_t& count = counts_[i];
+            count = in[i] ? std::min(count, threshold - 1) + 1 : std::max(std::min(count, threshold) - 1, 0);
+            if (count == threshold) out[i] = true;
+            if (count == 0) out[i] = false;
+        }
+    }
+
+private:
+    std::int32_t* counts_;  // one per filter, from 0 to delay
+};
+
+}  // namespace
+
+HAL_COMPONENT(Debounce, "debounce", "Filters groups of noisy digital inputs", R"(
+A filter counts up while its input is TRUE and down while it is FALSE, between 0 and `delay`. At `delay` the output
+becomes TRUE, at 0 FALSE; between the two it keeps its state. `cfg=2,3` makes two groups, `debounce.0` with two filters
+and `debounce.1` with three; a group has one function and one `delay`.
+
+    loadrt debounce cfg=2
+    addf debounce.0 servo
+    setp debounce.0.delay 10
+    net home-raw     => debounce.0.0.in
+    net home-switch  <= debounce.0.0.out
+    net limit-raw    => debounce.0.1.in
+    net limit-switch <= debounce.0.1.out
+)")

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Edge : hal::Component {
+    using Component::Component;
+    hal::In<bool>            in{*this, "in", "the input"};
+    hal::Out<bool>           out{*this, "out", "goes TRUE when the wanted edge is seen"};
+    hal::Out<bool>           out_invert{*this, "out-invert", "the inverse of out", {.initial = true}};
+    hal::Param<bool>         both{*this, "both", "TRUE: both edges count, whatever in-edge says"};
+    hal::Param<bool>         in_edge{*this, "in-edge", "the edge that counts: TRUE is falling, FALSE is rising", {.initial = true}};
+    hal::Param<std::int32_t> width_ns{*this, "out-width-ns", "length of the output pulse; 0 is one cycle", {.unit = "ns"}};
+    hal::Out<std::int32_t>   time_left_ns{*this, "time-left-ns", "what is left of the output pulse", {.unit = "ns"}};
+    hal::Out<bool>           last_in{*this, "last-in", "the input as last seen"};
+    hal::Function            run{*this, "", &Edge::update, "looks for an edge"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const bool now = in;
+        const bool changed = started_ && now != was_in_;
+        if (changed && (both || now != in_edge)) {
+            left_ns_ = std::max(width_ns.get(), 0);
+            pulse_ = true;
+        } else if (pulse_) {
+            left_ns_ = std::max<std::int64_t>(left_ns_ - cycle.period_ns(), 0);
+            pulse_ = left_ns_ > 0;
+        }
+        out = pulse_;
+        out_invert = !pulse_;
+        time_left_ns = static_cast<std::int32_t>(left_ns_);
+        last_in = now;
+        was_in_ = now;
+        started_ = true;
+    }
+
+private:
+    std::int64_t left_ns_ = 0;
+    bool started_ = false, was_in_ = false, pulse_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Edge, "edge", "Turns an edge into a pulse", R"(
+`out` goes TRUE in the cycle that sees the wanted edge, for `out-width-ns` rounded up to whole cycles, at least one; a
+new edge in that time starts the pulse again. An input that is TRUE from the beginning is not an edge. The default,
+`in-edge` TRUE, is the *falling* edge.
+
+    loadrt edge names=button-down
+    addf button-down servo
+    setp button-down.in-edge FALSE
+    net button      => button-down.in
+    net button-down <= button-down.out
+)")

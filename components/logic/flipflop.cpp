@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Flipflop : hal::Component {
+    using Component::Component;
+    hal::In<bool> data{*this, "data", "goes to out at a rising edge of clk"};
+    hal::In<bool> clk{*this, "clk", "a rising edge writes data to out"};
+    hal::In<bool> set{*this, "set", "while TRUE out is TRUE"};
+    hal::In<bool> reset{*this, "reset", "while TRUE out is FALSE, whatever set is"};
+    hal::Io<bool> out{*this, "out", "the stored bit"};
+    hal::Io<bool> out_not{*this, "out-not", "the stored bit, inverted"};
+    hal::Function run{*this, "", &Flipflop::update, "stores"};
+
+    void update(hal::Cycle) noexcept {
+        bool stored = out;
+        if (clk && !was_clk_) stored = data;
+        was_clk_ = clk;
+        if (set) stored = true;
+        if (reset) stored = false;
+        out = stored;
+        out_not = !stored;
+    }
+
+private:
+    bool was_clk_ = true;  // a clock that is high from the beginning is not an edge
+};
+
+}  // namespace
+
+HAL_COMPONENT(Flipflop, "flipflop", "D flip-flop with set and reset", R"(
+`reset` overrides `set`, and both override `clk`. The bit lives in `out` itself, which is an input/output pin, so
+another writer on the same signal can change it.
+
+    # remember a short alarm until the operator acknowledges it
+    loadrt flipflop names=alarm-memory
+    addf alarm-memory servo
+    net alarm       => alarm-memory.set
+    net acknowledge => alarm-memory.reset
+    net alarm-lamp  <= alarm-memory.out
+)")

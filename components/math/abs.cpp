@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Abs : hal::Component {
+    using Component::Component;
+    hal::In<double>  in{*this, "in", "the input"};
+    hal::Out<double> out{*this, "out", "the input without its sign"};
+    hal::Out<bool>   sign{*this, "sign", "TRUE while in is below 0"};
+    hal::Out<bool>   is_positive{*this, "is-positive", "TRUE while in is above 0"};
+    hal::Out<bool>   is_negative{*this, "is-negative", "TRUE while in is below 0"};
+    hal::Function    run{*this, "", &Abs::update, "computes out and the sign"};
+
+    void update(hal::Cycle) noexcept {
+        const double value = in;
+        out = std::fabs(value);
+        sign = value < 0.0;
+        is_positive = value > 0.0;
+        is_negative = value < 0.0;
+    }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Abs, "abs", "Absolute value and sign", R"(
+`out = |in|`. At 0 all three flags are FALSE.
+
+    loadrt abs names=spindle-speed
+    addf spindle-speed servo
+    net spindle-velocity => spindle-speed.in
+    net spindle-speed    <= spindle-speed.out
+    net spindle-reverse  <= spindle-speed.is-negative
+)")

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Ddt : hal::Component {
+    using Component::Component;
+    hal::In<double>  in{*this, "in", "the input"};
+    hal::Out<double> out{*this, "out", "change of in per second"};
+    hal::Function    run{*this, "", &Ddt::update, "computes out"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double value = in;
+        out = std::isfinite(before_) ? (value - before_) / cycle.seconds() : 0.0;
+        before_ = value;
+    }
+
+private:
+    double before_ = std::numeric_limits<double>::quiet_NaN();  // none yet
+};
+
+}  // namespace
+
+HAL_COMPONENT(Ddt, "ddt", "Derivative of a value", R"(
+`out = (in - in of the cycle before) / period`, and 0 in the first cycle and in the one after an input that was not a
+number. A quantised input gives a noisy derivative: follow with `lowpass`.
+
+    loadrt ddt names=velocity
+    addf velocity servo
+    net position => velocity.in
+    net velocity <= velocity.out
+)")

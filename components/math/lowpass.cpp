@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Lowpass : hal::Component {
+    using Component::Component;
+    hal::In<double>  in{*this, "in", "the input"};
+    hal::Out<double> out{*this, "out", "the input, smoothed"};
+    hal::In<bool>    load{*this, "load", "while TRUE out is in"};
+    hal::In<double>  gain{*this, "gain", "share of the new value, 0 to 1"};
+    hal::Function    run{*this, "", &Lowpass::update, "filters"};
+
+    void update(hal::Cycle) noexcept {
+        const double value = load ? in.get() : state_ + (in - state_) * gain;
+        if (std::isfinite(value)) state_ = value;
+        out = state_;
+    }
+
+private:
+    double state_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Lowpass, "lowpass", "First-order low-pass filter", R"(
+`out = out + (in - out) * gain`. For a corner frequency f in Hz and a period T in s: `gain = 1 - exp(-2 pi f T)`. The
+gain is 0, and the output stands still, until it is set; above 2 the filter is unstable. A cycle whose input is not a number is left out.
+
+    # 10 Hz in a 1 kHz thread
+    loadrt lowpass names=load-smooth
+    addf load-smooth servo
+    setp load-smooth.gain 0.0609
+    net spindle-load => load-smooth.in
+    net load-meter   <= load-smooth.out
+)")

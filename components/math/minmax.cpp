@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Minmax : hal::Component {
+    using Component::Component;
+    hal::In<double>  in{*this, "in", "the input"};
+    hal::In<bool>    reset{*this, "reset", "while TRUE min and max are in"};
+    hal::Out<double> max{*this, "max", "highest input since the reset"};
+    hal::Out<double> min{*this, "min", "lowest input since the reset"};
+    hal::Function    run{*this, "", &Minmax::update, "watches the input"};
+
+    void update(hal::Cycle) noexcept {
+        const double value = in;
+        if (!std::isnan(value)) {
+            const bool first = reset || !started_;
+            highest_ = first ? value : std::max(highest_, value);
+            lowest_ = first ? value : std::min(lowest_, value);
+            started_ = true;
+        }
+        max = highest_;
+        min = lowest_;
+    }
+
+private:
+    double highest_ = 0.0, lowest_ = 0.0;
+    bool started_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Minmax, "minmax", "Keeps the lowest and the highest value seen", R"(
+The first input, and any input while `reset` is TRUE, is both. Inputs that are not numbers are passed over.
+
+    loadrt minmax names=error-range
+    addf error-range servo
+    net following-error => error-range.in
+    net clear-range     => error-range.reset
+    net worst-error     <= error-range.max
+)")
