@@ -16,9 +16,10 @@ struct Limit2 : hal::Component {
     void update(hal::Cycle cycle) noexcept {
         const double goal = std::min(std::max(in.get(), min.get()), max.get());
         const double stride = max_velocity * cycle.seconds(), distance = goal - position_;
-        if (load || std::fabs(distance) <= stride) {
-            if (!std::isnan(goal)) position_ = goal;
-        } else if (stride > 0.0 && !std::isnan(distance)) position_ += std::copysign(stride, distance);
+        if (std::isfinite(goal)) {
+            if (load || std::fabs(distance) <= stride) position_ = goal;
+            else if (stride > 0.0) position_ += std::copysign(stride, distance);
+        }
         out = position_;
     }
 

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#include <numbers>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct Siggen : hal::Component {
+    using Component::Component;
+    hal::Out<double> square{*this, "square", "square wave: positive while triangle and cosine rise"};
+    hal::Out<double> sine{*this, "sine", "sine wave: 90 degrees behind cosine"};
+    hal::Out<double> cosine{*this, "cosine", "cosine wave: 90 degrees ahead of sine"};
+    hal::Out<double> triangle{*this, "triangle", "triangle wave: its peaks are those of cosine"};
+    hal::Out<double> sawtooth{*this, "sawtooth", "sawtooth wave: rises, and drops at the positive peak of cosine"};
+    hal::Out<bool>   clock{*this, "clock", "TRUE while square is at its upper level"};
+    hal::In<double>  frequency{*this, "frequency", "periods of the wave per second", {.initial = 1.0, .unit = "Hz"}};
+    hal::In<double>  amplitude{*this, "amplitude", "the waves swing from -amplitude to +amplitude about offset", {.initial = 1.0}};
+    hal::In<double>  offset{*this, "offset", "added to all waves"};
+    hal::In<bool>    reset{*this, "reset", "while TRUE the waves stand in the middle of the period"};
+    hal::Function    run{*this, "update", &Siggen::update, "computes the next sample"};
+
+    void update(hal::Cycle cycle) noexcept {
+        if (reset) phase_ = 0.5;
+        const double angle = 2.0 * std::numbers::pi * phase_;
+        const bool second_half = phase_ > 0.5;
+        const double scale = amplitude, middle = offset;
+        square = middle + (second_half ? scale : -scale);
+        sine = middle + scale * (phase_ == 0.5 ? 0.0 : std::sin(angle));
+        cosine = middle + scale * std::cos(angle);
+        triangle = middle + scale * (second_half ? 4.0 * phase_ - 3.0 : 1.0 - 4.0 * phase_);
+        sawtooth = middle + scale * (2.0 * phase_ - 1.0);
+        clock = second_half;
+
+        const double next = phase_ + frequency * cycle.seconds();
+        const double wrapped = next - std::floor(next);
+        if (std::isfinite(wrapped)) phase_ = wrapped < 1.0 ? wrapped : 0.0;
+    }
+
+private:
+    double phase_ = 0.0;  // 0 to below 1; 0 is the positive peak of cosine
+};
+
+}  // namespace
+
+HAL_COMPONENT(Siggen, "siggen", "Signal generator: sine, cosine, triangle, square, sawtooth", R"(
+With the phase p running from 0 to 1 in 1/frequency seconds:
+
+    cosine   = offset + amplitude * cos(2 pi p)        sine = offset + amplitude * sin(2 pi p)
+    triangle = falls for p < 0.5, then rises           sawtooth = offset + amplitude * (2 p - 1)
+    square   = offset - amplitude for p <= 0.5, else offset + amplitude
+
+The first sample has p = 0. While `reset` is TRUE p is 0.5: sine and sawtooth are at `offset`, the others at
+`offset - amplitude`. A frequency that is not a number holds the phase. Keep the frequency well below that of the thread.
+
+    loadrt siggen names=test-signal
+    addf test-signal.update servo
+    setp test-signal.frequency 0.5
+    setp test-signal.amplitude 10
+    net command <= test-signal.sine
+)")

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// The conv_* components: one value to another type, with what happens to values the other type does not have.
+#pragma once
+
+#include <limits>
+#include <utility>
+
+#include "hal/component.hpp"
+
+namespace conv {
+
+/// True when every value of `From` lies in the range of `To`.
+template <class To, class From>
+constexpr bool always_fits() {
+    if constexpr (std::same_as<To, double> || std::same_as<From, bool>) return true;
+    else if constexpr (std::same_as<From, double> || std::same_as<To, bool>) return false;
+    else return std::in_range<To>(std::numeric_limits<From>::min()) && std::in_range<To>(std::numeric_limits<From>::max());
+}
+
+/// True when `value` lies in the range of `To`; a value that is not a number does not. [any]
+template <class To, class From>
+constexpr bool fits(From value) noexcept {
+    if constexpr (always_fits<To, From>()) return true;
+    else if constexpr (std::same_as<To, bool>) return value == From{0} || value == From{1};
+    else if constexpr (std::same_as<From, double>) {
+        // min is 0 or a power of two, so it is exact; max + 1 is a power of two, max itself need not be exact.
+        constexpr double min = static_cast<double>(std::numeric_limits<To>::min());
+        constexpr double beyond = 2.0 * static_cast<double>(std::numeric_limits<To>::max() / 2 + 1);
+        return value >= min && (sizeof(To) == 8 ? value < beyond : value <= beyond - 1.0);
+    } else return std::in_range<To>(value);
+}
+
+/// `value` modulo 2^64, after cutting off its fraction; 0 for infinity and what is not a number. [any]
+inline std::uint64_t wrapped(double value) noexcept {
+    const double rest = std::fmod(std::trunc(std::fabs(value)), 0x1p64);
+    const auto bits = std::isfinite(rest) ? static_cast<std::uint64_t>(rest) : 0;
+    return value < 0.0 ? 0 - bits : bits;
+}
+
+/// `value` in the other type. What does not fit wraps around (a bit is TRUE for all but 0), or goes to the nearest end
+/// of the range when `clamp` is set. [any]
+template <class To, class From>
+constexpr To convert(From value, bool clamp) noexcept {
+    if (clamp && !fits<To>(value)) {
+        if (value > From{0}) return std::numeric_limits<To>::max();
+        if (value < From{0}) return std::numeric_limits<To>::lowest();
+        return To{};  // not a number
+    }
+    if constexpr (std::same_as<To, bool>) return value != From{0};
+    else if constexpr (std::same_as<From, double>) return fits<To>(value) ? static_cast<To>(value) : static_cast<To>(wrapped(value));
+    else return static_cast<To>(value);
+}
+
+/// A conversion that can always be made.
+template <class From, class To>
+struct Widening : hal::Component {
+    using Component::Component;
+    hal::In<From> in{*this, "in", "the value to convert"};
+    hal::Out<To>  out{*this, "out", "the same value in the other type"};
+    hal::Function run{*this, "", &Widening::update, "converts"};
+
+    void update(hal::Cycle) noexcept { out = convert<To, From>(in, false); }
+
+    static constexpr const char* manual = R"(
+HAL does not convert between types by itself; this component stands between two signals. Every input has an output; a
+64-bit integer keeps about 16 digits when it becomes a float.
+)";
+};
+
+/// A conversion that not every value survives.
+template <class From, class To>
+struct Narrowing : hal::Component {
+    using Component::Component;
+    hal::In<From>    in{*this, "in", "the value to convert"};
+    hal::Out<To>     out{*this, "out", "the value in the other type"};
+    hal::Out<bool>   out_of_range{*this, "out-of-range", "TRUE while in is not in the range of out"};
+    hal::Param<bool> clamp{*this, "clamp", "TRUE: what is out of range goes to the nearest end of it; FALSE: it wraps around"};
+    hal::Function    run{*this, "", &Narrowing::update, "converts"};
+
+    void update(hal::Cycle) noexcept {
+        const From value = in;
+        out_of_range = !fits<To>(value);
+        out = convert<To>(value, clamp);
+    }
+
+    static constexpr const char* manual = R"(
+HAL does not convert between types by itself; this component stands between two signals. A float loses its fraction
+(1.9 becomes 1, -1.9 becomes -1). A value that the other type does not have sets `out-of-range` and wraps around (modulo
+2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, goes to the nearest end of the range. An input that is not
+a number gives 0.
+)";
+};
+
+template <class From, class To>
+using Converter = std::conditional_t<always_fits<To, From>(), Widening<From, To>, Narrowing<From, To>>;
+
+}  // namespace conv
