@@ -14,6 +14,11 @@ namespace hal {
 namespace {
 thread_local Core* current_core = nullptr;
 
+// the shell may look at any moment
+void store(hal_pin& pin, std::int32_t value) noexcept { __atomic_store_n(&pin.slot->s32, value, __ATOMIC_RELAXED); }
+void store(hal_pin& pin, std::uint32_t value) noexcept { __atomic_store_n(&pin.slot->u32, value, __ATOMIC_RELAXED); }
+void store(hal_pin& pin, bool value) noexcept { __atomic_store_n(&pin.slot->bit, value, __ATOMIC_RELAXED); }
+
 struct Guard {
     Guard() noexcept { if (__rtsan_realtime_enter) __rtsan_realtime_enter(); }
     ~Guard() { if (__rtsan_realtime_exit) __rtsan_realtime_exit(); }
@@ -50,7 +55,7 @@ void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
         if (running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed)) run();
         else if (!safe_) make_safe();
         const std::int64_t took = time() - begin;
-        pins_.wakeup->slot->s32 = static_cast<std::int32_t>(measure_ ? woke_ns - due_ns : 0);
+        if (measure_) store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
         account(took);
         publish();
         answer();
@@ -69,7 +74,7 @@ void Core::service() noexcept {
 void Core::skip(std::uint64_t periods) noexcept {
     info_.number += periods;
     missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_relaxed);
-    pins_.missed->slot->u32 = static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed));
+    store(*pins_.missed, static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed)));
 }
 
 void Core::take(plan::Plan* plan) noexcept {
@@ -86,7 +91,10 @@ void Core::take(plan::Plan* plan) noexcept {
 }
 
 void Core::drain_writes() noexcept {
-    for (Write write; writes_.pop(write);) __atomic_store_n(&write.to->raw, write.value.raw, __ATOMIC_RELAXED);
+    for (Write write; writes_.pop(write);) {
+        __atomic_store_n(&write.to->raw, write.value.raw, __ATOMIC_RELAXED);
+        applied_.store(applied_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+    }
 }
 
 void Core::import() noexcept {
@@ -168,23 +176,23 @@ void Core::run_timed(const plan::Function& function, const plan::Step* steps) no
     run_steps(steps + function.begin, steps + function.end);
     const auto took = static_cast<std::int32_t>(monotonic_ns() - begin);
     plan::FunctionTimes& times = *function.times;
-    times.time.slot->s32 = took;
+    store(times.time, took);
     const bool more = took > times.tmax.slot->s32;
-    if (more) times.tmax.slot->s32 = took;
-    times.tmax_increased.slot->bit = more;
+    if (more) store(times.tmax, took);
+    store(times.tmax_increased, more);
     times.samples.store(times.samples.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     times.total_ns.store(times.total_ns.load(std::memory_order_relaxed) + static_cast<std::uint64_t>(took), std::memory_order_relaxed);
 }
 
 void Core::account(std::int64_t busy_ns) noexcept {
-    pins_.beat->slot->u32 += 1;
+    store(*pins_.beat, pins_.beat->slot->u32 + 1);
     if (!measure_) return;
     busy.add(busy_ns);
     const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
-    pins_.time->slot->s32 = took;
+    store(*pins_.time, took);
     const bool more = took > pins_.tmax->slot->s32;
-    if (more) pins_.tmax->slot->s32 = took;
-    pins_.tmax_increased->slot->bit = more;
+    if (more) store(*pins_.tmax, took);
+    store(*pins_.tmax_increased, more);
     const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
     const bool in_budget = budget == 0 || busy_ns <= budget;
     if (!in_budget) {
@@ -218,7 +226,7 @@ std::uint32_t Core::current_function() const noexcept {
 void check_finite(void* self, const hal_cycle* cycle) {
     auto& check = *static_cast<plan::FiniteCheck*>(self);
     if (const double value = check.pin->slot->real; !std::isfinite(value)) [[unlikely]] {
-        check.pin->slot->real = check.instead.real;
+        __atomic_store_n(&check.pin->slot->raw, check.instead.raw, __ATOMIC_RELAXED);
         if (!check.bad) static_cast<Core*>(check.sink)->raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, nullptr});
         check.bad = true;
     } else {

@@ -56,8 +56,9 @@ public:
     /// Takes an unanswered plan back. False when the thread has it already.
     bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
-    bool write(const Write& write) { return writes_.push(write); }
-    std::size_t unwritten() const { return writes_.size(); }
+    bool write(const Write& write) { return writes_.push(write) && ++pushed_; }
+    /// All writes have reached their places.
+    bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
     void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
     bool withdraw(Observation* observation) { return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel); }
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
@@ -104,6 +105,8 @@ private:
     std::atomic<bool> stopped_{false};                // set by the thread, cleared by the session
     std::atomic<bool> passed_{false};                 // set by the thread
     Queue<Write> writes_{4096};                       // session to thread
+    std::uint64_t pushed_ = 0;                        // the session's own
+    std::atomic<std::uint64_t> applied_{0};           // written by the thread
     Queue<FaultEvent> faults_{256};                   // thread to session
     plan::Plan* plan_ = nullptr;          // the rest is the thread's own
     hal_cycle info_{};

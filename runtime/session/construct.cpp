@@ -249,7 +249,8 @@ struct Starting {
 };
 
 bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) {
-    static_cast<Starting*>(host->data)->instance.streams.emplace_back(name, stream);
+    Instance& instance = static_cast<Starting*>(host->data)->instance;
+    instance.streams.emplace_back(*name ? instance.name + "." + name : instance.name, stream);
     return true;
 }
 constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};

@@ -230,7 +230,8 @@ std::vector<hal_value> read_all(Session::State& s, const std::vector<const Objec
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const Source from = source(*objects[i]);
         Core* const core = from.owner ? s.core(from.owner) : nullptr;
-        if (!core) {
+        // a single value is coherent with itself: no need to wait for the thread, unless it has news of it in its queue
+        if (!core || (objects.size() == 1 && core->settled())) {
             values[i].raw = __atomic_load_n(&from.from->raw, __ATOMIC_RELAXED);
             continue;
         }

@@ -155,7 +155,8 @@ typedef struct hal_stream {
 
 typedef struct hal_stream_host {
     uint32_t size;
-    bool (*publish)(const hal_host *, const char *name, hal_stream *); /* [setup]; in start; withdrawn at stop */
+    /* [setup] in start; withdrawn at stop. `name` is below the instance's name; "" is that name itself. */
+    bool (*publish)(const hal_host *, const char *name, hal_stream *);
 } hal_stream_host;
 
 /* Extension "hal.faults/1": the runtime's fault record, for a safety chain and for components that detect faults. */

@@ -121,8 +121,9 @@ hal_value to_value(T v) {
     return value;
 }
 
-// A slot is written by one thread only, so these are plain moves; `Io` pins of several threads may share a
-// cell, so those go through the atomic builtins (the same instruction on every machine we run on).
+// A slot is written by one thread only, and that thread's pins read it by plain moves. Stores are atomic because the
+// shell may look at a single value at any moment; loads of `Io` pins are, because several threads may share their cell.
+// On every machine we run on the instruction is the same.
 template <class T, bool Shared>
 T load(const hal_value* slot) noexcept {
     if constexpr (std::same_as<T, Port>) return Port{slot->port};
@@ -132,10 +133,9 @@ T load(const hal_value* slot) noexcept {
         return v;
     } else return *reinterpret_cast<const T*>(slot);
 }
-template <class T, bool Shared>
+template <class T>
 void store(hal_value* slot, T v) noexcept {
-    if constexpr (Shared) __atomic_store(reinterpret_cast<T*>(slot), &v, __ATOMIC_RELAXED);
-    else *reinterpret_cast<T*>(slot) = v;
+    __atomic_store(reinterpret_cast<T*>(slot), &v, __ATOMIC_RELAXED);
 }
 
 [[noreturn]] inline void refused() { throw std::runtime_error(""); }  // the host has recorded the reason already
@@ -273,14 +273,13 @@ public:
     }
     Pin(const Pin&) = delete;
 
-    static constexpr bool shared = Dir == HAL_DIR_IO;
-    T get() const noexcept { return detail::load<T, shared>(pin_.slot); }
+    T get() const noexcept { return detail::load<T, Dir == HAL_DIR_IO>(pin_.slot); }
     operator T() const noexcept { return get(); }
     /// True while a signal is connected. [realtime]
     bool linked() const noexcept { return pin_.slot != &pin_.own; }
 
 protected:
-    void put(T value) noexcept { detail::store<T, shared>(pin_.slot, value); }
+    void put(T value) noexcept { detail::store<T>(pin_.slot, value); }
 
 private:
     hal_pin pin_;
