@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Runs what the documents show.
+
+In README.md and docs/**/*.md:
+  ```hal file=NAME      the block is written to NAME; without file= it is given to `hal check`
+  ```cpp file=NAME      written to NAME
+  ```text file=NAME     written to NAME
+  ```console            lines `$ COMMAND` are run in order, in one folder per document; the lines below a command are
+                        its whole output, stdout and stderr together. A line `...` stands for any lines, `...` inside a
+                        line for any text. No output lines: anything is accepted. The exit status must be 0 unless the
+                        command ends in `# exit 1`.
+  `./hal` in a command is the program under test, and such a command runs in the repository's root. Nothing else is skipped but
+`./hal test` and `./hal bench`, which run this.
+"""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+HAL = pathlib.Path(os.environ.get("HAL_BIN", ROOT / "build/release/bin/hal")).resolve()
+NOT_RUN = ("./hal test", "./hal bench")
+FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```", re.M | re.S)
+
+
+def matches(expected, actual):
+    """True when the lines agree, `...` standing for anything."""
+    pattern = []
+    for line in expected:
+        if line.strip() == "...":
+            pattern.append(r"(?:.*\n)*?")
+        else:
+            pattern.append(".*".join(re.escape(part) for part in line.rstrip().split("...")) + r"[ \t]*\n")
+    return re.fullmatch("".join(pattern), "".join(line + "\n" for line in actual)) is not None
+
+
+def run(command, folder, environment):
+    status = 0
+    if "# exit " in command:
+        command, _, code = command.partition("# exit ")
+        status = int(code)
+    command = command.strip()
+    if command.startswith("./hal "):
+        command, folder = str(HAL) + command[len("./hal"):], ROOT
+    done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, timeout=120, text=True, errors="replace")
+    return done.returncode == status, done.returncode, done.stdout.splitlines()
+
+
+def check_console(text, where, folder, environment):
+    problems, commands = [], []
+    for line in text.splitlines():
+        if line.startswith("$ "):
+            commands.append((line[2:], []))
+        elif commands:
+            commands[-1][1].append(line)
+    for command, expected in commands:
+        if command.startswith(NOT_RUN):
+            continue
+        good, status, actual = run(command, folder, environment)
+        while expected and not expected[-1].strip():
+            expected.pop()
+        if not good:
+            problems.append(f"{where}: `{command}` ended with status {status}:\n" + "\n".join(actual))
+        elif expected and not matches(expected, actual):
+            problems.append(f"{where}: `{command}` printed\n" + "\n".join(actual) + "\n  where the document has\n" + "\n".join(expected))
+    return len(commands), problems
+
+
+def check_document(path):
+    text = path.read_text(encoding="utf-8")
+    ran, problems = 0, []
+    with tempfile.TemporaryDirectory() as folder:
+        home = pathlib.Path(folder, ".home")
+        environment = dict(os.environ, PATH=f"{HAL.parent}:{os.environ['PATH']}", NO_COLOR="1", HOME=str(home), XDG_RUNTIME_DIR=str(home),
+                           XDG_DATA_HOME=str(home), XDG_STATE_HOME=str(home), TERM="dumb")
+        home.mkdir(mode=0o700)
+        for block in FENCE.finditer(text):
+            language, options, body = block.groups()
+            where = f"{path.relative_to(ROOT)}:{text.count(chr(10), 0, block.start()) + 1}"
+            name = re.search(r"file=(\S+)", options)
+            if name:
+                file = pathlib.Path(folder, name.group(1))
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(body, encoding="utf-8")
+            elif language == "hal":
+                pathlib.Path(folder, "block.hal").write_text(body, encoding="utf-8")
+                good, status, actual = run("hal check block.hal", folder, environment)
+                ran += 1
+                if not good:
+                    problems.append(f"{where}: hal check says\n" + "\n".join(actual))
+            elif language == "console":
+                count, found = check_console(body, where, folder, environment)
+                ran += count
+                problems += found
+    return ran, problems
+
+
+def main():
+    chosen = [pathlib.Path(a).resolve() for a in sys.argv[1:]] or [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    total, failed = 0, 0
+    for path in chosen:
+        ran, problems = check_document(path)
+        total += ran
+        failed += len(problems)
+        for problem in problems:
+            print(problem + "\n")
+    print(f"{total - failed} passed, {failed} failed")
+    return 1 if failed or total == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
