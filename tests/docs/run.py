@@ -10,8 +10,8 @@ In README.md and docs/**/*.md:
                         its whole output, stdout and stderr together. A line `...` stands for any lines, `...` inside a
                         line for any text. No output lines: anything is accepted. The exit status must be 0 unless the
                         command ends in `# exit 1`.
-  `./hal` in a command is the program under test, and such a command runs in the repository's root. Nothing else is skipped but
-`./hal test` and `./hal bench`, which run this.
+  `./hal` in a command is the program under test and `build/release` its build tree; such commands run in the repository's
+root. Nothing is skipped but `./hal test` and `./hal bench`, which run this.
 """
 import os
 import pathlib
@@ -45,6 +45,8 @@ def run(command, folder, environment):
     command = command.strip()
     if command.startswith("./hal "):
         command, folder = str(HAL) + command[len("./hal"):], ROOT
+    if command.startswith("cmake --install build/release"):
+        command, folder = command.replace("build/release", str(HAL.parents[1])), ROOT
     done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT, timeout=120, text=True, errors="replace")
     return done.returncode == status, done.returncode, done.stdout.splitlines()
