@@ -152,6 +152,8 @@ inline constexpr CodePage code_pages[] = {
      "check again."},
     {"two-readers",
      "A port is a byte stream: what one reader takes is gone for the other. It has one writer and one reader."},
+    {"too-many-words",
+     "A file may consist of 10000000 words, which is two million nets. This one has more, so it is not a netlist; nothing of it was used."},
     {"two-writers",
      "A signal has one writer: one OUT pin, or any number of I/O pins, never both. A second output on the same signal "
      "would make its value depend on the order of functions.\n\nJoin two sources with sum2, or2 or mux2, or unlink the first one with unlinkp."},

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t most_names = 1'000'000;                  // that one command stands for
 constexpr std::size_t most_bytes = std::size_t{256} << 20;     // of text that one command becomes
+constexpr std::size_t most_parts = 1000;                       // ranges and literals of one word
 constexpr std::size_t word_overhead = sizeof(Token);
 
 /// A stretch of a word: a literal, the numbers from `first` to `last`, or the elements of a set.
@@ -19,12 +20,14 @@ struct Part {
     std::string_view literal;
     std::vector<std::string_view> elements;
     std::uint64_t first = 0, last = 0, count = 1;
-    std::size_t width = 0;  ///< digits, when leading zeros are kept
+    std::size_t width = 0;  ///< of a number: at least 1, more when leading zeros are kept
+
+    bool names() const { return width > 0 || !elements.empty(); }
 
     void append_to(std::string& out, std::uint64_t index) const {
         if (!elements.empty()) {
             out += elements[index];
-        } else if (count > 1 || width > 0) {
+        } else if (width > 0) {
             const std::string digits = std::to_string(last >= first ? first + index : first - index);
             out.append(width > digits.size() ? width - digits.size() : 0, '0');
             out += digits;
@@ -79,7 +82,8 @@ public:
             }
             add_literal(pattern, literal, at);
             Part part;
-            if (!(range ? parse_range(at, close, part) : parse_set(at, close, part)) || !add(pattern, std::move(part), at, close + 1)) return false;
+            if (!(range ? parse_range(at, close, part) : parse_set(at, close, part)) || !add(pattern, std::move(part), at, close + 1))
+                return false;
             at = literal = close + 1;
         }
         add_literal(pattern, literal, end);
@@ -101,6 +105,7 @@ private:
     }
 
     bool add(Pattern& pattern, Part part, std::size_t begin, std::size_t end) {
+        if (pattern.parts.size() > most_parts) return fail(begin, end, "this word has too many ranges");
         if (part.count > most_names || pattern.count * part.count > most_names)
             return fail(begin, end, "this word stands for more than " + std::to_string(most_names) + " names");
         pattern.count *= part.count;
@@ -120,12 +125,13 @@ private:
             const char* end = bounds[i].data() + bounds[i].size();
             const auto [stop, status] = std::from_chars(bounds[i].data(), end, *values[i]);
             if (bounds[i].empty() || stop != end || status == std::errc::invalid_argument)
-                return fail(open, close + 1, "the bounds of a range are whole numbers", "write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}");
+                return fail(open, close + 1, "the bounds of a range are whole numbers",
+                            "write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}");
             if (status != std::errc{} || bounds[i].size() > 18) return fail(open, close + 1, "the bounds of this range are too large");
             if (bounds[i].size() > 1 && bounds[i][0] == '0') part.width = std::max(bounds[0].size(), bounds[1].size());
         }
         part.count = (part.last >= part.first ? part.last - part.first : part.first - part.last) + 1;
-        part.width = std::max<std::size_t>(part.width, 1);  // 1: a number, not a literal
+        part.width = std::max<std::size_t>(part.width, 1);
         return true;
     }
 
@@ -133,10 +139,11 @@ private:
         if (close >= text_end_) return fail(open, open + 1, "this set has no }", "a set is written {x,y,z}, without blanks");
         if (text_[close] == '{') return fail(open, close + 1, "a set cannot contain a set", "write all its names side by side: {x,y,z}");
         const std::string_view inside = text_.substr(open + 1, close - open - 1);
-        if (inside.empty()) return fail(open, close + 1, "this set is empty", "a set is written {x,y,z}");
-        if (inside.find("..") != inside.npos) return fail(open, close + 1, "a set does not contain a range", "write the range alone: [0..5]");
+        if (inside.find("..") != inside.npos)
+            return fail(open, close + 1, "a set does not contain a range", "write the range alone: [0..5]");
         for (std::size_t at = 0; at <= inside.size();) {
             const std::size_t comma = std::min(inside.find(',', at), inside.size());
+            if (comma == at) return fail(open, close + 1, "a name of this set is empty", "a set is written {x,y,z}");
             part.elements.push_back(inside.substr(at, comma - at));
             at = comma + 1;
         }
@@ -243,12 +250,16 @@ private:
                 diagnostics_.error("bad-range", place(token, fault.begin, fault.end), fault.message, "", fault.help);
                 return false;
             }
-            word.ranged = word.ranged || std::any_of(pattern.parts.begin(), pattern.parts.end(), [](const Part& p) { return !p.elements.empty() || p.width > 0; });
+            word.ranged = word.ranged || std::any_of(pattern.parts.begin(), pattern.parts.end(), [](const Part& p) { return p.names(); });
             word.count += pattern.count;
             longest = std::max(longest, word.head.size() + pattern.longest);
             list_bytes_ += pattern.count * (pattern.longest + 1);
             word.patterns.push_back(std::move(pattern));
             at = stop + 1;
+            if (word.count > most_names) {
+                diagnostics_.error("bad-range", token.span, "this word stands for more than " + std::to_string(most_names) + " names");
+                return false;
+            }
         }
         if (!word.ranged) {
             word.count = 1;
@@ -256,10 +267,6 @@ private:
             return true;
         }
         word.longest = longest;
-        if (word.count > most_names) {
-            diagnostics_.error("bad-range", token.span, "this word stands for more than " + std::to_string(most_names) + " names");
-            return false;
-        }
         return true;
     }
 
@@ -278,7 +285,8 @@ private:
     /// Part of a token in the source, as far as the token stands there as it is.
     static Span place(const Token& token, std::size_t begin, std::size_t end) {
         if (token.span.end - token.span.begin != token.text.size()) return token.span;
-        return {token.span.source, token.span.begin + static_cast<std::uint32_t>(begin), token.span.begin + static_cast<std::uint32_t>(end)};
+        return {token.span.source, token.span.begin + static_cast<std::uint32_t>(begin),
+                token.span.begin + static_cast<std::uint32_t>(end)};
     }
 
     std::vector<Command> in_place() {
@@ -301,8 +309,9 @@ private:
 
     std::vector<Command> mismatch(const Word& leader, const Word& word) {
         const auto names = [](const Word& w) { return std::to_string(w.count) + (w.count == 1 ? " name" : " names"); };
-        Diagnostic made{.code = "range-length",
-                        .message = "'" + leader.token->text + "' stands for " + names(leader) + ", '" + word.token->text + "' for " + names(word)};
+        Diagnostic made{
+            .code = "range-length",
+            .message = "'" + leader.token->text + "' stands for " + names(leader) + ", '" + word.token->text + "' for " + std::to_string(word.count)};
         made.labels = {{word.token->span, names(word)}, {leader.token->span, names(leader)}};
         made.help.push_back("ranges and sets of one command run along with each other, so they need the same number of names");
         diagnostics_.add(std::move(made));
@@ -326,7 +335,8 @@ private:
 std::vector<Command> expand(const Command& command, Diagnostics& diagnostics) {
     static constexpr std::array<std::string_view, 7> literal{"print", "echo", "unecho", "help", "loadusr", "source", "save"};
     if (std::find(literal.begin(), literal.end(), command.name.text) != literal.end()) return {command};
-    const bool plain = !has_range(command.name.text) && std::none_of(command.args.begin(), command.args.end(), [](const Token& t) { return has_range(t.text); });
+    const bool plain = !has_range(command.name.text) &&
+                       std::none_of(command.args.begin(), command.args.end(), [](const Token& t) { return has_range(t.text); });
     if (plain) return {command};
     return Expander(command, diagnostics).run();
 }

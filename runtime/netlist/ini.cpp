@@ -25,8 +25,9 @@ std::optional<std::string> read_whole(const std::string& path, std::string& reas
         return std::nullopt;
     }
     std::string text;
-    struct stat status {};
-    if (::fstat(file, &status) == 0 && S_ISREG(status.st_mode)) text.reserve(std::min(static_cast<std::size_t>(status.st_size), largest_file) + 1);
+    struct stat status{};
+    if (::fstat(file, &status) == 0 && S_ISREG(status.st_mode))
+        text.reserve(std::min(static_cast<std::size_t>(status.st_size), largest_file) + 1);
     char part[65536];
     ssize_t got = 0;
     while ((got = ::read(file, part, sizeof part)) != 0) {
@@ -37,6 +38,7 @@ std::optional<std::string> read_whole(const std::string& path, std::string& reas
         text.append(part, static_cast<std::size_t>(got));
     }
     ::close(file);
+    if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);  // a byte-order mark says nothing here
     return reason.empty() ? std::optional(std::move(text)) : std::nullopt;
 }
 
@@ -68,7 +70,8 @@ public:
         Line line;
         while (reader.next(line)) {
             if (const auto at = reader.control(); at && line.text()[*at] == '\0')
-                return diagnostics_.error("binary-text", line.span(*at, *at + 1), "this is not a text file", "a control character", "an INI file is plain text in UTF-8");
+                return diagnostics_.error("binary-text", line.span(*at, *at + 1), "this is not a text file", "a control character",
+                                          "an INI file is plain text in UTF-8");
             entry(line, path, depth);
         }
     }

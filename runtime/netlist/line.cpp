@@ -8,7 +8,8 @@ namespace hal {
 std::size_t Line::piece_of(std::size_t at) const {
     const auto holds = [&](std::size_t i) { return pieces_[i].at <= at && (i + 1 == pieces_.size() || at < pieces_[i + 1].at); };
     if (last_piece_ < pieces_.size() && holds(last_piece_)) return last_piece_;
-    const auto after = std::upper_bound(pieces_.begin(), pieces_.end(), at, [](std::size_t place, const Piece& piece) { return place < piece.at; });
+    const auto after =
+        std::upper_bound(pieces_.begin(), pieces_.end(), at, [](std::size_t place, const Piece& piece) { return place < piece.at; });
     return last_piece_ = after == pieces_.begin() ? 0 : static_cast<std::size_t>(after - pieces_.begin()) - 1;
 }
 
@@ -41,6 +42,7 @@ void Line::append(std::string_view stretch, std::uint32_t source_begin) {
         text_ = stretch;
         return;
     }
+    if (stretch.empty()) return;
     if (pieces_.size() == 1) buffer_ = text_;
     pieces_.push_back({buffer_.size(), source_begin, source_end, false});
     buffer_ += stretch;
@@ -64,9 +66,7 @@ void Line::append_value(std::string_view value, Span reference) {
     text_ = buffer_;
 }
 
-LineReader::LineReader(const Sources& sources, std::uint32_t source) : source_(source), text_(sources.get(source).text) {
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // a byte-order mark says nothing here
-}
+LineReader::LineReader(const Sources& sources, std::uint32_t source) : source_(source), text_(sources.get(source).text) {}
 
 bool LineReader::next(Line& line) {
     if (at_ >= text_.size()) return false;

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/diagnostic.hpp"
 #include "base/source.hpp"
 
 namespace hal {
@@ -85,5 +86,8 @@ struct Reference {
     std::string_view section, name;
 };
 Reference reference_at(std::string_view text, std::size_t at);
+
+/// Reports what makes a text no netlist, whatever the values of its references.
+void check_syntax(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics);
 
 }  // namespace hal

@@ -12,11 +12,13 @@ namespace hal {
 namespace {
 
 constexpr std::size_t most_errors = 20;                     // shown of one source
+constexpr std::size_t most_words = 10'000'000;              // of one source: two million nets
 constexpr std::size_t most_substituted = std::size_t{64} << 20;  // bytes of values in one source: a value may be long, and named often
 
 std::vector<std::string> environment_names() {
     std::vector<std::string> names;
-    for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) names.emplace_back(*entry, std::string_view(*entry).find('='));
+    for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry)
+        names.emplace_back(*entry, std::string_view(*entry).find('='));
     return names;
 }
 
@@ -24,17 +26,19 @@ std::string bracketed(std::string_view section, std::string_view key) { return "
 
 class Parser {
 public:
-    Parser(const Sources& sources, std::uint32_t source, const Environment& environment, Diagnostics& diagnostics)
+    /// Without an environment every reference has a value: only the syntax is looked at.
+    Parser(const Sources& sources, std::uint32_t source, const Environment* environment, Diagnostics& diagnostics)
         : reader_(sources, source), source_(source), environment_(environment), diagnostics_(diagnostics) {}
 
     std::vector<Command> run() {
-        while (!binary_ && reader_.next(line_)) parse_line();
-        if (reader_.dos_ending())
+        while (!given_up_ && reader_.next(line_)) parse_line();
+        if (reader_.dos_ending() && environment_ != nullptr && !given_up_)
             diagnostics_.warning("dos-line-endings", *reader_.dos_ending(), "the lines of this file end in CR LF, as on DOS", "",
                                  "harmless here; `hal fmt` writes plain line ends");
         if (errors_ > most_errors)
-            diagnostics_.error("too-many-errors", last_error_, std::to_string(errors_ - most_errors) + " more errors in this file are not shown", "the last of them");
-        if (binary_) commands_.clear();
+            diagnostics_.error("too-many-errors", last_error_,
+                               std::to_string(errors_ - most_errors) + " more errors in this file are not shown", "the last of them");
+        if (given_up_) commands_.clear();
         return std::move(commands_);
     }
 
@@ -42,6 +46,14 @@ private:
     void error(Code code, Span at, std::string message, std::string label = "", std::string help = "") {
         last_error_ = at;
         if (++errors_ <= most_errors) diagnostics_.error(code, at, std::move(message), std::move(label), std::move(help));
+    }
+
+    /// Counts an error that will not be shown: no work for its text and suggestions.
+    bool hidden(Span at) {
+        if (errors_ < most_errors) return false;
+        ++errors_;
+        last_error_ = at;
+        return true;
     }
 
     void parse_line() {
@@ -63,7 +75,7 @@ private:
         if (const auto at = reader_.control(); at && (*at < comment || line_.text()[*at] == '\0')) {
             error("binary-text", line_.span(*at, *at + 1), "this is not a text file", "a control character",
                   "a netlist is plain text in UTF-8; nothing of this file was used");
-            binary_ = true;
+            given_up_ = true;
             return false;
         }
         if (const auto at = reader_.carriage_return()) {
@@ -79,8 +91,10 @@ private:
     void unclosed(const Line& line, std::size_t quote) {
         const std::string sign(1, line.text()[quote]);
         const bool in_value = !line.verbatim(quote, quote + 1);
-        error("unterminated-quote", line.span(quote, quote + 1), "the quote " + sign + " is never closed", in_value ? "it comes from this value" : "opened here",
-              "close it with " + sign + " on the same line; there is no escape character, but one kind of quote may stand inside the other");
+        error(
+            "unterminated-quote", line.span(quote, quote + 1), "the quote " + sign + " is never closed",
+            in_value ? "it comes from this value" : "opened here",
+            "close it with " + sign + " on the same line; there is no escape character, but one kind of quote may stand inside the other");
     }
 
     void warn_of_continued_comment(std::size_t comment) {
@@ -88,8 +102,9 @@ private:
         // Two pieces of the source: the comment swallowed at least one more physical line.
         const Span whole = line_.span(comment, line_.text().size());
         if (line_.verbatim(comment, line_.text().size())) return;
-        diagnostics_.warning("continued-comment", {source_, whole.begin, whole.begin + 1}, "this comment ends in \\ and so goes on in the next line, which is not run",
-                             "", "take the \\ away, or put the comment at the end of the last line");
+        diagnostics_.warning("continued-comment", {source_, whole.begin, whole.begin + 1},
+                             "this comment ends in \\ and so goes on in the next line, which is not run", "",
+                             "take the \\ away, or put the comment at the end of the last line");
     }
 
     /// As scan_quotes, for text whose comment is gone: a `#` from a value is a character like any other.
@@ -118,7 +133,8 @@ private:
                 at = end;
                 continue;
             }
-            const std::string* value = reference.kind == Reference::broken ? broken(text[at], span) : look_up(reference, text.substr(at, reference.length), span);
+            const std::string* value = reference.kind == Reference::broken ? broken(text.substr(at, 100), span)
+                                                                           : look_up(reference, text.substr(at, reference.length), span);
             good = good && value != nullptr;
             if (good) {
                 substituted_ += value->size();
@@ -136,58 +152,75 @@ private:
     }
 
     bool names_key(const Reference& reference) const {
-        return reference.kind == Reference::key && environment_.ini != nullptr && environment_.ini->get(reference.section, reference.name);
+        return reference.kind == Reference::key && environment_ != nullptr && environment_->ini != nullptr &&
+               environment_->ini->get(reference.section, reference.name);
     }
 
-    const std::string* broken(char sign, Span at) {
-        const bool variable = sign == '$';
-        error("bad-reference", at, variable ? "'$' is not followed by the name of an environment variable" : "'[' starts no [SECTION]KEY", "",
-              variable ? "write $NAME or $(NAME)" : "write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names");
+    const std::string* broken(std::string_view rest, Span at) {
+        if (hidden(at)) return nullptr;
+        rest = rest.substr(0, rest.find_first_of(" \t"));
+        if (rest[0] == '$') {
+            error("bad-reference", at, "'$' is not followed by the name of an environment variable", "", "write $NAME or $(NAME)");
+        } else if (rest.find("..") != rest.npos) {
+            error("bad-range", at, "this range has no ]", "", "a range is written [0..5], without blanks");
+        } else {
+            error("bad-reference", at, "'[' starts no [SECTION]KEY", "",
+                  "write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names");
+        }
         return nullptr;
     }
 
     /// The value a reference (written as `text`) stands for, or null after reporting that there is none.
     const std::string* look_up(const Reference& reference, std::string_view text, Span at) {
+        static const std::string any = "x";
+        if (environment_ == nullptr) return &any;
         auto known = values_.find(text);
-        if (known == values_.end()) known = values_.emplace(text, reference.kind == Reference::variable ? variable(std::string(reference.name)) : key(reference)).first;
+        if (known == values_.end())
+            known =
+                values_.emplace(text, reference.kind == Reference::variable ? variable(std::string(reference.name)) : key(reference)).first;
         if (known->second) return &*known->second;
-        if (errors_ >= most_errors) error("unset-variable", at, "");  // counted, not shown: no work for suggestions
-        else if (reference.kind == Reference::variable) report_variable(reference, at);
+        if (hidden(at)) return nullptr;
+        if (reference.kind == Reference::variable) report_variable(reference, at);
         else report_key(reference, at);
         return nullptr;
     }
 
     std::optional<std::string> variable(const std::string& name) const {
-        if (environment_.variable) return environment_.variable(name);
+        if (environment_->variable) return environment_->variable(name);
         const char* value = std::getenv(name.c_str());
         return value == nullptr ? std::nullopt : std::optional<std::string>(value);
     }
 
     std::optional<std::string> key(const Reference& reference) const {
-        return environment_.ini == nullptr ? std::nullopt : environment_.ini->get(reference.section, reference.name);
+        return environment_->ini == nullptr ? std::nullopt : environment_->ini->get(reference.section, reference.name);
     }
 
     void report_variable(const Reference& reference, Span at) {
         const std::string name(reference.name);
-        error("unset-variable", at, "the environment variable '" + name + "' is not set", environment_.variable ? "" : did_you_mean(name, environment_names()),
+        error("unset-variable", at, "the environment variable '" + name + "' is not set",
+              environment_->variable ? "" : did_you_mean(name, environment_names()),
               "set it in front of the command: " + name + "=… hal …");
     }
 
     void report_key(const Reference& reference, Span at) {
         const std::string name = bracketed(reference.section, reference.name);
-        if (environment_.ini == nullptr)
-            return error("unset-ini-key", at, "'" + name + "' has no value: no INI file was given", "", "give it with --ini FILE.ini (halcmd: -i FILE.ini)");
-        const std::vector<std::string> names = environment_.ini->names();
+        if (environment_->ini == nullptr)
+            return error("unset-ini-key", at, "'" + name + "' has no value: no INI file was given", "",
+                         "give it with --ini FILE.ini (halcmd: -i FILE.ini)");
+        const std::vector<std::string> names = environment_->ini->names();
         std::vector<std::string> section;
         for (const std::string& candidate : names)
-            if (candidate.starts_with("[" + std::string(reference.section) + "]")) section.push_back(candidate.substr(reference.section.size() + 2));
-        const std::string help = section.empty() || reference.section.empty() ? "" : "keys of [" + std::string(reference.section) + "]: " + listed(section);
+            if (candidate.starts_with("[" + std::string(reference.section) + "]"))
+                section.push_back(candidate.substr(reference.section.size() + 2));
+        const std::string help =
+            section.empty() || reference.section.empty() ? "" : "keys of [" + std::string(reference.section) + "]: " + listed(section);
         error("unset-ini-key", at, "there is no '" + name + "' in the INI file", did_you_mean(name, names), help);
     }
 
     void split(const Line& line, std::string_view text) {
         Command command;
-        std::size_t at = 0, count = 0, first = 0, last = 0;
+        std::size_t at = 0, first = 0, last = 0;
+        bool named = false;
         const auto word_end = [&](std::size_t from) {
             std::size_t stop = from;
             while (stop < text.size() && !is_blank(text[stop])) {
@@ -201,37 +234,46 @@ private:
             if (at == text.size()) break;
             const std::size_t stop = word_end(at);
             Token token{std::string(text.substr(at, stop - at)), line.span(at, stop)};
-            if (count == 0) {
+            if (++words_ > most_words) {
+                given_up_ = true;
+                return error("too-many-words", token.span, "this file has more than " + std::to_string(most_words) + " words", "",
+                             "that is no netlist; nothing of this file was used");
+            }
+            if (named) {
+                if (command.args.empty()) command.args.reserve(4);
+                command.args.push_back(std::move(token));
+            } else {
                 first = at;
                 command.name = std::move(token);
-            } else {
-                if (count == 1) command.args.reserve(4);
-                command.args.push_back(std::move(token));
+                named = true;
             }
-            ++count;
             at = last = stop;
         }
-        if (count == 0) return;
+        if (!named) return;
         command.span = line.span(first, last);
         commands_.push_back(std::move(command));
     }
 
     LineReader reader_;
     std::uint32_t source_;
-    const Environment& environment_;
+    const Environment* environment_;
     Diagnostics& diagnostics_;
     Line line_, expanded_;
     std::vector<Command> commands_;
     std::map<std::string, std::optional<std::string>, std::less<>> values_;  ///< of references met, as they are written
-    std::size_t errors_ = 0, substituted_ = 0;
+    std::size_t errors_ = 0, words_ = 0, substituted_ = 0;
     Span last_error_;
-    bool binary_ = false, carriage_return_said_ = false;
+    bool given_up_ = false, carriage_return_said_ = false;
 };
 
 }  // namespace
 
 std::vector<Command> parse(const Sources& sources, std::uint32_t source, const Environment& environment, Diagnostics& diagnostics) {
-    return Parser(sources, source, environment, diagnostics).run();
+    return Parser(sources, source, &environment, diagnostics).run();
+}
+
+void check_syntax(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) {
+    Parser(sources, source, nullptr, diagnostics).run();
 }
 
 bool is_arrow(std::string_view word) { return word == "=>" || word == "<=" || word == "<=>"; }
