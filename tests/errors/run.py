@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Runs error tests: run.py [HAL] [--every-code] [TEST...]
+
+CODE.hal provokes the diagnostic CODE: `hal check CODE.hal`, or the command line in CODE.cmd, runs in this folder, and
+its whole standard error must be CODE.expected, which must mention [CODE]. CODE-more.hal is a further test of CODE.
+Files the tests source have another ending (.inc). Without TEST (or with --every-code, which runs nothing) each code of `hal explain` must have a test, and each test a code.
+"""
+import difflib
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
+
+
+def program(arguments):
+    """The program to test; takes it off the arguments when it is the first of them."""
+    if arguments and Path(arguments[0]).name == "hal" and os.access(arguments[0], os.X_OK):
+        return Path(arguments.pop(0)).resolve()
+    if os.environ.get("HAL_BIN"):
+        return Path(os.environ["HAL_BIN"]).resolve()
+    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
+    if not built:
+        sys.exit("run.py: no program to test; build it (./hal --version) or set HAL_BIN")
+    return built[-1]
+
+
+def run(hal, command):
+    """Standard error and exit status of a command line whose first word is hal, halrun or halcmd."""
+    with tempfile.TemporaryDirectory() as folder:
+        keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH") or key.endswith("SAN_OPTIONS")}
+        environment = {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder}
+        try:
+            done = subprocess.run([str(hal.parent / command[0]), *command[1:]], cwd=HERE, env=environment, stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
+        except subprocess.TimeoutExpired as late:
+            return late.stderr or b"", f"still running after {TIMEOUT:g} s"
+    return done.stderr, done.returncode
+
+
+def codes(hal):
+    """All diagnostic codes."""
+    listed = subprocess.run([str(hal), "explain"], stdout=subprocess.PIPE, check=True, timeout=TIMEOUT).stdout.decode()
+    return {line.split()[0] for line in listed.splitlines() if line and not line.startswith(" ")}
+
+
+def code_of(test, known):
+    """The longest code the test's name begins with, at a dash."""
+    parts = test.split("-")
+    names = ["-".join(parts[:n]) for n in range(len(parts), 0, -1)]
+    return next((name for name in names if name in known), None)
+
+
+def check(hal, test, known):
+    """What is wrong with a test, as lines; empty: nothing."""
+    expected = HERE / f"{test}.expected"
+    if not expected.exists():
+        return [f"it has no file '{test}.expected'"]
+    code = code_of(test, known)
+    if not code:
+        return ["no diagnostic code has this name; see: hal explain"]
+    command = ["hal", "check", f"{test}.hal"]
+    if (HERE / f"{test}.cmd").exists():
+        command = shlex.split((HERE / f"{test}.cmd").read_text())
+    got, status = run(hal, command)
+    wanted = expected.read_bytes()
+    problems = []
+    if not isinstance(status, int) or status < 0:
+        problems.append(f"ended with {status}")
+    if f"[{code}]".encode() not in wanted:
+        problems.append(f"'{test}.expected' does not mention [{code}]")
+    if got != wanted:
+        text = lambda data: data.decode(errors="backslashreplace").splitlines()
+        problems += list(difflib.unified_diff(text(wanted), text(got), "expected", "stderr", lineterm="", n=2)) or ["the same lines, but other line ends"]
+    return problems
+
+
+def main():
+    arguments = sys.argv[1:]
+    hal = program(arguments)
+    coverage_only = "--every-code" in arguments
+    names = [Path(a).stem for a in arguments if a != "--every-code"]
+    known = codes(hal)
+    everything = sorted({path.stem for pattern in ("*.hal", "*.cmd") for path in HERE.glob(pattern)})
+    tests = [] if coverage_only else [t for t in everything if not names or t in names]
+    failed = 0
+    for test in tests:
+        if problems := check(hal, test, known):
+            failed += 1
+            print(f"FAILED {test}")
+            print("\n".join("    " + line for line in problems))
+    if not names:
+        tested = {code_of(test, known) for test in everything}
+        for code in sorted(known - tested):
+            failed += 1
+            print(f"FAILED {code}: no test; write {code}.hal and {code}.expected")
+        for path in sorted(HERE.glob("*.expected")):
+            if not code_of(path.stem, known) or path.stem not in everything:
+                failed += 1
+                print(f"FAILED {path.name}: no code has this name, or there is no {path.stem}.hal")
+    print(f"{len(tests)} error tests run, {failed} failed" if not coverage_only else f"{len(known)} codes, {failed} without test")
+    return 0 if (tests or coverage_only) and not failed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Runs netlist tests: run.py [HAL] [TEST...]
+
+A test is a folder with test.hal. `hal sim test.hal` runs in it, twice; both runs must print the same bytes, and they
+must be those of `expected`. Where there is a file `expected.stderr`, standard error is compared too; where there is a
+file `status`, it holds the exit status (else 0); where there is a file `command`, it is the command line instead.
+HAL is the program (default: $HAL_BIN, else the newest build); a TEST is a folder, its test.hal, or a part of its name.
+"""
+import difflib
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
+
+
+def program(arguments):
+    """The program to test; takes it off the arguments when it is the first of them."""
+    if arguments and Path(arguments[0]).name == "hal" and os.access(arguments[0], os.X_OK):
+        return Path(arguments.pop(0)).resolve()
+    if os.environ.get("HAL_BIN"):
+        return Path(os.environ["HAL_BIN"]).resolve()
+    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
+    if not built:
+        sys.exit("run.py: no program to test; build it (./hal --version) or set HAL_BIN")
+    return built[-1]
+
+
+def environment(folder):
+    """Nothing of the user's own: no colours, no running instances, no home."""
+    keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH") or key.endswith("SAN_OPTIONS")}
+    return {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder}
+
+
+def run(hal, test):
+    """Standard output, standard error and exit status of one run."""
+    command = ["hal", "sim", "test.hal"]
+    if (test / "command").exists():
+        command = shlex.split((test / "command").read_text())
+    command[0] = str(hal.parent / command[0])
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            done = subprocess.run(command, cwd=test, env=environment(folder), stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
+        except subprocess.TimeoutExpired as late:
+            return late.stdout or b"", late.stderr or b"", f"still running after {TIMEOUT:g} s"
+    return done.stdout, done.stderr, done.returncode
+
+
+def differences(wanted, got, what):
+    text = lambda data: data.decode(errors="backslashreplace").splitlines()
+    lines = list(difflib.unified_diff(text(wanted), text(got), f"expected {what}", what, lineterm="", n=2))
+    return lines or [f"{what}: the same lines, but other line ends"]
+
+
+def check(hal, test):
+    """What is wrong with a test, as lines; empty: nothing."""
+    if not (test / "expected").exists():
+        return ["it has no file 'expected'"]
+    first, second = run(hal, test), run(hal, test)
+    out, err, status = first
+    problems = []
+    wanted_status = int((test / "status").read_text()) if (test / "status").exists() else 0
+    if status != wanted_status:
+        problems += [f"exit status {status}, not {wanted_status}; standard error:"] + err.decode(errors="backslashreplace").splitlines()
+    if out != (wanted := (test / "expected").read_bytes()):
+        problems += differences(wanted, out, "stdout")
+    if (test / "expected.stderr").exists() and err != (wanted := (test / "expected.stderr").read_bytes()):
+        problems += differences(wanted, err, "stderr")
+    if first[0] != second[0] or first[2] != second[2]:
+        problems += ["a second run differs from the first:"] + differences(first[0], second[0], "stdout")
+    return problems
+
+
+def main():
+    arguments = sys.argv[1:]
+    hal = program(arguments)
+    tests = sorted(path.parent for path in HERE.rglob("test.hal"))
+    if arguments:
+        wanted = [Path(a).resolve().parent if a.endswith(".hal") else Path(a).resolve() if Path(a).is_dir() else a for a in arguments]
+        tests = [t for t in tests if any(t == w or (isinstance(w, str) and w in str(t.relative_to(HERE))) for w in wanted)]
+    failed = 0
+    for test in tests:
+        if problems := check(hal, test):
+            failed += 1
+            print(f"FAILED {test.relative_to(HERE)}")
+            print("\n".join("    " + line for line in problems))
+    print(f"{len(tests) - failed} of {len(tests)} netlist tests passed")
+    return 0 if tests and not failed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace hal::tools {
+
+/// A drawing of dots for the terminal: 2 x 4 dots per character (Braille), or 1 x 2 without Unicode.
+class Canvas {
+public:
+    /// `columns` x `rows` characters.
+    Canvas(std::size_t columns, std::size_t rows, bool unicode);
+
+    /// Coordinates run from -1 to 1 in the largest centred square, y upwards. What lies outside is not drawn.
+    void dot(double x, double y);
+    void line(double x0, double y0, double x1, double y1);
+    void circle(double x, double y, double radius);
+
+    /// One text per row, each `columns` characters.
+    std::vector<std::string> rows() const;
+
+private:
+    std::size_t columns_, rows_, dots_x_, dots_y_;
+    bool unicode_;
+    double half_;               // dots from the centre to the side of the square
+    std::vector<bool> dots_;
+};
+
+}  // namespace hal::tools

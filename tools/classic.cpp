@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#include "classic.hpp"
+
+#include <cstdlib>
+#include <fmt/core.h>
+#include <getopt.h>
+
+#include "options.hpp"
+#include "say.hpp"
+#include "shell/address.hpp"
+#include "shell/client.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+constexpr int bad_option = 255;
+
+/// halcmd's letters, which halrun takes too. False: not one of them.
+bool halcmd_letter(int letter, Options& options) {
+    switch (letter) {
+    case 'f': options.from_file = true; return true;
+    case 'i': options.ini = ::optarg; return true;
+    case 'k': options.keep_going = true; return true;
+    case 'q': options.loudness = Loudness::errors; return true;
+    case 'Q': options.loudness = Loudness::nothing; return true;
+    case 'v':
+    case 'V': options.loudness = Loudness::results; return true;
+    case 's': options.script = true; return true;
+    case 'e': options.echo = true; return true;
+    default: return false;
+    }
+}
+
+void take_words(Options& options, int argc, char** argv) { options.words.assign(argv + ::optind, argv + argc); }
+
+constexpr const char* halcmd_usage =
+    "usage: halcmd [OPTION…] [COMMAND…]\n"
+    "       halcmd [OPTION…] -f [FILE]\n\n"
+    "  -f [FILE]   commands from a file, or from standard input\n"
+    "  -i INIFILE  where [SECTION]KEY is looked up, with -f\n"
+    "  -k          go on after an error\n"
+    "  -q -Q -v    print errors only (the default), nothing, every result\n"
+    "  -s          output for scripts\n"
+    "  -e          echo each line on stderr\n"
+    "  -R          nothing to do here: there is no lock to release\n"
+    "  -h [NAME]   this, or the help of a command; halcmd help lists them\n";
+
+/// For bash's `complete -C halcmd`: what fits the word being typed, one per line.
+int complete_word() {
+    const char* line = std::getenv("COMP_LINE");
+    const char* point = std::getenv("COMP_POINT");
+    if (!line) return 0;
+    std::string typed(line);
+    if (point && *point) typed.resize(std::min(typed.size(), static_cast<std::size_t>(std::strtoul(point, nullptr, 10))));
+    const auto command = typed.find_first_of(" \t");
+    const auto begin = command == std::string::npos ? command : typed.find_first_not_of(" \t", command);
+    typed = begin == std::string::npos ? "" : typed.substr(begin);
+    std::string problem;
+    const auto client = Client::connect("", problem);
+    if (!client) return 1;
+    std::string text;
+    for (const Candidate& candidate : client->complete(typed, typed.size()).candidates) text += candidate.text + "\n";
+    return print(text) ? 0 : 1;
+}
+
+int halcmd(int argc, char** argv) {
+    Options options;
+    options.program = "halcmd";
+    options.classic = true;
+    for (int letter; (letter = ::getopt(argc, argv, "+RCfi:kqQsvVhe")) != -1;) {
+        if (halcmd_letter(letter, options)) continue;
+        if (letter == 'R') return 0;
+        if (letter == 'C') return complete_word();
+        if (letter != 'h') return bad_option;
+        take_words(options, argc, argv);
+        if (options.words.empty()) return print(halcmd_usage) ? 0 : 1;
+        options.words.insert(options.words.begin(), "help");
+        return run_shell(options);
+    }
+    take_words(options, argc, argv);
+    if (options.words.empty() && !options.from_file) return print(halcmd_usage) ? 0 : 1;
+    if (!options.ini.empty() && !options.from_file) {
+        fail(options, "-i needs -f");
+        return bad_option;
+    }
+    if (options.from_file && options.words.size() > 1) options.words.resize(1);  // a command as well is ignored
+    return run_shell(options);
+}
+
+constexpr const char* halrun_usage =
+    "usage: halrun [-I] [HALCMD-OPTION…] [FILE.hal | FILE.ini]\n"
+    "       halrun -U\n\n"
+    "  -I          type commands after the file\n"
+    "  -U          end the instance that runs\n"
+    "Without a file: commands are typed, or read from standard input.\n";
+
+int end_running(const Options& options) {
+    std::string problem;
+    const auto client = Client::connect("", problem);
+    if (!client) return 0;  // nothing runs: that is what was asked for
+    const Client::Answer answer = client->stop();
+    if (answer.status != 0) fail(options, answer.err);
+    return answer.status;
+}
+
+int halrun(int argc, char** argv) {
+    Options options;
+    options.program = "halrun";
+    options.classic = true;
+    for (int letter; (letter = ::getopt(argc, argv, "+IUTfi:kqQsvVhe")) != -1;) {
+        if (halcmd_letter(letter, options)) continue;
+        switch (letter) {
+        case 'I': options.interactive = true; break;
+        case 'U': return end_running(options);
+        case 'T': return fail(options, "Tcl is not supported; write .hal files, or drive halcmd from any language");
+        case 'h': return print(halrun_usage) ? 0 : 1;
+        default: return 1;
+        }
+    }
+    take_words(options, argc, argv);
+    if (options.words.size() > 1) {
+        options.arguments.assign(options.words.begin() + 1, options.words.end());
+        options.words.resize(1);
+    }
+    if (!options.words.empty()) {
+        const std::string& file = options.words.front();
+        if (file.ends_with(".tcl")) return fail(options, fmt::format("'{}': Tcl is not supported; write a .hal file", file));
+        if (!options.from_file && !file.ends_with(".hal") && !file.ends_with(".ini"))
+            return fail(options, fmt::format("'{}': the name of a netlist ends with .hal or .ini; or type: halrun -f {}", file, file));
+    }
+    return run_run(options);
+}
+
+int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, int (*run)(const Options&)) {
+    Options options;
+    options.program = program;
+    options.classic = true;
+    for (int letter; (letter = ::getopt(argc, argv, letters)) != -1;) {
+        char* end = nullptr;
+        const std::uint64_t number = ::optarg ? std::strtoull(::optarg, &end, 10) : 0;
+        if (::optarg && (*::optarg == '\0' || *end != '\0')) return fail(options, fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
+        switch (letter) {
+        case 'c': options.channel = number; break;
+        case 'n': options.count = number; break;
+        case 't': options.tag = true; break;
+        default: return 1;
+        }
+    }
+    take_words(options, argc, argv);
+    if (options.words.size() > 1) return fail(options, fmt::format("one file only; '{}' is too much", options.words[1]));
+    return run(options);
+}
+
+int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:t", run_record); }
+int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:", run_play); }
+
+constexpr Classic table[] = {{"halcmd", halcmd}, {"halrun", halrun}, {"halsampler", halsampler}, {"halstreamer", halstreamer}};
+
+}  // namespace
+
+const Classic* find_classic(std::string_view program) {
+    for (const Classic& row : table)
+        if (program == row.name) return &row;
+    return nullptr;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// `hal graph FILE [-o OUT]`: the netlist as a drawing.
+#include "graph.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "offline.hpp"
+#include "say.hpp"
+
+extern char** environ;
+
+namespace hal::tools {
+
+namespace {
+
+/// Lets Graphviz lay it out. The reason of a failure, or empty.
+std::string render_svg(const std::string& dot, const std::string& path) {
+    int in[2];
+    if (::pipe2(in, O_CLOEXEC) != 0) return std::strerror(errno);
+    posix_spawn_file_actions_t actions;
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawn_file_actions_adddup2(&actions, in[0], STDIN_FILENO);
+    const std::string target = "-o" + path;
+    const char* const arguments[] = {"dot", "-Tsvg", target.c_str(), nullptr};
+    pid_t process = 0;
+    const int problem = ::posix_spawnp(&process, "dot", &actions, nullptr, const_cast<char* const*>(arguments), environ);
+    ::posix_spawn_file_actions_destroy(&actions);
+    ::close(in[0]);
+    if (problem == 0) write_all(in[1], dot);  // what goes wrong here is seen in the exit status
+    ::close(in[1]);
+    if (problem == ENOENT) return "SVG needs Graphviz; type: sudo apt install graphviz (or write a .dot file: -o netlist.dot)";
+    if (problem != 0) return fmt::format("cannot run dot: {}", std::strerror(problem));
+    int status = 0;
+    while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
+    }
+    return status == 0 ? "" : fmt::format("dot could not write '{}'", path);
+}
+
+std::string write_file(const std::string& path, const std::string& text) {
+    const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    const bool good = descriptor >= 0 && write_all(descriptor, text);
+    const int why = errno;
+    if (descriptor >= 0) ::close(descriptor);
+    return good ? "" : fmt::format("cannot write '{}': {}", path, std::strerror(why));
+}
+
+}  // namespace
+
+int run_graph(const Options& options) {
+    const bool svg = options.output.ends_with(".svg");
+    if (!options.output.empty() && !svg && !options.output.ends_with(".dot") && !options.output.ends_with(".gv"))
+        return fail(options, fmt::format("'{}' is neither .svg nor .dot; type: -o {}.svg", options.output, options.words.front()));
+    Session session(offline());
+    ShellOptions how;
+    how.check = true;
+    how.color = colours(STDERR_FILENO);
+    Shell shell(session, how);
+    TextOutput output;
+    if (load_offline(shell, options, output) != 0) {
+        write_all(STDERR_FILENO, output.err_text);
+        return 1;
+    }
+    const std::lock_guard lock(session.mutex);
+    const std::string dot = as_dot(session.model(), options.words.front());
+    if (options.output.empty()) return print(dot) ? 0 : 1;
+    const std::string why = svg ? render_svg(dot, options.output) : write_file(options.output, dot);
+    return why.empty() ? 0 : fail(options, why);
+}
+
+}  // namespace hal::tools

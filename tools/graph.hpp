@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "model/model.hpp"
+
+namespace hal::tools {
+
+/// The netlist as a Graphviz drawing: a table per instance with a port per pin, functions with their place in their
+/// thread, edges coloured by type; dashed where the value is one cycle old, dotted where it comes from another thread.
+std::string as_dot(const Model& model, const std::string& title);
+
+}  // namespace hal::tools

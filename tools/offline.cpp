@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#include "offline.hpp"
+
+#include <unistd.h>
+
+#include "say.hpp"
+
+namespace hal::tools {
+
+void ErrorsOnly::err(std::string_view text) { write_all(STDERR_FILENO, text); }
+
+SessionOptions offline() {
+    SessionOptions options;
+    options.check_only = true;
+    options.virtual_clock = true;
+    return options;
+}
+
+int load_offline(Shell& shell, const Options& options, Output& output) {
+    if (!options.ini.empty() && shell.read_ini(options.ini, output) != 0) return 1;
+    int bad = 0;
+    for (const std::string& path : options.words) bad += shell.run_file(path, output) != 0;
+    return bad;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// What was typed, for every subcommand; filled by commands.cpp (subcommands) and classic.cpp (LinuxCNC's program names).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace hal::tools {
+
+enum class Loudness { nothing, errors, results };  ///< halcmd's -Q, -q (the default) and -v
+
+struct Options {
+    std::string program = "hal";         ///< how messages begin: "hal run", "halcmd"
+    std::vector<std::string> words;      ///< the positional arguments: files, a shell command, a component, a code
+    std::vector<std::string> arguments;  ///< behind `--`: $1 $2 … and NAME=VALUE of the netlists
+    std::string name;                    ///< --name: of the instance; empty: not given
+    std::string ini;
+    std::string output;                  ///< -o
+    std::int64_t for_ns = -1;            ///< --for; -1: not given
+    std::uint64_t cycles = 0;            ///< --cycles; 0: not given
+    std::uint64_t count = 0;             ///< -n; 0: without end
+    std::uint64_t channel = 0;           ///< of record and play, when it is not among the words
+    bool interactive = false, keep_going = false, no_picture = false, report = false;
+    bool from_file = false;              ///< -f: the first word is a file of commands; without one, standard input
+    std::vector<std::string> execute;    ///< -e COMMAND
+    bool echo = false, script = false, json = false;
+    Loudness loudness = Loudness::errors;
+    bool check = false, csv = false, tag = false;
+    bool markdown = false, man = false;
+    bool classic = false;                ///< under the name halrun or halcmd: as LinuxCNC does it
+    double seconds = 2.0;                ///< of each measurement of doctor
+};
+
+/// Each subcommand, in its own file. Returns the exit code.
+int run_run(const Options&);
+int run_sim(const Options&);
+int run_shell(const Options&);
+int run_check(const Options&);
+int run_fmt(const Options&);
+int run_graph(const Options&);
+int run_doc(const Options&);
+int run_explain(const Options&);
+int run_record(const Options&);
+int run_play(const Options&);
+int run_doctor(const Options&);
+int run_completion(const Options&);
+
+}  // namespace hal::tools

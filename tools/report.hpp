@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "session/session.hpp"
+
+namespace hal::tools {
+
+/// What is loaded: instances by component, threads with period and functions, what of real time is missing. Takes
+/// Session::mutex.
+std::string loaded_summary(Session& session);
+
+/// How it ran: per thread cycles, missed periods, wake-up and execution times, faults, and the slowest functions. Takes
+/// Session::mutex.
+std::string timing_report(Session& session);
+
+}  // namespace hal::tools

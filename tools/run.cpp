@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// `hal run` and `halrun`: netlists in real-time threads until somebody ends it.
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "machine.hpp"
+#include "picture.hpp"
+#include "report.hpp"
+#include "say.hpp"
+#include "shell/address.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+/// LinuxCNC's halrun: only what the commands print; threads start when the netlist says so; ends after the files unless
+/// the user types.
+int run_classic(Machine& machine, const Options& options) {
+    const int status = machine.load();
+    if (status != 0 || machine.stop.requested()) return status;
+    return options.interactive || options.words.empty() ? machine.talk({"halcmd: ", "halcmd+: "}) : status;
+}
+
+int run_plain(Machine& machine, const Options& options) {
+    if (const int status = machine.load(); status != 0) return status;
+    machine.start_threads();
+    const std::string& name = machine.session.options().name;
+    print(loaded_summary(machine.session));
+    int status = 0;
+    if (options.interactive) {
+        status = machine.talk({"hal> ", "hal+> "});
+    } else {
+        print(fmt::format("{}; in another terminal: hal shell{}\n", options.for_ns >= 0 ? "running" : "running until Ctrl-C", name == "default" ? "" : " --name " + name));
+        const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
+        machine.stop.wait_ns(options.for_ns);
+    }
+    const bool faulted = machine.faulted();
+    machine.shut_down();
+    print("\n" + timing_report(machine.session));
+    return faulted ? 1 : status;
+}
+
+}  // namespace
+
+int run_run(const Options& options) {
+    if (options.words.empty() && !options.interactive && !options.classic) return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
+    if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
+    Machine machine(options, own_name(options), false);
+    if (!machine.serve()) return 1;
+    return options.classic ? run_classic(machine, options) : run_plain(machine, options);
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "signals.hpp"
+
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/signalfd.h>
+#include <system_error>
+#include <time.h>
+#include <unistd.h>
+
+namespace hal::tools {
+
+namespace {
+
+sigset_t ending_signals() {
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, number);
+    return set;
+}
+
+std::int64_t now_ns() {
+    timespec t{};
+    ::clock_gettime(CLOCK_MONOTONIC, &t);
+    return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+}  // namespace
+
+StopRequest::StopRequest() {
+    const sigset_t set = ending_signals();
+    ::pthread_sigmask(SIG_BLOCK, &set, nullptr);
+    event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+    if (event_ < 0 || done_ < 0 || signals_ < 0) throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
+}
+
+void StopRequest::listen() {
+    thread_ = std::thread([this] { serve(); });
+}
+
+void StopRequest::release() {
+    if (!thread_.joinable()) return;
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t n = ::write(done_, &one, sizeof one);
+    thread_.join();
+    signalfd_siginfo info{};
+    while (::read(signals_, &info, sizeof info) == sizeof info) {  // an impatient second Ctrl-C is no reason to skip the tidying up
+    }
+    const sigset_t set = ending_signals();
+    ::pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+}
+
+StopRequest::~StopRequest() {
+    release();
+    for (const int descriptor : {event_, done_, signals_}) ::close(descriptor);
+}
+
+void StopRequest::request() noexcept {
+    requested_.store(true, std::memory_order_release);
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t n = ::write(event_, &one, sizeof one);  // an eventfd can only be full, and then it is readable
+}
+
+void StopRequest::serve() {
+    for (;;) {
+        pollfd both[2] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}};
+        if (::poll(both, 2, -1) < 0) continue;
+        if (both[1].revents != 0) return;
+        signalfd_siginfo info{};
+        if (::read(signals_, &info, sizeof info) != sizeof info) continue;
+        if (!(info.ssi_signo == SIGINT && spare)) request();
+        if (on_signal) on_signal();
+    }
+}
+
+bool StopRequest::wait_ns(std::int64_t ns) const {
+    const std::int64_t end = ns < 0 ? 0 : now_ns() + ns;
+    while (!requested()) {
+        pollfd event{event_, POLLIN, 0};
+        const std::int64_t left = ns < 0 ? -1 : end - now_ns();
+        if (ns >= 0 && left <= 0) return requested();
+        const timespec patience{static_cast<time_t>(left / 1'000'000'000), static_cast<long>(left % 1'000'000'000)};
+        ::ppoll(&event, 1, ns < 0 ? nullptr : &patience, nullptr);
+    }
+    return true;
+}
+
+}  // namespace hal::tools

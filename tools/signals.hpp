@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// The end of a run, asked for from outside: Ctrl-C, SIGTERM, a client's `stop`.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <thread>
+
+namespace hal::tools {
+
+/// Takes SIGINT, SIGTERM and SIGHUP while it lives; make it before any other thread. Nothing runs in signal handlers.
+class StopRequest {
+public:
+    StopRequest();
+    ~StopRequest();
+    StopRequest(const StopRequest&) = delete;
+
+    /// Called in a thread of its own when a signal comes, to end what the main thread waits for.
+    std::function<void()> on_signal;
+    /// While set, SIGINT only calls on_signal: it is for the command that runs, not for the machine.
+    std::atomic<bool> spare{false};
+
+    void request() noexcept;      ///< [any]
+    bool requested() const noexcept { return requested_.load(std::memory_order_acquire); }
+    /// Readable for ever once requested.
+    int fd() const { return event_; }
+    /// Waits until requested, or for `ns` (negative: without end). True when requested.
+    bool wait_ns(std::int64_t ns) const;
+    /// From now on on_signal may be called.
+    void listen();
+    /// From now on it is not called any more, and a further signal ends the process as it would any other: for the time
+    /// when outputs are safe and the rest is tidying up.
+    void release();
+
+private:
+    void serve();
+    int event_ = -1, signals_ = -1, done_ = -1;
+    std::atomic<bool> requested_{false};
+    std::thread thread_;
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// `hal sim`: netlists on a virtual clock. Standard output has what the commands print and nothing else.
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "machine.hpp"
+#include "report.hpp"
+#include "say.hpp"
+
+namespace hal::tools {
+
+int run_sim(const Options& options) {
+    const bool advance = options.for_ns >= 0 || options.cycles != 0;
+    if (options.for_ns >= 0 && options.cycles != 0) return fail(options, "--for and --cycles exclude each other; leave one out");
+    Machine machine(options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
+    if (!machine.serve()) return 1;
+    int status = machine.load();
+    if (status == 0 && advance) {
+        machine.start_threads();
+        machine.advance(options.for_ns, options.cycles);
+    }
+    if (machine.faulted() || machine.stop.requested()) status = 1;
+    machine.shut_down();
+    if (options.report) write_all(STDERR_FILENO, timing_report(machine.session));
+    return status;
+}
+
+}  // namespace hal::tools
