@@ -128,7 +128,8 @@ private:
         const std::int64_t pitch_ns = seen_.now_ns - tooth_ns_;
         const bool gap = missing > 0 && tooth_pitch_ns_ > 0 && 2 * pitch_ns > (missing + 2) * tooth_pitch_ns_;
         tooth_ns_ = seen_.now_ns;
-        tooth_pitch_ns_ = gap ? tooth_pitch_ns_ : pitch_ns;
+        if (seen_tooth_ && !gap) tooth_pitch_ns_ = pitch_ns;
+        seen_tooth_ = true;
         if (missing > 0) index = gap;
         return gap ? missing + 1 : 1;
     }
@@ -156,7 +157,8 @@ private:
     // update-counters only
     Seen seen_;
     bool started_ = false, a_ = false, b_ = false, z_ = false, latch_ = false;
-    std::int64_t tooth_ns_ = 0, tooth_pitch_ns_ = 0;
+    bool seen_tooth_ = false;
+    std::int64_t tooth_ns_ = 0, tooth_pitch_ns_ = 0;  // when the newest tooth came; from tooth to tooth
     // between the two: capture-position sets armed_ while index-enable waits, update-counters clears it at the index
     hal::Mailbox<Seen> handed_;  // update-counters writes, capture-position reads
     std::atomic<bool> armed_{false};
