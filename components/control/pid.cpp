@@ -91,11 +91,12 @@ public:
         const double deviation = (use_previous ? last_command_ : command.get()) - feedback;
         error = deviation;
         const double e = beyond_deadband(limited(deviation, max_error));
-        if (has_previous_ & !at_index) differentiate(e, 1.0 / dt);
+        const bool valid = std::isfinite(command - feedback);
+        if (valid & has_previous_ & !at_index) differentiate(e, 1.0 / dt);
         last_command_ = command;
         last_feedback_ = feedback;
         last_e_ = e;
-        has_previous_ = std::isfinite(last_command_ - last_feedback_);
+        has_previous_ = valid;
 
         if (enable & tune_mode) tune(deviation, dt);
         else {
