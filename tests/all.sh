@@ -35,7 +35,7 @@ if [ "${1-}" != quick ]; then
     run_tests rt-guard -L 'unit|rt|netlists'
 
     compile asan "everything under the address and undefined-behaviour sanitizers" all
-    run_tests asan -LE check
+    run_tests asan -LE 'check|docs'
 
     compile tsan "everything under the thread sanitizer" all
     # g++ 12's thread sanitizer cannot start where the kernel randomises addresses by more than 28 bits.
