@@ -42,7 +42,8 @@ std::string right_aligned(std::string text, std::size_t width) {
 
 class Renderer {
 public:
-    Renderer(const Diagnostic& diagnostic, const Sources& sources, const Style& style) : diagnostic_(diagnostic), sources_(sources), style_(style) {}
+    Renderer(const Diagnostic& diagnostic, const Sources& sources, const Style& style)
+        : diagnostic_(diagnostic), sources_(sources), style_(style) {}
 
     std::string render() {
         header();
@@ -81,7 +82,8 @@ private:
         const Mark first = marks_[0];
         const Span span = first.label->span;
         if (!first.main && span.source != shown_source_)
-            out_ += style_.gutter + right_aligned("in", gutter_) + style_.off + " " + printable(sources_.location(span), std::string::npos) + "\n";
+            out_ += style_.gutter + right_aligned("in", gutter_) + style_.off + " " +
+                    printable(sources_.location(span), std::string::npos) + "\n";
         shown_source_ = span.source;
 
         const std::string text = lay_out(sources_.line(span), first);
@@ -111,7 +113,8 @@ private:
         std::string signs(width, ' ');
         for (const bool main : {false, true})  // where two places overlap the main one is seen
             for (const Mark& mark : drawn)
-                if (mark.main == main) signs.replace(mark.column, mark.column_end - mark.column, mark.column_end - mark.column, main ? '^' : '-');
+                if (mark.main == main)
+                    signs.replace(mark.column, mark.column_end - mark.column, mark.column_end - mark.column, main ? '^' : '-');
         gutter(std::string(gutter_, ' '));
         for (std::size_t at = 0; at < signs.size();) {
             const std::size_t stop = std::min(signs.find_first_not_of(signs[at], at), signs.size());
@@ -131,13 +134,14 @@ private:
 
     /// The piece of `line` around `first` as it is printed; notes the columns of all marks that lie in it.
     std::string lay_out(std::string_view line, const Mark& first) {
-        const bool fits = line.size() <= most_bytes && columns(line) <= window_columns;
+        const bool fits = line.size() <= most_bytes && width_of(line) <= window_columns;
         const std::size_t start = fits ? 0 : window_start(line, first.begin);
         std::string text(start > 0 ? ellipsis : "");
         std::size_t column = start > 0 ? 1 : 0, at = start;
         std::vector<Mark*> here;
         for (Mark& mark : marks_)
-            if (mark.label->span.source == first.label->span.source && mark.line == first.line && mark.begin >= start) here.push_back(&mark);
+            if (mark.label->span.source == first.label->span.source && mark.line == first.line && mark.begin >= start)
+                here.push_back(&mark);
         const auto note = [&](std::size_t from, std::size_t to, std::size_t width) {
             for (Mark* mark : here) {
                 if (mark->begin >= from && mark->begin < to) mark->column = column, mark->visible = true;
@@ -145,10 +149,9 @@ private:
             }
         };
         while (at < line.size() && at < start + most_bytes && column < window_columns) {
-            const bool tab = line[at] == '\t';
-            const Glyph glyph = tab ? Glyph{1, tab_stop - column % tab_stop, false} : glyph_at(line, at);
+            const Glyph glyph = glyph_in(line, at, column);
             note(at, at + glyph.bytes, glyph.columns);
-            if (tab) text.append(glyph.columns, ' ');
+            if (line[at] == '\t') text.append(glyph.columns, ' ');
             else append_glyph(text, line, at, glyph);
             column += glyph.columns;
             at += glyph.bytes;
@@ -160,13 +163,28 @@ private:
         return text;
     }
 
+    /// As glyph_at, with tabs up to their stop.
+    static Glyph glyph_in(std::string_view line, std::size_t at, std::size_t column) {
+        return line[at] == '\t' ? Glyph{1, tab_stop - column % tab_stop, false} : glyph_at(line, at);
+    }
+
+    static std::size_t width_of(std::string_view line) {
+        std::size_t column = 0;
+        for (std::size_t at = 0; at < line.size();) {
+            const Glyph glyph = glyph_in(line, at, column);
+            column += glyph.columns;
+            at += glyph.bytes;
+        }
+        return column;
+    }
+
     /// Where the window on a long line begins, so that `place` is in it.
     static std::size_t window_start(std::string_view line, std::size_t place) {
         std::size_t at = place, before = 0;
         while (at > 0 && place - at < most_bytes / 2) {
             std::size_t previous = at - 1;
             while (previous > 0 && at - previous < 4 && (line[previous] & 0xC0) == 0x80) --previous;
-            before += columns(line.substr(previous, at - previous));
+            before += line[previous] == '\t' ? tab_stop : columns(line.substr(previous, at - previous));
             if (before > columns_before) return at;
             at = previous;
         }
@@ -215,7 +233,8 @@ std::string render(const Diagnostics& diagnostics, const Sources& sources, bool 
         if (file == files.end()) file = files.insert(files.end(), at.source);
         entries.push_back({static_cast<std::size_t>(file - files.begin()), at.known() ? at.begin : 0, &one});
     }
-    std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.file != b.file ? a.file < b.file : a.begin < b.begin; });
+    std::stable_sort(entries.begin(), entries.end(),
+                     [](const Entry& a, const Entry& b) { return a.file != b.file ? a.file < b.file : a.begin < b.begin; });
     std::string out;
     for (const Entry& entry : entries) out += (out.empty() ? "" : "\n") + render(*entry.diagnostic, sources, color);
     return out;
