@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -30,9 +31,14 @@ ShellOptions shell_options(const Options& options) {
     return how;
 }
 
-/// What stands behind `--`: $1, $2 … of the netlists, and NAME=VALUE as $NAME.
-void export_arguments(const Options& options, const std::string& instance) {
+/// What stands behind `--`: $1, $2 … of the netlists, and NAME=VALUE as $NAME. For the programs they start: which
+/// instance halcmd is to talk to, and first in PATH the folder of this very program.
+void export_variables(const Options& options, const std::string& instance) {
     ::setenv("HALCYON_INSTANCE", instance.c_str(), 1);
+    std::error_code unknown;
+    const std::string folder = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
+    const char* path = std::getenv("PATH");
+    if (!unknown) ::setenv("PATH", (folder + ":" + (path && *path ? path : "/usr/local/bin:/usr/bin:/bin")).c_str(), 1);
     for (std::size_t i = 0; i < options.arguments.size(); ++i) {
         const std::string& argument = options.arguments[i];
         ::setenv(std::to_string(i + 1).c_str(), argument.c_str(), 1);
@@ -70,7 +76,7 @@ std::string own_name(const Options& options) {
 
 Machine::Machine(const Options& options, const std::string& name, bool virtual_clock)
     : session(session_options(name, virtual_clock)), shell(session, shell_options(options)), options_(options) {
-    export_arguments(options, name);
+    export_variables(options, name);
     stop.on_signal = [this] { shell.cancel(); };
     stop.listen();
 }

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""What works on files without running them: check, fmt, graph, doc."""
+import json
+import os
+import re
+import shutil
+import stat
+import unittest
+
+from harness import SERVO, Case
+
+BAD = """loadrt threads name1=servo period1=1000000
+loadrt sum2 names=adder
+net a adder.outt
+setp adder.in0 much
+addf adder sevo
+"""
+
+
+class Check(Case):
+    def test_good_file(self):
+        path = self.write("good.hal", SERVO)
+        done = self.run_program("check", path)
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertEqual("", done.stdout)
+        self.assertIn("no errors", done.stderr)
+
+    def test_all_errors_at_once_in_order(self):
+        error = self.bad("check", self.write("bad.hal", BAD))
+        places = [int(line) for line in re.findall(r"(?m)^\S*bad\.hal:(\d+):\d+: error:", error)]
+        self.assertEqual([3, 4, 5], places, error)
+        self.assertIn("did you mean 'adder.out'?", error)
+        self.assertIn("did you mean 'servo'?", error)
+        self.assertRegex(error.splitlines()[-1], r"^3 errors")
+        self.assertEqual(1, error.count("3 errors"), error)
+
+    def test_one_bad_file_of_two_fails(self):
+        good, bad = self.write("good.hal", SERVO), self.write("bad.hal", "net\n")
+        self.assertIn("bad.hal:1", self.bad("check", good, bad))
+
+    def test_later_files_see_earlier_ones(self):
+        first, second = self.write("first.hal", SERVO), self.write("second.hal", "setp adder.in1 4\n")
+        done = self.run_program("check", first, second)
+        self.assertEqual(0, done.returncode, done.stderr)
+
+    def test_starts_no_program_and_no_thread(self):
+        path = self.write("acts.hal", SERVO + f"loadusr -w touch {self.folder}/touched\nstart\n")
+        done = self.run_program("check", path)
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertFalse((self.folder / "touched").exists())
+
+    def test_missing_file(self):
+        self.assertIn("nowhere.hal", self.bad("check", "nowhere.hal"))
+
+    def test_folder_and_binary(self):
+        self.bad("check", self.folder)
+        path = self.folder / "binary.hal"
+        path.write_bytes(bytes(range(256)) * 40)
+        self.assertIn("binary.hal:1", self.bad("check", path))
+
+    def test_ini_values(self):
+        ini, path = self.write("a.ini", "[LIMITS]\nMAX = 7\n"), self.write("a.hal", SERVO + "setp adder.in0 [LIMITS]MAX\n")
+        self.assertEqual(0, self.run_program("check", "--ini", ini, path).returncode)
+        self.assertIn("[LIMITS]MAX", self.bad("check", path))
+
+
+class Format(Case):
+    UGLY = "loadrt   sum2 names=a # one\n\nnet x a.out=>b.in\nsetp  a.in0 1\nsetp a.gain0    2\n"
+
+    def test_in_place_once(self):
+        path = self.write("ugly.hal", self.UGLY)
+        self.good("fmt", path)
+        formatted = (self.folder / "ugly.hal").read_text()
+        self.assertNotEqual(self.UGLY, formatted)
+        self.assertIn("# one", formatted)
+        self.good("fmt", path)
+        self.assertEqual(formatted, (self.folder / "ugly.hal").read_text())
+
+    def test_check_changes_nothing(self):
+        path = self.write("ugly.hal", self.UGLY)
+        self.assertEqual(f"hal fmt: '{path}' is not formatted; type: hal fmt {path}\n", self.bad("fmt", "--check", path))
+        self.assertEqual(self.UGLY, (self.folder / "ugly.hal").read_text())
+        self.good("fmt", path)
+        self.good("fmt", "--check", path)
+
+    def test_standard_input(self):
+        self.good("fmt", self.write("ugly.hal", self.UGLY))
+        self.assertEqual((self.folder / "ugly.hal").read_text(), self.good("fmt", "-", given=self.UGLY))
+
+    def test_keeps_mode_and_link(self):
+        path = self.write("ugly.hal", self.UGLY)
+        os.chmod(path, 0o640)
+        link = self.folder / "link.hal"
+        link.symlink_to("ugly.hal")
+        self.good("fmt", link)
+        self.assertTrue(link.is_symlink())
+        self.assertEqual(0o640, stat.S_IMODE(os.stat(path).st_mode))
+        self.good("fmt", "--check", path)
+
+    def test_bad_netlist_is_left_alone(self):
+        text = "setp a 'unterminated\n"
+        path = self.write("bad.hal", text)
+        self.assertIn("bad.hal:1", self.bad("fmt", path))
+        self.assertEqual(text, (self.folder / "bad.hal").read_text())
+        self.assertEqual([path], [str(p) for p in self.folder.glob("bad.hal*")])
+
+    def test_missing_file(self):
+        self.assertEqual("hal fmt: cannot read 'nowhere.hal': No such file or directory\n", self.bad("fmt", "nowhere.hal"))
+
+
+class Graph(Case):
+    LOOP = """loadrt threads name1=base period1=100000 fp1=0 name2=servo period2=1000000
+loadrt sum2 names=first,second,other
+addf first servo
+addf second servo
+addf other base
+net forward first.out => second.in0 other.in0
+net back second.out => first.in0
+net loose second.in1
+"""
+
+    def test_dot_has_a_port_per_pin_and_styles(self):
+        text = self.good("graph", self.write("loop.hal", self.LOOP))
+        self.assertTrue(text.startswith("digraph "))
+        ports = {label: port for port, label in re.findall(r'<td port="(p\d+)"[^>]*><font[^>]*>([^<]+)</font>', text)}
+        self.assertLessEqual({"in0", "in1", "out", "offset"}, set(ports) | {"offset"})
+        edges = re.findall(r'-> .*style=(\w+), tooltip="([^"]+)"', text)
+        self.assertIn(("solid", "forward"), edges)
+        self.assertIn(("dotted", "forward"), edges)
+        self.assertIn(("dashed", "back"), edges)
+        self.assertIn("1. in servo", text)
+        self.assertIn("2. in servo", text)
+        self.assertIn('label="loose"', text)
+
+    @unittest.skipUnless(shutil.which("dot"), "Graphviz is not installed")
+    def test_svg(self):
+        self.good("graph", self.write("loop.hal", self.LOOP), "-o", "loop.svg")
+        drawing = (self.folder / "loop.svg").read_text()
+        self.assertIn("<svg", drawing)
+        self.assertIn("forward", drawing)
+
+    def test_svg_without_graphviz_names_the_package(self):
+        error = self.bad("graph", self.write("loop.hal", self.LOOP), "-o", "loop.svg", environment={"PATH": str(self.folder)})
+        self.assertIn("apt install graphviz", error)
+
+    def test_dot_file(self):
+        path = self.write("loop.hal", self.LOOP)
+        self.good("graph", path, "-o", "loop.dot")
+        self.assertEqual(self.good("graph", path), (self.folder / "loop.dot").read_text())
+
+    def test_names_are_escaped(self):
+        text = self.good("graph", self.write("odd.hal", 'loadrt sum2 names=a<b&c\nnewsig s<&>"x float\nnet s<&>"x a<b&c.out\n'))
+        self.assertIn("<b>a&lt;b&amp;c</b>", text)
+        self.assertIn('label="s<&>\\"x"', text)
+
+    def test_other_endings_and_bad_netlists_are_refused(self):
+        path = self.write("loop.hal", self.LOOP)
+        self.assertIn("neither .svg nor .dot", self.bad("graph", path, "-o", "loop.png"))
+        self.assertIn("bad.hal:3", self.bad("graph", self.write("bad.hal", BAD)))
+
+
+class Doc(Case):
+    def test_lists_all_components(self):
+        names = [line.split()[0] for line in self.good("doc").splitlines()]
+        self.assertEqual(sorted(names), names)
+        self.assertLessEqual({"and2", "pid", "sum2", "threads"}, set(names))
+
+    def test_page_is_made_from_the_declarations(self):
+        page = self.good("doc", "and2")
+        for line in (r"    and2: ", r"    loadrt and2 \[count=N \| names=NAME,…\]", r"    and2\.N\.in0 +bit +in ", r"    and2\.N\.out +bit +out ", r"FUNCTIONS\n    and2\.N "):
+            self.assertRegex(page, line)
+
+    def test_every_component_has_a_page_in_every_form(self):
+        for name in [entry["name"] for entry in json.loads(self.good("doc", "--json"))]:
+            page = json.loads(self.good("doc", name, "--json"))
+            self.assertEqual(name.replace("_", "-"), page["name"])
+            self.assertTrue(page["summary"], name)
+            for pin in page["pins"]:
+                self.assertTrue(pin["doc"], f"{name}.{pin['name']}")
+            self.assertTrue(self.good("doc", name, "--markdown").startswith("# "))
+            self.assertTrue(self.good("doc", name, "--man").startswith(".TH "))
+
+    def test_unknown_component_gets_a_suggestion(self):
+        error = self.bad("doc", "adn2")
+        self.assertIn("there is no component 'adn2'; did you mean 'and2'", error)
+        self.assertEqual(1, error.count("\n"))
+
+    def test_broken_plugin_is_a_sentence(self):
+        (self.folder / "plugins").mkdir()
+        self.write("plugins/broken.so", "not a shared object")
+        error = self.bad("doc", "broken", environment={"HALCYON_PLUGIN_PATH": str(self.folder / "plugins")})
+        self.assertIn("is not a usable component", error)
+
+
+if __name__ == "__main__":
+    unittest.main()

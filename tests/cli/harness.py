@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""What the tests of the program share: a sandbox, running machines, a terminal."""
+import fcntl
+import os
+import pty
+import select
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import termios
+import time
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PATIENCE = float(os.environ.get("HALCYON_TEST_TIMEOUT", "30"))  # for what should happen at once
+
+
+def program():
+    if os.environ.get("HAL_BIN"):
+        return Path(os.environ["HAL_BIN"]).resolve()
+    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
+    if not built:
+        raise unittest.SkipTest("no program to test; build it (./hal --version) or set HAL_BIN")
+    return built[-1]
+
+
+HAL = program()
+PLUGINS = os.environ.get("HALCYON_PLUGIN_PATH") or str(HAL.parent.parent / "tests" / "components")
+
+SERVO = """loadrt threads name1=servo period1=1000000
+loadrt sum2 names=adder
+addf adder servo
+setp adder.in0 2
+setp adder.in1 3
+net total adder.out
+"""
+
+
+def wait_until(predicate, what):
+    """Asks again and again until `predicate` answers something true, which is returned."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        if answer := predicate():
+            return answer
+        if time.monotonic() > deadline:
+            raise AssertionError(f"{what}: not after {PATIENCE:g} s")
+        time.sleep(0.01)
+
+
+class Case(unittest.TestCase):
+    """A test with a folder, a socket folder and a home of its own; what it starts is ended with it."""
+
+    maxDiff = None
+
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="hal-"))
+        self.addCleanup(shutil.rmtree, self.folder, True)
+        keep = {key: value for key, value in os.environ.items() if key == "PATH" or key.endswith("SAN_OPTIONS")}
+        self.environment = {**keep, "LC_ALL": "C.UTF-8", "TERM": "xterm", "HOME": str(self.folder), "XDG_RUNTIME_DIR": str(self.folder),
+                            "XDG_STATE_HOME": str(self.folder / "state"), "HALCYON_PLUGIN_PATH": PLUGINS}
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return str(path)
+
+    def run_program(self, *words, name="hal", given=None, environment=None):
+        """Runs hal (or an alias) to its end; standard output and error as text."""
+        return subprocess.run([name, *map(str, words)], executable=str(HAL), cwd=self.folder, env={**self.environment, **(environment or {})},
+                              input=given, stdin=subprocess.DEVNULL if given is None else None, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, timeout=2 * PATIENCE)
+
+    def good(self, *words, **how):
+        """As run_program, but it must succeed; its standard output."""
+        done = self.run_program(*words, **how)
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+        return done.stdout
+
+    def bad(self, *words, status=1, **how):
+        """As run_program, but it must fail with that status; its standard error."""
+        done = self.run_program(*words, **how)
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        return done.stderr
+
+    def start(self, *words, name="hal", instance="default", loaded=True, **how):
+        """Starts `hal run …` in the background and waits until its files are loaded and its threads run."""
+        machine = subprocess.Popen([name, *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
+                                   stdin=how.get("stdin", subprocess.DEVNULL), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, machine)
+        if loaded:
+            def ready():
+                if machine.poll() is not None:
+                    raise AssertionError("it ended: " + "".join(machine.communicate()))
+                return self.shell("getp", "servo.threadbeat", instance=instance).stdout.strip() not in ("", "0")
+            wait_until(ready, "the machine runs")
+        return machine
+
+    def end(self, machine, number=signal.SIGTERM):
+        """Ends a process; its output."""
+        if machine.poll() is None:
+            machine.send_signal(number)
+        try:
+            return machine.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            machine.kill()
+            machine.communicate()
+            raise AssertionError("the machine does not end") from None
+        except ValueError:
+            return "", ""  # asked for already
+
+    def shell(self, *words, instance="default"):
+        return self.run_program("shell", "--name", instance, *words)
+
+    def value(self, name, instance="default"):
+        return self.shell("getp", name, instance=instance).stdout.strip()
+
+
+class Terminal:
+    """A process on a terminal of 100 x 30 characters."""
+
+    def __init__(self, case, *words, name="hal", environment=None):
+        self.process, self.descriptor = pty.fork()
+        if self.process == 0:
+            os.chdir(case.folder)
+            os.execve(str(HAL), [name, *map(str, words)], {**case.environment, **(environment or {})})
+        fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
+        self.seen = ""
+        self.status = None
+        case.addCleanup(self.close)
+
+    def send(self, text):
+        os.write(self.descriptor, text.encode())
+
+    def read(self, patience):
+        if not select.select([self.descriptor], [], [], patience)[0]:
+            return False
+        try:
+            data = os.read(self.descriptor, 65536)
+        except OSError:  # the other side has gone
+            return None
+        self.seen += data.decode(errors="replace")
+        return True if data else None
+
+    def expect(self, text):
+        """Waits for a text; returns, and forgets, everything up to its end."""
+        deadline = time.monotonic() + PATIENCE
+        while text not in self.seen:
+            if self.read(0.1) is None or time.monotonic() > deadline:
+                raise AssertionError(f"{text!r} does not appear; there is: {self.seen!r}")
+        at = self.seen.index(text) + len(text)
+        before, self.seen = self.seen[:at], self.seen[at:]
+        return before
+
+    def wait(self):
+        """Waits for the end of the process; its exit status."""
+        deadline = time.monotonic() + PATIENCE
+        while self.status is None:
+            self.read(0.05)
+            done, status = os.waitpid(self.process, os.WNOHANG)
+            if done:
+                self.status = os.waitstatus_to_exitcode(status)
+            elif time.monotonic() > deadline:
+                raise AssertionError(f"it does not end; there is: {self.seen!r}")
+        while self.read(0):
+            pass
+        return self.status
+
+    def close(self):
+        if self.status is None:
+            os.kill(self.process, signal.SIGKILL)
+            os.waitpid(self.process, 0)
+            self.status = -signal.SIGKILL
+        os.close(self.descriptor)

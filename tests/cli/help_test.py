@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Help, wrong words, explain, completion script, doctor."""
+import json
+import subprocess
+import unittest
+
+from harness import HAL, Case
+
+
+class Help(Case):
+    def test_without_words_lists_the_commands(self):
+        for words in ((), ("help",), ("--help",)):
+            text = self.good(*words)
+            for name in ("run", "sim", "shell", "check", "fmt", "graph", "doc", "explain", "record", "doctor"):
+                self.assertRegex(text, rf"(?m)^  {name} ")
+
+    def test_of_a_command_names_its_options(self):
+        for words in (("help", "run"), ("run", "--help"), ("run", "-h")):
+            text = self.good(*words)
+            for option in ("--for", "--name", "-I", "--no-picture", "--ini", "-k"):
+                self.assertIn(option, text)
+
+    def test_of_every_command_exists(self):
+        for line in self.good("help").splitlines():
+            if line.startswith("  ") and line.split()[0].isalpha():
+                self.assertIn("usage: hal " + line.split()[0], self.good("help", line.split()[0]))
+
+    def test_version(self):
+        self.assertRegex(self.good("--version"), r"^hal \d+\.\d+\.\d+\n$")
+
+
+class WrongWords(Case):
+    def test_unknown_command_gets_a_suggestion(self):
+        self.assertEqual("hal: there is no command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
+
+    def test_unknown_command_without_likeness_points_to_help(self):
+        self.assertEqual("hal: there is no command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
+
+    def test_a_netlist_as_command_says_how_to_run_it(self):
+        self.assertEqual("hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal"))
+
+    def test_unknown_option_gets_a_suggestion(self):
+        self.assertEqual("hal sim: there is no option '--cycle'; did you mean '--cycles'?\n", self.bad("sim", "x.hal", "--cycle", "3"))
+
+    def test_unknown_shell_option(self):
+        self.assertIn("there is no option '--jsn'; did you mean '--json'?", self.bad("shell", "--jsn", "show"))
+
+    def test_bad_duration(self):
+        for text in ("soon", "10x", "-3s", ""):
+            self.assertIn("is not a duration; write 10s, 250ms or 2min", self.bad("sim", "x.hal", "--for=" + text))
+
+    def test_bad_number(self):
+        error = self.bad("sim", "x.hal", "--cycles", "many")
+        self.assertIn("--cycles", error)
+        self.assertIn("many", error)
+        self.assertEqual(1, error.count("\n"))
+
+    def test_missing_file_word(self):
+        for command in ("sim", "check", "fmt", "graph"):
+            error = self.bad(command)
+            self.assertIn("type: hal " + command, error)
+            self.assertEqual(1, error.count("\n"))
+
+    def test_too_many_words(self):
+        self.assertIn("hal help doctor", self.bad("doctor", "now"))
+
+
+class Explain(Case):
+    def test_lists_all_codes(self):
+        self.assertIn("two-writers", self.good("explain"))
+
+    def test_page(self):
+        for code in ("two-writers", "[two-writers]"):
+            page = self.good("explain", code)
+            self.assertTrue(page.startswith("two-writers\n\n"), page)
+            self.assertIn("sum2", page)
+
+    def test_unknown_code_gets_a_suggestion(self):
+        self.assertEqual("hal explain: there is no diagnostic 'two-writer'; did you mean 'two-writers'?\n", self.bad("explain", "two-writer"))
+
+
+class CompletionScript(Case):
+    def complete(self, line):
+        script = self.good("completion", "bash")
+        words = line.split(" ")
+        code = script + f"\nCOMP_WORDS=({' '.join(repr(w) for w in words)}); COMP_CWORD={len(words) - 1}; _hal; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+        path = f"{HAL.parent}:{self.environment['PATH']}"
+        return subprocess.run(["bash", "-c", code], env={**self.environment, "PATH": path}, cwd=self.folder, stdout=subprocess.PIPE, text=True,
+                              check=True, timeout=30).stdout.split()
+
+    def test_subcommands(self):
+        self.assertEqual(["record"], self.complete("hal rec"))
+
+    def test_options(self):
+        self.assertEqual(["--no-picture"], self.complete("hal run --no"))
+
+    def test_codes(self):
+        self.assertEqual(["two-writers"], self.complete("hal explain two-w"))
+
+    def test_components(self):
+        self.assertIn("and2", self.complete("hal doc an"))
+
+    def test_other_shells_are_refused(self):
+        self.assertIn("hal completion bash", self.bad("completion", "fish"))
+
+
+class Doctor(Case):
+    def test_gives_verdicts_and_measures(self):
+        text = self.good("doctor", "--seconds", "0.05")
+        for subject in ("kernel", "SCHED_FIFO", "memory locking", "capabilities", "throttling", "frequency", "isolated cpus", "clock source", "idle states"):
+            self.assertRegex(text, rf"(?m)^(good|fair|poor)  {subject} ")
+        self.assertRegex(text, r"(?m)^wake-up at 1 kHz, SCHED_\w+")
+        self.assertRegex(text, r"(?m)^  sleeping, then spinning the last 200 us .*s$")
+
+    def test_every_poor_verdict_has_a_remedy(self):
+        report = json.loads(self.good("doctor", "--seconds", "0.05", "--json"))
+        for finding in report["findings"]:
+            self.assertIn(finding["verdict"], ("good", "fair", "poor"))
+            if finding["verdict"] == "poor":
+                self.assertTrue(finding["remedy"], finding)
+        sleeping, hybrid = report["wakeup"]
+        self.assertEqual((0, 200000), (sleeping["spin_ns"], hybrid["spin_ns"]))
+        for measured in report["wakeup"]:
+            self.assertGreater(measured["cycles"], 0)
+            self.assertLessEqual(measured["p50_ns"], measured["p99_ns"])
+            self.assertLessEqual(measured["p99_ns"], measured["max_ns"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT
+"""hal run: loading, the summary and the report, the ends a run can come to, several instances."""
+import os
+import signal
+import unittest
+
+from harness import SERVO, Case, Terminal, wait_until
+
+FURUTA_SIGNALS = """loadrt threads name1=servo period1=1000000
+loadrt siggen
+addf siggen.0.update servo
+net arm-angle siggen.0.sine
+net pendulum-angle siggen.0.cosine
+"""
+
+
+class Run(Case):
+    def test_says_what_is_loaded_and_how_it_ran(self):
+        done = self.run_program("run", self.write("a.hal", SERVO), "--for", "200ms")
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertRegex(done.stdout, r"(?m)^1 instance of 1 component, 1 signal, 1 thread$")
+        self.assertRegex(done.stdout, r"(?m)^  sum2 +adder$")
+        self.assertRegex(done.stdout, r"(?m)^  servo +every 1 ms: adder$")
+        self.assertRegex(done.stdout, r"(?m)^thread .*cycles .*missed .*wake-up")
+        self.assertRegex(done.stdout, r"(?m)^servo +1 ms +\d+ ")
+        self.assertRegex(done.stdout, r"(?m)^slowest functions: adder ")
+        self.assertNotIn("\033", done.stdout)
+
+    def test_starts_the_threads(self):
+        self.start("run", self.write("a.hal", SERVO))
+        wait_until(lambda: self.shell("gets", "total").stdout == "5\n", "the sum is there")
+
+    def test_bad_netlist_ends_it(self):
+        error = self.bad("run", self.write("a.hal", "loadrt summ2\n"))
+        self.assertIn("a.hal:1:8: error", error)
+
+    def test_keep_going_runs_in_spite_of_errors(self):
+        machine = self.start("run", "-k", self.write("a.hal", "loadrt summ2\n" + SERVO))
+        self.assertEqual("3", self.value("adder.in1"))
+        self.end(machine)
+        self.assertEqual(1, machine.returncode)
+
+    def test_missing_file_and_missing_word(self):
+        self.assertIn("nowhere.hal", self.bad("run", "nowhere.hal"))
+        self.assertIn("type: hal run FILE.hal", self.bad("run"))
+
+    def test_ini_file_lists_netlists(self):
+        self.write("one.hal", SERVO)
+        self.write("two.hal", "setp adder.in0 [VALUES]IN0\n")
+        ini = self.write("machine.ini", "[HAL]\nHALFILE = one.hal\nHALFILE = two.hal\nHALCMD = setp adder.in1 1\n[VALUES]\nIN0 = 20\n")
+        self.start("run", ini)
+        wait_until(lambda: self.shell("gets", "total").stdout == "21\n", "the sum is there")
+
+    def test_arguments(self):
+        self.start("run", self.write("a.hal", SERVO + "setp adder.in0 $1\n"), "--", "30")
+        wait_until(lambda: self.shell("gets", "total").stdout == "33\n", "the sum is there")
+
+
+class End(Case):
+    WITNESS = "loadrt threads name1=servo period1=1000000\nloadrt witness file=end.txt\naddf witness.0 servo\n"
+
+    def ended_by(self, end, status=0):
+        machine = self.start("run", self.write("a.hal", self.WITNESS))
+        wait_until(lambda: self.value("witness.0.out") == "5", "the output is 5")
+        end(machine)
+        out, err = self.end(machine)
+        self.assertEqual((status, ""), (machine.returncode, err))
+        self.assertRegex(out, r"(?m)^servo +1 ms +\d+ ")
+        text = (self.folder / "end.txt").read_text()
+        self.assertIn("emergency\n", text)
+        self.assertTrue(text.endswith("stop out=-1\n"), text)
+        self.assertEqual([], [p.name for p in (self.folder / "halcyon").iterdir() if p.suffix == ".sock"])
+
+    def test_interrupt_leaves_outputs_safe(self):
+        self.ended_by(lambda machine: machine.send_signal(signal.SIGINT))
+
+    def test_terminate_leaves_outputs_safe(self):
+        self.ended_by(lambda machine: machine.send_signal(signal.SIGTERM))
+
+    def test_hangup_leaves_outputs_safe(self):
+        self.ended_by(lambda machine: machine.send_signal(signal.SIGHUP))
+
+    def test_two_interrupts_are_one(self):
+        def twice(machine):
+            machine.send_signal(signal.SIGINT)
+            machine.send_signal(signal.SIGINT)
+        self.ended_by(twice)
+
+    def test_halrun_u_ends_it(self):
+        self.ended_by(lambda machine: self.good("-U", name="halrun"))
+
+    def test_reader_of_its_output_leaves(self):
+        machine = self.start("run", self.write("a.hal", self.WITNESS))
+        machine.stdout.close()
+        machine.send_signal(signal.SIGINT)
+        wait_until(lambda: machine.poll() is not None, "it ends")
+        self.assertTrue((self.folder / "end.txt").read_text().endswith("stop out=-1\n"))
+        machine.stdout = open(os.devnull)
+
+    def test_crash_makes_outputs_safe_and_names_the_function(self):
+        machine = self.start("run", self.write("a.hal", self.WITNESS))
+        self.shell("setp", "witness.0.crash", "1")
+        out, err = machine.communicate(timeout=60)
+        self.assertEqual(-signal.SIGSEGV, machine.returncode, err)
+        self.assertIn("witness.0", err)
+        self.assertIn("emergency\n", (self.folder / "end.txt").read_text())
+
+
+class Instances(Case):
+    def test_same_name_is_refused(self):
+        path = self.write("a.hal", SERVO)
+        self.start("run", path)
+        error = self.bad("run", path)
+        self.assertIn("default", error)
+        self.assertIn("--name", error)
+        self.assertEqual("3", self.value("adder.in1"))
+
+    def test_two_names_live_side_by_side(self):
+        path = self.write("a.hal", SERVO)
+        self.start("run", path, "--name", "left", instance="left")
+        self.start("run", path, "--name", "right", instance="right")
+        self.shell("setp", "adder.in0", "100", instance="left")
+        wait_until(lambda: self.value("adder.out", "left") == "103", "left has the new sum")
+        self.assertEqual("5", self.value("adder.out", "right"))
+
+    def test_bad_name_is_refused(self):
+        path = self.write("a.hal", SERVO)
+        for name in ("a/b", "..", "a b", "x" * 65):
+            error = self.bad("run", path, "--name", name)
+            self.assertIn("is no name for an instance", error)
+
+    def test_name_of_a_killed_one_is_free(self):
+        path = self.write("a.hal", SERVO)
+        machine = self.start("run", path)
+        machine.kill()
+        machine.wait()
+        self.start("run", path)
+
+
+class Picture(Case):
+    def test_furuta_is_drawn_on_a_terminal(self):
+        terminal = Terminal(self, "run", self.write("a.hal", FURUTA_SIGNALS))
+        terminal.expect("arm, from above")
+        terminal.expect("⠀")
+        for _ in range(3):  # it is redrawn in place
+            frame = terminal.expect("missed")
+        self.assertRegex(frame, r"\033\[\d+A")
+        self.assertRegex(frame, r"arm +-?\d+\.\d deg +pendulum +-?\d+\.\d deg")
+        os.kill(terminal.process, signal.SIGINT)
+        self.assertEqual(0, terminal.wait())
+        self.assertIn("slowest functions", terminal.seen)
+        self.assertNotIn("\033[?25l", terminal.seen)
+
+    def test_axis_is_drawn(self):
+        terminal = Terminal(self, "run", self.write("a.hal", FURUTA_SIGNALS.replace("arm-angle", "axis-position")))
+        terminal.expect("position ")
+        os.kill(terminal.process, signal.SIGTERM)
+        self.assertEqual(0, terminal.wait())
+
+    def test_not_without_unicode(self):
+        terminal = Terminal(self, "run", self.write("a.hal", FURUTA_SIGNALS), environment={"LC_ALL": "C"})
+        frame = terminal.expect("missed")
+        self.assertIn("arm, from above", frame)
+        self.assertNotIn("⠀", frame)
+
+    def test_not_when_told_so(self):
+        terminal = Terminal(self, "run", "--no-picture", "--for", "100ms", self.write("a.hal", FURUTA_SIGNALS))
+        self.assertEqual(0, terminal.wait())
+        self.assertNotIn("from above", terminal.seen)
+
+    def test_not_in_a_pipe(self):
+        done = self.run_program("run", "--for", "100ms", self.write("a.hal", FURUTA_SIGNALS))
+        self.assertNotIn("from above", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

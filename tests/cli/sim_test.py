@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""hal sim: the virtual clock from outside."""
+import signal
+import unittest
+
+from harness import SERVO, Case, wait_until
+
+
+class Sim(Case):
+    def test_prints_only_what_commands_print(self):
+        path = self.write("a.hal", SERVO + "start\nadvance 3\ngets total\n")
+        self.assertEqual("5\n", self.good("sim", path))
+
+    def test_for_advances_the_clock(self):
+        counter = self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt time\naddf time.0 servo\n")
+        self.assertEqual("", self.good("sim", counter, "--for", "2s"))
+        report = self.run_program("sim", counter, "--for", "2s", "--report")
+        self.assertEqual("", report.stdout)
+        self.assertRegex(report.stderr, r"(?m)^servo +1 ms +2000 +0 ")
+
+    def test_cycles_advance_the_clock(self):
+        path = self.write("a.hal", SERVO)
+        self.assertRegex(self.run_program("sim", path, "--cycles", "1234", "--report").stderr, r"(?m)^servo +1 ms +1234 +0 ")
+
+    def test_for_and_cycles_exclude_each_other(self):
+        self.assertIn("exclude each other", self.bad("sim", "x.hal", "--for", "1s", "--cycles", "1"))
+
+    def test_twice_the_same(self):
+        path = self.write("a.hal", "loadrt threads name1=base period1=50000 name2=servo period2=1000000\nloadrt siggen\nloadrt sampler cfg=ff\n"
+                          "addf siggen.0.update base\naddf sampler.0 servo\nnet s siggen.0.sine => sampler.0.pin.0\nstart\nadvance 5000\n"
+                          "gets s\nshow thread\nshow pin siggen\nsave\n")
+        self.assertEqual(self.good("sim", path), self.good("sim", path))
+
+    def test_error_ends_it_before_the_clock(self):
+        path = self.write("a.hal", "loadrt threads name1=servo period1=1000000\nnet a b.c\n")
+        done = self.run_program("sim", path, "--for", "1s", "--report")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("a.hal:2", done.stderr)
+        self.assertNotIn("cycles", done.stderr)
+
+    def test_arguments_are_variables(self):
+        path = self.write("a.hal", SERVO + "setp adder.in0 $1\nsetp adder.in1 $OFFSET\nstart\nadvance 2\ngets total\n")
+        self.assertEqual("42\n", self.good("sim", path, "--", "40", "OFFSET=2"))
+
+    def test_programs_it_starts_reach_it(self):
+        path = self.write("a.hal", SERVO + "start\nadvance 2\nloadusr -w halcmd setp adder.in0 10\nadvance 2\ngets total\n")
+        self.assertEqual("13\n", self.good("sim", path))
+
+    def test_can_be_interrupted(self):
+        path = self.write("a.hal", SERVO)
+        machine = self.start("sim", path, "--for", "100000000s", "--name", "long", loaded=False)
+        wait_until(lambda: self.shell("getp", "servo.threadbeat", instance="long").stdout.strip() not in ("", "0"), "it runs")
+        out, err = self.end(machine, signal.SIGINT)
+        self.assertEqual((1, "", ""), (machine.returncode, out, err))
+
+
+if __name__ == "__main__":
+    unittest.main()
