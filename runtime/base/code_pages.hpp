@@ -18,6 +18,9 @@ inline constexpr CodePage code_pages[] = {
      "A load argument has a value its component does not accept: not a number where one is needed, out of its limits, or a "
      "list that does not fit the number of instances.\n\n"
      "`hal doc COMPONENT` lists a component's arguments with their defaults and limits."},
+    {"bad-duration",
+     "`advance` lets time pass: so many cycles of the fastest thread, or so long. A bare number says neither.\n\n"
+     "Examples: `advance 10 cycles`, `advance 250ms`, `advance 2s`. Units: ns us ms s min h."},
     {"bad-ini-line",
      "An INI file consists of `[SECTION]` lines, `KEY = value` lines, comments (`#` or `;` as the first character of a line), and "
      "`#INCLUDE FILE`. A line that is none of these is ignored with this warning; a section name without its `]` too.\n\n"
@@ -50,6 +53,9 @@ inline constexpr CodePage code_pages[] = {
      "A netlist is plain text in UTF-8. This file contains a zero byte, or another control character outside of a comment, so it is "
      "something else: a program, a picture, a text in UTF-16. Nothing of it was used.\n\n"
      "`file FILE` says what it is; `iconv -f utf-16 -t utf-8` converts a text."},
+    {"cannot-write",
+     "`save` could not write the file; nothing else was changed. The reason is the system's.\n\n"
+     "Without a file name `save` prints to the terminal."},
     {"construct-failed",
      "The component refused to be made: its constructor gave the reason that is printed. Nothing of it is left behind.\n\n"
      "`hal doc COMPONENT` shows its arguments."},
@@ -72,9 +78,16 @@ inline constexpr CodePage code_pages[] = {
     {"init-done",
      "initf functions run once, in a cycle of their own before the first cyclic pass of their thread. This thread has made "
      "that pass, so the function would never run."},
+    {"interrupted",
+     "A command that was waiting (loadusr -w, loadusr -W, waitusr, advance) was told to stop, or the one who gave it has gone.\n\n"
+     "What was done before it stays done."},
     {"linked-set",
      "A linked pin takes its value from its signal; setp would be overwritten at once, so it is refused.\n\n"
      "Set the signal with sets (when nothing writes it), or unlink the pin with unlinkp first."},
+    {"locked",
+     "A lock forbids this kind of change. `lock tune` forbids loading, linking, addf and threads; `lock all` also forbids setting "
+     "values, start and stop.\n\n"
+     "`status lock` shows what is locked, `unlock` takes all locks off, `unlock tune` those of tune."},
     {"lone-carriage-return",
      "A carriage return stands in the middle of a line. Such a line looks like several in an editor but is one for the netlist, so it "
      "is refused; other lines with the same fault are not listed.\n\n"
@@ -89,6 +102,9 @@ inline constexpr CodePage code_pages[] = {
      "`names=` and `count=` (or `num_chan=`) both say how many instances there are; only one of them may be given."},
     {"no-alias",
      "unalias takes the alias of a pin; the named pin has none. `show alias` lists all aliases."},
+    {"no-program",
+     "loadusr could not start the program: it is not in PATH, is not executable, or the system refused.\n\n"
+     "A path with a / is taken as it stands; `~` is the home directory."},
     {"no-such-component",
      "No plugin of this name was found on the search path: HALCYON_PLUGIN_PATH, the user's plugin folder, the build tree, "
      "the installation.\n\n"
@@ -106,8 +122,25 @@ inline constexpr CodePage code_pages[] = {
      "`show thread` lists them."},
     {"no-such-type",
      "The type names are bit, float, s32, u32, s64, u64, port, and in the second dialect bool, real, si32, ui32, sint, uint."},
+    {"no-thread",
+     "The command needs a thread, and there is none.\n\n"
+     "Make one: `newthread servo-thread 1000000`, or `loadrt threads name1=servo-thread period1=1000000`."},
+    {"no-transaction",
+     "`commit` and `abort` end what `begin` started, and no `begin` came before in this shell or file.\n\n"
+     "Outside begin … commit each line takes effect by itself, and in a file all edits up to the next command that acts on the machine."},
+    {"not-a-program",
+     "waitusr and unloadusr are about programs outside the runtime: those started by loadusr, and those that registered over "
+     "the control socket.\n\n"
+     "Components inside the runtime are unloaded by unloadrt or unload; `show comp` lists both, programs as type User."},
     {"not-in-thread",
      "delf takes a function out of the thread it is in. This one is not in the named thread."},
+    {"open-transaction",
+     "Edits between `begin` and `commit` are collected and take effect together. A second `begin` before that means nothing, and "
+     "a file that ends before its `commit` changes nothing with the collected edits.\n\n"
+     "End the row with `commit`, or forget it with `abort`."},
+    {"out-of-memory",
+     "The system gave no more memory while an edit was made. The edit was undone; the machine runs on as it was.\n\n"
+     "`ulimit -v` and `ulimit -l` limit the memory and the locked memory of a process; `free -h` shows what the machine has."},
     {"output-set",
      "Only the component writes an output; setp on it would be overwritten in the next cycle.\n\n"
      "To force a value downstream, unlink the output and set the signal: `unlinkp OUT`, `sets SIGNAL VALUE`."},
@@ -120,10 +153,20 @@ inline constexpr CodePage code_pages[] = {
      "A pin is in at most one signal. Unlink it first with unlinkp, or link the other pins to the signal it is in."},
     {"port-sized",
      "The buffer of a port signal is allocated once, by the first sets; its size does not change afterwards."},
+    {"program-ended",
+     "loadusr -W waits until the program says that its component is ready, and the program ended first.\n\n"
+     "Its own messages say why. A program registers over the control socket with the request {\"component\":\"NAME\"}; "
+     "-Wn NAME waits for another name than the program's."},
+    {"program-failed",
+     "loadusr -w waits for the program's end and takes an exit status other than 0 as an error, as LinuxCNC does.\n\n"
+     "`loadusr -i -w PROGRAM` ignores the status."},
     {"range-length",
      "The ranges and sets of one command run along with each other, so each of them must stand for as many names as the one in the "
      "first word: `net j[0..2]-cmd traj.[0..2].out => pid.{x,y,z}.command` is three commands.\n\n"
      "When the first word has no range, ranges in the others are lists in place: `net on s.on => pid.{x,y,z}.enable` is one command."},
+    {"recursive-source",
+     "A file reads itself by `source`, directly or through others; it would never end. The places show the way round.\n\n"
+     "Put what both need into a third file."},
     {"signal-named-like-pin",
      "net takes the signal's name first, then pins. The first name is a pin's, so the signal's name was probably forgotten.\n\n"
      "`net SIGNAL pin pin …`"},
@@ -163,6 +206,15 @@ inline constexpr CodePage code_pages[] = {
     {"unknown-argument",
      "The component has no load argument of this name, and ignoring it could hide a mistake.\n\n"
      "`hal doc COMPONENT` lists its arguments. All components take count=, names= and personality=."},
+    {"unknown-command",
+     "The first word of a line is a command, and there is none of this name.\n\n"
+     "`help` lists all commands, `help COMMAND` tells more about one. To set a pin by assignment, put blanks around the =: `pid.0.Pgain = 5`."},
+    {"unknown-option",
+     "The command has no such option.\n\n"
+     "`help COMMAND` shows its options. Options stand before the other arguments: those behind a program's name belong to the program."},
+    {"unknown-word",
+     "One of a few words is expected here, and this is none of them.\n\n"
+     "The message lists the words; `help COMMAND` explains them."},
     {"unreadable-file",
      "The file cannot be read; the system's reason is part of the message. A file may be at most 1 GB."},
     {"unset-ini-key",
@@ -172,6 +224,9 @@ inline constexpr CodePage code_pages[] = {
     {"unset-variable",
      "`$NAME` and `$(NAME)` stand for an environment variable, and this one is not set. A name may contain letters, digits, `.`, `_` and "
      "`-`, so `$HOME-x` is the variable `HOME-x`; write `$(HOME)-x`. Quotes do not protect a `$`."},
+    {"unsupported-file",
+     "Tcl files are not read: they are programs, not netlists.\n\n"
+     "Most are loops over names, which a .hal file says with ranges and sets: `net j[0..5]-cmd traj.out-[0..5] => pid.[0..5].command`."},
     {"unterminated-quote",
      "A quote, ' or \", is opened and not closed before the end of the line. Quotes protect blanks and `#`; they stay in the word. There is "
      "no escape character, but one kind of quote may stand inside the other: \"it's\".\n\n"

@@ -10,6 +10,10 @@ std::uint32_t Sources::add(std::string name, std::string text) {
     return static_cast<std::uint32_t>(sources_.size());
 }
 
+void Sources::drop(std::uint32_t source) {
+    if (source != 0 && source == sources_.size()) sources_.pop_back();
+}
+
 const Sources::Source& Sources::get(std::uint32_t source) const {
     static const Source nowhere{.name = "<runtime>", .text = "", .line_starts = {0}};
     return source == 0 || source > sources_.size() ? nowhere : sources_[source - 1];

@@ -30,8 +30,11 @@ public:
         mutable std::vector<std::uint32_t> line_starts = {};  ///< filled by the first question about a place
     };
 
-    /// Adds a text and returns its number. Texts of the shell (`keep` false) share one recycled entry per line.
+    /// Adds a text and returns its number.
     std::uint32_t add(std::string name, std::string text);
+    /// Gives the newest text back when no span points into it any more: what a shell line leaves behind that made
+    /// nothing. Its number is used again. Any other text stays.
+    void drop(std::uint32_t source);
     const Source& get(std::uint32_t source) const;
     std::string_view text(Span span) const;
     Place place(Span span) const;

@@ -6,7 +6,9 @@
 // [setup], one thread at a time per Shell, but for cancel().
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -99,10 +101,14 @@ public:
     /// The page of a diagnostic code for `hal explain CODE`; empty when there is no such code.
     static std::string explain(std::string_view code);
 
+    /// What $NAME means in commands; empty: the environment of this process. A client of the socket brings its own.
+    void look_up(std::function<std::optional<std::string>(const std::string&)> variable);
+
     Processes& processes() const;
+    struct State;
 
 private:
-    struct State;
+    int run_ini(const std::string& path, Output& output);
     std::unique_ptr<State> state_;
 };
 

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// help, explain, print, echo and the other commands about the shell itself; the manual made from the command table.
+#include <algorithm>
+#include <charconv>
+
+#include <fmt/format.h>
+
+#include "shell/commands.hpp"
+#include "shell/script.hpp"
+
+namespace hal {
+namespace {
+
+std::string names_of(const CommandRow& row) { return *row.also ? std::string(row.name) + ", " + row.also : row.name; }
+
+std::string usage(const CommandRow& row) { return *row.arguments ? std::string(row.name) + " " + row.arguments : row.name; }
+
+}  // namespace
+
+void command_source(Context& context) { context.script.source(context); }
+
+void command_print(Context& context) {
+    std::string text = context.session.sources.location(context.command.span, false) + ": HALCMD MSG:";
+    for (const auto& token : context.command.args) text += " " + token.text;
+    context.output.err(text + "\n");
+}
+
+void command_echo(Context& context) {
+    context.shell.options.echo = true;
+    context.output.out("Echo on\n");
+}
+
+void command_unecho(Context& context) {
+    context.shell.options.echo = false;
+    context.output.out("Echo off\n");
+}
+
+void command_debug(Context& context) {
+    const std::string& text = context.argument(0);
+    int level = -1;
+    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), level);
+    if (status != std::errc{} || end != text.data() + text.size() || level < 0 || level > 5) {
+        context.diagnostics.error("unknown-word", context.span(0), "'" + text + "' is no level", "", "levels go from 0 (nothing) to 5 (everything)");
+        return;
+    }
+    context.shell.options.level = static_cast<Level>(std::min(level, 3));
+}
+
+void command_help(Context& context) {
+    if (context.count() == 0) {
+        std::string text;
+        for (const auto& row : command_table()) text += fmt::format("  {:<14} {}\n", names_of(row), row.summary);
+        context.output.out(text + "`help COMMAND` says more about one, `explain CODE` about an error.\n");
+        return;
+    }
+    const std::string& name = context.argument(0);
+    if (const CommandRow* const row = find_command(name)) {
+        context.output.out(usage(*row) + "\n  " + row->summary + "\n" + (*row->help ? std::string(row->help) + "\n" : ""));
+        return;
+    }
+    context.diagnostics.error("unknown-command", context.span(0), "there is no command '" + name + "'", did_you_mean(name, command_names()),
+                              "`help` lists all commands");
+}
+
+void command_explain(Context& context) {
+    const std::string& code = context.argument(0);
+    const std::string page = Shell::explain(code);
+    if (!page.empty()) return context.output.out(page + "\n");
+    std::vector<std::string> codes;
+    for (const auto& row : code_pages) codes.emplace_back(row.name);
+    context.diagnostics.error("unknown-word", context.span(0), "there is no error code '" + code + "'", did_you_mean(code, codes));
+}
+
+void command_quit(Context& context) { context.script.quit(); }
+
+void command_nothing(Context&) {}
+
+std::string Shell::explain(std::string_view code) {
+    for (const auto& row : code_pages)
+        if (code == row.name) return row.page;
+    return "";
+}
+
+std::string Shell::manual() {
+    std::string text = "# Commands\n";
+    for (const auto& row : command_table()) {
+        text += fmt::format("\n## {}\n\n    {}\n\n{}{}.\n", names_of(row), usage(row), static_cast<char>(std::toupper(row.summary[0])), row.summary + 1);
+        if (*row.help) text += fmt::format("\n{}\n", row.help);
+    }
+    return text;
+}
+
+}  // namespace hal

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Runs one text: which of its commands form a transaction, when it takes effect, what is printed about it.
+// Internal to the shell; used for one execute(), run_text() or run_file(), and not after that.
+//
+// Consecutive edits are one transaction. It ends before a command that acts on the machine and at the end of the text;
+// with -k after every line. All its problems are printed together and the last line says what became of it. A `source`d
+// file belongs to the text at its place. From the first edit to the end of its transaction the session's mutex is held.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shell/commands.hpp"
+#include "shell/state.hpp"
+
+namespace hal {
+
+class Script {
+public:
+    Script(Shell& shell, Shell::State& state, Output& output);
+    ~Script();
+    Script(const Script&) = delete;
+
+    /// Runs a text that is in the session's sources, then ends the last transaction. Returns 0, or 1 when anything failed.
+    int run(std::uint32_t source);
+    /// Several texts with the loads of all of them merged and done first (`[HAL]TWOPASS`).
+    int run_two_pass(const std::vector<std::uint32_t>& texts);
+
+    /// The `source` and `quit` commands.
+    void source(Context& context);
+    void quit() { ended_ = true; }
+    /// True when Shell::cancel was called; says so once.
+    bool interrupted(Context& context);
+    bool quit_seen() const { return ended_; }
+    /// True when nothing in the model points into the text that was run.
+    bool text_can_go() const { return !text_is_kept_; }
+
+private:
+    struct Parsed {
+        std::vector<Command> commands;
+        Diagnostics problems;  ///< of the text itself
+    };
+    Parsed parse_text(std::uint32_t source);
+    void run_commands(std::uint32_t source);
+    void run_line(const Command& command);
+    void edit(const Command& command, const CommandRow& row);
+    void act(const Command& command, const CommandRow& row);
+    void transaction(const Command& command);
+    void echo_line(std::string_view line, std::uint32_t number);
+    void take_lock();
+    /// Ends the transaction: commits, prints. Sets failed_ and, without -k, stopped_.
+    void finish();
+    void report(Diagnostics& found, std::size_t edits, bool took_effect);
+    /// -k: each line is a transaction. A check looks at the text as a whole in any case.
+    bool separately() const { return shell_.options.keep_going && !shell_.options.check; }
+    bool stop() const { return stopped_ || ended_; }
+
+    Shell& shell_;
+    Shell::State& state_;
+    Session& session_;
+    Output& output_;
+    std::unique_lock<std::mutex> lock_;
+    Diagnostics pending_;           ///< of the open transaction
+    std::size_t edits_ = 0;         ///< in it
+    std::size_t errors_ = 0;        ///< printed so far, for the summary with -k
+    bool failed_ = false, stopped_ = false, ended_ = false, text_is_kept_ = false;
+    struct Open {
+        std::string path;           ///< canonical
+        Span at;                    ///< of the `source` command, in the file before
+    };
+    std::vector<Open> files_;       ///< being read, the outermost first
+};
+
+}  // namespace hal
