@@ -103,33 +103,38 @@ TEST_F(Rendering, underlines_the_first_line_of_a_place_on_several) {
 }
 
 TEST_F(Rendering, keeps_carets_below_tabs_and_wide_characters) {
-    EXPECT_EQ(at("net\tä日本\tx end", "end"), "test.hal:1:11: error: wrong [two-writers]\n"
-                                             "    1 | net     ä日本   x end\n"
-                                             "      |                   ^^^ here\n");
+    EXPECT_EQ(at("net\tä日本\tx end", "end"),
+              "test.hal:1:11: error: wrong [two-writers]\n"
+              "    1 | net     ä日本   x end\n"
+              "      |                   ^^^ here\n");
 }
 
 TEST_F(Rendering, shows_control_characters_and_broken_bytes_as_escapes) {
-    EXPECT_EQ(at("a\x1b[31m\xff\x01 end", "end"), "test.hal:1:10: error: wrong [two-writers]\n"
-                                                   "    1 | a\\x1b[31m\\xff\\x01 end\n"
-                                                   "      |                   ^^^ here\n");
-    EXPECT_EQ(at("\u202Ereversed end", "end"), "test.hal:1:11: error: wrong [two-writers]\n"
-                                               "    1 | \\xe2\\x80\\xaereversed end\n"
-                                               "      |                      ^^^ here\n");
+    EXPECT_EQ(at("a\x1b[31m\xff\x01 end", "end"),
+              "test.hal:1:10: error: wrong [two-writers]\n"
+              "    1 | a\\x1b[31m\\xff\\x01 end\n"
+              "      |                   ^^^ here\n");
+    EXPECT_EQ(at("\u202Ereversed end", "end"),
+              "test.hal:1:11: error: wrong [two-writers]\n"
+              "    1 | \\xe2\\x80\\xaereversed end\n"
+              "      |                      ^^^ here\n");
 }
 
 TEST_F(Rendering, windows_a_huge_line_around_the_place) {
     const std::string text = std::string(1'000'000, 'a') + " bad " + std::string(1'000'000, 'c');
-    EXPECT_EQ(at(text, "bad"), "test.hal:1:1000002: error: wrong [two-writers]\n    1 | …" + std::string(39, 'a') + " bad " + std::string(55, 'c') +
-                                   "…\n      | " + std::string(41, ' ') + "^^^ here\n");
+    EXPECT_EQ(at(text, "bad"), "test.hal:1:1000002: error: wrong [two-writers]\n    1 | …" + std::string(39, 'a') + " bad " +
+                                   std::string(55, 'c') + "…\n      | " + std::string(41, ' ') + "^^^ here\n");
 }
 
 TEST_F(Rendering, shows_two_places_far_apart_on_one_line_in_two_windows) {
     const auto source = add("first " + std::string(1000, 'a') + " last");
     Diagnostic error{.code = "two-writers", .message = "wrong"};
     error.labels = {{find(sources, source, "last"), "L"}, {find(sources, source, "first"), "F"}};
-    EXPECT_EQ(render(error, sources), "test.hal:1:1008: error: wrong [two-writers]\n"
-                                      "    1 | …" + std::string(39, 'a') + " last\n      | " + std::string(41, ' ') + "^^^^ L\n" +
-                                      "    1 | first " + std::string(94, 'a') + "…\n      | ----- F\n");
+    EXPECT_EQ(render(error, sources),
+              "test.hal:1:1008: error: wrong [two-writers]\n"
+              "    1 | …" +
+                  std::string(39, 'a') + " last\n      | " + std::string(41, ' ') + "^^^^ L\n" + "    1 | first " + std::string(94, 'a') +
+                  "…\n      | ----- F\n");
 }
 
 TEST_F(Rendering, is_bounded_when_the_line_has_no_width_or_nothing_but_escapes) {
@@ -154,8 +159,9 @@ TEST_F(Rendering, keeps_a_message_on_one_line) {
     const auto source = add("x");
     Diagnostics found;
     found.error("two-writers", find(sources, source, "x"), "one\ntwo\x1b", "la\tbel", "first\nsecond");
-    EXPECT_EQ(render(found, sources), "test.hal:1:1: error: one two\\x1b [two-writers]\n    1 | x\n      | ^ la bel\n"
-                                      "      = help: first\n              second\n");
+    EXPECT_EQ(render(found, sources),
+              "test.hal:1:1: error: one two\\x1b [two-writers]\n    1 | x\n      | ^ la bel\n"
+              "      = help: first\n              second\n");
 }
 
 TEST_F(Rendering, needs_no_place) {
@@ -172,9 +178,10 @@ TEST_F(Rendering, makes_room_for_long_line_numbers) {
 
 TEST_F(Rendering, colors_when_asked) {
     const auto source = add("bad");
-    EXPECT_EQ(render(Diagnostic{.code = "two-writers", .message = "wrong", .labels = {{find(sources, source, "bad"), "here"}}}, sources, true),
-              "test.hal:1:1: \033[1;31merror: \033[0m\033[1mwrong\033[0m [two-writers]\n"
-              "\033[34m    1 | \033[0mbad\n\033[34m      | \033[0m\033[1;31m^^^\033[0m \033[1;31mhere\033[0m\n");
+    EXPECT_EQ(
+        render(Diagnostic{.code = "two-writers", .message = "wrong", .labels = {{find(sources, source, "bad"), "here"}}}, sources, true),
+        "test.hal:1:1: \033[1;31merror: \033[0m\033[1mwrong\033[0m [two-writers]\n"
+        "\033[34m    1 | \033[0mbad\n\033[34m      | \033[0m\033[1;31m^^^\033[0m \033[1;31mhere\033[0m\n");
 }
 
 TEST_F(Rendering, sorts_by_place_with_files_in_order_of_first_mention) {
@@ -227,7 +234,9 @@ TEST(Suggestion, names_those_that_are_equally_near) {
     EXPECT_EQ(hal::did_you_mean("x3", {"x0", "x1", "x2", "x4"}), "did you mean 'x0', 'x1' or 'x2'?");
 }
 
-TEST(Suggestion, completes_a_beginning) { EXPECT_EQ(hal::did_you_mean("servo", {"servo-thread", "base-thread"}), "did you mean 'servo-thread'?"); }
+TEST(Suggestion, completes_a_beginning) {
+    EXPECT_EQ(hal::did_you_mean("servo", {"servo-thread", "base-thread"}), "did you mean 'servo-thread'?");
+}
 
 TEST(Suggestion, is_silent_when_nothing_is_near) {
     EXPECT_EQ(hal::did_you_mean("motor.speed", {"pid.0.output", "x"}), "");

@@ -104,7 +104,8 @@ TEST_F(Ini_file, gives_values_to_netlists) {
 TEST_F(Ini_file, suggests_keys_for_one_that_is_not_there) {
     const hal::Ini ini = read("[AXIS_X]\nMAX_VELOCITY = 2.5\nMAX_LIMIT = 1\n");
     environment.ini = &ini;
-    EXPECT_EQ(said("setp a [AXIS_X]MAX_VELOCTY\nsetp b [NONE]NOTHING\n"), R"(test.hal:1:8: error: there is no '[AXIS_X]MAX_VELOCTY' in the INI file [unset-ini-key]
+    EXPECT_EQ(said("setp a [AXIS_X]MAX_VELOCTY\nsetp b [NONE]NOTHING\n"),
+              R"(test.hal:1:8: error: there is no '[AXIS_X]MAX_VELOCTY' in the INI file [unset-ini-key]
     1 | setp a [AXIS_X]MAX_VELOCTY
       |        ^^^^^^^^^^^^^^^^^^^ did you mean '[AXIS_X]MAX_VELOCITY'?
       = help: keys of [AXIS_X]: MAX_VELOCITY, MAX_LIMIT

@@ -81,7 +81,9 @@ private:
 /// A directory that goes when the test does.
 class Folder {
 public:
-    Folder() : path_(std::filesystem::temp_directory_path() / ("halcyon-netlist-" + std::to_string(::getpid()))) { std::filesystem::create_directories(path_); }
+    Folder() : path_(std::filesystem::temp_directory_path() / ("halcyon-netlist-" + std::to_string(::getpid()))) {
+        std::filesystem::create_directories(path_);
+    }
     ~Folder() { std::filesystem::remove_all(path_); }
     Folder(const Folder&) = delete;
     Folder& operator=(const Folder&) = delete;
