@@ -63,7 +63,12 @@ struct Widening : hal::Component {
 
     static constexpr const char* manual = R"(
 HAL does not convert between types by itself; this component stands between two signals. Every input has an output; a
-64-bit integer keeps about 16 digits when it becomes a float.
+64-bit integer keeps about 16 digits when it becomes a float. For example:
+
+    loadrt conv_s32_float
+    addf conv-s32-float.0 servo
+    net edges-counted => conv-s32-float.0.in
+    net edges         <= conv-s32-float.0.out
 )";
 };
 
@@ -87,7 +92,13 @@ struct Narrowing : hal::Component {
 HAL does not convert between types by itself; this component stands between two signals. A float loses its fraction
 (1.9 becomes 1, -1.9 becomes -1). A value that the other type does not have sets `out-of-range` and wraps around (modulo
 2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, goes to the nearest end of the range. An input that is not
-a number gives 0.
+a number gives 0. For example:
+
+    loadrt conv_float_s32
+    addf conv-float-s32.0 servo
+    setp conv-float-s32.0.clamp TRUE
+    net torque-wanted => conv-float-s32.0.in
+    net torque-word   <= conv-float-s32.0.out
 )";
 };
 

@@ -36,7 +36,7 @@ std::string plugin_file(const std::string& component) {
     throw std::runtime_error("no plugin '" + component + "' in " + searched);
 }
 
-Instance::Instance(const std::string& component, Arguments arguments, Extensions extensions)
+Instance::Instance(const std::string& component, Arguments arguments, Extensions extensions, Life life)
     : arguments_(std::move(arguments)), extensions_(std::move(extensions)) {
     host_.size = sizeof host_;
     host_.data = this;
@@ -74,20 +74,27 @@ Instance::Instance(const std::string& component, Arguments arguments, Extensions
     component_ = static_cast<const hal_component*>(dlsym(library_, "hal_plugin"));
     if (component_ == nullptr) throw std::runtime_error(file + " exports no hal_plugin");
     self_ = allocations_.emplace_back(zeroed(component_->instance_size, component_->instance_align), component_->instance_align).first;
-    created_ = component_->create(&host_, self_);
-    if (created_) {
-        started_ = component_->start(self_, &host_);
-        if (!started_) component_->destroy(self_);
-    }
-    if (!started_) {
-        for (const auto& [memory, align] : allocations_) ::operator delete(memory, std::align_val_t{align});
+    if (!component_->create(&host_, self_)) {
+        release();
         throw std::runtime_error(reason_);
+    }
+    if (life == Life::created) return;
+    try {
+        start();
+    } catch (...) {
+        component_->destroy(self_);
+        release();
+        throw;
     }
 }
 
 Instance::~Instance() {
     stop();
     component_->destroy(self_);
+    release();
+}
+
+void Instance::release() {
     for (const auto& [memory, align] : allocations_) ::operator delete(memory, std::align_val_t{align});
     dlclose(library_);
 }

@@ -41,9 +41,11 @@ public:
     /// Extensions of the interface that the component may ask for, by id.
     using Extensions = std::map<std::string, const void*>;
 
-    /// Creates and starts an instance of `component`, found in HALCYON_PLUGIN_PATH or the build tree. Throws the
-    /// component's own reason when it refuses.
-    explicit Instance(const std::string& component, Arguments arguments = {}, Extensions extensions = {});
+    enum class Life { created, started };
+
+    /// Creates and starts an instance of `component`, found in HALCYON_PLUGIN_PATH or the build tree; with
+    /// Life::created it is left for start(). Throws the component's own reason when it refuses.
+    explicit Instance(const std::string& component, Arguments arguments = {}, Extensions extensions = {}, Life life = Life::started);
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
@@ -83,7 +85,7 @@ public:
     void unlink(std::string_view pin);
 
     void stop();   ///< calls the component's stop(), once
-    void start();  ///< starts again after stop()
+    void start();  ///< starts an instance that was only created, or again after stop()
 
     const hal_component& component() const { return *component_; }
     const std::vector<Pin>& pins() const { return pins_; }
@@ -93,6 +95,7 @@ public:
     const Function& function(std::string_view name) const;
 
 private:
+    void release();
     template <class T>
     static constexpr hal_type type_of() {
         if constexpr (std::same_as<T, bool>) return HAL_TYPE_BIT;
@@ -119,7 +122,7 @@ private:
     void* library_ = nullptr;
     const hal_component* component_ = nullptr;
     void* self_ = nullptr;
-    bool created_ = false, started_ = false;
+    bool started_ = false;
     std::vector<Pin> pins_;
     std::map<std::string, std::size_t, std::less<>> index_;
     std::vector<Function> functions_;

@@ -98,6 +98,10 @@ TEST(Debounce, Survives_a_delay_that_shrinks) {
     EXPECT_EQ(response(filter, "1111111111", "0.in", "0.out"), "0000000000");
     filter.set("delay", 2);
     EXPECT_EQ(response(filter, "100", "0.in", "0.out"), "110");
+    filter.set("delay", 10);
+    EXPECT_EQ(response(filter, "1111111111", "0.in", "0.out"), "0000000001");
+    filter.set("delay", 2);
+    EXPECT_EQ(response(filter, "00", "0.in", "0.out"), "10");
 }
 
 TEST(Debounce, Makes_as_many_filters_as_cfg_says_each_on_its_own) {

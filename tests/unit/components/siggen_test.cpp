@@ -77,4 +77,14 @@ TEST(Siggen, Runs_backwards_and_survives_any_frequency) {
     EXPECT_TRUE(std::isfinite(siggen.get<double>("cosine")));
 }
 
+TEST(Siggen, A_phase_just_below_zero_does_not_round_up_to_a_whole_period) {
+    Instance siggen("siggen");
+    siggen.set("frequency", -1e-20);
+    for (int i = 0; i < 2; ++i) {
+        siggen.run("update", eighth);
+        EXPECT_EQ(siggen.get<double>("sawtooth"), -1.0);
+        EXPECT_FALSE(siggen.get<bool>("clock"));
+    }
+}
+
 }  // namespace
