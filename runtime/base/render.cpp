@@ -184,7 +184,7 @@ private:
         while (at > 0 && place - at < most_bytes / 2) {
             std::size_t previous = at - 1;
             while (previous > 0 && at - previous < 4 && (line[previous] & 0xC0) == 0x80) --previous;
-            before += line[previous] == '\t' ? tab_stop : columns(line.substr(previous, at - previous));
+            before += width_of(line.substr(previous, at - previous));
             if (before > columns_before) return at;
             at = previous;
         }

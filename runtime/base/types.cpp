@@ -116,6 +116,7 @@ std::optional<hal_type> type_named(std::string_view name) {
 
 Parsed parse_value(hal_type type, std::string_view text) {
     Parsed parsed;
+    parsed.value.raw = 0;  // {} sets the first member of a union only
     if (!row(type).number) {
         parsed.problem = std::string("a ") + name(type) + " has no value to write";
         return parsed;

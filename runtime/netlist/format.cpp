@@ -111,25 +111,28 @@ private:
         return at;
     }
 
-    /// A command that would be too long on one line keeps the line breaks its user gave it. False: it fits.
+    /// A command that would be too long on one line keeps the line breaks its user gave it. False: it fits, or has none.
     bool long_command(const std::vector<std::string_view>& words, const std::string& remark) {
         std::size_t total = 0;
         for (const std::string_view word : words) total += width(word) + 1;
         if (total - 1 <= line_width) return false;
-        flush();
-        begin_line();
+        std::string text;
         std::uint32_t end = 0;
-        bool first = true;
+        bool broken = false;  // a line may also end inside a word, which is then joined
         for (const std::string_view word : words) {
             const auto at = static_cast<std::size_t>(word.data() - line_.text().data());
             const Span span = line_.span(at, at + word.size());
-            const std::string_view between = first ? "" : sources_.text({source_, end, span.begin});
-            if (between.find('\n') != between.npos) out_ += " \\\n    ";
-            else if (!first) out_ += ' ';
-            out_ += word;
+            const std::string_view between = text.empty() ? "" : sources_.text({source_, end, span.begin});
+            const bool here = between.find('\n') != between.npos;
+            text += here ? " \\\n    " : text.empty() ? "" : " ";
+            text += word;
             end = span.end;
-            first = false;
+            broken = broken || here;
         }
+        if (!broken) return false;
+        flush();
+        begin_line();
+        out_ += text;
         if (!remark.empty()) out_ += "  ";
         end_line(remark);
         return true;

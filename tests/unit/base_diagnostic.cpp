@@ -145,6 +145,7 @@ TEST_F(Rendering, is_bounded_when_the_line_has_no_width_or_nothing_but_escapes) 
     EXPECT_LT(at(std::string(100'000, '\t') + "end", "end").size(), 5000u);
     EXPECT_LT(at(std::string(90, '\t') + "end", "end").size(), 5000u);
     EXPECT_LT(at(std::string(100'000, '\x80') + "end", "end").size(), 5000u);
+    EXPECT_LT(at(std::string(90, '\r') + "end", "end").size(), 5000u);
 }
 
 TEST_F(Rendering, shortens_a_name_of_10000_characters) {
