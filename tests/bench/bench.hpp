@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// What the sections of the bench share: options, and the table they fill.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hal::bench {
+
+struct Options {
+    bool quick = false;       ///< shorter runs, wider spread
+    bool full = false;        ///< what takes minutes as well: a cold build, a million edits
+    std::string programs;     ///< folder of the built `hal`
+    int cpu = 0;              ///< of the real-time thread; everything else of the bench stays off it
+};
+
+/// What a ratio has to be. `at_most`: ours / theirs. `not_above`: the same with 1, where a tenth is the spread of the
+/// measurement. `times_less`: theirs / ours. `limit`: ours against a figure.
+struct Goal {
+    enum class Kind { none, at_most, not_above, times_less, limit } kind = Kind::none;
+    double value = 0.0;
+};
+inline Goal not_above() { return {Goal::Kind::not_above, 1.1}; }
+inline Goal at_most(double ratio) { return {Goal::Kind::at_most, ratio}; }
+inline Goal times_less(double ratio) { return {Goal::Kind::times_less, ratio}; }
+inline Goal limit(double figure) { return {Goal::Kind::limit, figure}; }
+
+struct Row {
+    std::string what;
+    std::string unit;                       ///< of ours and theirs
+    std::optional<double> ours = {};
+    std::string peer = {};                  ///< what theirs is of, or why there is no figure of it
+    std::optional<double> theirs = {};
+    Goal goal = {};
+};
+
+/// The table printed at the end. Rows stand in the order in which they were added.
+class Report {
+public:
+    void section(const std::string& title);
+    void row(const Row& row);
+    void note(const std::string& sentence);
+    std::string text() const;
+
+private:
+    struct Line {
+        enum class Kind { section, row, note } kind;
+        std::string cells[6];  ///< of a row: what, ours, peer, ratio, target, verdict; else the text in the first
+    };
+    std::vector<Line> lines_;
+};
+
+void dispatch(const Options&, Report&);
+void wakeup(const Options&, Report&);
+void load(const Options&, Report&);
+void shell(const Options&, Report&);
+void edit(const Options&, Report&);
+void coherence(const Options&, Report&);
+void size(const Options&, Report&);
+
+}  // namespace hal::bench

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+// What a function costs in a thread of many: the runtime with its statistics, a hand-written loop over the same structs,
+// and LinuxCNC, each with everything in the caches ("hot") and once a millisecond.
+#include <algorithm>
+#include <fmt/core.h>
+#include <limits>
+#include <thread>
+
+#include "bench.hpp"
+#include "dispatch_loops.hpp"
+#include "execute/core.hpp"
+#include "linuxcnc.hpp"
+#include "machine.hpp"
+#include "model/compile.hpp"
+#include "runtime.hpp"
+#include "sample.hpp"
+
+namespace hal::bench {
+namespace {
+
+struct Case {
+    const char* component;
+    std::size_t count;
+    std::size_t linuxcnc_count;  // what its shared memory holds; pid: its own limit
+    const char* function = "";   // below the instance's name
+    bool chained = false;        // each out is linked to the next in0
+};
+
+constexpr Case cases[] = {
+    {"and2", 1000, 900},     {"sum2", 1000, 900},           {"mux2", 1000, 900},
+    {"limit1", 1000, 900},   {"pid", 100, 16, ".do-pid-calcs"}, {"and2", 1000, 800, "", true}, {"sum2", 1000, 800, "", true},
+};
+
+/// Instances, links, values; then the functions in a thread `t`.
+std::string netlist(const Case& c, std::size_t count) {
+    const bool pid = std::string_view(c.component) == "pid";
+    std::string text = fmt::format("loadrt {} {}={}\n", c.component, pid ? "num_chan" : "count", count);
+    for (std::size_t i = 0; c.chained && i + 1 < count; ++i) text += fmt::format("net c{} {}.{}.out => {}.{}.in0\n", i, c.component, i, c.component, i + 1);
+    for (std::size_t i = 0; pid && i < count; ++i)
+        text += fmt::format("setp pid.{0}.enable 1\nsetp pid.{0}.Pgain 2\nsetp pid.{0}.Igain 0.5\nsetp pid.{0}.Dgain 0.01\nsetp pid.{0}.command {0}\n", i);
+    for (std::size_t i = 0; i < count; ++i) text += fmt::format("addf {}.{}{} t\n", c.component, i, c.function);
+    return text;
+}
+
+/// The machine of a case, loaded but run by nobody, with a plan for whoever runs it.
+class Bed {
+public:
+    explicit Bed(const Case& c) : runtime_(true), loop_(loop_over(c.component)) {
+        runtime_.apply("newthread t 1000000\n" + netlist(c, c.count));
+        const Model& model = runtime_.session.model();
+        for (const auto& instance : model.find_component(c.component)->instances) instances_.push_back(instance->memory);
+    }
+
+    /// A core on this machine that measures itself, or not.
+    std::unique_ptr<Core> core(bool measure) {
+        const Model& model = runtime_.session.model();
+        Thread& t = *model.threads.front();
+        auto core = std::make_unique<Core>(1u, t.options.period_ns, ThreadPins{&t.time, &t.tmax, &t.tmax_increased, &t.beat, &t.missed, &t.wakeup}, board_, running_, measure);
+        CompileInput input;
+        input.epoch = ++epoch_;
+        const std::unordered_set<const Function*> none;
+        const std::unordered_map<Pin*, hal_value> pins;
+        const std::unordered_map<Signal*, hal_value> signals;
+        const std::unordered_map<Signal*, Pin*> inherited;
+        input.without = &none;
+        input.pin_values = &pins;
+        input.signal_values = &signals;
+        input.inherited = &inherited;
+        input.core_of = [&](const Thread&) -> void* { return core.get(); };
+        input.check_finite = check_finite;
+        plans_.push_back(std::move(compile(model, input).plans.front().second));
+        core->offer(plans_.back().get());
+        core->service();
+        return core;
+    }
+    void loop(std::uint64_t cycle) const {
+        const hal_cycle info{sizeof info, 0, 1'000'000, 1e-3, 0, cycle};
+        loop_(instances_.data(), instances_.size(), &info);
+    }
+    std::size_t count() const { return instances_.size(); }
+
+private:
+    std::vector<std::unique_ptr<plan::Plan>> plans_;  // before the session: it writes through the pins when it ends
+    Runtime runtime_;
+    Loop loop_;
+    std::vector<void*> instances_;
+    FaultBoard board_;
+    std::atomic<bool> running_{true};
+    std::uint64_t epoch_ = 1'000'000;
+};
+
+struct Hot {
+    double ours = 0, loop = 0, bare = 0;  // ns per function; bare: without statistics
+};
+
+/// Cycles back to back in a real-time thread, the three in turn; medians of single cycles.
+Hot measure_hot(const Options& options, const Case& c) {
+    Bed bed(c);
+    const auto measured = bed.core(true), bare = bed.core(false);  // of one layout: the second plan is the first again
+    std::vector<double> ours, loop, without;
+    const int rounds = options.quick ? 4 : 10, cycles = options.quick ? 500 : 2000;
+    const auto time = [&](std::vector<double>& samples, auto cycle) {
+        for (int i = 0; i < cycles; ++i) {
+            const std::int64_t begin = monotonic_ns();
+            cycle(begin, static_cast<std::uint64_t>(i));
+            if (const std::int64_t end = monotonic_ns(); i >= 10) samples.push_back(static_cast<double>(end - begin));
+        }
+    };
+    for (int round = 0; round < rounds; ++round) {
+        run_real_time(options.cpu, [&] {
+            time(ours, [&](std::int64_t now, std::uint64_t) { measured->cycle(now, now); });
+            time(loop, [&](std::int64_t, std::uint64_t i) { bed.loop(i); });
+            time(without, [&](std::int64_t now, std::uint64_t) { bare->cycle(now, now); });
+        });
+    }
+    const auto per = [&](std::vector<double>& samples) { return median(samples) / static_cast<double>(bed.count()); };
+    return {per(ours), per(loop), per(without)};
+}
+
+/// Values of a time that changes each millisecond, read beside it.
+template <class Read>
+std::vector<double> watch(std::size_t count, Read read) {
+    std::vector<double> samples;
+    while (samples.size() < count) {
+        std::this_thread::sleep_for(std::chrono::microseconds(1200));
+        samples.push_back(read());
+    }
+    return samples;
+}
+
+struct Slow {
+    double ours = 0, loop = 0;
+};
+
+/// Once a millisecond, in turn; medians of what a sampler sees of the time of the whole thread, as with LinuxCNC.
+Slow measure_at_rate(const Options& options, const Case& c) {
+    std::vector<double> ours, loop;
+    const std::size_t samples = options.quick ? 150 : 300;
+    for (int round = 0; round < (options.quick ? 1 : 3); ++round) {
+        {
+            Runtime runtime;
+            runtime.apply(new_thread("t", 1'000'000, options.cpu) + netlist(c, c.count));
+            runtime.session.start_threads();
+            const Thread& t = *runtime.session.model().threads.front();
+            watch(20, [] { return 0.0; });
+            std::vector<double> seen = watch(samples, [&] { return static_cast<double>(__atomic_load_n(&t.time.slot->s32, __ATOMIC_RELAXED)); });
+            ours.push_back(median(seen));
+        }
+        {
+            Bed bed(c);
+            const auto bind = bed.core(false);
+            PeriodicThread thread(options.cpu, 1'000'000, [&](std::uint64_t cycle) { bed.loop(cycle); });
+            watch(20, [] { return 0.0; });
+            std::vector<double> seen = watch(samples, [&] { return static_cast<double>(thread.last_ns()); });
+            loop.push_back(median(seen));
+        }
+    }
+    const auto n = static_cast<double>(c.count);
+    return {median(ours) / n, median(loop) / n};
+}
+
+struct Peer {
+    std::optional<double> hot, slow;
+};
+
+/// LinuxCNC by the same sampling; its smallest sample stands for hot.
+Peer measure_linuxcnc(const Options& options, const Case& c) {
+    const auto peer = LinuxCnc::start("name1=t period1=1000000");
+    if (!peer || peer->file(netlist(c, c.linuxcnc_count) + "start\n").status != 0) return {};
+    peer->sample("t.time", 20, 1200);
+    std::vector<double> samples = peer->sample("t.time", options.quick ? 300 : 900, 1200);
+    std::erase_if(samples, [](double s) { return s <= 0; });
+    if (samples.empty()) return {};
+    const double unit = LinuxCnc::ns_per_time_unit() / static_cast<double>(c.linuxcnc_count);
+    return {*std::min_element(samples.begin(), samples.end()) * unit, median(samples) * unit};
+}
+
+}  // namespace
+
+void dispatch(const Options& options, Report& report) {
+    report.section("dispatch: ns per function in a thread of 1000 (pid: 100), statistics on");
+    std::vector<std::pair<std::string, Hot>> statistics;
+    for (const Case& c : cases) {
+        const std::string name = c.component + std::string(c.chained ? ", chained" : "");
+        wait_for_quiet(1.0);
+        const Hot hot = measure_hot(options, c);
+        const Slow slow = measure_at_rate(options, c);
+        const Peer peer = measure_linuxcnc(options, c);
+        statistics.emplace_back(name, hot);
+        const std::string absent = LinuxCnc::absent().empty() ? "LinuxCNC did not start" : LinuxCnc::absent();
+        const auto peer_name = [&](const std::optional<double>& figure) { return figure ? LinuxCnc::name() : absent; };
+        report.row({name + ", hot", "ns", hot.ours, "loop", hot.loop, at_most(1.5)});
+        report.row({"", "ns", hot.ours, peer_name(peer.hot), peer.hot, times_less(3)});
+        report.row({name + ", 1 kHz", "ns", slow.ours, "loop", slow.loop, at_most(1.5)});
+        report.row({"", "ns", slow.ours, peer_name(peer.slow), peer.slow, times_less(5)});
+    }
+    for (const auto& [name, hot] : statistics) report.row({name + ", cost of statistics, hot", "ns", hot.ours, "without", hot.bare, at_most(1.1)});
+    report.note("Medians. Ours is the whole cycle divided by its functions. LinuxCNC's hot figure is its best cycle at 1 kHz, of as many");
+    report.note("functions as fit its shared memory (900; chained 800; pid 16).");
+}
+
+}  // namespace hal::bench

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// ./hal bench [--quick] [--full] [SECTION…]
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fmt/core.h>
+
+#include "bench.hpp"
+#include "machine.hpp"
+#include "sample.hpp"
+
+namespace {
+
+using namespace hal::bench;
+
+struct Section {
+    const char* name;
+    const char* what;
+    void (*run)(const Options&, Report&);
+};
+
+constexpr Section sections[] = {
+    {"dispatch", "cost of a function in a thread of 1000, against a hand-written loop and LinuxCNC", dispatch},
+    {"wakeup", "how late threads wake, against cyclictest", wakeup},
+    {"load", "100 to 100 000 nets, from text to running threads, against LinuxCNC", load},
+    {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit},
+    {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
+};
+
+int usage(const char* problem, const char* word) {
+    if (*problem) fmt::print(stderr, "hal-bench: {}'{}'\n", problem, word);
+    fmt::print(stderr, "hal-bench [--quick] [--full] [SECTION...]   prints figures, asserts nothing\n"
+                       "  --quick  shorter runs\n  --full   also what takes minutes: a cold build, a million edits\n");
+    for (const Section& section : sections) fmt::print(stderr, "  {:9}{}\n", section.name, section.what);
+    return *problem ? 2 : 0;
+}
+
+void run(const Section& section, const Options& options, Report& report) {
+    fmt::print(stderr, "{} ", section.name);
+    const Stopwatch watch;
+    const double stolen = stolen_ms();
+    try {
+        section.run(options, report);
+    } catch (const std::exception& problem) {
+        report.note(fmt::format("{} ended early: {}", section.name, problem.what()));
+    }
+    report.note(fmt::format("took {:.1f} s, of which the hypervisor kept {:.0f} ms of CPU time", watch.ms() / 1000, stolen_ms() - stolen));
+    fmt::print(stderr, "{:.1f} s\n", watch.ms() / 1000);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Options options;
+    std::vector<const Section*> wanted;
+    for (int i = 1; i < argc; ++i) {
+        const Section* found = nullptr;
+        for (const Section& section : sections)
+            if (std::strcmp(argv[i], section.name) == 0) found = &section;
+        if (found) wanted.push_back(found);
+        else if (std::strcmp(argv[i], "--quick") == 0) options.quick = true;
+        else if (std::strcmp(argv[i], "--full") == 0) options.full = true;
+        else if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) return usage("", "");
+        else return usage("no section or option ", argv[i]);
+    }
+    if (wanted.empty())
+        for (const Section& section : sections) wanted.push_back(&section);
+    options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
+    options.cpu = real_time_cpu();
+
+    Report report;
+    report.section("machine");
+    for (const auto& fact : machine_facts(options.cpu)) report.note(fact);
+    stay_off(options.cpu);
+    const Stopwatch watch;
+    for (const Section* const section : wanted) run(*section, options, report);
+    fmt::print("{}\n{:.0f} s in all\n", report.text(), watch.ms() / 1000);
+    return 0;
+}
