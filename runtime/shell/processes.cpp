@@ -10,7 +10,7 @@
 #include <sched.h>
 #include <spawn.h>
 #include <sys/eventfd.h>
-#include <sys/pidfd.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -95,7 +95,7 @@ pid_t Processes::start(const ProcessStart& start, bool waited, std::string& prob
         problem = std::strerror(error);
         return 0;
     }
-    const int pidfd = pidfd_open(pid, 0);
+    const int pidfd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));  // glibc 2.36's header cannot be used from C++
     if (pidfd < 0) {
         problem = std::string("its end cannot be watched: ") + std::strerror(errno);
         kill(pid, SIGKILL);
