@@ -78,6 +78,9 @@ inline constexpr CodePage code_pages[] = {
     {"init-done",
      "initf functions run once, in a cycle of their own before the first cyclic pass of their thread. This thread has made "
      "that pass, so the function would never run."},
+    {"instance-running",
+     "Each instance of the runtime has a name of its own, and one of this name runs. Its control socket stays its own.\n\n"
+     "Give the new one another name: `hal run --name second FILE.hal`."},
     {"interrupted",
      "A command that was waiting (loadusr -w, loadusr -W, waitusr, advance) was told to stop, or the one who gave it has gone.\n\n"
      "What was done before it stays done."},
@@ -105,6 +108,9 @@ inline constexpr CodePage code_pages[] = {
     {"no-program",
      "loadusr could not start the program: it is not in PATH, is not executable, or the system refused.\n\n"
      "A path with a / is taken as it stands; `~` is the home directory."},
+    {"no-socket",
+     "The control socket of the instance could not be made; without it no shell could reach the running machine. The sockets lie in "
+     "$XDG_RUNTIME_DIR/halcyon, or in /tmp/halcyon-UID, a folder that must belong to you and be closed to others."},
     {"no-such-component",
      "No plugin of this name was found on the search path: HALCYON_PLUGIN_PATH, the user's plugin folder, the build tree, "
      "the installation.\n\n"
@@ -186,7 +192,7 @@ inline constexpr CodePage code_pages[] = {
      "The component could not acquire what it needs (a device, a socket, a file) and gave the reason that is printed. The "
      "whole edit was undone."},
     {"substitution-too-long",
-     "The values put in place of `$NAME` and `[SECTION]KEY` in one file are longer than 64 MB together. No machine needs that; a value is "
+     "The values put in place of `$NAME` and `[SECTION]KEY` in one file are longer than 32 MB together. No machine needs that; a value is "
      "wrong, or a reference stands in a generated file far too often."},
     {"thread-refused",
      "The operating system gave no thread, mostly because a limit on processes or memory is reached: see `ulimit -a`."},
@@ -196,7 +202,7 @@ inline constexpr CodePage code_pages[] = {
     {"two-readers",
      "A port is a byte stream: what one reader takes is gone for the other. It has one writer and one reader."},
     {"too-many-words",
-     "A file may consist of 10000000 words, which is two million nets. This one has more, so it is not a netlist; nothing of it was used."},
+     "A file may consist of 5000000 words, which is a million nets. This one has more, so it is not a netlist; nothing of it was used."},
     {"two-writers",
      "A signal has one writer: one OUT pin, or any number of I/O pins, never both. A second output on the same signal "
      "would make its value depend on the order of functions.\n\nJoin two sources with sum2, or2 or mux2, or unlink the first one with unlinkp."},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // start, stop, advance, lock, unlock: commands that act on the machine as a whole.
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <thread>
@@ -27,6 +28,22 @@ void wait_for(Context& context, Done&& done) {
     }
 }
 
+/// On the virtual clock in pieces, so that somebody else can look at the machine and a long simulation can be ended.
+void advance_ns(Context& context, std::int64_t ns) {
+    Session& session = context.session;
+    if (session.options().virtual_clock) {
+        constexpr std::int64_t piece = 100'000'000;
+        for (; ns > 0 && !context.interrupted(); ns -= piece) {
+            session.advance_ns(std::min(ns, piece));
+            context.lock.unlock();
+            context.lock.lock();
+        }
+        return;
+    }
+    const std::int64_t end = session.now_ns() + ns;
+    wait_for(context, [&] { return session.now_ns() >= end; });
+}
+
 void advance_cycles(Context& context, std::uint64_t cycles) {
     Session& session = context.session;
     if (session.model().threads.empty()) {
@@ -34,20 +51,13 @@ void advance_cycles(Context& context, std::uint64_t cycles) {
                                   "make one with `newthread servo-thread 1000000`");
         return;
     }
-    if (session.options().virtual_clock) return session.advance_cycles(cycles);
+    if (session.options().virtual_clock) return advance_ns(context, static_cast<std::int64_t>(cycles) * session.model().threads.front()->options.period_ns);
     const std::string fastest = session.model().threads.front()->name;
     const std::uint64_t end = session.thread_report(*session.model().threads.front()).cycles + cycles;
     wait_for(context, [&] {
         const Thread* const thread = session.model().find_thread(fastest);
         return !thread || session.thread_report(*thread).cycles >= end;
     });
-}
-
-void advance_ns(Context& context, std::int64_t ns) {
-    Session& session = context.session;
-    if (session.options().virtual_clock) return session.advance_ns(ns);
-    const std::int64_t end = session.now_ns() + ns;
-    wait_for(context, [&] { return session.now_ns() >= end; });
 }
 
 }  // namespace

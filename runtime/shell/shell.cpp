@@ -47,7 +47,7 @@ Session& Shell::session() const { return state_->session; }
 Processes& Shell::processes() const { return *state_->processes; }
 bool Shell::collecting() const { return state_->collecting; }
 bool Shell::quit() const { return state_->quit; }
-void Shell::cancel() { state_->cancelled.store(true, std::memory_order_relaxed); }
+void Shell::cancel(bool on) { state_->cancelled.store(on, std::memory_order_relaxed); }
 
 void Shell::look_up(std::function<std::optional<std::string>(const std::string&)> variable) { state_->variable = std::move(variable); }
 

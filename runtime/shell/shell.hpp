@@ -88,8 +88,8 @@ public:
     bool collecting() const;
     /// True after `quit` or `exit` was executed; whoever reads lines stops reading.
     bool quit() const;
-    /// Ends a command that waits; it reports that it was interrupted. [any]
-    void cancel();
+    /// Ends a command that waits; it reports that it was interrupted, as do all later ones until `false` is said. [any]
+    void cancel(bool on = true);
     /// True when executing the line may wait for something outside (loadusr -w …), so that a server needs a thread for it.
     static bool may_wait(std::string_view text);
 

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// The far end of a sampler's or streamer's FIFO: records to JSON and back. The session's mutex must be held: it keeps the
+// stream alive and makes its callers one.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hal/abi.h"
+
+namespace hal {
+
+/// Appends `,"types":"bf","depth":N,"waiting":N,"lost":N` to a JSON object.
+void describe_stream(const hal_stream& stream, std::string& to);
+/// Takes at most so many records out and appends `,"numbers":[…],"records":[[…],…]`. False: `why` it cannot be read.
+bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::string& why);
+/// Puts records in, as many as there is room for, and appends `,"taken":N`. False, and nothing put in: `why`.
+bool feed_records(hal_stream& stream, const std::vector<std::vector<std::string>>& records, std::string& to, std::string& why);
+
+}  // namespace hal
