@@ -180,7 +180,8 @@ private:
                 time_sum_ += elapsed_;
             }
             direction_ = -direction_;
-            peak_ = elapsed_ = 0.0;
+            peak_ = std::fabs(deviation);  // this sample is the first beyond zero
+            elapsed_ = 0.0;
             if (++half_cycles_ >= static_cast<std::int64_t>(std::max<std::uint32_t>(tune_cycles, 1))) {
                 adopt(amplitude_sum_ / static_cast<double>(half_cycles_), 2.0 * time_sum_ / static_cast<double>(half_cycles_));
                 stop_tuning();
