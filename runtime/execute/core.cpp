@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "execute/core.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 
@@ -47,9 +48,11 @@ void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     const Guard guard;
     const std::int64_t begin = time();
     info_.start_ns = due_ns;
-    if (measure_) wakeup.add(woke_ns - due_ns);
-    drain_writes();
-    if (plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel)) take(offered);
+    if (measure_) {
+        busy_since_.store(begin, std::memory_order_release);
+        wakeup.add(woke_ns - due_ns);
+    }
+    take_over();
     if (plan_) {
         import();
         if (running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed)) run();
@@ -62,11 +65,11 @@ void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     }
     ++info_.number;
     cycles.store(cycles.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    busy_since_.store(0, std::memory_order_release);
 }
 
 void Core::service() noexcept {
-    drain_writes();
-    if (plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel)) take(offered);
+    take_over();
     if (!running_.load(std::memory_order_acquire) && !safe_) make_safe();
     if (plan_) answer();
 }
@@ -75,6 +78,14 @@ void Core::skip(std::uint64_t periods) noexcept {
     info_.number += periods;
     missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_relaxed);
     store(*pins_.missed, static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed)));
+}
+
+// The inbox first: a write that was queued before a plan was offered goes to the places of the plan before it, and
+// those places are gone once the new plan has been taken.
+void Core::take_over() noexcept {
+    plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel);
+    drain_writes();
+    if (offered) take(offered);
 }
 
 void Core::take(plan::Plan* plan) noexcept {
@@ -120,6 +131,7 @@ void Core::publish() noexcept {
 void Core::answer() noexcept {
     Observation* const wish = observation_.exchange(nullptr, std::memory_order_acq_rel);
     if (!wish) return;
+    drain_writes();  // who reads after having written sees what was written
     for (std::size_t i = 0; i < wish->count; ++i) wish->to[i].raw = __atomic_load_n(&wish->from[i]->raw, __ATOMIC_RELAXED);
     wish->cycle = info_.number;
     wish->done.store(true, std::memory_order_release);
@@ -174,7 +186,7 @@ void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
 void Core::run_timed(const plan::Function& function, const plan::Step* steps) noexcept {
     const std::int64_t begin = monotonic_ns();
     run_steps(steps + function.begin, steps + function.end);
-    const auto took = static_cast<std::int32_t>(monotonic_ns() - begin);
+    const auto took = static_cast<std::int32_t>(std::min<std::int64_t>(monotonic_ns() - begin, INT32_MAX));
     plan::FunctionTimes& times = *function.times;
     store(times.time, took);
     const bool more = took > times.tmax.slot->s32;

@@ -56,7 +56,17 @@ public:
     /// Takes an unanswered plan back. False when the thread has it already.
     bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
-    bool write(const Write& write) { return writes_.push(write) && ++pushed_; }
+    /// Queues a row of writes, which all take effect in one cycle; false, and nothing done, when the queue has no room.
+    bool write(const Write* row, std::size_t count) {
+        if (!writes_.push(row, count)) return false;
+        pushed_ += count;
+        return true;
+    }
+    static constexpr std::size_t most_writes = 4096;              ///< longest row
+    /// Room for so many more; the thread only makes it larger.
+    std::size_t room() const { return writes_.capacity() - writes_.size(); }
+    /// When the cycle that is running began (CLOCK_MONOTONIC), or 0 between cycles and under the virtual clock.
+    std::int64_t busy_since_ns() const { return busy_since_.load(std::memory_order_acquire); }
     /// All writes have reached their places.
     bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
     void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
@@ -82,6 +92,7 @@ public:
     std::jmp_buf recover;                                         ///< where an exception that left a function comes back to
 
 private:
+    void take_over() noexcept;
     void take(plan::Plan* plan) noexcept;
     void drain_writes() noexcept;
     void import() noexcept;
@@ -104,7 +115,8 @@ private:
     std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
     std::atomic<bool> stopped_{false};                // set by the thread, cleared by the session
     std::atomic<bool> passed_{false};                 // set by the thread
-    Queue<Write> writes_{4096};                       // session to thread
+    std::atomic<std::int64_t> busy_since_{0};         // written by the thread
+    Queue<Write> writes_{most_writes};                // session to thread
     std::uint64_t pushed_ = 0;                        // the session's own
     std::atomic<std::uint64_t> applied_{0};           // written by the thread
     Queue<FaultEvent> faults_{256};                   // thread to session

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -25,6 +26,7 @@ namespace hal {
 namespace {
 
 constexpr std::size_t stack_bytes = 1 << 20;
+constexpr std::size_t signal_stack_bytes = 1 << 16;
 
 void prefault_stack() noexcept {
     volatile char room[stack_bytes / 2];
@@ -97,6 +99,7 @@ struct Executor::Runner {
     std::atomic<std::uint64_t> faults_before{0};
     std::atomic<int> tid{0};
     Granted granted;                          // written before `ready`
+    std::unique_ptr<char[]> signal_stack = std::make_unique<char[]>(signal_stack_bytes);
     std::int64_t epoch_ns = 0;
 
     bool callable() const { return options.period_ns >= Wait::callable_period_ns; }
@@ -120,6 +123,11 @@ struct Executor::Runner {
             }
         }
         granted.refused = wants && granted.policy == Granted::Policy::other;
+        // a crash handler must run even when it is the stack that overflowed
+        stack_t other{};
+        other.ss_sp = signal_stack.get();
+        other.ss_size = signal_stack_bytes;
+        sigaltstack(&other, nullptr);
         prefault_stack();
         ready.store(true, std::memory_order_release);
     }
@@ -201,7 +209,8 @@ Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
     }, &runner);
     pthread_attr_destroy(&attributes);
     if (failed) {
-        runner.ended = true;
+        unlist(&runner.core);
+        std::erase_if(runners_, [&](const auto& one) { return one.get() == &runner; });
         throw std::runtime_error(std::string("the system gives no thread: ") + std::strerror(failed));
     }
     while (!runner.ready.load(std::memory_order_acquire)) std::this_thread::yield();
@@ -221,7 +230,10 @@ bool Executor::remove(Core& core, std::int64_t timeout_ns) {
         const std::int64_t end = until.tv_nsec + timeout_ns + leaving.options.period_ns;
         until.tv_sec += end / 1'000'000'000;
         until.tv_nsec = end % 1'000'000'000;
-        if (pthread_timedjoin_np(leaving.thread, nullptr, &until) != 0) return false;
+        if (pthread_timedjoin_np(leaving.thread, nullptr, &until) != 0) {
+            leaving.quit.store(false, std::memory_order_release);  // should it come back to life, it goes on
+            return false;
+        }
     }
     unlist(&core);
     runners_.erase(at);
@@ -245,7 +257,26 @@ bool wait_for(Ready ready, std::int64_t timeout_ns) {
     }
     return true;
 }
+
+constexpr std::int64_t for_ever = std::numeric_limits<std::int64_t>::max() / 2;
+
+// A cycle that began so long ago is not waited for again: it was waited for once.
+bool hangs(const Core& core, std::int64_t timeout_ns) {
+    const std::int64_t since = core.busy_since_ns();
+    return since != 0 && monotonic_ns() - since > timeout_ns + 2 * core.period_ns();
+}
 }  // namespace
+
+std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
+    std::vector<Core*> found;
+    for (const auto& runner : runners_) {
+        Core& core = runner->core;
+        const std::int64_t since = core.busy_since_ns();
+        if (since == 0) continue;
+        if (!wait_for([&] { return core.busy_since_ns() != since || hangs(core, timeout_ns); }, for_ever) || hangs(core, timeout_ns)) found.push_back(&core);
+    }
+    return found;
+}
 
 std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns) {
     std::vector<Core*> silent;
@@ -254,7 +285,7 @@ std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*
     for (const auto& [core, plan] : plans) {
         const bool taken = wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, timeout_ns + 2 * core->period_ns());
         if (!taken && core->withdraw(plan)) silent.push_back(core);
-        else if (!taken) wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, timeout_ns);
+        else if (!taken) wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, for_ever);  // it is just taking it
     }
     return silent;
 }
@@ -265,20 +296,34 @@ bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& wishes
     bool all = true;
     for (const auto& [core, wish] : wishes) {
         const auto done = [wish = wish] { return wish->done.load(std::memory_order_acquire); };
-        if (wait_for(done, timeout_ns + 2 * core->period_ns())) continue;
+        wait_for([&, core = core] { return done() || hangs(*core, timeout_ns); }, timeout_ns + 2 * core->period_ns());
+        if (done()) continue;
         if (core->withdraw(wish)) all = false;
-        else wait_for(done, std::numeric_limits<std::int64_t>::max() / 2);  // it is being answered: never free it under the thread
+        else wait_for(done, for_ever);  // it is being answered: never free it under the thread
     }
     return all;
 }
 
-bool Executor::write(Core& core, const Write& write, std::int64_t timeout_ns) {
-    if (core.write(write)) {
-        if (virtual_) core.service();
-        return true;
+bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows, std::int64_t timeout_ns) {
+    for (const auto& [core, row] : rows) {
+        const auto fits = [&, core = core, needed = row.size()] { return core->room() >= needed; };
+        if (fits()) continue;
+        wait_for([&, core = core] { return call(runner(*core)), fits() || hangs(*core, timeout_ns); }, timeout_ns + 2 * core->period_ns());
+        if (!fits()) return false;
     }
+    for (const auto& [core, row] : rows) {
+        core->write(row.data(), row.size());
+        if (virtual_) core->service();
+    }
+    return true;
+}
+
+void Executor::set_priority(Core& core, int priority) {
     Runner& target = runner(core);
-    return wait_for([&] { call(target); return core.write(write); }, timeout_ns + 2 * core.period_ns());
+    if (virtual_ || target.granted.policy != Granted::Policy::fifo || target.granted.priority == priority) return;
+    sched_param parameters{};
+    parameters.sched_priority = priority;
+    if (pthread_setschedparam(target.thread, SCHED_FIFO, &parameters) == 0) target.granted.priority = priority;
 }
 
 void Executor::advance(std::int64_t ns) {

@@ -45,13 +45,19 @@ public:
     void stop() { running_.store(false, std::memory_order_release); }
     bool running() const { return running_.load(std::memory_order_acquire); }
 
+    /// Threads that are in the middle of a cycle and do not end it within the time-out. Asked before an edit, so that a
+    /// hanging thread refuses it before any other thread has taken its part.
+    std::vector<Core*> hanging(std::int64_t timeout_ns) const;
     /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the time-out;
     /// their plans have been withdrawn.
     std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns);
     /// Waits for all observations. False when a thread did not answer; its observation is withdrawn.
     bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns);
-    /// Queues a write; waits when the queue is full. False when the thread does not drain it.
-    bool write(Core& core, const Write& write, std::int64_t timeout_ns);
+    /// Queues a row of at most Core::most_writes writes per thread; each row takes effect in one cycle. Waits while there is no
+    /// room. False, and nothing done, when a thread does not make room.
+    bool write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows, std::int64_t timeout_ns);
+    /// Gives a running SCHED_FIFO thread another priority: a faster one has come, or one has gone.
+    void set_priority(Core& core, int priority);
 
     /// Virtual clock: runs every cycle due within the next `ns`, fastest thread first at equal instants.
     /// Real clock: waits so long.

@@ -237,11 +237,15 @@ private:
         } else if (const auto set = input_.pin_values->find(&pin); set != input_.pin_values->end() && plan) {
             plan->carries.push_back({slot, nullptr, set->second});
         } else if (pin.memory->slot != slot && plan) {
-            // an unlinked pin keeps the last value
-            if (pin.home == thread) plan->carries.push_back({slot, pin.memory->slot, {}});
+            // an unlinked pin keeps the last value; a stream's buffer stays with its signal
+            if (pin.type == HAL_TYPE_PORT) plan->carries.push_back({slot, nullptr, {.raw = 0}});
+            else if (pin.home == thread) plan->carries.push_back({slot, pin.memory->slot, {}});
             else plan->carries.push_back({slot, nullptr, *pin.memory->slot});
         }
-        if (pin.memory->slot != slot) (plan ? plan->rebinds : out_.session_rebinds).push_back({pin.memory, slot});
+        if (pin.memory->slot != slot) {
+            if (plan) plan->rebinds.push_back({pin.memory, slot});
+            else out_.session_rebinds.push_back({pin.memory, slot, pin.type != HAL_TYPE_PORT});
+        }
         if (plan && (pin.flags & HAL_PIN_SAFE)) plan->safe.push_back({pin.memory, pin.safe});
     }
 

@@ -39,7 +39,12 @@ struct Compiled {
     };
     std::vector<Place> places;                        ///< of every signal
     std::vector<std::pair<Pin*, Thread*>> homes;      ///< of pins whose thread changes
-    std::vector<plan::Rebind> session_rebinds;        ///< of pins that no thread uses; done after the swap
+    struct SessionRebind {
+        hal_pin* pin;
+        hal_value* slot;
+        bool keeps_value;  ///< what it had when it was linked; false for a port, whose buffer stays with its signal
+    };
+    std::vector<SessionRebind> session_rebinds;       ///< of pins that no thread uses; done after the swap
     /// Carries whose value another thread owns now: to be observed and filled in before the swap.
     struct Unknown {
         plan::Carry* carry;

@@ -3,6 +3,7 @@
 #include "model/edit.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace hal {
 namespace {
@@ -25,6 +26,16 @@ std::unique_ptr<Pin> own_pin(Model& model, std::string name, hal_type type, hal_
     pin->id = model.next_id++;
     memory.slot = &memory.own;
     return pin;
+}
+
+void enter(Model& model, Pin& pin) {
+    model.pin.emplace(pin.name, &pin);
+    if (!pin.alias.empty()) model.pin.emplace(pin.alias, &pin);
+}
+
+void leave(Model& model, const Pin& pin) {
+    model.pin.erase(pin.name);
+    if (!pin.alias.empty()) model.pin.erase(pin.alias);
 }
 
 }  // namespace
@@ -65,7 +76,6 @@ Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
     const auto add = [&](const char* suffix, hal_type type, hal_dir dir, hal_pin& memory, const char* doc, const char* unit) {
         auto pin = own_pin(model_, made->name + suffix, type, dir, memory, doc, unit);
         pin->of_thread = made;
-        model_.pin.emplace(pin->name, pin.get());
         made->pins.push_back(std::move(pin));
     };
     add(".time", HAL_TYPE_S32, HAL_DIR_OUT, made->time, "execution time of the last cycle", "ns");
@@ -76,14 +86,19 @@ Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
     add(".wakeup", HAL_TYPE_S32, HAL_DIR_OUT, made->wakeup, "how late the last cycle began", "ns");
     const auto place = std::upper_bound(model_.threads.begin(), model_.threads.end(), options.period_ns,
                                         [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
-    model_.threads.insert(place, std::move(owned));
-    model_.thread.emplace(made->name, made);
+    const auto position = place - model_.threads.begin();
+    make_room(model_.threads);
     on_undo([this, made] {
         for (const auto& pin : made->pins) model_.pin.erase(pin->name);
         model_.thread.erase(made->name);
-        model_.threads.erase(owner(model_.threads, made));
+        const auto at = owner(model_.threads, made);
+        removed_.threads.push_back(std::move(*at));  // it may be running
+        model_.threads.erase(at);
     });
+    model_.threads.insert(model_.threads.begin() + position, std::move(owned));
     structural_ = true;
+    model_.thread.emplace(made->name, made);
+    for (const auto& pin : made->pins) model_.pin.emplace(pin->name, pin.get());
     return made;
 }
 
@@ -92,26 +107,20 @@ bool Edit::remove_thread(Word name) {
     if (!leaving) return false;
     while (!leaving->functions.empty()) take_from_thread(*leaving->functions.back());
     while (!leaving->init.empty()) take_from_thread(*leaving->init.back());
-    for (const auto& pin : leaving->pins) {
-        unlink(*pin);
-        model_.pin.erase(pin->name);
-        if (!pin->alias.empty()) model_.pin.erase(pin->alias);
-    }
-    model_.thread.erase(leaving->name);
+    for (const auto& pin : leaving->pins) unlink(*pin);
     const auto at = owner(model_.threads, leaving);
-    const auto position = at - model_.threads.begin();
-    removed_.threads.push_back(std::move(*at));
-    model_.threads.erase(at);
-    on_undo([this, leaving, position] {
+    make_room(removed_.threads);
+    on_undo([this, leaving, position = at - model_.threads.begin()] {
         const auto back = owner(removed_.threads, leaving);
         model_.threads.insert(model_.threads.begin() + position, std::move(*back));
         removed_.threads.erase(back);
         model_.thread.emplace(leaving->name, leaving);
-        for (const auto& pin : leaving->pins) {
-            model_.pin.emplace(pin->name, pin.get());
-            if (!pin->alias.empty()) model_.pin.emplace(pin->alias, pin.get());
-        }
+        for (const auto& pin : leaving->pins) enter(model_, *pin);
     });
+    for (const auto& pin : leaving->pins) leave(model_, *pin);
+    model_.thread.erase(leaving->name);
+    removed_.threads.push_back(std::move(*at));
+    model_.threads.erase(at);
     structural_ = true;
     return true;
 }
@@ -138,17 +147,18 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     if (index < 0 || index > size)
         return fail("bad-position", position_at, "thread " + quoted(to->name) + " has " + std::to_string(size) + (size == 1 ? " function" : " functions") + ", so there is no position " + std::to_string(position),
                     "", "positions 1 to " + std::to_string(size + 1) + " count from the front, -1 to -" + std::to_string(size + 1) + " from the end");
-    row.insert(row.begin() + index, target);
-    const Span before = target->added;
-    target->thread = to;
-    target->init = init;
-    target->added = function_name.span;
-    on_undo([target, to, init, before] {
+    make_room(row);
+    on_undo([target, to, init, before = target->added, init_before = target->init] {
         auto& functions = init ? to->init : to->functions;
         functions.erase(std::find(functions.begin(), functions.end(), target));
         target->thread = nullptr;
+        target->init = init_before;
         target->added = before;
     });
+    row.insert(row.begin() + index, target);
+    target->thread = to;
+    target->init = init;
+    target->added = function_name.span;
     structural_ = true;
     return true;
 }
@@ -170,15 +180,14 @@ void Edit::take_from_thread(Function& function) {
     const bool init = function.init;
     auto& row = init ? from->init : from->functions;
     const auto at = std::find(row.begin(), row.end(), &function);
-    const auto position = at - row.begin();
-    row.erase(at);
-    function.thread = nullptr;
-    on_undo([&function, from, init, position] {
+    on_undo([&function, from, init, position = at - row.begin()] {
         auto& functions = init ? from->init : from->functions;
         functions.insert(functions.begin() + position, &function);
         function.thread = from;
         function.init = init;
     });
+    row.erase(at);
+    function.thread = nullptr;
     structural_ = true;
 }
 
@@ -188,14 +197,15 @@ Component& Edit::add_component(std::string name, Span at) {
     made->name = std::move(name);
     made->loaded = at;
     made->id = model_.next_id++;
-    model_.components.push_back(std::move(owned));
-    model_.component.emplace(made->name, made);
+    make_room(model_.components);
     on_undo([this, made] {
         model_.component.erase(made->name);
-        const auto at = owner(model_.components, made);
-        removed_.components.push_back(std::move(*at));  // its instances still have to be destroyed
-        model_.components.erase(at);
+        const auto leaving = owner(model_.components, made);
+        removed_.components.push_back(std::move(*leaving));  // its instances still have to be destroyed
+        model_.components.erase(leaving);
     });
+    model_.components.push_back(std::move(owned));
+    model_.component.emplace(made->name, made);
     return *made;
 }
 
@@ -213,8 +223,9 @@ std::uint32_t Edit::take_number(Component& component) {
 }
 
 void Edit::note_arguments(Component& component, std::string text) {
-    component.arguments.push_back(std::move(text));
+    make_room(component.arguments);
     on_undo([&component] { component.arguments.pop_back(); });
+    component.arguments.push_back(std::move(text));
 }
 
 void Edit::reorder(Thread& thread, std::vector<Function*> functions) {
@@ -236,19 +247,14 @@ bool Edit::add_instance(Component& component, std::unique_ptr<Instance>& owned, 
     for (const auto& function : functions)
         if (model_.find_function(function->name))
             return fail("name-taken", made->loaded, "there is a function " + quoted(function->name) + " already", "its function", "give the new instance another name: names=…");
+    for (const auto& function : functions)
+        for (const auto& pin : function->pins)
+            if (!name_free(pin->name, made->loaded, "a pin of its function")) return false;
 
-    for (const auto& pin : made->pins) model_.pin.emplace(pin->name, pin.get());
-    model_.instance.emplace(made->name, made);
-    component.instances.push_back(std::move(owned));
-    std::vector<Function*> new_functions;
-    for (auto& function : functions) {
-        new_functions.push_back(function.get());
-        model_.function.emplace(function->name, function.get());
-        for (const auto& pin : function->pins) model_.pin.emplace(pin->name, pin.get());
-        component.functions.push_back(std::move(function));
-    }
-    added_instances_.push_back(made);
-    const auto functions_before = component.functions.size() - new_functions.size();
+    make_room(component.instances);
+    make_room(component.functions, functions.size());
+    make_room(added_instances_);
+    const auto functions_before = component.functions.size();
     on_undo([this, made, functions_before] {
         Component& of = *made->component;
         while (of.functions.size() > functions_before) {
@@ -262,99 +268,112 @@ bool Edit::add_instance(Component& component, std::unique_ptr<Instance>& owned, 
         removed_.instances.push_back(std::move(of.instances.back()));  // undone last first, so it is the last
         of.instances.pop_back();
     });
+    component.instances.push_back(std::move(owned));
+    std::move(functions.begin(), functions.end(), std::back_inserter(component.functions));
+    added_instances_.push_back(made);
     structural_ = true;
+    model_.instance.emplace(made->name, made);
+    for (const auto& pin : made->pins) model_.pin.emplace(pin->name, pin.get());
+    for (auto function = component.functions.begin() + static_cast<std::ptrdiff_t>(functions_before); function != component.functions.end(); ++function) {
+        model_.function.emplace((*function)->name, function->get());
+        for (const auto& pin : (*function)->pins) model_.pin.emplace(pin->name, pin.get());
+    }
     return true;
 }
 
 void Edit::extend_function(Function& function, const plan::Step& step, Instance& instance) {
-    function.steps.push_back(step);
-    function.instances.push_back(&instance);
+    make_room(function.steps);
+    make_room(function.instances);
     on_undo([&function] {
         function.steps.pop_back();
         function.instances.pop_back();
     });
+    function.steps.push_back(step);
+    function.instances.push_back(&instance);
 }
 
 void Edit::remove_instance(Instance& leaving) {
     Component& component = *leaving.component;
     for (const auto& pin : leaving.pins) {
+        Signal* const written = pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_SAFE) ? pin->signal : nullptr;
         unlink(*pin);
-        model_.pin.erase(pin->name);
-        if (!pin->alias.empty()) model_.pin.erase(pin->alias);
+        if (written) signal_values[written] = pin->safe;  // what it drove goes to the declared safe value
     }
-    model_.instance.erase(leaving.name);
     // functions of its own go; shared ones lose its steps, and go with the last instance
-    std::vector<std::pair<Function*, std::size_t>> gone;
+    struct Gone {
+        Function* function;
+        std::ptrdiff_t position;
+    };
     struct Shrunk {
         Function* function;
         std::vector<plan::Step> steps;
         std::vector<Instance*> instances;
     };
+    std::vector<Gone> gone;
     auto shrunk = std::make_shared<std::vector<Shrunk>>();
     for (Function* const function : leaving.functions) {
         if (function->shared && function->instances.size() > 1) {
             shrunk->push_back({function, function->steps, function->instances});
-            for (std::size_t i = function->instances.size(); i-- > 0;) {
-                if (function->instances[i] != &leaving) continue;
-                function->instances.erase(function->instances.begin() + static_cast<std::ptrdiff_t>(i));
-                function->steps.erase(function->steps.begin() + static_cast<std::ptrdiff_t>(i));
-            }
             continue;
         }
         take_from_thread(*function);
-        for (const auto& pin : function->pins) {
-            unlink(*pin);
-            model_.pin.erase(pin->name);
-            if (!pin->alias.empty()) model_.pin.erase(pin->alias);
-        }
-        model_.function.erase(function->name);
-        const auto at = owner(component.functions, function);
-        gone.emplace_back(function, at - component.functions.begin());
-        removed_.functions.push_back(std::move(*at));
-        component.functions.erase(at);
+        for (const auto& pin : function->pins) unlink(*pin);
+        gone.push_back({function, owner(component.functions, function) - component.functions.begin()});
     }
+    std::sort(gone.begin(), gone.end(), [](const Gone& a, const Gone& b) { return a.position < b.position; });
     const auto at = owner(component.instances, &leaving);
-    const auto position = at - component.instances.begin();
-    removed_.instances.push_back(std::move(*at));
-    component.instances.erase(at);
-    on_undo([this, &leaving, &component, position, gone, shrunk] {
+    make_room(removed_.instances);
+    make_room(removed_.functions, gone.size());
+    on_undo([this, &leaving, &component, position = at - component.instances.begin(), gone, shrunk] {
         const auto back = owner(removed_.instances, &leaving);
         component.instances.insert(component.instances.begin() + position, std::move(*back));
         removed_.instances.erase(back);
         model_.instance.emplace(leaving.name, &leaving);
-        const auto restore = [&](const std::unique_ptr<Pin>& pin) {
-            model_.pin.emplace(pin->name, pin.get());
-            if (!pin->alias.empty()) model_.pin.emplace(pin->alias, pin.get());
-        };
-        for (const auto& pin : leaving.pins) restore(pin);
-        for (auto it = gone.rbegin(); it != gone.rend(); ++it) {
-            const auto from = owner(removed_.functions, it->first);
-            component.functions.insert(component.functions.begin() + static_cast<std::ptrdiff_t>(it->second), std::move(*from));
+        for (const auto& pin : leaving.pins) enter(model_, *pin);
+        for (const auto& [function, place] : gone) {
+            const auto from = owner(removed_.functions, function);
+            component.functions.insert(component.functions.begin() + place, std::move(*from));
             removed_.functions.erase(from);
-            model_.function.emplace(it->first->name, it->first);
-            for (const auto& pin : it->first->pins) restore(pin);
+            model_.function.emplace(function->name, function);
+            for (const auto& pin : function->pins) enter(model_, *pin);
         }
         for (const auto& s : *shrunk) {
             s.function->steps = s.steps;
             s.function->instances = s.instances;
         }
     });
+    for (const auto& pin : leaving.pins) leave(model_, *pin);
+    model_.instance.erase(leaving.name);
+    for (const auto& s : *shrunk)
+        for (std::size_t i = s.function->instances.size(); i-- > 0;) {
+            if (s.function->instances[i] != &leaving) continue;
+            s.function->instances.erase(s.function->instances.begin() + static_cast<std::ptrdiff_t>(i));
+            s.function->steps.erase(s.function->steps.begin() + static_cast<std::ptrdiff_t>(i));
+        }
+    for (auto it = gone.rbegin(); it != gone.rend(); ++it) {
+        for (const auto& pin : it->function->pins) leave(model_, *pin);
+        model_.function.erase(it->function->name);
+        removed_.functions.push_back(std::move(component.functions[static_cast<std::size_t>(it->position)]));
+        component.functions.erase(component.functions.begin() + it->position);
+    }
+    removed_.instances.push_back(std::move(*at));
+    component.instances.erase(at);
     structural_ = true;
 }
 
 void Edit::remove_component(Component& leaving) {
     while (!leaving.instances.empty()) remove_instance(*leaving.instances.back());
-    model_.component.erase(leaving.name);
     const auto at = owner(model_.components, &leaving);
-    const auto position = at - model_.components.begin();
-    removed_.components.push_back(std::move(*at));
-    model_.components.erase(at);
-    on_undo([this, &leaving, position] {
+    make_room(removed_.components);
+    on_undo([this, &leaving, position = at - model_.components.begin()] {
         const auto back = owner(removed_.components, &leaving);
         model_.components.insert(model_.components.begin() + position, std::move(*back));
         removed_.components.erase(back);
         model_.component.emplace(leaving.name, &leaving);
     });
+    model_.component.erase(leaving.name);
+    removed_.components.push_back(std::move(*at));
+    model_.components.erase(at);
     structural_ = true;
 }
 

@@ -3,6 +3,7 @@
 // word; everything done can be undone. LinuxCNC's rules (DESIGN section 4, "Kept from LinuxCNC exactly").
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -90,6 +91,7 @@ public:
         std::vector<std::unique_ptr<Component>> components;
         std::vector<std::unique_ptr<Signal>> signals;
         std::vector<std::unique_ptr<Thread>> threads;
+        std::vector<decltype(Signal::port)> ports;  ///< of a buffer that was undone
     };
     Removed& removed() { return removed_; }
     const std::vector<Instance*>& added_instances() const { return added_instances_; }
@@ -103,6 +105,12 @@ private:
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
     void keep_value(Pin& pin);
+    // Memory may end at any line. So every edit first makes room for what it will add, then says how to undo it, and only
+    // then changes the model, without allocating; entries of an index come last, and undoing copes with missing ones.
+    template <class T>
+    static void make_room(std::vector<T>& row, std::size_t more = 1) {
+        if (row.capacity() - row.size() < more) row.reserve(row.size() + std::max(more, row.size()));
+    }
     void on_undo(std::function<void()> action) { undo_.push_back(std::move(action)); }
 
     Model& model_;

@@ -103,14 +103,16 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     made->typed = typed_at.known() ? typed_at : name.span;
     made->slot = &made->value;
     made->index = model_.signals.size();
-    model_.signals.push_back(std::move(owned));
-    model_.signal.emplace(made->name, made);
+    make_room(model_.signals);
     on_undo([this, made] {
         model_.signal.erase(made->name);
         std::swap(model_.signals[made->index], model_.signals.back());
         model_.signals[made->index]->index = made->index;
+        removed_.signals.push_back(std::move(model_.signals.back()));  // a thread may know its buffer
         model_.signals.pop_back();
     });
+    model_.signals.push_back(std::move(owned));
+    model_.signal.emplace(made->name, made);
     return made;
 }
 
@@ -118,13 +120,7 @@ bool Edit::remove_signal(Word name) {
     Signal* const leaving = signal(name);
     if (!leaving) return false;
     while (!leaving->pins.empty()) unlink(*leaving->pins.back());
-    model_.signal.erase(leaving->name);
-    std::swap(model_.signals[leaving->index], model_.signals.back());
-    model_.signals[leaving->index]->index = leaving->index;
-    removed_.signals.push_back(std::move(model_.signals.back()));
-    model_.signals.pop_back();
-    signal_values.erase(leaving);
-    inherited.erase(leaving);
+    make_room(removed_.signals);
     on_undo([this, leaving] {
         auto at = std::find_if(removed_.signals.begin(), removed_.signals.end(), [&](const auto& s) { return s.get() == leaving; });
         leaving->index = model_.signals.size();
@@ -132,6 +128,13 @@ bool Edit::remove_signal(Word name) {
         removed_.signals.erase(at);
         model_.signal.emplace(leaving->name, leaving);
     });
+    model_.signal.erase(leaving->name);
+    std::swap(model_.signals[leaving->index], model_.signals.back());
+    model_.signals[leaving->index]->index = leaving->index;
+    removed_.signals.push_back(std::move(model_.signals.back()));
+    model_.signals.pop_back();
+    signal_values.erase(leaving);
+    inherited.erase(leaving);
     structural_ = true;
     return true;
 }
@@ -183,19 +186,20 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
     // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the signal.
     const bool unwritten = !signal.writer && signal.ios == 0;
     if (pin.type != HAL_TYPE_PORT && unwritten && (pin.dir != HAL_DIR_IN || signal.readers == 0)) {
-        const auto before = signal_values.find(&signal);
-        const bool had = before != signal_values.end();
-        const hal_value old = had ? before->second : hal_value{};
-        Pin* const old_from = inherited.contains(&signal) ? inherited[&signal] : nullptr;
         signal_values.erase(&signal);
         inherited[&signal] = &pin;
-        on_undo([this, &signal, had, old, old_from] {
-            if (had) signal_values[&signal] = old;
-            if (old_from) inherited[&signal] = old_from;
-            else inherited.erase(&signal);
-        });
     }
-    const Span linked_before = pin.linked_at;
+    make_room(signal.pins);
+    on_undo([&pin, &signal, linked_before = pin.linked_at, in_before = pin.arrow_in, out_before = pin.arrow_out] {
+        signal.pins.erase(std::find(signal.pins.rbegin(), signal.pins.rend(), &pin).base() - 1);
+        pin.signal = nullptr;
+        pin.linked_at = linked_before;
+        pin.arrow_in = in_before;
+        pin.arrow_out = out_before;
+        if (pin.dir == HAL_DIR_OUT) signal.writer = nullptr;
+        if (pin.dir == HAL_DIR_IN) --signal.readers;
+        if (pin.dir == HAL_DIR_IO) --signal.ios;
+    });
     signal.pins.push_back(&pin);
     pin.signal = &signal;
     pin.linked_at = word.span;
@@ -204,14 +208,6 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
     if (pin.dir == HAL_DIR_OUT) signal.writer = &pin;
     if (pin.dir == HAL_DIR_IN) ++signal.readers;
     if (pin.dir == HAL_DIR_IO) ++signal.ios;
-    on_undo([&pin, &signal, linked_before] {
-        signal.pins.erase(std::find(signal.pins.rbegin(), signal.pins.rend(), &pin).base() - 1);
-        pin.signal = nullptr;
-        pin.linked_at = linked_before;
-        if (pin.dir == HAL_DIR_OUT) signal.writer = nullptr;
-        if (pin.dir == HAL_DIR_IN) --signal.readers;
-        if (pin.dir == HAL_DIR_IO) --signal.ios;
-    });
     structural_ = true;
     return true;
 }
@@ -220,21 +216,29 @@ void Edit::unlink(Pin& pin) {
     Signal* const signal = pin.signal;
     if (!signal) return;
     const auto at = std::find(signal->pins.begin(), signal->pins.end(), &pin);
-    const auto position = at - signal->pins.begin();
-    signal->pins.erase(at);
-    pin.signal = nullptr;
-    if (pin.dir == HAL_DIR_OUT) signal->writer = nullptr;
-    if (pin.dir == HAL_DIR_IN) --signal->readers;
-    if (pin.dir == HAL_DIR_IO) --signal->ios;
-    // it keeps the signal's value, which may be one that this very transaction set
-    if (const auto set = signal_values.find(signal); set != signal_values.end()) pin_values[&pin] = set->second;
-    on_undo([signal, &pin, position] {
+    // it keeps the signal's value, which may be one that this very transaction set or let it inherit
+    if (pin.type != HAL_TYPE_PORT) {
+        if (const auto set = signal_values.find(signal); set != signal_values.end()) {
+            pin_values[&pin] = set->second;
+        } else if (const auto given = inherited.find(signal); given != inherited.end() && given->second != &pin) {
+            Pin& giver = *given->second;
+            const auto own = pin_values.find(&giver);
+            const hal_value value = own != pin_values.end() ? own->second : hal_value{.raw = __atomic_load_n(&giver.memory->slot->raw, __ATOMIC_RELAXED)};
+            pin_values[&pin] = value;
+        }
+    }
+    on_undo([signal, &pin, position = at - signal->pins.begin()] {
         signal->pins.insert(signal->pins.begin() + position, &pin);
         pin.signal = signal;
         if (pin.dir == HAL_DIR_OUT) signal->writer = &pin;
         if (pin.dir == HAL_DIR_IN) ++signal->readers;
         if (pin.dir == HAL_DIR_IO) ++signal->ios;
     });
+    signal->pins.erase(at);
+    pin.signal = nullptr;
+    if (pin.dir == HAL_DIR_OUT) signal->writer = nullptr;
+    if (pin.dir == HAL_DIR_IN) --signal->readers;
+    if (pin.dir == HAL_DIR_IO) --signal->ios;
     structural_ = true;
 }
 
@@ -260,15 +264,8 @@ bool Edit::set_pin(Word name, Word value) {
         return fail("bad-value", value.span, "a port pin has no value to set", "", "link it and give the signal a buffer: sets SIGNAL BYTES");
     const Parsed parsed = parse_value(target->type, value.text);
     if (!parsed.problem.empty())
-        return fail("bad-value", value.span, quoted(value.text) + " " + parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
+        return fail("bad-value", value.span, parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
     if (target->home) {
-        const auto before = pin_values.find(target);
-        const bool had = before != pin_values.end();
-        const hal_value old = had ? before->second : hal_value{};
-        on_undo([this, target, had, old] {
-            if (had) pin_values[target] = old;
-            else pin_values.erase(target);
-        });
         pin_values[target] = parsed.value;
     } else {
         keep_value(*target);
@@ -286,15 +283,16 @@ bool Edit::set_signal(Word name, Word value) {
         if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30))
             return fail("bad-value", value.span, quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)", "port signal");
         if (target->port) return fail("port-sized", name.span, "port signal " + quoted(name.text) + " has its buffer already", "", "its size is fixed once set");
-        auto* const port = new hal_port{bytes.value.u32, 0, 0, 0, new std::uint8_t[bytes.value.u32]()};
-        target->port = {port, [](hal_port* p) { delete[] p->data; delete p; }};
-        target->value.port = port;
-        signal_values[target] = target->value;
+        auto room = std::make_unique<std::uint8_t[]>(bytes.value.u32);
+        auto made = std::make_unique<hal_port>(hal_port{bytes.value.u32, 0, 0, 0, room.get()});
+        signal_values[target] = hal_value{.port = made.get()};
         on_undo([this, target] {
-            target->port.reset();
+            removed_.ports.push_back(std::move(target->port));  // a thread may know it
             target->value.port = nullptr;
-            signal_values.erase(target);
         });
+        room.release();
+        target->port = {made.release(), [](hal_port* p) { delete[] p->data; delete p; }};
+        target->value.port = target->port.get();
         structural_ = true;
         return true;
     }
@@ -307,18 +305,9 @@ bool Edit::set_signal(Word name, Word value) {
     }
     const Parsed parsed = parse_value(target->type, value.text);
     if (!parsed.problem.empty())
-        return fail("bad-value", value.span, quoted(value.text) + " " + parsed.problem, "signal " + quoted(name.text) + " is " + hal::name(target->type));
-    const auto before = signal_values.find(target);
-    const bool had = before != signal_values.end();
-    const hal_value old = had ? before->second : hal_value{};
-    Pin* const from = inherited.contains(target) ? inherited[target] : nullptr;
-    inherited.erase(target);
+        return fail("bad-value", value.span, parsed.problem, "signal " + quoted(name.text) + " is " + hal::name(target->type));
     signal_values[target] = parsed.value;
-    on_undo([this, target, had, old, from] {
-        if (had) signal_values[target] = old;
-        else signal_values.erase(target);
-        if (from) inherited[target] = from;
-    });
+    inherited.erase(target);
     return true;
 }
 
@@ -331,12 +320,13 @@ bool Edit::alias(Word kind, Word name, Word second) {
         return fail("alias-taken", name.span, quoted(name.text) + " has the alias " + quoted(target->alias) + " already", "", "take it off first: unalias " + std::string(kind.text) + " " + target->alias);
     if (model_.find_pin(second.text)) return fail("name-taken", second.span, "there is a pin or alias " + quoted(second.text) + " already");
     if (model_.find_signal(second.text)) return fail("name-taken", second.span, "there is a signal " + quoted(second.text) + " already");
-    target->alias = second.text;
-    model_.pin.emplace(target->alias, target);
+    std::string name_too(second.text);
     on_undo([this, target] {
         model_.pin.erase(target->alias);
         target->alias.clear();
     });
+    target->alias = std::move(name_too);
+    model_.pin.emplace(target->alias, target);
     return true;
 }
 
@@ -346,13 +336,12 @@ bool Edit::unalias(Word kind, Word second) {
     Pin* const target = pin(second);
     if (!target) return false;
     if (target->alias.empty()) return fail("no-alias", second.span, quoted(second.text) + " has no alias");
-    const std::string old = target->alias;
-    model_.pin.erase(target->alias);
-    target->alias.clear();
-    on_undo([this, target, old] {
+    on_undo([this, target, old = target->alias] {
         target->alias = old;
         model_.pin.emplace(target->alias, target);
     });
+    model_.pin.erase(target->alias);
+    target->alias.clear();
     return true;
 }
 

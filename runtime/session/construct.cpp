@@ -42,6 +42,7 @@ struct Construction {
     std::size_t list_length = 0;
     std::vector<std::string> texts;      // keeps what argument() gave
     std::string failure;
+    bool no_memory = false;
 };
 
 Construction& of(const hal_host* host) { return *static_cast<Construction*>(host->data); }
@@ -51,7 +52,18 @@ bool refuse(Construction& c, std::string why) {
     return false;
 }
 
-bool declare_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+// What a plugin calls must not throw into it: its frames may be C.
+template <class Result, class Action>
+Result guarded(Construction& c, Result otherwise, Action action) noexcept {
+    try {
+        return action();
+    } catch (const std::bad_alloc&) {
+        c.no_memory = true;
+        return otherwise;
+    }
+}
+
+bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Construction& c = of(host);
     if (decl->size < sizeof *decl || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT || decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
         return refuse(c, "it declares a pin that is none");
@@ -75,7 +87,7 @@ bool declare_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory
     return true;
 }
 
-bool declare_function(const hal_host* host, const hal_function_decl* decl) {
+bool take_function(const hal_host* host, const hal_function_decl* decl) {
     Construction& c = of(host);
     if (decl->size < sizeof *decl || !decl->name || !decl->step) return refuse(c, "it declares a function that is none");
     if (decl->flags & HAL_FUNCTION_EMERGENCY) {
@@ -89,7 +101,7 @@ bool declare_function(const hal_host* host, const hal_function_decl* decl) {
     return true;
 }
 
-const char* give_argument(const hal_host* host, const hal_argument_decl* decl) {
+const char* find_argument(const hal_host* host, const hal_argument_decl* decl) {
     Construction& c = of(host);
     c.asked.insert(decl->name);
     if (std::strcmp(decl->name, "personality") == 0 && !c.personality.empty()) return c.personality.c_str();
@@ -104,20 +116,35 @@ const char* give_argument(const hal_host* host, const hal_argument_decl* decl) {
     return c.texts.back().c_str();
 }
 
-void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
-    Construction& c = of(host);
-    if (bytes > (std::size_t{1} << 32) || align > 64) return nullptr;
+void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
+    if (bytes > (std::size_t{1} << 32) || align == 0 || align > 4096) return nullptr;
     try {
         // room to align by hand: arrays of char are aligned for any ordinary type only
-        c.instance.allocations.push_back(std::make_unique<char[]>(bytes + align));
+        instance.allocations.push_back(std::make_unique<char[]>(bytes + align));
     } catch (const std::bad_alloc&) {
         return nullptr;
     }
-    const auto address = reinterpret_cast<std::uintptr_t>(c.instance.allocations.back().get());
+    const auto address = reinterpret_cast<std::uintptr_t>(instance.allocations.back().get());
     return reinterpret_cast<void*>((address + align - 1) / align * align);
 }
 
-void record_failure(const hal_host* host, const char* reason) { refuse(of(host), reason ? reason : ""); }
+bool declare_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+    return guarded(of(host), false, [&] { return take_pin(host, decl, memory); });
+}
+bool declare_function(const hal_host* host, const hal_function_decl* decl) {
+    return guarded(of(host), false, [&] { return take_function(host, decl); });
+}
+const char* give_argument(const hal_host* host, const hal_argument_decl* decl) {
+    return guarded(of(host), decl->fallback, [&] { return find_argument(host, decl); });
+}
+void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
+    void* const memory = allocate_for(of(host).instance, bytes, align);
+    of(host).no_memory = of(host).no_memory || !memory;
+    return memory;
+}
+void record_failure(const hal_host* host, const char* reason) {
+    guarded(of(host), false, [&] { return refuse(of(host), reason ? reason : ""); });
+}
 
 const void* no_extension(const hal_host*, const char*) { return nullptr; }
 
@@ -126,6 +153,7 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
     const hal_host host{sizeof host, &c, declare_pin, declare_function, give_argument, allocate, record_failure, no_extension};
     c.texts.reserve(request.arguments.size());  // pointers into it are handed out
     if (!component.plugin->create(&host, instance->memory)) {
+        if (c.no_memory) throw std::bad_alloc();
         const std::string why = c.failure.empty() ? "it gave no reason" : c.failure;
         for (const auto& [name, given] : request.arguments)
             if (why.starts_with(name + "=")) {
@@ -136,8 +164,13 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
         return false;
     }
     instance->constructed = true;
+    // whatever goes wrong from here, what was constructed is destroyed, until the model owns it
+    struct Undo {
+        std::unique_ptr<Instance>& instance;
+        ~Undo() { if (instance) destroy_instance(*instance); }
+    } const undo{instance};
+    if (c.no_memory) throw std::bad_alloc();
     if (!c.failure.empty()) {
-        destroy_instance(*instance);
         diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
         return false;
     }
@@ -172,16 +205,11 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
     std::set<std::string_view> names;
     for (const auto& pin : instance->pins)
         if (!names.insert(pin->name).second) {
-            const std::string twice = pin->name;
-            destroy_instance(*instance);
-            diagnostics.error("construct-failed", request.at, "component '" + component.name + "' declares pin '" + twice + "' twice");
+            diagnostics.error("construct-failed", request.at, "component '" + component.name + "' declares pin '" + pin->name + "' twice");
             return false;
         }
     Instance& made = *instance;
-    if (!edit.add_instance(component, instance, std::move(own))) {
-        destroy_instance(*instance);
-        return false;
-    }
+    if (!edit.add_instance(component, instance, std::move(own))) return false;
     for (const auto& [function, step] : extended) edit.extend_function(*function, step, made);
     return true;
 }
@@ -246,12 +274,24 @@ struct Starting {
     Instance& instance;
     const hal_faults* faults;
     std::string failure;
+
+    bool fail(const char* reason) noexcept {
+        try {
+            if (failure.empty()) failure = reason;
+        } catch (const std::bad_alloc&) {}  // then it gives no reason
+        return false;
+    }
 };
 
 bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) {
-    Instance& instance = static_cast<Starting*>(host->data)->instance;
-    instance.streams.emplace_back(*name ? instance.name + "." + name : instance.name, stream);
-    return true;
+    Starting& starting = *static_cast<Starting*>(host->data);
+    try {
+        Instance& instance = starting.instance;
+        instance.streams.emplace_back(*name ? instance.name + "." + name : instance.name, stream);
+        return true;
+    } catch (const std::bad_alloc&) {
+        return starting.fail("there is no memory left for its stream");
+    }
 }
 constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};
 }  // namespace
@@ -260,15 +300,11 @@ std::string start_instance(Instance& instance, const hal_faults* faults) {
     Starting starting{instance, faults, {}};
     const hal_host host{
         sizeof host, &starting,
-        [](const hal_host* h, const hal_pin_decl*, hal_pin*) { static_cast<Starting*>(h->data)->failure = "pins are declared in the constructor, not in start"; return false; },
-        [](const hal_host* h, const hal_function_decl*) { static_cast<Starting*>(h->data)->failure = "functions are declared in the constructor, not in start"; return false; },
+        [](const hal_host* h, const hal_pin_decl*, hal_pin*) { return static_cast<Starting*>(h->data)->fail("pins are declared in the constructor, not in start"); },
+        [](const hal_host* h, const hal_function_decl*) { return static_cast<Starting*>(h->data)->fail("functions are declared in the constructor, not in start"); },
         [](const hal_host*, const hal_argument_decl* decl) { return decl->fallback; },
-        [](const hal_host* h, std::size_t bytes, std::size_t) -> void* {
-            auto& allocations = static_cast<Starting*>(h->data)->instance.allocations;
-            allocations.push_back(std::make_unique<char[]>(bytes));
-            return allocations.back().get();
-        },
-        [](const hal_host* h, const char* reason) { static_cast<Starting*>(h->data)->failure = reason; },
+        [](const hal_host* h, std::size_t bytes, std::size_t align) { return allocate_for(static_cast<Starting*>(h->data)->instance, bytes, align); },
+        [](const hal_host* h, const char* reason) { static_cast<Starting*>(h->data)->fail(reason ? reason : ""); },
         [](const hal_host* h, const char* id) -> const void* {
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
             if (std::strcmp(id, "hal.faults/1") == 0) return static_cast<Starting*>(h->data)->faults;
@@ -282,6 +318,8 @@ std::string start_instance(Instance& instance, const hal_faults* faults) {
 
 void stop_instance(Instance& instance) noexcept {
     if (!instance.started) return;
+    const hal_cycle none{.size = sizeof none, .pad = 0, .period_ns = 0, .period_s = 0.0, .start_ns = 0, .number = 0};
+    for (const plan::Step& step : instance.emergency) step.step(step.self, &none);
     instance.component->plugin->stop(instance.memory);
     instance.streams.clear();
     instance.started = false;

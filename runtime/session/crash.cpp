@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <cxxabi.h>
 #include <exception>
 #include <unistd.h>
 
@@ -50,7 +51,13 @@ void name_function(std::uint32_t id) noexcept {
     say("a function");
 }
 
+std::atomic<bool> reported{false};
+
 void on_signal(int signal) {
+    if (reported.exchange(true)) {  // by the terminate handler, or a crash while making safe
+        raise(signal);
+        return;
+    }
     Executor::make_all_safe();
     say("hal: ");
     if (const Core* const core = Core::current(); core && core->in_function()) {
@@ -70,7 +77,11 @@ void on_signal(int signal) {
 
 // A noexcept function let an exception out. The cycle goes on without the thread's functions.
 [[noreturn]] void on_terminate() {
-    if (Core* const core = Core::current(); core && core->in_function()) std::longjmp(core->recover, 1);
+    if (Core* const core = Core::current(); core && core->in_function()) {
+        if (std::current_exception()) abi::__cxa_end_catch();  // gives the exception's memory back
+        std::longjmp(core->recover, 1);
+    }
+    if (reported.exchange(true)) std::abort();
     Executor::make_all_safe();
     say("hal: an exception outside of the cycle was not caught; outputs were set to their safe values; the process ends\n");
     std::abort();
@@ -84,8 +95,8 @@ void watch_for_crashes(Session::State* state) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         struct sigaction action{};
         action.sa_handler = on_signal;
-        action.sa_flags = SA_RESETHAND | SA_NODEFER;
-        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL}) sigaction(signal, &action, nullptr);
+        action.sa_flags = SA_RESETHAND | SA_NODEFER | SA_ONSTACK;
+        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) sigaction(signal, &action, nullptr);
 #endif
         return true;
     }();

@@ -2,9 +2,13 @@
 #include "session/plugins.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <dlfcn.h>
 #include <filesystem>
+#include <fstream>
+#include <link.h>
 #include <set>
 #include <sstream>
 
@@ -33,6 +37,26 @@ std::string problem_of(const hal_component& component) {
     if (component.instance_size == 0 || component.instance_size > (1u << 30) || align == 0 || (align & (align - 1)) != 0 || align > 4096)
         return "the size or alignment of its instances makes no sense";
     return {};
+}
+
+// The loader touches what the headers promise and dies (SIGBUS) where a cut file ends, so that is checked before.
+std::string problem_of_file(const std::string& path) {
+    std::ifstream file(path, std::ios::binary | std::ios::ate);
+    if (!file) return std::strerror(errno);
+    const auto size = static_cast<std::uint64_t>(file.tellg());
+    ElfW(Ehdr) header{};
+    file.seekg(0);
+    if (!file.read(reinterpret_cast<char*>(&header), sizeof header) || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0)
+        return size == 0 ? "the file is empty" : "it is not a shared library";
+    if (header.e_ident[EI_CLASS] != (sizeof(void*) == 8 ? ELFCLASS64 : ELFCLASS32) || header.e_phentsize != sizeof(ElfW(Phdr))) return "it is not a shared library for this machine";
+    std::uint64_t needed = header.e_shoff + std::uint64_t{header.e_shnum} * header.e_shentsize;
+    file.seekg(static_cast<std::streamoff>(header.e_phoff));
+    for (int i = 0; i < header.e_phnum; ++i) {
+        ElfW(Phdr) part{};
+        if (!file.read(reinterpret_cast<char*>(&part), sizeof part)) return "the file is cut short";
+        if (part.p_type == PT_LOAD) needed = std::max<std::uint64_t>(needed, part.p_offset + part.p_filesz);
+    }
+    return needed > size ? "the file is cut short: " + std::to_string(size) + " of " + std::to_string(needed) + " bytes" : "";
 }
 
 }  // namespace
@@ -79,6 +103,7 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics&
         diagnostics.error("bad-plugin", at, "'" + found + "' is not a usable component: " + why, "", "rebuild it against this version's hal/component.hpp");
         return std::nullopt;
     };
+    if (const std::string why = problem_of_file(found); !why.empty()) return bad(why);
     void* const library = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library) {
         std::string why = dlerror();

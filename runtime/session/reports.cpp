@@ -81,21 +81,23 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
 }  // namespace
 
 void Session::State::collect_faults() {
-    for (const auto& thread : model.threads) {
-        Core* const from = core(thread.get());
-        if (!from) continue;
-        for (FaultEvent event; from->next_fault(event);) {
-            auto [code, sentence] = worded(model, *thread, event);
-            FaultRecord record;
-            record.number = fault_log.empty() ? 1 : fault_log.back().number + 1;
-            record.cycle = event.cycle;
-            record.thread = thread->name;
-            record.code = std::move(code);
-            record.sentence = std::move(sentence);
-            record.age_ns = event.time_ns;  // made an age when it is asked for
-            fault_log.push_back(std::move(record));
-            if (fault_log.size() > kept_faults) fault_log.pop_front();
-        }
+    for (const auto& thread : model.threads) collect_faults(*thread);
+}
+
+void Session::State::collect_faults(const Thread& thread) {
+    Core* const from = core(&thread);
+    if (!from) return;
+    for (FaultEvent event; from->next_fault(event);) {
+        auto [code, sentence] = worded(model, thread, event);
+        FaultRecord record;
+        record.number = ++fault_number;
+        record.cycle = event.cycle;
+        record.thread = thread.name;
+        record.code = std::move(code);
+        record.sentence = std::move(sentence);
+        record.age_ns = event.time_ns;  // made an age when it is asked for
+        fault_log.push_back(std::move(record));
+        if (fault_log.size() > kept_faults) fault_log.pop_front();
     }
 }
 

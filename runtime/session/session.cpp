@@ -22,6 +22,7 @@ Session::Session(SessionOptions options) : state_(std::make_unique<State>(std::m
 Session::~Session() {
     shut_down();
     watch_for_crashes(nullptr);
+    if (state_->abandoned) (void)state_.release();
 }
 
 const SessionOptions& Session::options() const { return state_->options; }
@@ -31,46 +32,41 @@ bool Session::edits(const Command& command) { return is_edit(command); }
 
 void Session::apply(const Command& command, Diagnostics& diagnostics) {
     State& s = *state_;
-    if (!s.edit) {
-        s.edit = std::make_unique<Edit>(s.model);
-        s.commands = 0;
-    }
-    for (const auto& thread : s.model.threads)
-        if (const Core* const core = s.core(thread.get())) thread->init_done = core->passed();
-    Elaboration on{s.model, *s.edit, s.plugins, diagnostics, s.auto_orders};
-    for (const Command& plain : expand(command, diagnostics)) {
-        ++s.commands;
-        elaborate(on, plain);
+    try {
+        if (!s.reserve) s.reserve = std::make_unique<char[]>(1 << 20);
+        if (!s.edit) {
+            s.edit = std::make_unique<Edit>(s.model);
+            s.commands = 0;
+        }
+        for (const auto& thread : s.model.threads)
+            if (const Core* const core = s.core(thread.get())) thread->init_done = core->passed();
+        Elaboration on{s.model, *s.edit, s.plugins, diagnostics, s.auto_orders};
+        for (const Command& plain : expand(command, diagnostics)) {
+            ++s.commands;
+            elaborate(on, plain);
+        }
+    } catch (const std::bad_alloc&) {
+        s.out_of_memory(diagnostics);
     }
 }
 
 bool Session::in_transaction() const { return state_->edit != nullptr; }
 
-void Session::State::destroy_removed() {
-    auto& removed = edit->removed();
-    for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) destroy_instance(**it);
-}
-
-void Session::State::undo_edit() {
-    edit->undo();
-    destroy_removed();
-    edit.reset();
-    auto_orders.clear();
-}
-
 void Session::abort() {
-    if (state_->edit) state_->undo_edit();
+    if (state_->edit) state_->withdraw();
 }
 
 namespace {
 
 // What a single shell line may not yet have right (net comes before addf) is said for whole files only.
-void check_all(const Model& model, bool whole, Diagnostics& diagnostics) {
+void check_all(const Model& model, bool whole, bool complete, Diagnostics& diagnostics) {
     check_periods(model, diagnostics);
     check_spread_pins(model, diagnostics);
     check_arrows(model, diagnostics);
     if (!whole) return;
-    check_unthreaded_functions(model, diagnostics);
+    // a file that has looked at its values before its first addf is not complete yet
+    const bool scheduled = std::any_of(model.threads.begin(), model.threads.end(), [](const auto& thread) { return !thread->functions.empty(); });
+    if (complete || scheduled) check_unthreaded_functions(model, diagnostics);
     check_cross_thread_io(model, diagnostics);
     check_stale_reads(model, diagnostics);
 }
@@ -80,71 +76,86 @@ void check_all(const Model& model, bool whole, Diagnostics& diagnostics) {
 bool Session::commit(Diagnostics& diagnostics) {
     State& s = *state_;
     if (!s.edit) return !diagnostics.failed();
-    if (diagnostics.failed()) return abort(), false;
-    if (!s.edit->structural()) {
-        // values only: straight into the threads' queues, whatever the size of the machine
-        bool written = true;
-        const auto write = [&](const Thread* thread, hal_value* to, hal_value value) {
-            if (Core* const core = s.core(thread)) written = s.executor->write(*core, {to, value}, answer_timeout_ns) && written;
-        };
-        for (const auto& [pin, value] : s.edit->pin_values) write(pin->home, pin->memory->slot, value);
-        for (const auto& [signal, value] : s.edit->signal_values) {
-            if (signal->cell) __atomic_store_n(&signal->cell->raw, value.raw, __ATOMIC_RELAXED);
-            else if (signal->home) write(signal->home, signal->slot, value);
-            else {
-                signal->value = value;
-                for (const auto& [thread, copy] : signal->copies) write(thread, copy, value);
-            }
-        }
-        if (!written) diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "", "show thread and show fault say more");
-        s.edit.reset();
-        return written;
+    bool good = false;
+    try {
+        good = !diagnostics.failed() && s.carry_out(diagnostics);
+    } catch (const std::bad_alloc&) {
+        s.out_of_memory(diagnostics);
     }
-    apply_auto_order(s.model, *s.edit, s.auto_orders, diagnostics);
-    s.auto_orders.clear();
+    if (!good) s.withdraw();
+    return good;
+}
+
+bool Session::State::carry_out(Diagnostics& diagnostics) {
+    if (!edit->structural() && edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) return write_values(diagnostics);
+    apply_auto_order(model, *edit, auto_orders, diagnostics);
     Diagnostics found;
-    check_all(s.model, s.commands > 1, found);
+    check_all(model, commands > 1, options.check_only, found);
     for (const Diagnostic& one : found.all()) {
         // an old warning is not said again with every later edit
-        if (one.severity == Severity::error || s.reported.insert(one.message).second) diagnostics.add(one);
+        if (one.severity == Severity::error || reported.insert(one.message).second) diagnostics.add(one);
     }
-    if (diagnostics.failed()) return abort(), false;
-    if (s.options.check_only) {
-        s.destroy_removed();
-        s.edit.reset();
-        return true;
-    }
+    if (diagnostics.failed()) return false;
+    if (options.check_only) return close_edit(), true;
+    if (!all_answer(diagnostics)) return false;
 
-    std::vector<Instance*> started;
-    for (Instance* const instance : s.edit->added_instances()) {
-        if (!instance->constructed || s.model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
-        if (const std::string why = start_instance(*instance, &s.executor->board().shared); !why.empty())
+    for (Instance* const instance : edit->added_instances()) {
+        if (!instance->constructed || model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
+        if (const std::string why = start_instance(*instance, &executor->board().shared); !why.empty())
             diagnostics.error("start-failed", instance->loaded, "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
-        else
-            started.push_back(instance);
     }
-    const bool good = !diagnostics.failed() && s.make_threads(diagnostics) && s.end_threads(s.edit->removed().threads, diagnostics) && s.synchronise(diagnostics);
-    if (!good) {
-        // Back to the model as it was. Threads that took the new plan take one of the old model again.
-        for (auto it = started.rbegin(); it != started.rend(); ++it) stop_instance(**it);
-        std::vector<std::unique_ptr<Instance>> gone;
-        s.edit->undo();
-        std::vector<std::unique_ptr<Thread>> unwanted;
-        std::vector<const Thread*> orphans;
-        for (const auto& [thread, core] : s.cores)
-            if (std::none_of(s.model.threads.begin(), s.model.threads.end(), [&, t = thread](const auto& one) { return one.get() == t; })) orphans.push_back(thread);
-        for (const Thread* const thread : orphans) {
-            if (s.executor->remove(*s.cores[thread], answer_timeout_ns)) s.cores.erase(thread);
-        }
-        Diagnostics ignored;
-        if (s.make_threads(ignored)) s.synchronise(ignored);
-        s.destroy_removed();
-        s.edit.reset();
+    if (diagnostics.failed()) return false;
+    touched = true;
+    if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) || !synchronise(diagnostics)) return false;
+    stuck.clear();
+    close_edit();
+    return true;
+}
+
+// Values only: straight into the threads' queues, whatever the size of the machine.
+bool Session::State::write_values(Diagnostics& diagnostics) {
+    std::vector<std::pair<Core*, std::vector<Write>>> rows;
+    const auto write = [&](const Thread* thread, hal_value* to, hal_value value) {
+        Core* const to_core = core(thread);
+        if (!to_core) return;
+        auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& one) { return one.first == to_core; });
+        if (row == rows.end()) row = rows.insert(row, {to_core, {}});
+        row->second.push_back({to, value});
+    };
+    for (const auto& [pin, value] : edit->pin_values) write(pin->home, pin->memory->slot, value);
+    for (const auto& [signal, value] : edit->signal_values) {
+        if (signal->cell) continue;
+        if (signal->home) write(signal->home, signal->slot, value);
+        else
+            for (const auto& [thread, copy] : signal->copies) write(thread, copy, value);
+    }
+    if (!executor->write(rows, answer_timeout_ns)) {
+        diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "", "show thread and show fault say more");
         return false;
     }
-    s.destroy_removed();
-    s.edit.reset();
+    for (const auto& [signal, value] : edit->signal_values) {
+        if (signal->cell) __atomic_store_n(&signal->cell->raw, value.raw, __ATOMIC_RELAXED);
+        else if (!signal->home) signal->value = value;
+    }
+    close_edit();
     return true;
+}
+
+void Session::State::out_of_memory(Diagnostics& diagnostics) {
+    reserve.reset();
+    diagnostics.error("out-of-memory", {}, "there is no memory left for this edit", "", "the machine runs on as it was; 'ulimit -v' and 'ulimit -l' limit a process");
+}
+
+// The transaction is over, one way or the other: what is no longer in the model goes.
+void Session::State::close_edit() {
+    collect_faults();  // before the plugins whose words they use
+    auto& removed = edit->removed();
+    for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) destroy_instance(**it);
+    edit.reset();
+    auto_orders.clear();
+    before.pins.clear();
+    before.signals.clear();
+    touched = false;
 }
 
 // --- the machine ----------------------------------------------------------------------------------------------------
@@ -195,7 +206,10 @@ void Session::shut_down() {
     stop_threads();
     bool all_ended = true;
     for (const auto& [thread, core] : s.cores) all_ended = s.executor->remove(*core, answer_timeout_ns) && all_ended;
-    if (!all_ended) return;  // a function that hangs may still use its instance: leave everything as it is
+    if (!all_ended) {  // a function that hangs may still use its instance: leave everything as it is
+        s.abandoned = true;
+        return;
+    }
     s.cores.clear();
     for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c)
         for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) destroy_instance(**i);

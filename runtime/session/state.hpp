@@ -28,7 +28,7 @@ struct Session::State {
     std::unique_ptr<Executor> executor;
     std::unordered_map<const Thread*, Core*> cores;
     std::unordered_map<const Thread*, std::unique_ptr<plan::Plan>> plans;  ///< what each thread runs
-    std::vector<std::unique_ptr<plan::Plan>> stuck;                        ///< of threads that never answered
+    std::vector<std::unique_ptr<plan::Plan>> stuck;  ///< kept after an edit that a thread did not answer: places in them may be in use
     std::uint64_t epoch = 0;
 
     std::unique_ptr<Edit> edit;              ///< the open transaction
@@ -36,10 +36,19 @@ struct Session::State {
     std::size_t commands = 0;                ///< in the open transaction
     std::set<std::string> reported;          ///< warnings and notes said before
 
+    /// What the open transaction put in place of, should it be withdrawn after a thread has taken it.
+    struct {
+        std::unordered_map<Pin*, hal_value> pins;
+        std::unordered_map<Signal*, hal_value> signals;
+    } before;
+    bool touched = false;                    ///< threads may have been made, ended or given a plan for the open transaction
+    std::unique_ptr<char[]> reserve;         ///< given back when memory has run out, so that undoing has some
+
     std::deque<FaultRecord> fault_log;
-    std::vector<std::int64_t> fault_times;
+    std::uint64_t fault_number = 0;          ///< of the newest
     std::vector<std::string> refused;        ///< by the system: "memory locking"
     bool shut = false;
+    bool abandoned = false;                  ///< a thread hangs and may go on using everything here
 
     Core* core(const Thread* thread) const;
     /// Adds threads that have no core yet. False after reporting.
@@ -48,14 +57,24 @@ struct Session::State {
     bool end_threads(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics);
     /// Compiles the model and makes all threads run it; in two steps when functions move between threads.
     bool synchronise(Diagnostics& diagnostics);
-    void undo_edit();
-    void destroy_removed();
+    /// Makes the open transaction take effect. False after reporting; then it is to be withdrawn.
+    bool carry_out(Diagnostics& diagnostics);
+    /// Undoes the open transaction, in the model and in threads that have taken it.
+    void withdraw();
+    /// Reports that there is no memory left, and makes some.
+    void out_of_memory(Diagnostics& diagnostics);
     void collect_faults();
 
 private:
+    bool write_values(Diagnostics& diagnostics);
+    bool all_answer(Diagnostics& diagnostics);
     bool swap(const std::unordered_set<const Function*>& without, Diagnostics& diagnostics);
+    void keep_values();
     void observe_unknowns(Compiled& compiled);
     void settle(Compiled& compiled, const std::vector<Core*>& silent);
+    void close_edit();
+    void collect_faults(const Thread& thread);
+    void silent_thread(const Core* core, Diagnostics& diagnostics) const;
 };
 
 /// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any more.

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // From an edited model to threads that run it: DESIGN section 4, steps 5 and 6.
 #include <algorithm>
+#include <stdexcept>
 
+#include "session/construct.hpp"
 #include "session/state.hpp"
 
 namespace hal {
@@ -17,12 +19,17 @@ bool Session::State::make_threads(Diagnostics& diagnostics) {
     int priority = 98;
     for (const auto& thread : model.threads) {
         const ThreadOptions& o = thread->options;
-        if (!cores.contains(thread.get())) {
-            CoreOptions wanted{o.period_ns, o.cpu, o.policy == Policy::fifo ? (o.priority ? o.priority : std::max(priority, 1)) : 0, o.policy == Policy::deadline, o.spin_ns, o.budget_ns, o.profile_every};
+        const int by_rate = o.policy != Policy::fifo ? 0 : o.priority ? o.priority : std::max(priority, 1);
+        if (Core* const there = core(thread.get())) {
+            executor->set_priority(*there, by_rate);
+        } else {
+            const CoreOptions wanted{o.period_ns, o.cpu, by_rate, o.policy == Policy::deadline, o.spin_ns, o.budget_ns, o.profile_every};
             const ThreadPins pins{&thread->time, &thread->tmax, &thread->tmax_increased, &thread->beat, &thread->missed, &thread->wakeup};
+            Core*& place = cores.try_emplace(thread.get(), nullptr).first->second;
             try {
-                cores[thread.get()] = &executor->add(wanted, pins);
-            } catch (const std::exception& e) {
+                place = &executor->add(wanted, pins);
+            } catch (const std::runtime_error& e) {
+                cores.erase(thread.get());
                 diagnostics.error("thread-refused", thread->made, "thread '" + thread->name + "' cannot be made: " + e.what());
                 return false;
             }
@@ -41,6 +48,7 @@ bool Session::State::end_threads(std::vector<std::unique_ptr<Thread>>& threads, 
             diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' does not end: one of its functions hangs");
             return false;
         }
+        collect_faults(*thread);
         cores.erase(thread);
         // it writes nothing any more: the session owns what it owned (its last plan's image stays until the swap)
         for (const auto& signal : model.signals) {
@@ -64,6 +72,47 @@ bool Session::State::end_threads(std::vector<std::unique_ptr<Thread>>& threads, 
     return true;
 }
 
+// Nothing may have changed when a thread turns out to hang, so this is seen first.
+bool Session::State::all_answer(Diagnostics& diagnostics) {
+    const std::vector<Core*> hang = executor->hanging(answer_timeout_ns);
+    for (const Core* const one : hang) silent_thread(one, diagnostics);
+    return hang.empty();
+}
+
+void Session::State::silent_thread(const Core* hangs, Diagnostics& diagnostics) const {
+    for (const auto& [thread, one] : cores)
+        if (one == hangs)
+            diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' did not answer within " + format_duration(static_cast<double>(answer_timeout_ns)) + ": one of its functions hangs, or it gets no CPU time", "",
+                              "show thread and show fault say more");
+}
+
+void Session::State::withdraw() {
+    edit->undo();
+    bool in_step = true;
+    if (touched) {
+        // Threads that took the new plan take one of the old model again, with the values it had.
+        std::vector<const Thread*> orphans;
+        for (const auto& [thread, core] : cores)
+            if (std::none_of(model.threads.begin(), model.threads.end(), [&, t = thread](const auto& one) { return one.get() == t; })) orphans.push_back(thread);
+        for (const Thread* const thread : orphans) {
+            if (executor->remove(*cores[thread], answer_timeout_ns)) cores.erase(thread);
+            else in_step = false;
+        }
+        edit->pin_values = before.pins;
+        for (const auto& signal : model.signals)
+            if (const auto value = before.signals.find(signal.get()); value != before.signals.end()) edit->signal_values.insert(*value);
+        try {
+            Diagnostics ignored;
+            make_threads(ignored);
+            synchronise(ignored);
+        } catch (const std::bad_alloc&) {
+            in_step = false;
+        }
+    }
+    if (!in_step) (void)edit.release();  // a thread may still use what the edit made: it stays for good
+    else close_edit();
+}
+
 bool Session::State::synchronise(Diagnostics& diagnostics) {
     // A function must never be in two threads at once: first everything runs without the movers, then with them.
     if (const auto movers = moving(model); !movers.empty() && !swap(movers, diagnostics)) return false;
@@ -81,17 +130,27 @@ bool Session::State::swap(const std::unordered_set<const Function*>& without, Di
     input.check_finite = check_finite;
     Compiled compiled = compile(model, input);
     observe_unknowns(compiled);
+    keep_values();
 
     std::vector<std::pair<Core*, plan::Plan*>> offers;
-    for (auto& [thread, plan] : compiled.plans) offers.emplace_back(core(thread), plan.get());
+    stuck.reserve(stuck.size() + 2 * compiled.plans.size());
+    for (auto& [thread, plan] : compiled.plans) {
+        if (!core(thread)) continue;
+        offers.emplace_back(core(thread), plan.get());
+        plans.try_emplace(thread);  // from here to the end of settle() nothing is allocated
+    }
     const std::vector<Core*> silent = executor->swap(offers, answer_timeout_ns);
     settle(compiled, silent);
-    for (const Core* const hangs : silent)
-        for (const auto& [thread, one] : cores)
-            if (one == hangs)
-                diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' did not answer within " + format_duration(static_cast<double>(answer_timeout_ns)) + ": one of its functions hangs, or it gets no CPU time", "",
-                                  "show thread and show fault say more");
+    for (const Core* const hangs : silent) silent_thread(hangs, diagnostics);
     return silent.empty();
+}
+
+void Session::State::keep_values() {
+    const auto value = [](const hal_value* slot) { return hal_value{.raw = __atomic_load_n(&slot->raw, __ATOMIC_RELAXED)}; };
+    for (const auto& [pin, unused] : edit->pin_values)
+        if (pin->home) before.pins.try_emplace(pin, value(pin->memory->slot));
+    for (const auto& [signal, unused] : edit->signal_values) before.signals.try_emplace(signal, value(signal->slot));
+    for (const auto& [signal, unused] : edit->inherited) before.signals.try_emplace(signal, value(signal->slot));
 }
 
 // Values that another thread owns: one coherent look into each such thread.
@@ -124,7 +183,8 @@ void Session::State::observe_unknowns(Compiled& compiled) {
     }
 }
 
-// All threads that answered run the new plans; the old images are still there, and nobody writes them any more.
+// All threads that answered run the new plans; the old images are still there, and nobody writes them any more. A thread
+// that did not answer still runs its old plan, so what is known of its places stays.
 void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent) {
     const auto hangs = [&](const Thread* thread) { return thread && std::find(silent.begin(), silent.end(), core(thread)) != silent.end(); };
     for (Compiled::Place& place : compiled.places) {
@@ -141,29 +201,37 @@ void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent
             if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end()) __atomic_store_n(&place.cell->raw, set->second.raw, __ATOMIC_RELAXED);
         }
     }
-    for (const plan::Rebind& rebind : compiled.session_rebinds) {
-        if (rebind.slot == &rebind.pin->own) rebind.pin->own = *rebind.pin->slot;
+    for (const auto& rebind : compiled.session_rebinds) {
+        if (rebind.slot == &rebind.pin->own) rebind.pin->own = rebind.keeps_value ? *rebind.pin->slot : hal_value{.raw = 0};
         rebind.pin->slot = rebind.slot;
     }
     for (const auto& [pin, thread] : compiled.homes)
         if (!hangs(pin->home) && !hangs(thread)) pin->home = thread;
     for (Compiled::Place& place : compiled.places) {
-        if (hangs(place.signal->home) || hangs(place.home)) continue;
         Signal& signal = *place.signal;
+        const auto keep = [&](auto& copies, bool of_hanging) { std::erase_if(copies, [&](const auto& copy) { return hangs(copy.first) != of_hanging; }); };
+        if (silent.empty()) {
+            signal.copies = std::move(place.copies);
+        } else {
+            keep(place.copies, false);
+            keep(signal.copies, true);
+            signal.copies.insert(signal.copies.end(), place.copies.begin(), place.copies.end());
+        }
+        if (hangs(signal.home) || hangs(place.home)) continue;
         signal.home = place.home;
         signal.slot = place.slot;
-        signal.copies = std::move(place.copies);
         signal.cell = std::move(place.cell);
     }
     for (const auto& [pin, value] : edit->pin_values)
-        if (!pin->home) *pin->memory->slot = value;
+        if (!pin->home && !pin->signal) *pin->memory->slot = value;
     // the values have been taken; a second swap of the same edit must not give them again
     edit->pin_values.clear();
     edit->signal_values.clear();
     edit->inherited.clear();
     for (auto& [thread, plan] : compiled.plans) {
-        if (hangs(thread)) continue;
-        plans[thread] = std::move(plan);
+        std::unique_ptr<plan::Plan>& running = plans.at(thread);
+        if (!silent.empty()) stuck.push_back(std::move(hangs(thread) ? plan : running));
+        if (!hangs(thread)) running = std::move(plan);
     }
     std::erase_if(plans, [&](const auto& entry) {
         return std::none_of(model.threads.begin(), model.threads.end(), [&](const auto& thread) { return thread.get() == entry.first; });

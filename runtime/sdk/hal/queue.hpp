@@ -33,6 +33,14 @@ public:
         head_.store(head + 1, std::memory_order_release);
         return true;
     }
+    /// All of a row or, when there is no room for all of it, nothing: the reader never sees a part. [realtime] writer
+    bool push(const T* items, std::size_t count) noexcept {
+        const auto head = head_.load(std::memory_order_relaxed);
+        if (head + count - tail_.load(std::memory_order_acquire) > mask_ + 1) return false;
+        for (std::size_t i = 0; i < count; ++i) items_[(head + i) & mask_] = items[i];
+        head_.store(head + count, std::memory_order_release);
+        return true;
+    }
     /// False when empty. [realtime] reader
     bool pop(T& item) noexcept {
         const auto tail = tail_.load(std::memory_order_relaxed);
