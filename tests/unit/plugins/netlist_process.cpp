@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// netlist_process PLUGINS real|virtual NETLIST: loads the netlist, starts the threads, runs 200 cycles. Status 3: refused.
+#include <iostream>
+#include <string_view>
+
+#include "session/session.hpp"
+
+int main(int argc, char** argv) {
+    if (argc != 4) return 2;
+    hal::SessionOptions options;
+    options.plugin_path = {argv[1]};
+    options.virtual_clock = std::string_view(argv[2]) == "virtual";
+    hal::Session session(options);
+    hal::Diagnostics diagnostics;
+    const auto source = session.sources.add("netlist", argv[3]);
+    for (const hal::Command& command : hal::parse(session.sources, source, {&session.ini, {}}, diagnostics)) session.apply(command, diagnostics);
+    if (!session.commit(diagnostics)) {
+        std::cerr << hal::render(diagnostics, session.sources);
+        return 3;
+    }
+    session.start_threads();
+    session.advance_cycles(200);
+    return 0;
+}

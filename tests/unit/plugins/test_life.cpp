@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Tells of every step of its life; refuses one of them when asked to.
+#include "hal/component.hpp"
+#include "watch.hpp"
+
+namespace {
+
+struct Life : hal::Component {
+    using Component::Component;
+    hal::Argument address{*this, "watch", 0, "what it reports to"};
+    hal::TextArgument refuse{*this, "refuse", "nothing", "construct or start"};
+    hal::In<bool> in{*this, "in", "copied to out"};
+    hal::Out<bool> out{*this, "out", "in", {.safe = true}};
+    hal::Out<double> level{*this, "level", "7", {.safe = -1.0}};
+    hal::Function run{*this, "", &Life::copy, "copies"};
+    hal::Emergency emergency{*this, &Life::make_safe, "counts"};
+    hal::test::Watch& watch = constructed();
+
+    ~Life() { ++watch.destroyed; }
+    hal::test::Watch& constructed() {
+        if (refuse.get() == "construct") throw std::runtime_error("it does not want to exist");
+        auto& found = hal::test::Watch::at(address);
+        ++found.constructed;
+        return found;
+    }
+    void start() {
+        if (refuse.get() == "start") throw std::runtime_error("it does not want to start");
+        ++watch.started;
+    }
+    void stop() noexcept { ++watch.stopped; }
+    void copy(hal::Cycle) noexcept {
+        const int now = ++watch.inside;
+        if (now > watch.most_inside) watch.most_inside = now;
+        while (watch.hang) watch.hanging = true;
+        watch.hanging = false;
+        ++watch.runs;
+        out = in.get();
+        level = 7.0;
+        --watch.inside;
+    }
+    void make_safe(hal::Cycle) noexcept { ++watch.emergencies; }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Life, "test-life", "Tells of every step of its life")
