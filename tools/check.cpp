@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `hal check`: everything wrong with netlists that can be known without running them.
+#include <unistd.h>
+
 #include "offline.hpp"
 #include "say.hpp"
 
@@ -9,10 +11,10 @@ int run_check(const Options& options) {
     Session session(offline());
     ShellOptions how;
     how.check = how.keep_going = true;
-    how.color = colours(2);
+    how.color = colours(STDERR_FILENO);
     Shell shell(session, how);
     ErrorsOnly output;
-    return load_offline(shell, options, output) == 0 ? 0 : 1;
+    return load_offline(shell, options, output, [](const std::string& path) { write_all(STDERR_FILENO, path + ": no errors\n"); }) == 0 ? 0 : 1;
 }
 
 }  // namespace hal::tools

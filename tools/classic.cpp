@@ -57,7 +57,7 @@ int complete_word() {
     const auto begin = command == std::string::npos ? command : typed.find_first_not_of(" \t", command);
     typed = begin == std::string::npos ? "" : typed.substr(begin);
     std::string problem;
-    const auto client = Client::connect("", problem);
+    const auto client = Client::connect(instance_wanted(""), problem);
     if (!client) return 1;
     std::string text;
     for (const Candidate& candidate : client->complete(typed, typed.size()).candidates) text += candidate.text + "\n";
@@ -97,7 +97,7 @@ constexpr const char* halrun_usage =
 
 int end_running(const Options& options) {
     std::string problem;
-    const auto client = Client::connect("", problem);
+    const auto client = Client::connect(instance_wanted(""), problem);
     if (!client) return 0;  // nothing runs: that is what was asked for
     const Client::Answer answer = client->stop();
     if (answer.status != 0) fail(options, answer.err);
@@ -132,6 +132,7 @@ int halrun(int argc, char** argv) {
     return run_run(options);
 }
 
+/// halsampler and halstreamer: -c and -n are numbers.
 int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, int (*run)(const Options&)) {
     Options options;
     options.program = program;
@@ -139,11 +140,13 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
     for (int letter; (letter = ::getopt(argc, argv, letters)) != -1;) {
         char* end = nullptr;
         const std::uint64_t number = ::optarg ? std::strtoull(::optarg, &end, 10) : 0;
-        if (::optarg && (*::optarg == '\0' || *end != '\0')) return fail(options, fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
+        if ((letter == 'c' || letter == 'n') && (*::optarg < '0' || *::optarg > '9' || *end != '\0'))
+            return fail(options, fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
         switch (letter) {
-        case 'c': options.channel = number; break;
+        case 'c': options.channel = ::optarg; break;
         case 'n': options.count = number; break;
         case 't': options.tag = true; break;
+        case 'N': options.name_as_component = ::optarg; break;
         default: return 1;
         }
     }
@@ -152,8 +155,8 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
     return run(options);
 }
 
-int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:t", run_record); }
-int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:", run_play); }
+int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", run_record); }
+int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", run_play); }
 
 constexpr Classic table[] = {{"halcmd", halcmd}, {"halrun", halrun}, {"halsampler", halsampler}, {"halstreamer", halstreamer}};
 

@@ -105,7 +105,8 @@ void declare_doc(CLI::App& app, Options& o) {
 void declare_explain(CLI::App& app, Options& o) { words(app, o, "CODE", "what stands in [brackets] at the end of a message; without it: all", false); }
 
 void declare_record(CLI::App& app, Options& o) {
-    words(app, o, "WHAT", "the sampler's channel (default 0), then the file to write (default: standard output)", false);
+    words(app, o, "CHANNEL FILE", "the number of the sampler (default 0), then the file to write (default: standard output)", false);
+    app.add_option("-c,--channel", o.channel, "a sampler by its number or by its instance's name")->type_name("CHANNEL");
     app.add_flag("--csv", o.csv, "comma-separated, with a line of column names first");
     app.add_option("-n,--count", o.count, "end after so many samples")->type_name("N");
     app.add_flag("-t,--tag", o.tag, "begin each line with the sample's number");
@@ -113,7 +114,8 @@ void declare_record(CLI::App& app, Options& o) {
 }
 
 void declare_play(CLI::App& app, Options& o) {
-    words(app, o, "WHAT", "the streamer's channel (default 0), then the file to read (default: standard input)", false);
+    words(app, o, "CHANNEL FILE", "the number of the streamer (default 0), then the file to read (default: standard input)", false);
+    app.add_option("-c,--channel", o.channel, "a streamer by its number or by its instance's name")->type_name("CHANNEL");
     named(app, o, "of the instance to feed");
 }
 
@@ -167,7 +169,10 @@ std::string help_of(const Subcommand& row) {
     text += "\n";
     for (const CLI::Option* option : app->get_options([](const CLI::Option* o) { return o->nonpositional(); })) {
         const std::string value = option->get_expected_min() > 0 && !option->get_type_name().empty() ? " " + option->get_type_name() : "";
-        text += fmt::format("  {:24} {}\n", option->get_name() + value, option->get_description());
+        std::string names;
+        for (const std::string& name : option->get_snames()) names += (names.empty() ? "-" : ", -") + name;
+        for (const std::string& name : option->get_lnames()) names += (names.empty() ? "--" : ", --") + name;
+        text += fmt::format("  {:24} {}\n", names + value, option->get_description());
     }
     return text;
 }

@@ -19,6 +19,8 @@ public:
     explicit LineReader(int descriptor, int stop = -1) : descriptor_(descriptor), stop_(stop) {}
     /// False at the end of the input, or when `stop` became readable. A last line without end of line counts.
     bool read(std::string& line);
+    /// The next line is here already: read() will not wait.
+    bool waiting() const { return waiting_.find('\n', begin_) != std::string::npos; }
 
 private:
     int descriptor_, stop_;

@@ -13,8 +13,9 @@ namespace hal::tools {
 namespace {
 
 std::string first_sentence(std::string_view page) {
-    const auto end = page.find(". ");
-    return std::string(page.substr(0, std::min(end, page.find('\n'))));
+    std::string_view sentence = page.substr(0, std::min(page.find(". "), page.find('\n')));
+    if (sentence.ends_with('.')) sentence.remove_suffix(1);
+    return std::string(sentence);
 }
 
 }  // namespace

@@ -51,6 +51,7 @@ class OwnShell final : public Listener {
 public:
     OwnShell(Shell& shell, StopRequest& stop, Output& output) : shell_(shell), stop_(stop), output_(output) {}
     int execute(std::string_view line) override {
+        shell_.cancel(false);
         stop_.spare = true;  // Ctrl-C is for the command now
         const int status = shell_.execute(line, output_);
         stop_.spare = false;

@@ -16,10 +16,13 @@ SessionOptions offline() {
     return options;
 }
 
-int load_offline(Shell& shell, const Options& options, Output& output) {
+int load_offline(Shell& shell, const Options& options, Output& output, const std::function<void(const std::string& path)>& good) {
     if (!options.ini.empty() && shell.read_ini(options.ini, output) != 0) return 1;
     int bad = 0;
-    for (const std::string& path : options.words) bad += shell.run_file(path, output) != 0;
+    for (const std::string& path : options.words) {
+        if (shell.run_file(path, output) != 0) ++bad;
+        else if (good) good(path);
+    }
     return bad;
 }
 

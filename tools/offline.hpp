@@ -2,6 +2,7 @@
 // Netlists loaded without running anything: for `hal check` and `hal graph`.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "options.hpp"
@@ -11,8 +12,8 @@
 namespace hal::tools {
 
 /// Loads the files of `options.words` into a session that constructs components but starts none. Everything printed,
-/// diagnostics included, goes to `output`. Returns the number of files that have errors.
-int load_offline(Shell& shell, const Options& options, Output& output);
+/// diagnostics included, goes to `output`; `good` is called for each file without errors. Returns how many have some.
+int load_offline(Shell& shell, const Options& options, Output& output, const std::function<void(const std::string& path)>& good = {});
 
 /// Options of such a session.
 SessionOptions offline();

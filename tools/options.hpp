@@ -20,7 +20,8 @@ struct Options {
     std::int64_t for_ns = -1;            ///< --for; -1: not given
     std::uint64_t cycles = 0;            ///< --cycles; 0: not given
     std::uint64_t count = 0;             ///< -n; 0: without end
-    std::uint64_t channel = 0;           ///< of record and play, when it is not among the words
+    std::string channel;                 ///< of record and play, when it is not among the words: a number or an instance
+    std::string name_as_component;       ///< halsampler -N
     bool interactive = false, keep_going = false, no_picture = false, report = false;
     bool from_file = false;              ///< -f: the first word is a file of commands; without one, standard input
     std::vector<std::string> execute;    ///< -e COMMAND

@@ -6,7 +6,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/diagnostic.hpp"
 #include "editor.hpp"
+#include "netlist/netlist.hpp"
 #include "options.hpp"
 #include "say.hpp"
 #include "shell/client.hpp"
@@ -69,6 +71,30 @@ int follow_input(Client& client, const Options& options) {
     return status;
 }
 
+/// Puts the values of this user's INI file into a netlist, line by line: the instance knows only its own INI file. False
+/// after printing what is wrong.
+bool substitute(const Options& options, const std::string& path, std::string& text) {
+    Sources sources;
+    Diagnostics diagnostics;
+    const Ini ini = Ini::read(sources, options.ini, diagnostics);
+    const std::uint32_t source = sources.add(path, text);
+    std::vector<Command> commands;
+    if (!diagnostics.failed()) commands = parse(sources, source, {&ini, {}}, diagnostics);
+    if (diagnostics.failed()) {
+        write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
+        return false;
+    }
+    text.clear();
+    std::uint32_t line = 1;
+    for (const Command& command : commands) {
+        for (const std::uint32_t wanted = sources.place(command.span).line; line < wanted; ++line) text += '\n';
+        text += command.name.text;
+        for (const Token& word : command.args) text += " " + word.text;
+    }
+    text += '\n';
+    return true;
+}
+
 int follow_file(Client& client, const Options& options) {
     const std::string& path = options.words.front();
     std::string text;
@@ -76,6 +102,7 @@ int follow_file(Client& client, const Options& options) {
         fail(options, fmt::format("cannot read '{}': {}", path, text));
         return options.classic ? 255 : 1;
     }
+    if (!options.ini.empty() && !substitute(options, path, text)) return 1;
     return show(client.run_text(path, text));
 }
 
@@ -85,9 +112,9 @@ int run_shell(const Options& options) {
     if (options.from_file && !options.words.empty() && !options.classic && options.words.size() > 1)
         return fail(options, fmt::format("nothing is expected behind the file at '{}'; options go before -f", options.words[1]));
     std::string problem;
-    const auto client = Client::connect(options.name, problem);
+    const auto client = Client::connect(instance_wanted(options.name), problem);
     if (!client) return fail(options, problem);
-    client->set_options(client_options(options));
+    if (!client->set_options(client_options(options)) && !client->connected()) return fail(options, fmt::format("instance '{}' does not answer", client->instance()));
     if (options.from_file && !options.words.empty()) return follow_file(*client, options);
     if (!options.execute.empty()) {
         int status = 0;

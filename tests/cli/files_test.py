@@ -23,7 +23,7 @@ class Check(Case):
         done = self.run_program("check", path)
         self.assertEqual(0, done.returncode, done.stderr)
         self.assertEqual("", done.stdout)
-        self.assertIn("no errors", done.stderr)
+        self.assertEqual(f"{path}: no errors\n", done.stderr)
 
     def test_all_errors_at_once_in_order(self):
         error = self.bad("check", self.write("bad.hal", BAD))
@@ -149,9 +149,9 @@ net loose second.in1
         self.assertEqual(self.good("graph", path), (self.folder / "loop.dot").read_text())
 
     def test_names_are_escaped(self):
-        text = self.good("graph", self.write("odd.hal", 'loadrt sum2 names=a<b&c\nnewsig s<&>"x float\nnet s<&>"x a<b&c.out\n'))
+        text = self.good("graph", self.write("odd.hal", 'loadrt sum2 names=a<b&c\nnewsig s<&>x float\nnet s<&>x a<b&c.out\n'))
         self.assertIn("<b>a&lt;b&amp;c</b>", text)
-        self.assertIn('label="s<&>\\"x"', text)
+        self.assertIn('label="s<&>x"', text)
 
     def test_other_endings_and_bad_netlists_are_refused(self):
         path = self.write("loop.hal", self.LOOP)

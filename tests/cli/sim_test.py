@@ -8,7 +8,7 @@ from harness import SERVO, Case, wait_until
 
 class Sim(Case):
     def test_prints_only_what_commands_print(self):
-        path = self.write("a.hal", SERVO + "start\nadvance 3\ngets total\n")
+        path = self.write("a.hal", SERVO + "start\nadvance 3 cycles\ngets total\n")
         self.assertEqual("5\n", self.good("sim", path))
 
     def test_for_advances_the_clock(self):
@@ -27,7 +27,7 @@ class Sim(Case):
 
     def test_twice_the_same(self):
         path = self.write("a.hal", "loadrt threads name1=base period1=50000 name2=servo period2=1000000\nloadrt siggen\nloadrt sampler cfg=ff\n"
-                          "addf siggen.0.update base\naddf sampler.0 servo\nnet s siggen.0.sine => sampler.0.pin.0\nstart\nadvance 5000\n"
+                          "addf siggen.0.update base\naddf sampler.0 servo\nnet s siggen.0.sine => sampler.0.pin.0\nstart\nadvance 5000 cycles\n"
                           "gets s\nshow thread\nshow pin siggen\nsave\n")
         self.assertEqual(self.good("sim", path), self.good("sim", path))
 
@@ -39,11 +39,11 @@ class Sim(Case):
         self.assertNotIn("cycles", done.stderr)
 
     def test_arguments_are_variables(self):
-        path = self.write("a.hal", SERVO + "setp adder.in0 $1\nsetp adder.in1 $OFFSET\nstart\nadvance 2\ngets total\n")
+        path = self.write("a.hal", SERVO + "setp adder.in0 $1\nsetp adder.in1 $OFFSET\nstart\nadvance 2 cycles\ngets total\n")
         self.assertEqual("42\n", self.good("sim", path, "--", "40", "OFFSET=2"))
 
     def test_programs_it_starts_reach_it(self):
-        path = self.write("a.hal", SERVO + "start\nadvance 2\nloadusr -w halcmd setp adder.in0 10\nadvance 2\ngets total\n")
+        path = self.write("a.hal", SERVO + "start\nadvance 2 cycles\nloadusr -w halcmd setp adder.in0 10\nadvance 2 cycles\ngets total\n")
         self.assertEqual("13\n", self.good("sim", path))
 
     def test_can_be_interrupted(self):

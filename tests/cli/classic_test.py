@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""halcmd and halrun, with LinuxCNC's options, output and exit status."""
+import signal
+import subprocess
+import unittest
+
+from harness import HAL, SERVO, Case, Terminal, wait_until
+
+
+class Halcmd(Case):
+    def setUp(self):
+        super().setUp()
+        self.start("run", self.write("a.hal", SERVO))
+
+    def halcmd(self, *words, **how):
+        return self.run_program(*words, name="halcmd", **how)
+
+    def test_one_shot(self):
+        self.assertEqual("2\n", self.halcmd("getp", "adder.in0").stdout)
+        self.assertEqual(0, self.halcmd("setp", "adder.in0", "-4").returncode)
+        self.assertEqual("-4\n", self.halcmd("getp", "adder.in0").stdout)
+        self.assertEqual(1, self.halcmd("getp", "nothing").returncode)
+
+    def test_letters_may_be_joined(self):
+        path = self.write("s.hal", "getp nothing\ngetp adder.in1\n")
+        done = self.halcmd("-kf", path)
+        self.assertEqual((1, "3\n"), (done.returncode, done.stdout))
+        self.assertEqual("", self.halcmd("-kQf", path).stderr)
+
+    def test_command_behind_a_file_is_ignored(self):
+        path = self.write("s.hal", "getp adder.in1\n")
+        self.assertEqual("3\n", self.halcmd("-f", path, "getp", "adder.in0").stdout)
+
+    def test_script_output(self):
+        self.assertRegex(self.halcmd("-s", "show", "pin", "adder.out").stdout, r"^sum2 float OUT +5 adder\.out ==> total\n$")
+
+    def test_echo(self):
+        done = self.halcmd("-e", "-f", self.write("s.hal", "\ngetp adder.in1\n"))
+        self.assertEqual(("3\n", True), (done.stdout, "(2)<echo>: getp adder.in1" in done.stderr))
+
+    def test_exit_status_255(self):
+        self.assertEqual(255, self.halcmd("-z").returncode)
+        self.assertEqual(255, self.halcmd("-f", "nowhere.hal").returncode)
+        self.assertEqual(255, self.halcmd("-i", "x.ini", "show").returncode)
+
+    def test_release_is_nothing(self):
+        self.assertEqual((0, "", ""), (lambda d: (d.returncode, d.stdout, d.stderr))(self.halcmd("-R")))
+
+    def test_help(self):
+        self.assertIn("usage: halcmd", self.halcmd().stdout)
+        self.assertIn("usage: halcmd", self.halcmd("-h").stdout)
+        self.assertIn("setp", self.halcmd("-h", "setp").stdout)
+
+    def test_standard_input(self):
+        done = self.halcmd("-f", given="getp adder.in0\ngetp adder.in1\n")
+        self.assertEqual((0, "2\n3\n"), (done.returncode, done.stdout))
+
+    def test_completion_for_bash(self):
+        line = "halcmd getp adder.i"
+        done = self.halcmd("-C", environment={"COMP_LINE": line, "COMP_POINT": str(len(line))})
+        self.assertEqual("adder.in0\nadder.in1\n", done.stdout)
+
+    def test_prompt(self):
+        terminal = Terminal(self, "-kf", name="halcmd")
+        terminal.expect("halcmd: ")
+        terminal.send("getp adder.in0\r")
+        terminal.expect("\n2\r\n")
+        terminal.send("exit\r")
+        self.assertEqual(0, terminal.wait())
+
+
+class Halrun(Case):
+    def halrun(self, *words, **how):
+        return self.run_program(*words, name="halrun", **how)
+
+    def test_runs_a_file_and_ends(self):
+        path = self.write("a.hal", SERVO + "start\ngetp adder.in1\n")
+        for words in (("-f", path), (path,)):
+            done = self.halrun(*words)
+            self.assertEqual((0, "3\n", ""), (done.returncode, done.stdout, done.stderr))
+
+    def test_threads_wait_for_start(self):
+        done = self.halrun("-f", self.write("a.hal", SERVO + "getp adder.out\n"))
+        self.assertEqual("0\n", done.stdout)
+
+    def test_error_is_its_status(self):
+        done = self.halrun("-f", self.write("a.hal", "getp nothing\n"))
+        self.assertEqual((1, ""), (done.returncode, done.stdout))
+        self.assertIn("a.hal:1", done.stderr)
+
+    def test_programs_started_by_it(self):
+        self.write("inner.sh", "halcmd getp adder.in0\nhalcmd setp adder.in0 9\n")
+        done = self.halrun("-f", self.write("a.hal", SERVO + "loadusr -w sh inner.sh\ngetp adder.in0\n"))
+        self.assertEqual((0, "2\n9\n", ""), (done.returncode, done.stdout, done.stderr))
+
+    def test_sampler_in_the_background(self):
+        self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt sampler cfg=f depth=100\nloadrt sum2 names=adder\nsetp adder.in0 1\n"
+                            "addf adder servo\naddf sampler.0 servo\nnet x adder.out => sampler.0.pin.0\n"
+                            "loadusr -Wn log halsampler -N log -n 5\nstart\nwaitusr -i log\n")
+        self.assertEqual((0, "1.000000 \n" * 5), (lambda d: (d.returncode, d.stdout))(self.halrun("-f", "a.hal")))
+
+    def test_ini_file(self):
+        self.write("a.hal", SERVO + "setp adder.in0 [A]B\ngetp adder.in0\n")
+        done = self.halrun(self.write("a.ini", "[HAL]\nHALFILE = a.hal\n[A]\nB = 6\n"))
+        self.assertEqual((0, "6\n"), (done.returncode, done.stdout))
+
+    def test_commands_from_standard_input(self):
+        done = self.halrun(given="loadrt sum2 names=a\ngetp a.in0\nquit\n")
+        self.assertEqual((0, "0\n"), (done.returncode, done.stdout))
+
+    def test_second_one_is_refused_and_u_ends_the_first(self):
+        first = self.start("-I", self.write("a.hal", SERVO + "start\n"), name="halrun", stdin=subprocess.PIPE)
+        error = self.halrun(self.write("b.hal", ""))
+        self.assertEqual(1, error.returncode)
+        self.assertIn("default", error.stderr)
+        self.assertEqual(0, self.halrun("-U").returncode)
+        self.assertEqual(0, first.wait(timeout=60))
+        self.assertEqual(0, self.halrun("-U").returncode)
+
+    def test_interactive(self):
+        terminal = Terminal(self, "-I", self.write("a.hal", SERVO), name="halrun")
+        terminal.expect("halcmd: ")
+        terminal.send("getp adder.in1\r")
+        terminal.expect("\n3\r\n")
+        terminal.send("quit\r")
+        self.assertEqual(0, terminal.wait())
+
+    def test_wrong_files(self):
+        self.assertIn("Tcl is not supported", self.halrun("x.tcl").stderr)
+        self.assertIn("Tcl is not supported", self.halrun("-T").stderr)
+        self.assertIn("ends with .hal or .ini", self.halrun("x.txt").stderr)
+        self.assertIn("nowhere.hal", self.halrun("nowhere.hal").stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

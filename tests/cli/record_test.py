@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""hal record and hal play, halsampler and halstreamer."""
+import csv
+import signal
+import subprocess
+import unittest
+
+from harness import Case, HAL, wait_until
+
+# A streamer feeds an adder, the sampler records what came and what became of it. Threads stand still until `start`.
+NETLIST = """loadrt threads name1=servo period1=1000000
+loadrt streamer cfg=fb depth=1000
+loadrt sampler cfg=fbsukl depth=1000
+loadrt sum2 names=twice
+addf streamer.0 servo
+addf twice servo
+addf sampler.0 servo
+net x streamer.0.pin.0 => twice.in0 twice.in1
+net y twice.out => sampler.0.pin.0
+net flag streamer.0.pin.1 => sampler.0.pin.1
+net beats servo.threadbeat => sampler.0.pin.3
+"""
+
+
+class Sim(Case):
+    """Deterministic: the programs run between two advances of the virtual clock."""
+
+    def sim(self, *commands):
+        return self.good("sim", self.write("a.hal", NETLIST + "".join(c + "\n" for c in commands)))
+
+    def test_what_is_played_is_recorded(self):
+        self.write("in.txt", "1.5 0\n-2 1\n# a comment\n\n3e3 1\n")
+        self.assertEqual("3.000000 0 \n-4.000000 1 \n6000.000000 1 \n",
+                         "".join(line.split(" ", 2)[0] + " " + line.split(" ", 2)[1] + " \n" for line in
+                                 self.sim("loadusr -w hal play in.txt", "start", "advance 3 cycles", "loadusr -w hal record -n 3").splitlines()))
+
+    def test_lines_have_a_blank_after_each_value(self):
+        self.write("in.txt", "1 1\n")
+        self.assertRegex(self.sim("loadusr -w halstreamer in.txt", "start", "advance 1 cycles", "loadusr -w halsampler -n 1"), r"^2\.000000 1 0 \d+ 0 0 \n$")
+
+    def test_tag_is_the_sample_number(self):
+        lines = self.sim("start", "advance 3 cycles", "loadusr -w halsampler -t -n 3").splitlines()
+        self.assertEqual(["0", "1", "2"], [line.split()[0] for line in lines])
+
+    def test_csv_names_the_linked_signals(self):
+        self.write("in.txt", "0.1 0\n0.2 1\n")
+        rows = list(csv.reader(self.sim("loadusr -w hal play in.txt", "start", "advance 2 cycles", "loadusr -w hal record --csv -n 2").splitlines()))
+        self.assertEqual(["y", "flag", "sampler.0.pin.2", "beats", "sampler.0.pin.4", "sampler.0.pin.5"], rows[0])
+        self.assertEqual([0.2, 0.4], [float(row[0]) for row in rows[1:]])
+        self.assertEqual(["0", "1"], [row[1] for row in rows[1:]])
+
+    def test_csv_with_sample_numbers(self):
+        rows = list(csv.reader(self.sim("start", "advance 2 cycles", "loadusr -w hal record --csv --tag -n 2").splitlines()))
+        self.assertEqual("sample", rows[0][0])
+        self.assertEqual(["0", "1"], [row[0] for row in rows[1:]])
+
+    def test_to_a_file(self):
+        self.assertEqual("", self.sim("start", "advance 2 cycles", "loadusr -w hal record -n 2 0 out.txt"))
+        self.assertEqual(2, (self.folder / "out.txt").read_text().count("\n"))
+
+    def test_a_lost_sample_prints_overrun(self):
+        lines = self.sim("start", "advance 1005 cycles", "loadusr -w halsampler -n 500", "advance 1 cycles", "loadusr -w halsampler -n 501").splitlines()
+        self.assertEqual(1002, len(lines))
+        self.assertEqual([1000], [i for i, line in enumerate(lines) if line == "overrun"])
+
+    def test_by_instance_name(self):
+        self.assertEqual(1, self.sim("loadrt sampler names=log cfg=f", "addf log servo", "start", "advance 1 cycles", "loadusr -w hal record -n 1 --channel log").count("\n"))
+
+
+class Live(Case):
+    def setUp(self):
+        super().setUp()
+        self.start("run", self.write("a.hal", NETLIST))
+
+    def test_wrong_words(self):
+        for command, word in (("record", "sampler"), ("play", "streamer")):
+            self.assertIn(f"{word}.7", self.bad(command, "7"))
+        self.write("in.txt", "1 0\n1 maybe\n")
+        error = self.bad("play", "0", "in.txt")
+        self.assertIn("in.txt:2", error)
+        self.assertIn("maybe", error)
+        self.write("in.txt", "1\n")
+        self.assertIn("in.txt:1", self.bad("play", "0", "in.txt"))
+        self.assertIn("nowhere.txt", self.bad("play", "0", "nowhere.txt"))
+        self.assertIn("not a number", self.bad("-n", "x", name="halsampler"))
+
+    def test_follows_until_interrupted(self):
+        recorder = subprocess.Popen([str(HAL), "record"], env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, recorder)
+        for _ in range(50):
+            self.assertEqual(6, len(recorder.stdout.readline().split()))
+        out, err = self.end(recorder, signal.SIGINT)
+        self.assertEqual((0, ""), (recorder.returncode, err))
+        self.assertTrue(out.endswith("\n"))
+
+    def test_instance_ends(self):
+        machine = self.start("run", self.write("b.hal", NETLIST), "--name", "b", instance="b")
+        recorder = subprocess.Popen([str(HAL), "record", "--name", "b"], env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, recorder)
+        recorder.stdout.readline()
+        self.end(machine)
+        _, err = recorder.communicate(timeout=60)
+        self.assertEqual(1, recorder.returncode)
+        self.assertIn("ended", err)
+
+    def test_play_waits_for_room(self):
+        self.shell("setp", "streamer.0.enable", "0")
+        player = subprocess.Popen([str(HAL), "play"], env=self.environment, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, player)
+        player.stdin.write("".join(f"{i} 0\n" for i in range(1500)))
+        player.stdin.flush()
+        wait_until(lambda: self.value("streamer.0.curr-depth") == "1000", "the FIFO is full")
+        self.assertIsNone(player.poll())
+        self.shell("setp", "streamer.0.enable", "1")
+        player.stdin.close()
+        self.assertEqual(0, player.wait(timeout=60))
+        player.stderr.close()
+        player.stdin = player.stderr = None
+        wait_until(lambda: self.value("streamer.0.pin.0") == "1499", "all of it was played")
+
+
+if __name__ == "__main__":
+    unittest.main()
