@@ -24,13 +24,13 @@ struct Flipflop : hal::Component {
     }
 
 private:
-    bool was_clk_ = true;  // a clock that is high from the beginning is not an edge
+    bool was_clk_ = false;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Flipflop, "flipflop", "D flip-flop with set and reset", R"(
-`reset` overrides `set`, and both override `clk`. The bit lives in `out` itself, which is an input/output pin, so
+`reset` overrides `set`, and both override `clk`; a `clk` that is TRUE in the first cycle is an edge. The bit lives in `out` itself, which is an input/output pin, so
 another writer on the same signal can change it.
 
     # remember a short alarm until the operator acknowledges it

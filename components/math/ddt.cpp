@@ -16,14 +16,14 @@ struct Ddt : hal::Component {
     }
 
 private:
-    double before_ = std::numeric_limits<double>::quiet_NaN();  // none yet
+    double before_ = 0.0;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Ddt, "ddt", "Derivative of a value", R"(
-`out = (in - in of the cycle before) / period`, and 0 in the first cycle and in the one after an input that was not a
-number. A quantised input gives a noisy derivative: follow with `lowpass`.
+`out = (in - in of the cycle before) / period`. Before the first cycle the input counts as 0; after an input that was not
+a number `out` is 0 for a cycle. A quantised input gives a noisy derivative: follow with `lowpass`.
 
     loadrt ddt names=velocity
     addf velocity servo

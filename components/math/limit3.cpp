@@ -6,8 +6,8 @@ namespace {
 // How far may the output move in one cycle and still be able to stop at a point `distance` ahead?
 //
 // In units of one cycle let A be the largest change of the displacement per cycle (maxa * period^2), and let the last
-// m = smooth-steps + 1 cycles before the stop change it by A/m, 2A/m, ... A only. Counted back from the stop, the
-// displacements of a braking output are then
+// m cycles before the stop change it by A/m, 2A/m, ... A only (m = smooth-steps - 1, at least 1). Counted back from the
+// stop, the displacements of a braking output are then
 //     v(j) = A j (j+1) / (2m)             for j <= m
 //     v(j) = v(m) + (j - m) A             for j >= m
 // and the ways they add up to are
@@ -59,7 +59,7 @@ struct Limit3 : hal::Component {
     hal::In<double>        max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>        max_velocity{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
     hal::In<double>        max_acceleration{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
-    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop over which the acceleration fades out", {.initial = 2}};
+    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop over which the acceleration fades out; up to 2 is the fastest stop", {.initial = 2}};
     hal::Function          run{*this, "", &Limit3::update, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -94,7 +94,7 @@ private:
         const double common = steady ? std::copysign(std::min(std::fabs(stride), std::fabs(last_stride_)), stride) : 0.0;
         const double drift = std::clamp(common, -v, v);
 
-        const Approach approach(a, static_cast<double>(smooth_steps) + 1.0);
+        const Approach approach(a, static_cast<double>(std::max<std::uint32_t>(smooth_steps, 2) - 1));
         const double before = velocity_ * dt;
         double step = drift + approach(target - position_ - drift);
         step = std::max(step, approach(min - position_));
@@ -118,8 +118,8 @@ HAL_COMPONENT(Limit3, "limit3", "Follows a value within limits of position, velo
 `out` goes to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without overshoot; it meets a moving
 input at its own speed, and follows an input that keeps the limits itself without any lag. It brakes in time for `min`
 and `max`. When a limit is moved, or the input turns round, so that the output can no longer stop in time, `maxa` is
-kept and the output comes back. `smooth-steps` fades the acceleration out over the last cycles before a stop: 0 is the
-fastest, 2 costs one cycle and is gentle to a jittering input.
+kept and the output comes back. With `smooth-steps` above 2 the acceleration fades out over the last cycles before a stop:
+it takes a little longer and is gentle to a jittering input.
 
 `out` starts at 0; `load` puts it on the input. While the input is not a number its last value counts. With `maxa` not
 positive `out` stands still. When `min` is above `max`, `max` wins.

@@ -182,6 +182,14 @@ TEST(Flipflop, Stores_data_at_the_rising_edge_of_the_clock_only) {
     EXPECT_TRUE(flipflop.get<bool>("out-not"));
 }
 
+TEST(Flipflop, A_clock_that_is_high_in_the_first_cycle_is_an_edge) {
+    Instance flipflop("flipflop");
+    flipflop.set("data", true);
+    flipflop.set("clk", true);
+    flipflop.run();
+    EXPECT_TRUE(flipflop.get<bool>("out"));
+}
+
 TEST(Flipflop, Reset_overrides_set_and_both_override_the_clock) {
     Instance flipflop("flipflop");
     flipflop.set("set", true);

@@ -104,9 +104,9 @@ TEST(Wcomp, Says_on_which_side_of_the_window_the_input_is) {
     }
 }
 
-TEST(Ddt, Differentiates_from_the_second_cycle_on) {
+TEST(Ddt, Differentiates_an_input_that_was_0_before_the_first_cycle) {
     Instance ddt("ddt");
-    EXPECT_EQ(after(ddt, 5.0), 0.0);
+    EXPECT_NEAR(after(ddt, 5.0), 5000.0, 1e-9);
     EXPECT_NEAR(after(ddt, 5.002), 2.0, 1e-9);
     EXPECT_EQ(after(ddt, 5.002), 0.0);
 }
