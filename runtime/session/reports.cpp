@@ -155,8 +155,11 @@ std::vector<std::string> Session::missing_privileges() const {
     std::vector<std::string> missing;
     bool scheduling = false;
     for (const auto& [thread, core] : s.cores) scheduling = scheduling || s.executor->granted(*core).refused;
-    if (scheduling) missing.emplace_back("real-time scheduling: threads run as ordinary ones and will be late under load; grant it with: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep PROGRAM");
-    for (const std::string& one : s.refused) missing.push_back(one + ": a page fault can delay a cycle; the same setcap grants it, or 'memlock unlimited' in /etc/security/limits.conf");
+    // PROGRAM is what the user started; setcap wants the file itself
+    const std::string grant = "; grant it with: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep $(readlink -f PROGRAM)";
+    if (scheduling) missing.push_back("no real-time scheduling here: threads run as ordinary ones and are late under load" + grant);
+    for (const std::string& one : s.refused)
+        missing.push_back("no " + one + " here: a page fault can delay a cycle" + (scheduling ? "; the same setcap grants it" : grant) + ", or 'memlock unlimited' in /etc/security/limits.conf");
     return missing;
 }
 
