@@ -78,7 +78,8 @@ int edits(std::string_view a, std::string_view b, int limit) {
             int cost = i == 0 ? j : j == 0 ? i : far;
             if (i > 0 && j > 0) {
                 cost = std::min({before[k] + (at(a, i - 1) != at(b, j - 1)), before[k + 1] + 1, now[k - 1] + 1});
-                if (i > 1 && j > 1 && at(a, i - 1) == at(b, j - 2) && at(a, i - 2) == at(b, j - 1)) cost = std::min(cost, two_before[k] + 1);
+                if (i > 1 && j > 1 && at(a, i - 1) == at(b, j - 2) && at(a, i - 2) == at(b, j - 1))
+                    cost = std::min(cost, two_before[k] + 1);
             }
             now[k] = std::min(cost, far);
             best = std::min(best, now[k]);
@@ -89,7 +90,8 @@ int edits(std::string_view a, std::string_view b, int limit) {
 }
 
 bool starts_with(std::string_view text, std::string_view prefix) {
-    return text.size() > prefix.size() && std::equal(prefix.begin(), prefix.end(), text.begin(), [](char a, char b) { return folded(a) == folded(b); });
+    return text.size() > prefix.size() &&
+           std::equal(prefix.begin(), prefix.end(), text.begin(), [](char a, char b) { return folded(a) == folded(b); });
 }
 
 }  // namespace
@@ -107,7 +109,9 @@ std::vector<std::string> similar(std::string_view name, const std::vector<std::s
         if (distance > limit && name.size() >= 3 && starts_with(candidate, name)) distance = typed_in_part;
         if (distance <= limit || distance == typed_in_part) found.push_back({distance, &candidate});
     }
-    const auto better = [](const Found& a, const Found& b) { return a.distance != b.distance ? a.distance < b.distance : *a.name < *b.name; };
+    const auto better = [](const Found& a, const Found& b) {
+        return a.distance != b.distance ? a.distance < b.distance : *a.name < *b.name;
+    };
     const auto kept = std::min(most, found.size());
     std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(), better);
     std::vector<std::string> names;

@@ -309,9 +309,9 @@ private:
 
     std::vector<Command> mismatch(const Word& leader, const Word& word) {
         const auto names = [](const Word& w) { return std::to_string(w.count) + (w.count == 1 ? " name" : " names"); };
-        Diagnostic made{
-            .code = "range-length",
-            .message = "'" + leader.token->text + "' stands for " + names(leader) + ", '" + word.token->text + "' for " + std::to_string(word.count)};
+        Diagnostic made{.code = "range-length",
+                        .message = "'" + leader.token->text + "' stands for " + names(leader) + ", '" + word.token->text + "' for " +
+                                   std::to_string(word.count)};
         made.labels = {{word.token->span, names(word)}, {leader.token->span, names(leader)}};
         made.help.push_back("ranges and sets of one command run along with each other, so they need the same number of names");
         diagnostics_.add(std::move(made));

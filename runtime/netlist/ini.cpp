@@ -38,7 +38,6 @@ std::optional<std::string> read_whole(const std::string& path, std::string& reas
         text.append(part, static_cast<std::size_t>(got));
     }
     ::close(file);
-    if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);  // a byte-order mark says nothing here
     return reason.empty() ? std::optional(std::move(text)) : std::nullopt;
 }
 

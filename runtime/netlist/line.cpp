@@ -66,7 +66,9 @@ void Line::append_value(std::string_view value, Span reference) {
     text_ = buffer_;
 }
 
-LineReader::LineReader(const Sources& sources, std::uint32_t source) : source_(source), text_(sources.get(source).text) {}
+LineReader::LineReader(const Sources& sources, std::uint32_t source) : source_(source), text_(sources.get(source).text) {
+    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // a byte-order mark says nothing here
+}
 
 bool LineReader::next(Line& line) {
     if (at_ >= text_.size()) return false;

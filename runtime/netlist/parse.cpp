@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cctype>
 #include <cstdlib>
 #include <map>
 
@@ -12,8 +14,8 @@ namespace hal {
 namespace {
 
 constexpr std::size_t most_errors = 20;                     // shown of one source
-constexpr std::size_t most_words = 10'000'000;              // of one source: two million nets
-constexpr std::size_t most_substituted = std::size_t{64} << 20;  // bytes of values in one source: a value may be long, and named often
+constexpr std::size_t most_words = 5'000'000;               // of one source: a million nets
+constexpr std::size_t most_substituted = std::size_t{32} << 20;  // bytes of values in one source: a value may be long, and named often
 
 std::vector<std::string> environment_names() {
     std::vector<std::string> names;
@@ -139,7 +141,7 @@ private:
             if (good) {
                 substituted_ += value->size();
                 if (substituted_ > most_substituted) {
-                    error("substitution-too-long", span, "the values put in place of names in this file are longer than 64 MB together");
+                    error("substitution-too-long", span, "the values put in place of names in this file are longer than 32 MB together");
                     return false;
                 }
                 expanded_.append(line_, done, at);
@@ -197,14 +199,16 @@ private:
 
     void report_variable(const Reference& reference, Span at) {
         const std::string name(reference.name);
+        const bool plain =
+            std::all_of(name.begin(), name.end(), [](char c) { return c == '_' || std::isalnum(static_cast<unsigned char>(c)); });
         error("unset-variable", at, "the environment variable '" + name + "' is not set",
               environment_->variable ? "" : did_you_mean(name, environment_names()),
-              "set it in front of the command: " + name + "=… hal …");
+              "set it in front of the command: " + (plain ? name + "=…" : "env '" + name + "=…'") + " hal …");
     }
 
     void report_key(const Reference& reference, Span at) {
         const std::string name = bracketed(reference.section, reference.name);
-        if (environment_->ini == nullptr)
+        if (environment_->ini == nullptr || environment_->ini->empty())
             return error("unset-ini-key", at, "'" + name + "' has no value: no INI file was given", "",
                          "give it with --ini FILE.ini (halcmd: -i FILE.ini)");
         const std::vector<std::string> names = environment_->ini->names();

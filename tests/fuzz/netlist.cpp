@@ -55,6 +55,17 @@ void check_format(hal::Sources& sources, std::uint32_t source, const std::vector
     require(words(after) == words(commands), "formatting keeps the meaning");
 }
 
+void check_value(const std::string& text) {
+    for (const hal::TypeRow& row : hal::types) {
+        const hal::Parsed parsed = hal::parse_value(row.type, text);
+        if (!parsed.problem.empty()) continue;
+        const hal::Parsed again = hal::parse_value(row.type, hal::format_exact(row.type, parsed.value));
+        // NaN has no sign in text; everything else comes back bit by bit.
+        const bool nan = row.type == HAL_TYPE_FLOAT && parsed.value.real != parsed.value.real;
+        require(again.problem.empty() && (nan || again.value.raw == parsed.value.raw), "a value is read back as it was");
+    }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -82,15 +93,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
 
     for (const hal::Command& command : commands)
-        for (const hal::Token& arg : command.args)
-            for (const hal::TypeRow& row : hal::types) {
-                const hal::Parsed parsed = hal::parse_value(row.type, arg.text);
-                if (!parsed.problem.empty()) continue;
-                const hal::Parsed again = hal::parse_value(row.type, hal::format_exact(row.type, parsed.value));
-                // NaN has no sign in text; everything else comes back bit by bit.
-                const bool nan = row.type == HAL_TYPE_FLOAT && parsed.value.real != parsed.value.real;
-                require(again.problem.empty() && (nan || again.value.raw == parsed.value.raw), "a value is read back as it was");
-            }
+        if (!command.args.empty()) check_value(command.args.back().text);
 
     const std::string text = hal::render(found, sources), colored = hal::render(found, sources, true);
     for (const char c : text) require(static_cast<unsigned char>(c) >= 0x20 || c == '\n', "nothing raw reaches the terminal");

@@ -151,10 +151,4 @@ test.hal:1:8: error: cannot read '/': Is a directory [unreadable-file]
 )");
 }
 
-TEST_F(Ini_file, read_source_drops_a_byte_order_mark) {
-    const auto source = hal::read_source(sources, folder.write("bom.hal", "\xEF\xBB\xBFstart\n"), {}, found);
-    ASSERT_TRUE(source);
-    EXPECT_EQ(sources.get(*source).text, "start\n");
-}
-
 }  // namespace

@@ -1,0 +1,1 @@
+hal check --ini bad-ini-line.ini bad-ini-line.hal

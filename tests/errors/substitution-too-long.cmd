@@ -1,0 +1,1 @@
+hal check --ini substitution-too-long.ini substitution-too-long.hal

@@ -1,0 +1,1 @@
+hal check --ini too-many-words.ini too-many-words.hal

@@ -1,0 +1,1 @@
+hal check --ini unset-ini-key.ini unset-ini-key.hal
