@@ -67,7 +67,7 @@ void declare_sim(CLI::App& app, Options& o) {
 void declare_shell(CLI::App& app, Options& o) {
     named(app, o, "of the instance to talk to; needed when several run");
     app.add_flag("-f,--file", o.from_file, "the first word is a file of commands; without one: standard input");
-    app.add_option("-e,--execute", o.execute, "execute this command; may be repeated")->type_name("COMMAND")->expected(1)->allow_extra_args(false);
+    app.add_option("-e,--execute", o.execute, "execute this command; may be repeated")->type_name("COMMAND")->allow_extra_args(false);
     app.add_option("-i,--ini", o.ini, "where [SECTION]KEY is looked up, with -f")->type_name("FILE");
     app.add_flag("-k,--keep-going", o.keep_going, "go on after an error");
     app.add_flag("-s,--script", o.script, "output for scripts: no titles, one line per item");

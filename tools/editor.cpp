@@ -246,6 +246,7 @@ bool Editor::read(const std::string& prompt, std::string& line) {
     s.prompt = prompt;
     s.interrupted = false;
     int length = 0;
+    el_set(s.line, EL_PREP_TERM, 1);  // before the prompt shows: a ^C in between would end the program
     const char* text = el_gets(s.line, &length);
     if (s.interrupted) {
         print("^C\n");

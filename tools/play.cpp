@@ -54,8 +54,7 @@ bool feed(Stream& stream, const Options& options, json records, const StopReques
     while (!records.empty()) {
         const json reply = stream.client->request({{"stream", stream.name}, {"records", records}});
         if (!reply.value("ok", false)) {
-            const bool ended = !stream.client->connected();
-            fail(options, ended ? fmt::format("instance '{}' has ended", stream.client->instance()) : reply.value("error", "no answer"));
+            fail(options, stream.lost());
             return false;
         }
         const auto taken = reply.value("taken", std::ptrdiff_t{0});

@@ -100,8 +100,7 @@ int follow(Stream& stream, const Options& options, int descriptor) {
         const std::uint64_t wanted = options.count == 0 ? at_once : std::min(at_once, options.count - taken);
         const json reply = stream.client->request({{"stream", stream.name}, {"take", wanted}});
         if (!reply.value("ok", false)) {
-            const bool ended = !stream.client->connected();
-            return fail(options, ended ? fmt::format("instance '{}' has ended", stream.client->instance()) : reply.value("error", "no answer"));
+            return fail(options, stream.lost());
         }
         const std::size_t got = reply.at("records").size();
         if (!write(lines.of(reply))) return 1;

@@ -11,8 +11,8 @@ namespace hal::tools {
 /// Session::mutex.
 std::string loaded_summary(Session& session);
 
-/// How it ran: per thread cycles, missed periods, wake-up and execution times, faults, and the slowest functions. Takes
-/// Session::mutex.
+/// How it ran: per thread cycles, missed periods, wake-up and execution times, faults, and the slowest functions. While
+/// the threads exist, that is before shut_down(). Takes Session::mutex.
 std::string timing_report(Session& session);
 
 }  // namespace hal::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // `hal run` and `halrun`: netlists in real-time threads until somebody ends it.
+#include <algorithm>
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -17,26 +18,27 @@ namespace {
 /// the user types.
 int run_classic(Machine& machine, const Options& options) {
     const int status = machine.load();
-    if (status != 0 || machine.stop.requested()) return status;
-    return options.interactive || options.words.empty() ? machine.talk({"halcmd: ", "halcmd+: "}) : status;
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    return options.interactive || options.words.empty() ? std::max(status, machine.talk({"halcmd: ", "halcmd+: "})) : status;
 }
 
 int run_plain(Machine& machine, const Options& options) {
-    if (const int status = machine.load(); status != 0) return status;
+    int status = machine.load();
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
     machine.start_threads();
     const std::string& name = machine.session.options().name;
     print(loaded_summary(machine.session));
-    int status = 0;
     if (options.interactive) {
-        status = machine.talk({"hal> ", "hal+> "});
+        status = std::max(status, machine.talk({"hal> ", "hal+> "}));
     } else {
         print(fmt::format("{}; in another terminal: hal shell{}\n", options.for_ns >= 0 ? "running" : "running until Ctrl-C", name == "default" ? "" : " --name " + name));
         const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
         machine.stop.wait_ns(options.for_ns);
     }
     const bool faulted = machine.faulted();
+    const std::string report = timing_report(machine.session);  // the threads take their figures with them
     machine.shut_down();
-    print("\n" + timing_report(machine.session));
+    print("\n" + report);
     return faulted ? 1 : status;
 }
 

@@ -20,7 +20,6 @@ int run_sim(const Options& options) {
         machine.advance(options.for_ns, options.cycles);
     }
     if (machine.faulted() || machine.stop.requested()) status = 1;
-    machine.shut_down();
     if (options.report) write_all(STDERR_FILENO, timing_report(machine.session));
     return status;
 }

@@ -49,6 +49,10 @@ bool Stream::open(const Options& options, const char* component) {
     return !options.classic || announce(options);
 }
 
+std::string Stream::lost() const {
+    return client->connected() ? fmt::format("'{}' is gone: it was unloaded, or its machine has ended", name) : fmt::format("instance '{}' has ended", client->instance());
+}
+
 bool Stream::announce(const Options& options) const {
     const std::string component = options.name_as_component.empty() ? fmt::format("{}{}", options.program, ::getpid()) : options.name_as_component;
     const nlohmann::json reply = client->request({{"component", component}});

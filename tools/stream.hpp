@@ -24,6 +24,8 @@ struct Stream {
     bool open(const Options& options, const char* component);
     /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME` sees that it is ready.
     bool announce(const Options& options) const;
+    /// Why it does not answer any more, as a sentence.
+    std::string lost() const;
 };
 
 /// How long to wait when the FIFO was empty, or full, before asking again.

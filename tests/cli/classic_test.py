@@ -96,7 +96,7 @@ class Halrun(Case):
     def test_sampler_in_the_background(self):
         self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt sampler cfg=f depth=100\nloadrt sum2 names=adder\nsetp adder.in0 1\n"
                             "addf adder servo\naddf sampler.0 servo\nnet x adder.out => sampler.0.pin.0\n"
-                            "loadusr -Wn log halsampler -N log -n 5\nstart\nwaitusr -i log\n")
+                            "loadusr -Wn log halsampler -N log -n 5\nstart\nwaitusr log\n")
         self.assertEqual((0, "1.000000 \n" * 5), (lambda d: (d.returncode, d.stdout))(self.halrun("-f", "a.hal")))
 
     def test_ini_file(self):
