@@ -231,21 +231,20 @@ Source source(const Signal& signal) {
 
 Source source(const Pin& pin) { return pin.signal ? source(*pin.signal) : Source{pin.memory->slot, pin.home}; }
 
-template <class Object>
-std::vector<hal_value> read_all(Session::State& s, const std::vector<const Object*>& objects) {
+std::vector<hal_value> read_all(Session::State& s, const std::vector<Source>& sources) {
     struct Group {
         std::vector<const hal_value*> from;
         std::vector<std::size_t> at;
         std::vector<hal_value> to;
         Observation wish;
     };
-    std::vector<hal_value> values(objects.size());
+    std::vector<hal_value> values(sources.size());
     std::map<Core*, Group> groups;
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        const Source from = source(*objects[i]);
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        const Source from = sources[i];
         Core* const core = from.owner ? s.core(from.owner) : nullptr;
         // a single value is coherent with itself: no need to wait for the thread, unless it has news of it in its queue
-        if (!core || (objects.size() == 1 && core->settled())) {
+        if (!core || (sources.size() == 1 && core->settled())) {
             values[i].raw = __atomic_load_n(&from.from->raw, __ATOMIC_RELAXED);
             continue;
         }
@@ -271,30 +270,36 @@ std::vector<hal_value> read_all(Session::State& s, const std::vector<const Objec
     return values;
 }
 
+template <class Object>
+std::vector<Source> sources_of(const std::vector<const Object*>& objects) {
+    std::vector<Source> all;
+    for (const Object* object : objects) all.push_back(source(*object));
+    return all;
+}
+
 }  // namespace
 
-std::vector<hal_value> Session::read_pins(const std::vector<const Pin*>& pins) { return read_all(*state_, pins); }
-std::vector<hal_value> Session::read_signals(const std::vector<const Signal*>& signals) { return read_all(*state_, signals); }
+std::vector<hal_value> Session::read_pins(const std::vector<const Pin*>& pins) { return read_all(*state_, sources_of(pins)); }
+std::vector<hal_value> Session::read_signals(const std::vector<const Signal*>& signals) { return read_all(*state_, sources_of(signals)); }
 
 std::vector<std::optional<Reading>> Session::read(const std::vector<std::string>& names) {
     std::vector<std::optional<Reading>> readings(names.size());
-    std::vector<const Pin*> pins;
-    std::vector<const Signal*> signals;
-    std::vector<std::size_t> pin_at, signal_at;
+    std::vector<Source> wanted;
+    std::vector<std::size_t> at;
     for (std::size_t i = 0; i < names.size(); ++i) {
         if (const Pin* const pin = model().find_pin(names[i])) {
             readings[i] = Reading{pin->type, {}};
-            pins.push_back(pin);
-            pin_at.push_back(i);
+            wanted.push_back(source(*pin));
         } else if (const Signal* const signal = model().find_signal(names[i])) {
             readings[i] = Reading{signal->type, {}};
-            signals.push_back(signal);
-            signal_at.push_back(i);
+            wanted.push_back(source(*signal));
+        } else {
+            continue;
         }
+        at.push_back(i);
     }
-    const auto pin_values = read_pins(pins), signal_values = read_signals(signals);
-    for (std::size_t k = 0; k < pins.size(); ++k) readings[pin_at[k]]->value = pin_values[k];
-    for (std::size_t k = 0; k < signals.size(); ++k) readings[signal_at[k]]->value = signal_values[k];
+    const auto values = read_all(*state_, wanted);
+    for (std::size_t k = 0; k < at.size(); ++k) readings[at[k]]->value = values[k];
     return readings;
 }
 

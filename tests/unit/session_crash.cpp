@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// A component that kills the process: outputs first, then a report, then death by the signal it was.
+#include <csignal>
+#include <cstdio>
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <regex>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace hal::test {
+namespace {
+
+struct Death {
+    const char* dies;
+    int signal;
+    const char* words;
+};
+
+struct Result {
+    int status = 0;
+    std::string said;
+};
+
+Result run(const char* clock, const std::string& netlist) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) return {};
+    const std::string plugins = HALCYON_TEST_PLUGINS, program = plugins + "/../netlist_process";
+    const pid_t child = fork();
+    if (child == 0) {
+        dup2(ends[1], STDERR_FILENO);
+        execl(program.c_str(), program.c_str(), plugins.c_str(), clock, netlist.c_str(), nullptr);
+        _exit(127);
+    }
+    close(ends[1]);
+    Result result;
+    char part[512];
+    for (ssize_t got; (got = read(ends[0], part, sizeof part)) > 0;) result.said.append(part, static_cast<std::size_t>(got));
+    close(ends[0]);
+    waitpid(child, &result.status, 0);
+    return result;
+}
+
+std::string netlist(const char* dies) {
+    return std::string("loadrt threads name1=t period1=1000000\nloadrt test-faulty names=f\nloadrt test-counter names=c\naddf c t\naddf f.run t\nsetp f.dies ") + dies + "\n";
+}
+
+struct Crash : testing::TestWithParam<std::tuple<const char*, Death>> {};
+
+TEST_P(Crash, makes_outputs_safe_names_the_function_and_dies_by_its_signal) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "the sanitizer reports crashes itself";
+#endif
+    const auto& [clock, death] = GetParam();
+    const Result result = run(clock, netlist(death.dies));
+    ASSERT_TRUE(WIFSIGNALED(result.status)) << result.status << " " << result.said;
+    EXPECT_EQ(WTERMSIG(result.status), death.signal) << result.said;
+    const std::string report = std::regex_replace(result.said, std::regex("at cycle [0-9]+;"), "at cycle N;");
+    EXPECT_EQ(report, std::string("emergency function called\nhal: test-faulty: function 'f.run' crashed (") + death.words +
+                          ") at cycle N; outputs were set to their safe values; the process ends\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(In, Crash,
+                         testing::Combine(testing::Values("real", "virtual"),
+                                          testing::Values(Death{"1", SIGSEGV, "segmentation fault"}, Death{"2", SIGABRT, "abort"}, Death{"3", SIGSEGV, "segmentation fault"},
+                                                          Death{"4", SIGILL, "illegal instruction"}, Death{"5", SIGFPE, "integer division by zero or overflow"})),
+                         [](const auto& death) { return std::string(std::get<0>(death.param)) + std::get<1>(death.param).dies; });
+
+TEST(A_process_without_a_fault, ends_quietly) {
+    const Result result = run("virtual", netlist("0"));
+    EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 0) << result.status;
+    EXPECT_EQ(result.said, "");
+}
+
+}  // namespace
+}  // namespace hal::test
