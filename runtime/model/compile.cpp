@@ -7,9 +7,6 @@
 namespace hal {
 namespace {
 
-/// Steps that may be read ahead of the last one, see Core::run_steps.
-constexpr std::size_t read_ahead = 8;
-
 template <class Action>
 void for_all_pins(const Model& model, Action action) {
     for (const auto& component : model.components) {
@@ -149,7 +146,6 @@ private:
                 for (const Instance* instance : function->instances)
                     if (met.insert(instance).second) plan.emergency.insert(plan.emergency.end(), instance->emergency.begin(), instance->emergency.end());
             }
-            to.insert(to.end(), read_ahead, plan::Step{nullptr, nullptr});
         };
         fill(thread.init, plan.init_steps, plan.init);
         fill(thread.functions, plan.steps, plan.functions);

@@ -159,7 +159,8 @@ struct Model {
     /// Keeps a text for as long as the model lives; equal texts share.
     const char* keep(std::string_view text);
 
-    std::uint32_t next_id = 1;
+    std::uint32_t next_id = 1;            ///< of pins and functions, for fault records
+    std::uint32_t next_component_id = 7;  ///< `show comp` numbers them as LinuxCNC does: real-time modules take every third
 
 private:
     struct Texts;
