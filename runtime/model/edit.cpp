@@ -196,7 +196,8 @@ Component& Edit::add_component(std::string name, Span at) {
     Component* const made = owned.get();
     made->name = std::move(name);
     made->loaded = at;
-    made->id = model_.next_id++;
+    made->id = model_.next_component_id;
+    model_.next_component_id += 3;
     make_room(model_.components);
     on_undo([this, made] {
         model_.component.erase(made->name);
