@@ -23,8 +23,10 @@ constexpr Section sections[] = {
     {"dispatch", "cost of a function in a thread of 1000, against a hand-written loop and LinuxCNC", dispatch},
     {"wakeup", "how late threads wake, against cyclictest", wakeup},
     {"load", "100 to 100 000 nets, from text to running threads, against LinuxCNC", load},
+    {"shell", "one-shot commands, a thousand setp, save, against halcmd", shell},
     {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit},
     {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
+    {"size", "of the program; with --full its build from cold", size},
 };
 
 int usage(const char* problem, const char* word) {
