@@ -86,7 +86,8 @@ int edits(std::string_view a, std::string_view b, int limit) {
         }
         if (best == far) return far;
     }
-    return rows[n % 3][static_cast<std::size_t>(m - n + 1 + limit)];
+    const int last = m - n + 1 + limit;
+    return rows[n % 3][static_cast<std::size_t>(last)];
 }
 
 bool starts_with(std::string_view text, std::string_view prefix) {

@@ -36,8 +36,8 @@ struct Mark {
     bool visible = false;
 };
 
-std::string right_aligned(std::string text, std::size_t width) {
-    return text.size() >= width ? text : std::string(width - text.size(), ' ') + text;
+std::string right_aligned(std::string_view text, std::size_t width) {
+    return std::string(width > text.size() ? width - text.size() : 0, ' ').append(text);
 }
 
 class Renderer {
@@ -219,6 +219,7 @@ std::string render(const Diagnostic& diagnostic, const Sources& sources, bool co
 }
 
 std::string render(const Diagnostics& diagnostics, const Sources& sources, bool color) {
+    constexpr std::size_t most_rendered = 100;
     const auto place = [](const Diagnostic& d) { return d.labels.empty() ? Span{} : d.labels[0].span; };
     std::vector<std::uint32_t> files;  // in order of first mention
     struct Entry {
@@ -236,7 +237,8 @@ std::string render(const Diagnostics& diagnostics, const Sources& sources, bool 
     std::stable_sort(entries.begin(), entries.end(),
                      [](const Entry& a, const Entry& b) { return a.file != b.file ? a.file < b.file : a.begin < b.begin; });
     std::string out;
-    for (const Entry& entry : entries) out += (out.empty() ? "" : "\n") + render(*entry.diagnostic, sources, color);
+    for (std::size_t i = 0; i < std::min(entries.size(), most_rendered); ++i) out += (out.empty() ? "" : "\n") + render(*entries[i].diagnostic, sources, color);
+    if (entries.size() > most_rendered) out += "\nand " + std::to_string(entries.size() - most_rendered) + " more; mend these first\n";
     return out;
 }
 

@@ -59,9 +59,8 @@ void parse_integer(std::string_view text, const char* type, T& value, std::strin
         base = 8;
     }
     std::uint64_t magnitude = 0;
-    const char* end = digits.data() + digits.size();
-    const auto [stop, status] = std::from_chars(digits.data(), end, magnitude, base);
-    if (digits.empty() || status == std::errc::invalid_argument || stop != end) {
+    const auto [stop, status] = std::from_chars(digits.begin(), digits.end(), magnitude, base);
+    if (digits.empty() || status == std::errc::invalid_argument || stop != digits.end()) {
         const bool octal = base == 8 && digits.find_first_not_of("0123456789") == digits.npos;
         problem = quoted(text) + (octal ? " is not a whole number (a leading 0 means octal)" : " is not a whole number");
         return;
@@ -159,10 +158,9 @@ std::string format_exact(hal_type type, const hal_value& value) {
 
 std::optional<std::int64_t> parse_duration_ns(std::string_view text, bool bare_ns) {
     double number = 0;
-    const char* end = text.data() + text.size();
-    const auto [stop, status] = std::from_chars(text.data(), end, number);
+    const auto [stop, status] = std::from_chars(text.begin(), text.end(), number);
     if (status != std::errc{} || !(number >= 0)) return std::nullopt;
-    const std::string_view unit(stop, static_cast<std::size_t>(end - stop));
+    const std::string_view unit(stop, text.end());
     double factor = bare_ns ? 1 : 1e9;
     if (!unit.empty()) {
         factor = 0;

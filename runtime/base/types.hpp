@@ -55,7 +55,8 @@ inline const char* name(hal_dir dir) {
     return names[static_cast<std::size_t>(dir)];
 }
 
-/// The value a text stands for. On failure the string says why: "is not a number", "is out of range for s32 (…)".
+/// The value a text stands for. On failure a clause says why: "'abc' is not a number", "3000000000 is out of range for
+/// s32 (-2147483648 to 2147483647)".
 struct Parsed {
     hal_value value{};
     std::string problem;  ///< empty: good

@@ -122,9 +122,8 @@ private:
         const std::string_view bounds[] = {inside.substr(0, dots), inside.substr(dots + 2)};
         std::uint64_t* values[] = {&part.first, &part.last};
         for (int i = 0; i < 2; ++i) {
-            const char* end = bounds[i].data() + bounds[i].size();
-            const auto [stop, status] = std::from_chars(bounds[i].data(), end, *values[i]);
-            if (bounds[i].empty() || stop != end || status == std::errc::invalid_argument)
+            const auto [stop, status] = std::from_chars(bounds[i].begin(), bounds[i].end(), *values[i]);
+            if (bounds[i].empty() || stop != bounds[i].end() || status == std::errc::invalid_argument)
                 return fail(open, close + 1, "the bounds of a range are whole numbers",
                             "write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}");
             if (status != std::errc{} || bounds[i].size() > 18) return fail(open, close + 1, "the bounds of this range are too large");

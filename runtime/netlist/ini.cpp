@@ -144,6 +144,7 @@ std::vector<std::string> Ini::all(std::string_view section, std::string_view key
 
 std::vector<std::string> Ini::names() const {
     std::vector<std::string> names;
+    names.reserve(entries_.size());
     for (const Entry& entry : entries_) names.push_back(bracketed(entry.section, entry.key));
     return names;
 }

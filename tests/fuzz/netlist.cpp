@@ -38,13 +38,15 @@ void check_spans(const hal::Sources& sources, std::uint32_t source, const std::v
         require(word == command.span.begin, "a command starts with its name");
         for (const hal::Token& arg : command.args) {
             require(!arg.text.empty(), "a word is not empty");
-            require(arg.span.begin >= word && arg.span.begin < arg.span.end && arg.span.end <= command.span.end, "words stand one after the other");
+            require(arg.span.begin >= word && arg.span.begin < arg.span.end && arg.span.end <= command.span.end,
+                    "words stand one after the other");
             word = arg.span.begin;
         }
     }
 }
 
-void check_format(hal::Sources& sources, std::uint32_t source, const std::vector<hal::Command>& commands, const hal::Environment& environment) {
+void check_format(hal::Sources& sources, std::uint32_t source, const std::vector<hal::Command>& commands,
+                  const hal::Environment& environment) {
     hal::Diagnostics found;
     const std::string once = hal::format(sources, source, found);
     if (found.failed()) return require(once == sources.get(source).text, "a faulty text is not formatted");
@@ -87,7 +89,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         hal::Diagnostics of_command;
         const std::vector<hal::Command> plain = hal::expand(command, of_command);
         require(plain.empty() == of_command.failed(), "a command is expanded or refused");
-        for (const hal::Command& one : plain) require(one.span.begin == command.span.begin && !one.name.text.empty(), "expansion keeps the place");
+        for (const hal::Command& one : plain)
+            require(one.span.begin == command.span.begin && !one.name.text.empty(), "expansion keeps the place");
         found.take(of_command);
         if ((names += plain.size()) > 100'000) break;  // a few huge ranges are enough
     }
