@@ -67,20 +67,16 @@ function(halcyon_folder name)
     target_link_libraries(halcyon_${name} ${scope} ${ARGN})
 endfunction()
 
-# Where the program looks for plugins; included by the one source that builds the search path.
-file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/paths.hpp" @ONLY CONTENT [[
+# The values of runtime/paths.hpp, in the one source that depends on where this build tree lies.
+file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/paths.cpp" @ONLY CONTENT [[
 // SPDX-License-Identifier: MIT
-// Written by CMake: what the program knows about where it was built and where it will be installed.
-#pragma once
-
-#include <string_view>
+#include "paths.hpp"
 
 namespace hal::paths {
-inline constexpr std::string_view version = "@PROJECT_VERSION@";
-inline constexpr std::string_view build_components = "@HALCYON_COMPONENT_OUTPUT_DIRECTORY@";
-inline constexpr std::string_view install_components = "@CMAKE_INSTALL_FULL_LIBDIR@/halcyon/components";
-inline constexpr std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk";
-inline constexpr std::string_view install_includes = "@CMAKE_INSTALL_FULL_INCLUDEDIR@";
+constinit const std::string_view version = "@PROJECT_VERSION@";
+constinit const std::string_view build_components = "@HALCYON_COMPONENT_OUTPUT_DIRECTORY@";
+constinit const std::string_view install_components = "@CMAKE_INSTALL_FULL_LIBDIR@/halcyon/components";
+constinit const std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk";
+constinit const std::string_view install_includes = "@CMAKE_INSTALL_FULL_INCLUDEDIR@";
 }  // namespace hal::paths
 ]])
-include_directories("${PROJECT_BINARY_DIR}/generated")

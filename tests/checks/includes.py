@@ -44,7 +44,7 @@ LIBRARIES = {
 }
 
 INCLUDE_ROOTS = ["runtime", "runtime/abi", "runtime/sdk", "drivers", "tools", "."]  # as the compiler searches
-GENERATED = {"paths.hpp": ["runtime/session", "runtime/shell", "tools"]}  # written by CMake
+SINGLE = {"paths.hpp": ["runtime/session", "runtime/shell", "tools"]}  # headers that belong to no folder
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
 
@@ -96,8 +96,8 @@ def problem(root, source, kind, name):
             return f"includes <{name}>: only {', '.join(users)} may"
     if kind == "<":
         return None
-    if name in GENERATED:
-        return None if folder in GENERATED[name] else f'includes "{name}": only {", ".join(GENERATED[name])} may'
+    if name in SINGLE:
+        return None if folder in SINGLE[name] else f'includes "{name}": only {", ".join(SINGLE[name])} may'
     found = resolve(root, source, name)
     if found is None:
         return f'includes "{name}": there is no such file in the tree; a library is included with <>'

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// What the program knows about where it was built and where it will be installed. The values are in a source that CMake
+// writes (cmake/HalcyonBuild.cmake), so that no other source depends on where the build tree lies.
+#pragma once
+
+#include <string_view>
+
+namespace hal::paths {
+
+extern const std::string_view version;             ///< of Halcyon, "1.2.3"
+extern const std::string_view build_components;    ///< folder of the plugins in the build tree
+extern const std::string_view install_components;  ///< folder of the plugins once installed
+extern const std::string_view build_includes;      ///< include path of the sdk in this tree, parts separated by `:`
+extern const std::string_view install_includes;    ///< include path of the sdk once installed
+
+}  // namespace hal::paths
