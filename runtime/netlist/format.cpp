@@ -44,6 +44,8 @@ public:
         LineReader reader(sources_, source_);
         while (reader.next(line_)) line(reader.continued());
         flush();
+        // A word that begins with a byte-order mark must not lose it by becoming the first of the file.
+        if (out_.starts_with("\xEF\xBB\xBF")) out_.insert(0, "\n");
         return std::move(out_);
     }
 

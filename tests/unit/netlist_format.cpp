@@ -90,6 +90,11 @@ TEST_F(Formatter, counts_characters_not_bytes) { EXPECT_EQ(formatted("setp gr√∂√
 
 TEST_F(Formatter, writes_plain_line_ends) { EXPECT_EQ(formatted("start\r\n# c\r\nstop\r\n"), "start\n# c\nstop\n"); }
 
+TEST_F(Formatter, drops_a_byte_order_mark_at_the_start_only) {
+    EXPECT_EQ(formatted("\xEF\xBB\xBFstart\n"), "start\n");
+    EXPECT_EQ(formatted("\n\xEF\xBB\xBFstart\n"), "\n\xEF\xBB\xBFstart\n");
+}
+
 TEST_F(Formatter, keeps_comments_that_go_on_in_the_next_line) {
     EXPECT_EQ(formatted("start # a \\\n   b  \nstop\n# c \\\n\nshow"), "start  # a \\\n   b\nstop\n# c\nshow\n");
 }
