@@ -51,7 +51,8 @@ private:
 /// One diagnostic as text, ending with a newline: the form of DESIGN section 7.
 std::string render(const Diagnostic& diagnostic, const Sources& sources, bool color = false);
 
-/// All of them in order of place (files in order of first mention), a blank line between two.
+/// All of them in order of place (files in order of first mention), a blank line between two; past
+/// the hundredth only how many more there are.
 std::string render(const Diagnostics& diagnostics, const Sources& sources, bool color = false);
 
 /// The names of `candidates` close to `name` (edit distance, prefixes, swapped separators), best first, at most `most`.
