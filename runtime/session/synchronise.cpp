@@ -32,6 +32,9 @@ bool Session::State::make_threads(Diagnostics& diagnostics) {
                 cores.erase(thread.get());
                 diagnostics.error("thread-refused", thread->made, "thread '" + thread->name + "' cannot be made: " + e.what());
                 return false;
+            } catch (const std::bad_alloc&) {
+                cores.erase(thread.get());
+                throw;
             }
         }
         --priority;

@@ -72,7 +72,7 @@ public:
     void cycles(std::uint64_t count) { session.advance_cycles(count); }
 
     /// The whole model as text: everything a transaction may change and an undone one must not.
-    std::string dump() {
+    std::string dump(bool values = true) {
         std::ostringstream out;
         const Model& model = session.model();
         for (const auto& component : model.components) {
@@ -90,7 +90,7 @@ public:
             if (!pin->alias.empty()) out << " alias " << pin->alias << (model.find_pin(pin->alias) == pin ? "" : " LOST");
             if (pin->signal) out << " on " << pin->signal->name << (pin->arrow_in ? " in" : "") << (pin->arrow_out ? " out" : "") << " at " << pin->linked_at.begin;
             if (pin->home) out << " home " << pin->home->name;
-            if (!changing(*pin)) out << " = " << format_exact(pin->type, session.read_pins({pin})[0]);
+            if (values && !changing(*pin)) out << " = " << format_exact(pin->type, session.read_pins({pin})[0]);
             out << "\n";
         }
         for (const Signal* signal : model.sorted_signals()) {
@@ -98,7 +98,7 @@ public:
                 << (signal->writer ? signal->writer->name : "-") << (model.signals[signal->index].get() == signal ? "" : " MISPLACED");
             for (const Pin* pin : signal->pins) out << " " << pin->name;
             if (signal->type == HAL_TYPE_PORT) out << " bytes " << (signal->port ? signal->port->capacity : 0);
-            else if (!signal->writer || !changing(*signal->writer)) out << " = " << format_exact(signal->type, session.read_signals({signal})[0]);
+            else if (values && (!signal->writer || !changing(*signal->writer))) out << " = " << format_exact(signal->type, session.read_signals({signal})[0]);
             out << "\n";
         }
         for (const auto& thread : model.threads) {
