@@ -41,15 +41,12 @@ Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard
     info_.period_s = static_cast<double>(period_ns) * 1e-9;
 }
 
-std::int64_t Core::time() const noexcept { return measure_ ? monotonic_ns() : 0; }
-
 void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     current_core = this;
     const Guard guard;
-    const std::int64_t begin = time();
     info_.start_ns = due_ns;
     if (measure_) {
-        busy_since_.store(begin, std::memory_order_release);
+        busy_since_.store(woke_ns, std::memory_order_release);
         wakeup.add(woke_ns - due_ns);
     }
     take_over();
@@ -57,9 +54,8 @@ void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
         import();
         if (running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed)) run();
         else if (!safe_) make_safe();
-        const std::int64_t took = time() - begin;
         if (measure_) store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
-        account(took);
+        account(measure_ ? monotonic_ns() - woke_ns : 0);
         publish();
         answer();
     }
@@ -72,6 +68,27 @@ void Core::service() noexcept {
     take_over();
     if (!running_.load(std::memory_order_acquire) && !safe_) make_safe();
     if (plan_) answer();
+}
+
+// After a millisecond of other work neither the instances nor the code are in a near cache, and waiting for memory is
+// half of the cycle's time. A thread that spins towards its deadline has the time to fetch them before.
+void Core::warm(std::int64_t until_ns) const noexcept {
+    if (!plan_) return;
+    constexpr std::uintptr_t line = 64;
+    unsigned fetched = 0;
+    const auto fetch = [&](const void* memory, std::size_t bytes) noexcept {
+        const auto begin = reinterpret_cast<std::uintptr_t>(memory);
+        for (std::uintptr_t at = begin & ~(line - 1); at < begin + bytes; at += line) {
+            if (fetched++ % 32 == 0 && monotonic_ns() >= until_ns) return false;
+            __builtin_prefetch(reinterpret_cast<const void*>(at));
+        }
+        return true;
+    };
+    if (!fetch(this, sizeof *this)) return;
+    for (const hal_pin* pin : {pins_.time, pins_.tmax, pins_.tmax_increased, pins_.beat, pins_.missed, pins_.wakeup}) fetch(pin, sizeof *pin);
+    if (sampled_ < plan_->functions.size()) fetch(plan_->functions[sampled_].times, sizeof(plan::FunctionTimes));
+    for (const plan::Memory& memory : plan_->working_set)
+        if (!fetch(memory.begin, memory.bytes)) return;
 }
 
 void Core::skip(std::uint64_t periods) noexcept {

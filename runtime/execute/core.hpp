@@ -40,10 +40,12 @@ public:
     Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, const std::atomic<bool>& running, bool measure);
 
     // --- by the thread --------------------------------------------------------------------------------------------
-    /// One cycle that was due at `due_ns` and woke at `woke_ns`. [realtime]
+    /// One cycle that was due at `due_ns` and woke at `woke_ns`, just now: its execution time counts from there. [realtime]
     void cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept;
     /// Takes a new plan and writes, answers an observation: between two cycles. [realtime]
     void service() noexcept;
+    /// Brings the memory of the next cycle into the caches, as far as it gets until `until_ns`. [realtime]
+    void warm(std::int64_t until_ns) const noexcept;
     /// Periods that passed unserved. [realtime]
     void skip(std::uint64_t periods) noexcept;
     /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
@@ -102,7 +104,6 @@ private:
     void run_timed(const plan::Function& function, const plan::Step* steps) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
     void account(std::int64_t busy_ns) noexcept;
-    std::int64_t time() const noexcept;
 
     const std::uint32_t id_;
     const std::int64_t period_ns_;

@@ -26,6 +26,7 @@ namespace hal {
 namespace {
 
 constexpr std::size_t stack_bytes = 1 << 20;
+constexpr std::int64_t calm_ns = 5'000;  // before the deadline nothing but the clock is looked at
 constexpr std::size_t signal_stack_bytes = 1 << 16;
 
 void prefault_stack() noexcept {
@@ -139,15 +140,15 @@ struct Executor::Runner {
         std::int64_t due = epoch_ns + ((monotonic_ns() - epoch_ns) / period + 1) * period;
         std::uint64_t served = 0;
         while (!quit.load(std::memory_order_acquire)) {
-            std::int64_t now;
             if (callable()) {
                 const std::uint32_t heard = bell.load(std::memory_order_acquire);
                 core.service();  // what came before `heard` was read
-                now = wait.until(due, bell, heard);
-                if (now < due) continue;  // called between two cycles
+                if (!wait.sleep(due, bell, heard)) continue;  // called between two cycles
             } else {
-                now = wait.until(due);
+                wait.sleep(due);
             }
+            core.warm(due - calm_ns);
+            const std::int64_t now = Wait::spin(due);
             if (now >= due + period) {
                 const auto late = (now - due) / period;
                 core.skip(static_cast<std::uint64_t>(late));

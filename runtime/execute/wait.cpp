@@ -23,7 +23,9 @@ void relax() noexcept {
 #endif
 }
 
-std::int64_t spin(std::int64_t deadline_ns) noexcept {
+}  // namespace
+
+std::int64_t Wait::spin(std::int64_t deadline_ns) noexcept {
     std::int64_t now = monotonic_ns();
     while (now < deadline_ns) {
         relax();
@@ -32,22 +34,19 @@ std::int64_t spin(std::int64_t deadline_ns) noexcept {
     return now;
 }
 
-}  // namespace
-
-std::int64_t Wait::until(std::int64_t deadline_ns) const noexcept {
+void Wait::sleep(std::int64_t deadline_ns) const noexcept {
     const timespec at = to_timespec(deadline_ns - spin_ns);
     while (monotonic_ns() < deadline_ns - spin_ns) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
-    return spin(deadline_ns);
 }
 
-std::int64_t Wait::until(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept {
+bool Wait::sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept {
     const timespec at = to_timespec(deadline_ns - spin_ns);
     while (monotonic_ns() < deadline_ns - spin_ns) {
         // FUTEX_WAIT_BITSET takes an absolute CLOCK_MONOTONIC time
         syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET_PRIVATE, heard, &at, nullptr, FUTEX_BITSET_MATCH_ANY);
-        if (bell.load(std::memory_order_acquire) != heard) return monotonic_ns();
+        if (bell.load(std::memory_order_acquire) != heard) return false;
     }
-    return spin(deadline_ns);
+    return true;
 }
 
 void Wait::ring(std::atomic<std::uint32_t>& bell) noexcept {

@@ -13,10 +13,12 @@ struct Wait {
     /// Threads slower than this sleep on a futex instead, so that the session can call them between two cycles.
     static constexpr std::int64_t callable_period_ns = 5'000'000;
 
-    /// Returns the time it is when the wait is over. [realtime]
-    std::int64_t until(std::int64_t deadline_ns) const noexcept;
-    /// The same, but returns early (with a time before the deadline) when `bell` no longer has the value `heard`.
-    std::int64_t until(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept;
+    /// Sleeps until `spin_ns` before the deadline. [realtime]
+    void sleep(std::int64_t deadline_ns) const noexcept;
+    /// The same; false: `bell` no longer has the value `heard`, and the sleep ended early.
+    bool sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept;
+    /// Spins for the rest. Returns the time it is then. [realtime]
+    static std::int64_t spin(std::int64_t deadline_ns) noexcept;
     /// Wakes a thread that waits on `bell`. [any]
     static void ring(std::atomic<std::uint32_t>& bell) noexcept;
 

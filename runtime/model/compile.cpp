@@ -149,6 +149,31 @@ private:
         };
         fill(thread.init, plan.init_steps, plan.init);
         fill(thread.functions, plan.steps, plan.functions);
+        note_working_set(thread, plan);
+    }
+
+    // Instances of one loadrt lie in a row: mostly one entry for all of them.
+    void note_working_set(const Thread& thread, plan::Plan& plan) const {
+        constexpr std::size_t gap = 64;     // closer than that is in a row
+        constexpr std::size_t code = 2048;  // of a function: its length is not known
+        auto& set = plan.working_set;
+        set.push_back({plan.steps.data(), plan.steps.size() * sizeof(plan::Step)});
+        set.push_back({plan.image.get(), plan.image_size * sizeof(hal_value)});
+        std::unordered_set<hal_step> met;
+        for (const plan::Step& step : plan.steps)
+            if (met.insert(step.step).second) set.push_back({reinterpret_cast<const void*>(step.step), code});
+        const std::size_t before = set.size();
+        for (const Function* function : thread.functions) {
+            if (excluded(function)) continue;
+            for (const Instance* instance : function->instances) {
+                const auto begin = reinterpret_cast<std::uintptr_t>(instance->memory);
+                const std::size_t bytes = instance->component->plugin->instance_size;
+                plan::Memory& last = set.back();
+                const auto end = reinterpret_cast<std::uintptr_t>(last.begin) + last.bytes;
+                if (set.size() > before && begin >= end && begin - end < gap) last.bytes += begin - end + bytes;
+                else set.push_back({instance->memory, bytes});
+            }
+        }
     }
 
     plan::Export& channel(Thread* from, Thread* to) {

@@ -96,6 +96,12 @@ struct Safe {
     hal_value value;
 };
 
+/// Bytes in a row that the cycle works on.
+struct Memory {
+    const void* begin;
+    std::size_t bytes;
+};
+
 struct Plan {
     std::uint64_t epoch = 0;
     std::vector<Step> steps;
@@ -112,6 +118,7 @@ struct Plan {
     std::unique_ptr<FiniteCheck[]> finite_checks;
     std::unique_ptr<hal_value[]> image;      ///< the slots of this thread's signals, in order of first use
     std::size_t image_size = 0;
+    std::vector<Memory> working_set;         ///< steps, image, code, instances in the order of their steps: see Core::warm
     std::vector<std::shared_ptr<void>> keep; ///< what must outlive the plan: cells shared between threads
     std::vector<std::uint64_t> scratch;      ///< room for the carries' reads, so that taking the plan allocates nothing
 };
