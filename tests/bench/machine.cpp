@@ -137,7 +137,8 @@ PeriodicThread::PeriodicThread(int cpu, std::int64_t period_ns, std::function<vo
         const Wait wait{Wait::default_spin_ns(t.period_ns_)};
         std::int64_t due = monotonic_ns() + t.period_ns_;
         for (std::uint64_t cycle = 0; !t.quit_.load(std::memory_order_relaxed); ++cycle) {
-            if (const std::int64_t now = wait.until(due); now > due) due += (now - due) / t.period_ns_ * t.period_ns_;
+            wait.sleep(due);
+            if (const std::int64_t now = Wait::spin(due); now > due) due += (now - due) / t.period_ns_ * t.period_ns_;
             const std::int64_t begin = monotonic_ns();
             t.work_(cycle);
             t.last_ns_.store(static_cast<std::int32_t>(monotonic_ns() - begin), std::memory_order_relaxed);
