@@ -11,12 +11,12 @@ Canvas::Canvas(std::size_t columns, std::size_t rows, bool unicode)
     : columns_(columns), rows_(rows), dots_x_(columns * 2), dots_y_(rows * (unicode ? 4 : 2)), unicode_(unicode) {
     // A character is twice as high as wide, so the dots are square in Braille; else two columns make one dot.
     if (!unicode_) dots_x_ = columns;
-    half_ = (static_cast<double>(std::min(dots_x_, dots_y_)) - 1.0) / 2.0;
+    half_ = static_cast<double>((std::min(dots_x_, dots_y_) - 1) / 2);
     dots_.resize(dots_x_ * dots_y_);
 }
 
 void Canvas::dot(double x, double y) {
-    const double column = (static_cast<double>(dots_x_) - 1.0) / 2.0 + x * half_, row = (static_cast<double>(dots_y_) - 1.0) / 2.0 - y * half_;
+    const double column = static_cast<double>((dots_x_ - 1) / 2) + x * half_, row = static_cast<double>((dots_y_ - 1) / 2) - y * half_;
     if (!(column > -0.5 && row > -0.5 && column < static_cast<double>(dots_x_) - 0.5 && row < static_cast<double>(dots_y_) - 0.5)) return;  // NaN too
     dots_[static_cast<std::size_t>(std::lround(row)) * dots_x_ + static_cast<std::size_t>(std::lround(column))] = true;
 }

@@ -89,11 +89,12 @@ std::string timing_report(Session& session) {
     if (reports.empty()) return text;
     std::size_t width = 6;
     for (const ThreadReport& report : reports) width = std::max(width, report.name.size());
-    text += fmt::format("{:{}}  {:>9} {:>10} {:>7} | wake-up late {:>17} {:>10} | busy {:>4} {:>10} {:>10}\n", "thread", width, "period", "cycles", "missed", "p50     p99", "max", "p50", "p99", "max");
+    constexpr const char* columns = "{:{}}  {:>9} {:>10} {:>7}  {:>11} {:>9} {:>9}  {:>9} {:>9} {:>9}\n";
+    text += fmt::format(columns, "thread", width, "period", "cycles", "missed", "wake-up p50", "p99", "max", "busy p50", "p99", "max");
     for (const ThreadReport& r : reports) {
-        text += fmt::format("{:{}}  {:>9} {:>10} {:>7} | {:>10} {:>10} {:>9}  | {:>9} {:>10} {:>10}\n", r.name, width, format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed,
-                            format_duration(r.wakeup_p50_ns), format_duration(r.wakeup_p99_ns), format_duration(r.wakeup_max_ns), format_duration(r.busy_p50_ns),
-                            format_duration(r.busy_p99_ns), format_duration(r.busy_max_ns));
+        text += fmt::format(columns, r.name, width, format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed, format_duration(r.wakeup_p50_ns),
+                            format_duration(r.wakeup_p99_ns), format_duration(r.wakeup_max_ns), format_duration(r.busy_p50_ns), format_duration(r.busy_p99_ns),
+                            format_duration(r.busy_max_ns));
     }
     std::string policies;
     for (const ThreadReport& r : reports) {

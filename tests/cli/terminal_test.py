@@ -135,7 +135,7 @@ class RunInteractively(Case):
         self.terminal.expect("hal> ")
         self.terminal.send("quit\r")
         self.assertEqual(0, self.terminal.wait())
-        self.assertIn("wake-up late", self.terminal.seen)
+        self.assertIn("wake-up p50", self.terminal.seen)
 
     def test_others_may_talk_to_it(self):
         self.shell("setp", "adder.in0", "6")
@@ -167,7 +167,7 @@ class RunInteractively(Case):
         self.terminal.expect("adder.in0")
         os.kill(self.terminal.process, signal.SIGTERM)
         self.assertEqual(0, self.terminal.wait())
-        self.assertIn("wake-up late", self.terminal.seen)
+        self.assertIn("wake-up p50", self.terminal.seen)
 
 
 if __name__ == "__main__":
