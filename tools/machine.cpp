@@ -88,7 +88,7 @@ Machine::~Machine() {
     server_.reset();
 }
 
-bool Machine::serve() {
+bool Machine::serve(bool needed) {
     const std::string& name = session.options().name;
     if (!good_instance_name(name)) {
         fail(options_, fmt::format("'{}' is no name for an instance; use letters, digits, '-', '_' and '.', at most 64", name));
@@ -102,9 +102,9 @@ bool Machine::serve() {
     server_ = std::make_unique<Server>(shell, std::move(how));
     Diagnostics diagnostics;
     if (server_->start(diagnostics)) return true;
-    write_all(STDERR_FILENO, render(diagnostics, session.sources, colours(STDERR_FILENO)));
     server_.reset();
-    return false;
+    if (needed) write_all(STDERR_FILENO, render(diagnostics, session.sources, colours(STDERR_FILENO)));
+    return !needed;
 }
 
 int Machine::load() {

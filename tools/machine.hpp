@@ -21,8 +21,8 @@ public:
     ~Machine();  ///< outputs safe, processes ended, instances destroyed
     Machine(const Machine&) = delete;
 
-    /// Opens the control socket. False after saying why on stderr.
-    bool serve();
+    /// Opens the control socket. False after saying why on stderr; one that is not `needed` is done without.
+    bool serve(bool needed);
     /// Runs the files. Returns the exit status.
     int load();
     /// `start`, unless the threads run already.

@@ -48,7 +48,7 @@ int run_run(const Options& options) {
     if (options.words.empty() && !options.interactive && !options.classic) return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
     if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
     Machine machine(options, own_name(options), false);
-    if (!machine.serve()) return 1;
+    if (!machine.serve(true)) return 1;
     return options.classic ? run_classic(machine, options) : run_plain(machine, options);
 }
 

@@ -13,7 +13,7 @@ int run_sim(const Options& options) {
     const bool advance = options.for_ns >= 0 || options.cycles != 0;
     if (options.for_ns >= 0 && options.cycles != 0) return fail(options, "--for and --cycles exclude each other; leave one out");
     Machine machine(options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
-    if (!machine.serve()) return 1;
+    if (!machine.serve(!options.name.empty())) return 1;
     int status = machine.load();
     if (status == 0 && advance) {
         machine.start_threads();

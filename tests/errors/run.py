@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: MIT
 """Runs error tests: run.py [HAL] [--every-code] [TEST...]
 
-CODE.hal provokes the diagnostic CODE: `hal check CODE.hal`, or the command line in CODE.cmd, runs in this folder, and
-its whole standard error must be CODE.expected, which must mention [CODE]. CODE-more.hal is a further test of CODE.
-Files the tests source have another ending (.inc). Without TEST (or with --every-code, which runs nothing) each code of `hal explain` must have a test, and each test a code.
+CODE.hal provokes the diagnostic CODE: `hal check CODE.hal`, or the command line in CODE.cmd, or the shell script CODE.sh
+runs in this folder, and its whole standard error must be CODE.expected, which must mention [CODE]. CODE-more.hal is a
+further test of CODE. Files the tests source have another ending (.inc). A script has the program in its PATH and an
+empty folder of its own in $HOME.
+Without TEST (or with --every-code, which runs nothing) each code of `hal explain` must have a test, and each test a code.
 """
 import difflib
 import os
@@ -32,12 +34,15 @@ def program(arguments):
 
 
 def run(hal, command):
-    """Standard error and exit status of a command line whose first word is hal, halrun or halcmd."""
+    """Standard error and exit status of a command line."""
     with tempfile.TemporaryDirectory() as folder:
         keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH") or key.endswith("SAN_OPTIONS")}
-        environment = {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder}
+        environment = {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder,
+                       "PATH": f"{hal.parent}:{os.environ['PATH']}"}
+        # a file that is no plugin, and the components made for tests
+        environment["HALCYON_PLUGIN_PATH"] = f"plugins:{hal.parent.parent / 'tests' / 'plugins'}"
         try:
-            done = subprocess.run([str(hal.parent / command[0]), *command[1:]], cwd=HERE, env=environment, stdin=subprocess.DEVNULL,
+            done = subprocess.run(["/usr/bin/env", *command], cwd=HERE, env=environment, stdin=subprocess.DEVNULL,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
         except subprocess.TimeoutExpired as late:
             return late.stderr or b"", f"still running after {TIMEOUT:g} s"
@@ -68,6 +73,8 @@ def check(hal, test, known):
     command = ["hal", "check", f"{test}.hal"]
     if (HERE / f"{test}.cmd").exists():
         command = shlex.split((HERE / f"{test}.cmd").read_text())
+    if (HERE / f"{test}.sh").exists():
+        command = ["sh", "-eu", f"{test}.sh"]
     got, status = run(hal, command)
     wanted = expected.read_bytes()
     problems = []
@@ -87,7 +94,7 @@ def main():
     coverage_only = "--every-code" in arguments
     names = [Path(a).stem for a in arguments if a != "--every-code"]
     known = codes(hal)
-    everything = sorted({path.stem for pattern in ("*.hal", "*.cmd") for path in HERE.glob(pattern)})
+    everything = sorted({path.stem for pattern in ("*.hal", "*.cmd", "*.sh") for path in HERE.glob(pattern)})
     tests = [] if coverage_only else [t for t in everything if not names or t in names]
     failed = 0
     for test in tests:

@@ -32,10 +32,11 @@ def program(arguments):
     return built[-1]
 
 
-def environment(folder):
+def environment(hal, folder):
     """Nothing of the user's own: no colours, no running instances, no home."""
     keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH") or key.endswith("SAN_OPTIONS")}
-    return {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder}
+    return {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder,
+            "PATH": f"{hal.parent}:{os.environ['PATH']}"}
 
 
 def run(hal, test):
@@ -43,10 +44,9 @@ def run(hal, test):
     command = ["hal", "sim", "test.hal"]
     if (test / "command").exists():
         command = shlex.split((test / "command").read_text())
-    command[0] = str(hal.parent / command[0])
     with tempfile.TemporaryDirectory() as folder:
         try:
-            done = subprocess.run(command, cwd=test, env=environment(folder), stdin=subprocess.DEVNULL,
+            done = subprocess.run(["/usr/bin/env", *command], cwd=test, env=environment(hal, folder), stdin=subprocess.DEVNULL,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
         except subprocess.TimeoutExpired as late:
             return late.stdout or b"", late.stderr or b"", f"still running after {TIMEOUT:g} s"

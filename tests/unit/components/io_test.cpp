@@ -103,7 +103,7 @@ TEST(Sampler, Takes_many_pins_and_refuses_bad_arguments) {
 
 TEST(Sampler, A_reader_on_another_processor_sees_whole_records_in_order) {
     Streaming s("sampler", {{"cfg", "ss"}, {"depth", "64"}});
-    constexpr std::uint64_t wanted = 200'000;
+    constexpr std::uint64_t wanted = 50'000;
     std::atomic<bool> done{false};
     std::thread machine([&] {
         for (std::int32_t i = 0; !done; ++i) {

@@ -241,7 +241,7 @@ TEST(Encoder, Counts_are_coherent_when_the_functions_run_on_two_processors) {
     e.set("position-scale", 1.0);
     std::atomic<bool> done{false};
     std::thread fast([&] {
-        for (std::int64_t i = 1; i <= 300'000; ++i) {
+        for (std::int64_t i = 1; i <= 100'000; ++i) {
             const std::int64_t at = i % 2000 < 1000 ? i % 2000 : 2000 - i % 2000;
             e.show(at);
         }
