@@ -14,7 +14,8 @@ namespace {
 /// What `update-freq` asks of `make-pulses`.
 struct Order {
     bool on = false;
-    double rate = 0.0;  // steps per period of make-pulses, signed
+    double rate = 0.0;          // steps per second, signed
+    double slope = 0.0;         // steps per second squared to get there; 0: at once
     std::int64_t step_ns = 0, space_ns = 0, hold_ns = 0, setup_ns = 0;
 };
 
@@ -27,7 +28,7 @@ struct Sequence {
 };
 constexpr int first_sequence = 2, user_type = 15;
 constexpr std::array<Sequence, 13> sequences{{
-    {2, 4, {0b00, 0b01, 0b11, 0b10}},                                                       // 2 quadrature
+    {2, 4, {0b01, 0b11, 0b10, 0b00}},                                                       // 2 quadrature
     {3, 3, {0b001, 0b010, 0b100}},                                                          // 3 three phases, full step
     {3, 6, {0b001, 0b011, 0b010, 0b110, 0b100, 0b101}},                                     // 4 three phases, half step
     {4, 4, {0b0001, 0b0010, 0b0100, 0b1000}},                                               // 5 unipolar, one phase on
@@ -98,7 +99,9 @@ struct Stepgen : hal::Component {
         const std::int64_t tick_ns = cycle.period_ns();
         tick_ns_.store(tick_ns, std::memory_order_relaxed);
         const Order& wanted = orders_.get();
-        position_ += wanted.rate;
+        const double before = rate_, change = wanted.slope * cycle.seconds();
+        rate_ = change > 0.0 ? std::clamp(wanted.rate, before - change, before + change) : wanted.rate;
+        position_ += (change > 0.0 ? 0.5 * (before + rate_) : rate_) * cycle.seconds();
         for (std::int64_t* timer : {&pulse_ns_, &space_ns_, &hold_ns_, &setup_ns_}) *timer = std::max<std::int64_t>(0, *timer - tick_ns);
 
         if (pulse_ns_ == 0 && high_) {  // the pulse ends
@@ -123,13 +126,14 @@ struct Stepgen : hal::Component {
     void update_freq(hal::Cycle cycle) noexcept {
         if (position_scale == 0.0 || !std::isfinite(position_scale)) position_scale = 1.0;
         scale_.store(position_scale, std::memory_order_relaxed);
-        const std::int64_t tick_ns = tick_ns_.load(std::memory_order_relaxed);
-        const double wanted = tick_ns > 0 && enable ? limited(command(cycle.seconds()), tick_ns, cycle.seconds()) : 0.0;
+        const std::int64_t known_ns = tick_ns_.load(std::memory_order_relaxed), tick_ns = known_ns > 0 ? known_ns : cycle.period_ns();
+        const double wanted = enable ? limited(command(cycle.seconds()), tick_ns, cycle.seconds()) : 0.0;
         if (!enable && position_cmd) last_command_ = *position_cmd * position_scale;
         frequency = wanted;
         Order next;
         next.on = enable;
-        next.rate = wanted * static_cast<double>(tick_ns) * 1e-9;
+        next.rate = wanted;
+        next.slope = enable ? acceleration() : 0.0;
         next.step_ns = step_length;
         if (step_space) next.space_ns = *step_space;
         if (dir_hold) next.hold_ns = *dir_hold;
@@ -139,20 +143,21 @@ struct Stepgen : hal::Component {
     }
 
 private:
-    /// The speed in steps/s that the command asks for, before limits. For a position: the command's own speed, and on top
-    /// what closes the distance as fast as it can still be braked away: v = sqrt(2 a |e| + (a dt / 2)^2) - a dt / 2.
+    /// The speed in steps/s at the end of this period that the command asks for, before limits. For a position: the
+    /// command's own speed, and on top of it what closes the distance e. With an acceleration a the speed changes evenly over
+    /// the period T; from v to w it covers (v + w) T / 2, and what is left must still be enough to brake from w:
+    ///     e - (v + w) T / 2 = w^2 / 2a,  so  w = sqrt((a T / 2)^2 + 2 a (e - v T / 2)) - a T / 2
     double command(double dt) noexcept {
         if (velocity_cmd) return *velocity_cmd * position_scale;
         const double target = *position_cmd * position_scale;
-        const double speed = (target - last_command_) / dt;
+        const double own = (target - last_command_) / dt;
         last_command_ = target;
         const double distance = target - position_out_.load(std::memory_order_relaxed);
-        double closing = std::fabs(distance) / dt;
-        if (const double a = acceleration(); a > 0.0) {
-            const double half = 0.5 * a * dt;
-            closing = std::min(closing, std::sqrt(2.0 * a * std::fabs(distance) + half * half) - half);
-        }
-        return speed + std::copysign(closing, distance);
+        const double a = acceleration();
+        if (!(a > 0.0)) return own + distance / dt;
+        const double half = 0.5 * a * dt, left = distance - 0.5 * (frequency - own) * dt;
+        const double closing = std::sqrt(half * half + 2.0 * a * std::fabs(left)) - half;
+        return own + std::copysign(std::min(closing, std::fabs(distance) / dt), left);
     }
 
     double limited(double wanted, std::int64_t tick_ns, double dt) noexcept {
@@ -225,6 +230,7 @@ private:
     // make-pulses only
     double position_ = 0.0;                 // where the motor should be, in steps
     std::int64_t made_ = 0;                 // steps made
+    double rate_ = 0.0;                     // how fast that moves now, in steps per second
     int direction_ = 1;
     bool high_ = false;
     std::int64_t pulse_ns_ = 0, space_ns_ = 0, hold_ns_ = 0, setup_ns_ = 0;  // what is left of each time
