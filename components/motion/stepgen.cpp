@@ -246,7 +246,7 @@ into the servo thread, one before and one after what computes the command. The t
 
 `position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a command that stands
 still: on top of the command's own speed, v = √(2 a e + (a T/2)²) - a T/2 for a distance e. `velocity-cmd` (ctrl_type=v) is
-followed within the same limits. Steps are whole periods of the fast thread apart, at most one per period; a step that has to
+followed within the same limits. With `maxaccel` the speed changes evenly from one update to the next, not in jumps. Steps are whole periods of the fast thread apart, at most one per period; a step that has to
 wait for one of the times below is made later, none is lost. A step is made where the position passes the middle between two.
 
 | step_type | outputs | times used |
