@@ -18,6 +18,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+# No command line provokes these alike on every machine; tests/unit/session_memory.cpp does.
+ELSEWHERE = {"out-of-memory", "thread-refused"}
 TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
 
 
@@ -104,7 +106,7 @@ def main():
             print("\n".join("    " + line for line in problems))
     if not names:
         tested = {code_of(test, known) for test in everything}
-        for code in sorted(known - tested):
+        for code in sorted(known - tested - ELSEWHERE):
             failed += 1
             print(f"FAILED {code}: no test; write {code}.hal and {code}.expected")
         for path in sorted(HERE.glob("*.expected")):

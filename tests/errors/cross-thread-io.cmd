@@ -1,0 +1,1 @@
+halrun -v cross-thread-io.hal

@@ -1,0 +1,1 @@
+halrun -v cyclic-order.hal

@@ -1,0 +1,1 @@
+hal sim init-done.hal --for 1ms

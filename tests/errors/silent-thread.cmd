@@ -1,0 +1,1 @@
+halrun silent-thread.hal

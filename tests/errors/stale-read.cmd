@@ -1,0 +1,1 @@
+halrun -v stale-read.hal

@@ -1,0 +1,1 @@
+hal sim start-failed.hal --for 1ms
