@@ -95,8 +95,6 @@ inline constexpr CodePage code_pages[] = {
      "A carriage return stands in the middle of a line. Such a line looks like several in an editor but is one for the netlist, so it "
      "is refused; other lines with the same fault are not listed.\n\n"
      "`tr '\\r' '\\n' < OLD > NEW` converts a file whose lines end in CR only."},
-    {"missing-argument",
-     "A component cannot be loaded without this argument."},
     {"name-taken",
      "Pins, aliases, signals, functions, instances and threads have names of their own kind that stand for one thing; pins "
      "and signals share one set of names. The name is in use.\n\n"

@@ -248,9 +248,10 @@ bool construct(Model& model, Edit& edit, Component& component, const LoadRequest
         if (i == 0) {
             for (const auto& [name, given] : request.arguments) {
                 if (c.asked.contains(name)) continue;
-                const std::vector<std::string> all(c.asked.begin(), c.asked.end());
+                std::vector<std::string> all(c.asked.begin(), c.asked.end());
+                all.insert(all.end(), {"names", "count", "personality"});
                 diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", did_you_mean(name, all),
-                                  "its arguments: " + (all.empty() ? std::string() : listed(all) + ", ") + "names, count, personality");
+                                  "its arguments: " + listed(all));
                 return false;
             }
             if (!known) {

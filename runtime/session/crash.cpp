@@ -90,11 +90,11 @@ void on_signal(int signal) {
 }  // namespace
 
 void watch_for_crashes(Session::State* state) {
-    // for threads that run cycles without being the executor's: the virtual clock
-    alignas(16) static thread_local char room[1 << 15];
-    const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
-    sigaltstack(&other, nullptr);
     static const bool installed = [] {
+        // for the program's own thread, which runs the cycles of a virtual clock; the executor's threads have one each
+        alignas(16) static char room[1 << 15];
+        const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
+        sigaltstack(&other, nullptr);
         std::set_terminate(on_terminate);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         struct sigaction action{};
