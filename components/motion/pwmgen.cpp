@@ -22,7 +22,8 @@ struct Order {
 struct Pwmgen : hal::Component {
     enum Type { single, with_direction, up_down };
 
-    hal::Argument type{*this, "output_type", 0, "0 one output, 1 with direction, 2 up and down; one number per instance", {.per_instance = true, .min = 0, .max = 2}};
+    hal::Argument type{*this, "output_type", 0, "0 one output, 1 with direction, 2 up and down; a number per instance",
+                       {.per_instance = true, .min = 0, .max = 2}};
 
     hal::Function make{*this, "make-pulses", &Pwmgen::make_pulses, "makes the waveforms; in the fastest thread", {.shared = true}};
     std::optional<hal::Out<bool>> pwm, dir, up, down;

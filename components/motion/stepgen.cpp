@@ -48,13 +48,13 @@ struct Stepgen : hal::Component {
 
     hal::Argument type{*this, "step_type", 0, "waveform, 0 to 15; one number per instance", {.per_instance = true, .min = 0, .max = user_type}};
     hal::TextArgument control{*this, "ctrl_type", "p", "p: position-cmd, v: velocity-cmd; one letter per instance", {.per_instance = true}};
-    hal::TextArgument user{*this, "user_step_type", "", "states of step type 15, numbers of up to 5 bits, at most 10 of them: 0x1,0x2,0x4"};
+    hal::TextArgument user{*this, "user_step_type", "", "states of step type 15: at most 10 numbers of up to 5 bits, 0x1,0x2,0x4"};
 
     hal::Function make{*this, "make-pulses", &Stepgen::make_pulses, "makes the waveforms; in the fastest thread", {.shared = true}};
     std::optional<hal::Out<bool>> first, second;  // step and dir, or up and down
     hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts", "steps made since the start"};
 
-    hal::Function capture{*this, "capture-position", &Stepgen::capture_position, "publishes the position; in the servo thread, before the controller", {.shared = true}};
+    hal::Function capture{*this, "capture-position", &Stepgen::capture_position, "publishes the position; before the controller", {.shared = true}};
     hal::Out<std::int32_t> counts{*this, capture, "counts", "steps made since the start"};
     hal::Out<double> position_fb{*this, capture, "position-fb", "position in length units, finer than a step"};
 
@@ -246,7 +246,8 @@ into the servo thread, one before and one after what computes the command. The t
 
 `position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a command that stands
 still: on top of the command's own speed, v = √(2 a e + (a T/2)²) - a T/2 for a distance e. `velocity-cmd` (ctrl_type=v) is
-followed within the same limits. With `maxaccel` the speed changes evenly from one update to the next, not in jumps. Steps are whole periods of the fast thread apart, at most one per period; a step that has to
+followed within the same limits. With `maxaccel` the speed changes evenly from one update to the next, not in jumps.
+Steps are whole periods of the fast thread apart, at most one per period; a step that has to
 wait for one of the times below is made later, none is lost. A step is made where the position passes the middle between two.
 
 | step_type | outputs | times used |
