@@ -20,9 +20,9 @@ MENTIONED = re.compile(r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\
 
 
 def absent(root, page, files):
-    """(line number, name) of each file that `page` mentions and that is neither beside or below it, nor at that path
+    """(line number, name) of each file that `page` mentions and that is neither near it (in the folder above or below that), nor at that path
     from the root or from where the sdk is included."""
-    near = [f.as_posix() for f in files if page.parent in f.parents]
+    near = [f.as_posix() for f in files if page.parent.parent in f.parents]
     for number, line in enumerate((root / page).read_text(errors="replace").splitlines(), 1):
         for quoted, link in MENTIONED.findall(line):
             name = quoted or link
