@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 // The end of memory at every single allocation of an edit: it works or it is refused, and then nothing has changed.
+#include <atomic>
+#include <cerrno>
 #include <cstdlib>
+#include <dlfcn.h>
 #include <malloc.h>
 #include <new>
+#include <pthread.h>
 
 #include "machine.hpp"
 #include "plugins/watch.hpp"
@@ -48,6 +52,18 @@ void operator delete(void* memory, std::align_val_t) noexcept { give(memory, 0);
 void operator delete[](void* memory, std::align_val_t) noexcept { give(memory, 0); }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { give(memory, 0); }
 void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { give(memory, 0); }
+
+#if !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__) && !defined(HALCYON_RT_GUARD)
+static std::atomic<bool> refuse_threads{false};
+
+extern "C" [[gnu::visibility("default")]] int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*run)(void*), void* self) {
+    if (refuse_threads) return EAGAIN;
+    static const auto real = reinterpret_cast<decltype(&pthread_create)>(dlsym(RTLD_NEXT, "pthread_create"));
+    return real(thread, attributes, run, self);
+}
+#else
+static bool refuse_threads = false;
+#endif
 
 namespace hal::test {
 namespace {
@@ -106,6 +122,21 @@ INSTANTIATE_TEST_SUITE_P(
                                      "net fresh y.u64-out\nnewsig f2 port\nsets f2 8", "setp x.float-in 3\nsetp y.float-in 4\nsets i 5", "alias pin y.u32-in other\nunalias pin speed", "addf --auto u"),
                      testing::Bool()),
     [](const auto& edit) { return std::to_string(edit.index); });
+
+TEST(A_thread_the_system_refuses, undoes_the_edit) {
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__) || defined(HALCYON_RT_GUARD)
+    GTEST_SKIP() << "the sanitizer stands before pthread_create itself";
+#endif
+    Machine machine(Clock::real);
+    machine.must("newthread first 1000000\nloadrt test-counter names=c\naddf c first");
+    machine.start();
+    refuse_threads = true;
+    machine.refused("newthread second 2000000\nloadrt test-life names=x\naddf x second\nsetp c.step 4", "thread-refused");
+    refuse_threads = false;
+    EXPECT_NE(machine.said.find("thread 'second' cannot be made: the system gives no thread: Resource temporarily unavailable"), std::string::npos) << machine.said;
+    machine.must("newthread second 2000000\nloadrt test-counter names=d\naddf d second");
+    EXPECT_TRUE(eventually([&] { return machine.number("d.count") > 3 && machine.number("c.count") > 3; }));
+}
 
 }  // namespace
 }  // namespace hal::test
