@@ -62,7 +62,7 @@ Script::Parsed Script::parse_text(std::uint32_t source) {
 
 int Script::run(std::uint32_t source) {
     const bool collecting_before = state_.collecting;
-    files_.push_back({canonical_path(session_.sources.get(source).name), {}});
+    files_.push_back({canonical_path(resolve_path(session_.sources.get(source).name, shell_.options.directory)), {}});
     run_commands(source);
     files_.pop_back();
     finish();
@@ -236,7 +236,7 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
             opted_out.push_back(text);
             continue;
         }
-        files_.push_back({canonical_path(session_.sources.get(text).name), {}});
+        files_.push_back({canonical_path(resolve_path(session_.sources.get(text).name, shell_.options.directory)), {}});
         sort_in(sort_in, text);
         files_.pop_back();
     }

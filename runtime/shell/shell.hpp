@@ -56,7 +56,7 @@ struct ShellOptions {
     bool notes = false;       ///< print notes (stale reads …) as well as errors and warnings
     bool check = false;       ///< `hal check`: a file is one transaction, commands that act are only looked at
     Level level = Level::errors;
-    std::string directory;    ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
+    std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
 };
 
 struct Processes;
