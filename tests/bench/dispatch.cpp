@@ -146,7 +146,7 @@ Slow measure_at_rate(const Options& options, const Case& c) {
         std::vector<double> seen = watch(samples, [&] { return static_cast<double>(__atomic_load_n(&t.time.slot->s32, __ATOMIC_RELAXED)); });
         return median(seen);
     };
-    for (int round = 0; round < (options.quick ? 1 : 3); ++round) {
+    for (int round = 0; round < (options.quick ? 1 : 2); ++round) {
         ours.push_back(rate(""));
         Bed bed(c);
         const auto bind = bed.core(false);
@@ -156,7 +156,7 @@ Slow measure_at_rate(const Options& options, const Case& c) {
             std::vector<double> seen = watch(samples, [&] { return static_cast<double>(thread.last_ns()); });
             loop.push_back(median(seen));
         }
-        cold.push_back(rate("spin=0"));
+        if (round == 0) cold.push_back(rate("spin=0"));
     }
     const auto n = static_cast<double>(c.count);
     return {median(ours) / n, median(loop) / n, median(cold) / n};
@@ -171,7 +171,7 @@ Peer measure_linuxcnc(const Options& options, const Case& c) {
     const auto peer = LinuxCnc::start("name1=t period1=1000000");
     if (!peer || peer->file(netlist(c, c.linuxcnc_count) + "start\n").status != 0) return {};
     peer->sample("t.time", 20, 1200);
-    std::vector<double> samples = peer->sample("t.time", options.quick ? 300 : 900, 1200);
+    std::vector<double> samples = peer->sample("t.time", options.quick ? 200 : 600, 1200);
     std::erase_if(samples, [](double s) { return s <= 0; });
     if (samples.empty()) return {};
     const double unit = LinuxCnc::ns_per_time_unit() / static_cast<double>(c.linuxcnc_count);

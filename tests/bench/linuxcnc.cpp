@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sched.h>
 #include <sys/ipc.h>
 #include <sys/shm.h>
 #include <thread>
@@ -57,7 +58,9 @@ bool clear_shared_memory() {
 std::string why_absent() {
     for (const char* program : {"rtapi_app", "halcmd"})
         if (find_program(program).empty()) return "LinuxCNC: not installed (linuxcnc-uspace)";
-    return is_running() || !clear_shared_memory() ? "LinuxCNC: in use, left alone" : "";
+    // In an IPC namespace of our own there is no other LinuxCNC, and nothing stays behind.
+    static const bool alone = unshare(CLONE_NEWIPC) == 0;
+    return alone || (!is_running() && clear_shared_memory()) ? "" : "LinuxCNC: in use, left alone";
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "machine.hpp"
 
 #include <ctime>
+#include <exception>
 #include <fmt/core.h>
 #include <fstream>
 #include <sched.h>
@@ -127,6 +128,21 @@ void run_real_time(int cpu, const std::function<void()>& work) {
         become_real_time(cpu);
         work();
     }).join();
+}
+
+void run_undisturbed(const std::function<void()>& work) {
+    std::exception_ptr problem;
+    std::thread([&] {
+        sched_param parameters{};
+        parameters.sched_priority = 1;
+        pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+        try {
+            work();
+        } catch (...) {
+            problem = std::current_exception();
+        }
+    }).join();
+    if (problem) std::rethrow_exception(problem);
 }
 
 PeriodicThread::PeriodicThread(int cpu, std::int64_t period_ns, std::function<void(std::uint64_t)> work)

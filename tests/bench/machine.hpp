@@ -31,6 +31,10 @@ double stolen_ms();
 /// Runs `work` once in a SCHED_FIFO thread on that CPU (in an ordinary thread where that is not allowed) and waits for it.
 void run_real_time(int cpu, const std::function<void()>& work);
 
+/// Runs `work` in a thread that ordinary programs do not push aside (SCHED_FIFO 1, as are the programs it starts; an ordinary
+/// thread where that is not allowed), waits for it, and passes on what it throws. Other work on the machine does not count.
+void run_undisturbed(const std::function<void()>& work);
+
 /// A loop of one's own as a real-time program would write it: the same wait, priority and CPU as a thread of the runtime,
 /// and its execution time where a sampler can see it.
 class PeriodicThread {

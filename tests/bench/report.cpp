@@ -55,7 +55,7 @@ void Report::row(const Row& row) {
         break;
     case Goal::Kind::limit:
         target = "≤ " + goal_number(row.goal.value) + (row.unit.empty() ? "" : " " + row.unit);
-        if (both) ratio = number(*row.theirs / *row.ours) + " × less";
+        if (both) ratio = "× " + number(*row.ours / *row.theirs);
         if (row.ours) reached = *row.ours <= row.goal.value;
         break;
     }
