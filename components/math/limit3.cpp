@@ -22,6 +22,9 @@ public:
 
     double operator()(double distance) const noexcept { return std::copysign(magnitude(std::fabs(distance)), distance); }
 
+    /// p(m + 1): the way of the last m + 1 cycles.
+    double last_cycles() const noexcept { return pm_ + vm_ + a_; }
+
 private:
     double magnitude(double distance) const noexcept {
         if (distance <= a_ / m_) return distance;
@@ -59,7 +62,7 @@ struct Limit3 : hal::Component {
     hal::In<double>        max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>        max_velocity{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
     hal::In<double>        max_acceleration{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
-    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop over which the acceleration fades out; up to 2 is the fastest stop", {.initial = 2}};
+    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop over which the acceleration fades out; 2 or less: the fastest stop", {.initial = 2}};
     hal::Function          run{*this, "", &Limit3::update, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -77,6 +80,8 @@ struct Limit3 : hal::Component {
     }
 
 private:
+    static constexpr double full = 1.0 - 1e-9;  // this much of A is A, but for rounding
+
     void put(double target, double dt) {
         velocity_ = loading_ ? (target - position_) / dt : 0.0;  // how it really moves while it is carried along
         position_ = target;
@@ -96,9 +101,21 @@ private:
 
         const Approach approach(a, static_cast<double>(std::max<std::uint32_t>(smooth_steps, 2) - 1));
         const double before = velocity_ * dt;
-        double step = drift + approach(target - position_ - drift);
-        step = std::max(step, approach(min - position_));
-        step = std::min(step, approach(max - position_));
+        // The displacement towards a point that is `distance` away and moves by `own` per cycle. It changes by all of A or
+        // is all of maxv; only the last cycles may take less. Where the fastest way would, the output brakes, and gets what
+        // is missing in a later cycle.
+        const auto towards = [&](double distance, double own) {
+            const double left = distance - own, fastest = own + approach(left);
+            if (std::fabs(fastest) >= v || std::fabs(fastest - before) >= a * full) return fastest;
+            const double braking = before - std::copysign(a, left);
+            const double slower = std::copysign(1.0, left) * (braking - own);
+            const bool as_soon = std::fabs(left) - slower <= std::min(a, slower) / full;  // there in the next cycle
+            return std::fabs(left) > approach.last_cycles() || as_soon ? braking : fastest;
+        };
+        double step = towards(target - position_, drift);
+        if (std::fabs(step - before) > a * full) step = before + std::copysign(a, step - before);
+        step = std::max(step, towards(min - position_, 0.0));
+        step = std::min(step, towards(max - position_, 0.0));
         step = std::clamp(step, -v, v);
         step = std::clamp(step, before - a, before + a);
         velocity_ = step / dt;
@@ -118,8 +135,9 @@ HAL_COMPONENT(Limit3, "limit3", "Follows a value within limits of position, velo
 `out` goes to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without overshoot; it meets a moving
 input at its own speed, and follows an input that keeps the limits itself without any lag. It brakes in time for `min`
 and `max`. When a limit is moved, or the input turns round, so that the output can no longer stop in time, `maxa` is
-kept and the output comes back. With `smooth-steps` above 2 the acceleration fades out over the last cycles before a stop:
-it takes a little longer and is gentle to a jittering input.
+kept and the output comes back. It moves with all of `maxa` or all of `maxv` until it is only some cycles from a stop. With
+`smooth-steps` above 2 the acceleration fades out over that many cycles: it takes a little longer and is gentle to a
+jittering input.
 
 `out` starts at 0; `load` puts it on the input. While the input is not a number its last value counts. With `maxa` not
 positive `out` stands still. When `min` is above `max`, `max` wins.
