@@ -17,7 +17,8 @@ Canvas::Canvas(std::size_t columns, std::size_t rows, bool unicode)
 
 void Canvas::dot(double x, double y) {
     const double column = static_cast<double>((dots_x_ - 1) / 2) + x * half_, row = static_cast<double>((dots_y_ - 1) / 2) - y * half_;
-    if (!(column > -0.5 && row > -0.5 && column < static_cast<double>(dots_x_) - 0.5 && row < static_cast<double>(dots_y_) - 0.5)) return;  // NaN too
+    if (!(column > -0.5 && row > -0.5 && column < static_cast<double>(dots_x_) - 0.5 && row < static_cast<double>(dots_y_) - 0.5))
+        return;  // NaN too
     dots_[static_cast<std::size_t>(std::lround(row)) * dots_x_ + static_cast<std::size_t>(std::lround(column))] = true;
 }
 
@@ -54,7 +55,8 @@ std::vector<std::string> Canvas::rows() const {
             for (std::size_t y = 0; y < 4; ++y)
                 for (std::size_t x = 0; x < 2; ++x)
                     if (at(2 * column + x, 4 * row + y)) cell |= bits[y][x];
-            text[row] += {static_cast<char>(0xE2), static_cast<char>(0xA0 | cell >> 6), static_cast<char>(0x80 | (cell & 0x3F))};  // U+2800 + cell
+            text[row] +=
+                {static_cast<char>(0xE2), static_cast<char>(0xA0 | cell >> 6), static_cast<char>(0x80 | (cell & 0x3F))};  // U+2800 + cell
         }
     return text;
 }

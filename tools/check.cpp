@@ -14,7 +14,8 @@ int run_check(const Options& options) {
     how.color = colours(STDERR_FILENO);
     Shell shell(session, how);
     ErrorsOnly output;
-    return load_offline(shell, options, output, [](const std::string& path) { write_all(STDERR_FILENO, path + ": no errors\n"); }) == 0 ? 0 : 1;
+    return load_offline(shell, options, output, [](const std::string& path) { write_all(STDERR_FILENO, path + ": no errors\n"); }) == 0 ? 0
+                                                                                                                                        : 1;
 }
 
 }  // namespace hal::tools

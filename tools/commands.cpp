@@ -32,11 +32,12 @@ void words(CLI::App& app, Options& o, const char* name, const char* what, bool r
 }
 
 void for_how_long(CLI::App& app, Options& o, const char* what) {
-    app.add_option_function<std::string>("--for", [&o](const std::string& text) {
+    const auto take = [&o](const std::string& text) {
         const auto ns = parse_duration_ns(text, false);
         if (!ns || *ns < 0) throw CLI::ValidationError("--for", fmt::format("'{}' is not a duration; write 10s, 250ms or 2min", text));
         o.for_ns = *ns;
-    }, what)->type_name("TIME");
+    };
+    app.add_option_function<std::string>("--for", take, what)->type_name("TIME");
 }
 
 void named(CLI::App& app, Options& o, const char* what) { app.add_option("-N,--name", o.name, what)->type_name("NAME"); }
@@ -102,7 +103,9 @@ void declare_doc(CLI::App& app, Options& o) {
     app.add_flag("--man", o.man, "as a troff page: hal doc pid --man | man -l -");
 }
 
-void declare_explain(CLI::App& app, Options& o) { words(app, o, "CODE", "what stands in [brackets] at the end of a message; without it: all", false); }
+void declare_explain(CLI::App& app, Options& o) {
+    words(app, o, "CODE", "what stands in [brackets] at the end of a message; without it: all", false);
+}
 
 void declare_record(CLI::App& app, Options& o) {
     words(app, o, "CHANNEL FILE", "the number of the sampler (default 0), then the file to write (default: standard output)", false);
@@ -227,7 +230,8 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     if (row.verbatim) {
         if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' && !(extra.front() == "--")) {
             const std::string hint = did_you_mean(extra.front(), option_names(*app));
-            return fail(options, fmt::format("there is no option '{}'; {}", extra.front(), hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
+            return fail(options, fmt::format("there is no option '{}'; {}", extra.front(),
+                                             hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
         }
         options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"), extra.end());
     } else if (!extra.empty()) {

@@ -56,7 +56,8 @@ int list(const Plugins& plugins, const Options& options) {
 }  // namespace
 
 int run_doc(const Options& options) {
-    if (options.markdown + options.json + options.man > 1) return fail(options, "--markdown, --json and --man exclude each other; give one");
+    if (options.markdown + options.json + options.man > 1)
+        return fail(options, "--markdown, --json and --man exclude each other; give one");
     const Plugins plugins;
     if (options.words.empty()) return list(plugins, options);
     for (const std::string& name : options.words) {
@@ -66,9 +67,11 @@ int run_doc(const Options& options) {
             Diagnostics diagnostics;
             const auto plugin = plugins.open(name, {}, diagnostics);
             if (!plugin) return fail(options, reason(diagnostics));
-            if (std::string problem; !gather(*plugin->component, page, problem)) return fail(options, fmt::format("component '{}' cannot be constructed: {}", name, problem));
+            if (std::string problem; !gather(*plugin->component, page, problem))
+                return fail(options, fmt::format("component '{}' cannot be constructed: {}", name, problem));
         }
-        if (!print(options.markdown ? as_markdown(page) : options.json ? as_json(page) : options.man ? as_man(page) : as_text(page))) return 1;
+        if (!print(options.markdown ? as_markdown(page) : options.json ? as_json(page) : options.man ? as_man(page) : as_text(page)))
+            return 1;
     }
     return 0;
 }

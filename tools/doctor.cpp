@@ -67,7 +67,8 @@ Finding kernel() {
     const char* kind = version.find("PREEMPT_DYNAMIC") != std::string::npos ? "PREEMPT_DYNAMIC"
                        : version.find("PREEMPT") != std::string::npos       ? "PREEMPT"
                                                                             : "no preemption";
-    return {Verdict::fair, "kernel", fmt::format("{} ({}), not PREEMPT_RT: wake-ups are late by milliseconds now and then", about.release, kind),
+    return {Verdict::fair, "kernel",
+            fmt::format("{} ({}), not PREEMPT_RT: wake-ups are late by milliseconds now and then", about.release, kind),
             "sudo apt install linux-image-rt-amd64, then reboot into it"};
 }
 
@@ -80,8 +81,9 @@ Finding machine() {
             long long value = 0, steal = 0;
             stat >> word;
             for (int i = 0; i < 8 && stat >> value; ++i) steal = value;
-            return {Verdict::fair, "machine", fmt::format("virtual: the host takes the processor away at will ({} s so far)",
-                                                          static_cast<double>(steal) / static_cast<double>(::sysconf(_SC_CLK_TCK))),
+            return {Verdict::fair, "machine",
+                    fmt::format("virtual: the host takes the processor away at will ({} s so far)",
+                                static_cast<double>(steal) / static_cast<double>(::sysconf(_SC_CLK_TCK))),
                     "run on bare metal, or give the guest dedicated processors"};
         }
     return {Verdict::good, "machine", "not virtual"};
@@ -108,7 +110,8 @@ Finding memory() {
     ::getrlimit(RLIMIT_MEMLOCK, &limit);
     if (capable(cap_ipc_lock)) return {Verdict::good, "memory locking", "allowed (cap_ipc_lock)"};
     if (limit.rlim_cur == RLIM_INFINITY) return {Verdict::good, "memory locking", "allowed (limit memlock unlimited)"};
-    return {Verdict::poor, "memory locking", fmt::format("limited to {} KiB: a page fault in a cycle costs 1 us to 10 ms", limit.rlim_cur / 1024),
+    return {Verdict::poor, "memory locking",
+            fmt::format("limited to {} KiB: a page fault in a cycle costs 1 us to 10 ms", limit.rlim_cur / 1024),
             grant() + "; or the line '@realtime - memlock unlimited' in /etc/security/limits.d/realtime.conf"};
 }
 
@@ -117,8 +120,9 @@ Finding capabilities() {
     const bool on_file = ::getxattr(path.c_str(), "security.capability", nullptr, 0) > 0;
     if (capable(cap_sys_nice) && capable(cap_ipc_lock) && capable(cap_net_raw))
         return {Verdict::good, "capabilities", on_file ? "granted to the program file" : "all there (by user)"};
-    return {Verdict::fair, "capabilities", on_file ? "granted to the program file, but not effective (a nosuid mount, or a container)"
-                                                   : "none granted to the program file: raw sockets and priorities need them",
+    return {Verdict::fair, "capabilities",
+            on_file ? "granted to the program file, but not effective (a nosuid mount, or a container)"
+                    : "none granted to the program file: raw sockets and priorities need them",
             grant()};
 }
 
@@ -126,8 +130,9 @@ Finding throttling() {
     const std::string text = first_line("/proc/sys/kernel/sched_rt_runtime_us");
     if (text.empty()) return {Verdict::good, "throttling", "none visible"};
     if (text == "-1") return {Verdict::good, "throttling", "off (kernel.sched_rt_runtime_us = -1)"};
-    return {Verdict::good, "throttling", fmt::format("real-time threads may use {} us of each {} us; a thread that stays below is not touched", text,
-                                                     first_line("/proc/sys/kernel/sched_rt_period_us"))};
+    return {Verdict::good, "throttling",
+            fmt::format("real-time threads may use {} us of each {} us; a thread that stays below is not touched", text,
+                        first_line("/proc/sys/kernel/sched_rt_period_us"))};
 }
 
 Finding governor() {
@@ -147,17 +152,21 @@ Finding governor() {
 Finding isolation() {
     const std::string isolated = first_line("/sys/devices/system/cpu/isolated"), full = first_line("/sys/devices/system/cpu/nohz_full");
     const long cpus = ::sysconf(_SC_NPROCESSORS_ONLN);
-    if (!isolated.empty()) return {Verdict::good, "isolated cpus", fmt::format("{} of {}{}", isolated, cpus, full.empty() || full == "(null)" ? "" : ", without ticks: " + full)};
+    if (!isolated.empty())
+        return {Verdict::good, "isolated cpus",
+                fmt::format("{} of {}{}", isolated, cpus, full.empty() || full == "(null)" ? "" : ", without ticks: " + full)};
     if (cpus < 2) return {Verdict::fair, "isolated cpus", "one processor only: everything shares it"};
     return {Verdict::fair, "isolated cpus", fmt::format("none of {}: other programs run beside the threads", cpus),
-            fmt::format("add isolcpus={0} nohz_full={0} rcu_nocbs={0} to the kernel command line (GRUB_CMDLINE_LINUX in /etc/default/grub)", cpus - 1)};
+            fmt::format("add isolcpus={0} nohz_full={0} rcu_nocbs={0} to the kernel command line (GRUB_CMDLINE_LINUX in /etc/default/grub)",
+                        cpus - 1)};
 }
 
 Finding clock_source() {
     const std::string source = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
     const bool fast = source == "tsc" || source == "arch_sys_counter" || source == "kvm-clock" || source == "riscv_clocksource";
     if (fast) return {Verdict::good, "clock source", source};
-    return {Verdict::fair, "clock source", fmt::format("{}: reading the clock costs about a microsecond", source.empty() ? "unknown" : source),
+    return {Verdict::fair, "clock source",
+            fmt::format("{}: reading the clock costs about a microsecond", source.empty() ? "unknown" : source),
             "find out why the kernel left tsc: dmesg | grep -i clocksource"};
 }
 
@@ -167,8 +176,10 @@ Finding idle_states() {
     unsigned states = 0;
     while (!first_line(fmt::format("/sys/devices/system/cpu/cpu0/cpuidle/state{}/name", states)).empty()) ++states;
     if (states <= 1) return {Verdict::good, "idle states", "no deep ones visible"};
-    if (device >= 0) return {Verdict::good, "idle states", fmt::format("{}, held shallow through /dev/cpu_dma_latency while threads run", states)};
-    return {Verdict::fair, "idle states", fmt::format("{}, and /dev/cpu_dma_latency may not be written: a deep sleep ends up to 0.2 ms late", states),
+    if (device >= 0)
+        return {Verdict::good, "idle states", fmt::format("{}, held shallow through /dev/cpu_dma_latency while threads run", states)};
+    return {Verdict::fair, "idle states",
+            fmt::format("{}, and /dev/cpu_dma_latency may not be written: a deep sleep ends up to 0.2 ms late", states),
             "echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee /etc/udev/rules.d/99-cpu-dma-latency.rules"};
 }
 
@@ -193,7 +204,8 @@ const char* word(Verdict verdict) {
 
 std::string described(const Finding& finding, bool colour) {
     static constexpr const char* codes[] = {"\033[32m", "\033[33m", "\033[31m"};
-    const std::string verdict = colour ? fmt::format("{}{}\033[0m", codes[static_cast<std::size_t>(finding.verdict)], word(finding.verdict)) : word(finding.verdict);
+    const std::string verdict = colour ? fmt::format("{}{}\033[0m", codes[static_cast<std::size_t>(finding.verdict)], word(finding.verdict))
+                                       : word(finding.verdict);
     std::string text = fmt::format("{}  {:15} {}\n", verdict, finding.subject, finding.sentence);
     if (!finding.remedy.empty()) text += fmt::format("      {:15}   try: {}\n", "", finding.remedy);
     return text;
@@ -207,21 +219,34 @@ int run_doctor(const Options& options) {
     for (const auto& check : checks) {
         const Finding finding = check();
         if (options.json)
-            report["findings"].push_back({{"verdict", word(finding.verdict)}, {"subject", finding.subject}, {"sentence", finding.sentence}, {"remedy", finding.remedy}});
+            report["findings"].push_back({{"verdict", word(finding.verdict)},
+                                          {"subject", finding.subject},
+                                          {"sentence", finding.sentence},
+                                          {"remedy", finding.remedy}});
         else if (!print(described(finding, colour))) return 1;
     }
     constexpr std::int64_t period_ns = 1'000'000, spin_ns = 200'000;
     for (const std::int64_t spin : {std::int64_t{0}, spin_ns}) {
         if (options.seconds <= 0.0) break;
         const Jitter jitter = measure_jitter(period_ns, spin, static_cast<std::int64_t>(options.seconds * 1e9));
-        const std::string how = spin == 0 ? "sleeping to the deadline" : fmt::format("sleeping, then spinning the last {}", format_duration(static_cast<double>(spin)));
+        const std::string how = spin == 0 ? "sleeping to the deadline"
+                                          : fmt::format("sleeping, then spinning the last {}", format_duration(static_cast<double>(spin)));
         if (options.json) {
-            report["wakeup"].push_back({{"period_ns", period_ns}, {"spin_ns", spin}, {"policy", jitter.policy}, {"cycles", jitter.cycles},
-                                        {"p50_ns", jitter.p50_ns}, {"p99_ns", jitter.p99_ns}, {"max_ns", jitter.max_ns}});
+            report["wakeup"].push_back({{"period_ns", period_ns},
+                                        {"spin_ns", spin},
+                                        {"policy", jitter.policy},
+                                        {"cycles", jitter.cycles},
+                                        {"p50_ns", jitter.p50_ns},
+                                        {"p99_ns", jitter.p99_ns},
+                                        {"max_ns", jitter.max_ns}});
             continue;
         }
-        const std::string title = spin == 0 ? fmt::format("\nwake-up at 1 kHz, {}, how late:\n{:42} {:>10} {:>10} {:>10}\n", jitter.policy, "", "p50", "p99", "max") : "";
-        if (!print(fmt::format("{}  {:40} {:>10} {:>10} {:>10}\n", title, how, format_duration(jitter.p50_ns), format_duration(jitter.p99_ns), format_duration(jitter.max_ns)))) return 1;
+        const std::string title = spin == 0 ? fmt::format("\nwake-up at 1 kHz, {}, how late:\n{:42} {:>10} {:>10} {:>10}\n", jitter.policy,
+                                                          "", "p50", "p99", "max")
+                                            : "";
+        if (!print(fmt::format("{}  {:40} {:>10} {:>10} {:>10}\n", title, how, format_duration(jitter.p50_ns),
+                               format_duration(jitter.p99_ns), format_duration(jitter.max_ns))))
+            return 1;
     }
     return !options.json || print(report.dump(2) + "\n") ? 0 : 1;
 }

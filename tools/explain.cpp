@@ -35,7 +35,8 @@ int run_explain(const Options& options) {
         const auto row = std::find_if(std::begin(code_pages), std::end(code_pages), [&](const CodePage& c) { return code == c.name; });
         if (row == std::end(code_pages)) {
             const std::string hint = did_you_mean(code, names);
-            return fail(options, fmt::format("there is no diagnostic '{}'; {}", code, hint.empty() ? "type 'hal explain' for the list" : hint));
+            return fail(options,
+                        fmt::format("there is no diagnostic '{}'; {}", code, hint.empty() ? "type 'hal explain' for the list" : hint));
         }
         if (!print(fmt::format("{}\n\n{}\n", row->name, row->page))) return 1;
     }

@@ -23,7 +23,7 @@ std::string replace_file(const std::string& path, std::string_view text) {
     std::error_code problem;
     const std::string target = std::filesystem::canonical(path, problem).string();  // a link stays a link
     if (problem) return problem.message();
-    struct stat about {};
+    struct stat about{};
     if (::stat(target.c_str(), &about) != 0) return std::strerror(errno);
     std::string fresh = target + ".XXXXXX";
     const int descriptor = ::mkostemp(fresh.data(), O_CLOEXEC);
@@ -59,7 +59,8 @@ int run_fmt(const Options& options) {
         } else if (path == "-") {
             if (!print(formatted)) status = 1;
         } else if (formatted != text) {
-            if (const std::string why = replace_file(path, formatted); !why.empty()) status = fail(options, fmt::format("cannot write '{}': {}", path, why));
+            if (const std::string why = replace_file(path, formatted); !why.empty())
+                status = fail(options, fmt::format("cannot write '{}': {}", path, why));
         }
     }
     return status;

@@ -37,8 +37,7 @@ std::string render_svg(const std::string& dot, const std::string& path) {
     if (problem == ENOENT) return "SVG needs Graphviz; type: sudo apt install graphviz (or write a .dot file: -o netlist.dot)";
     if (problem != 0) return fmt::format("cannot run dot: {}", std::strerror(problem));
     int status = 0;
-    while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
-    }
+    while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {}
     return status == 0 ? "" : fmt::format("dot could not write '{}'", path);
 }
 

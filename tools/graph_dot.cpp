@@ -10,7 +10,8 @@ namespace hal::tools {
 
 namespace {
 
-constexpr const char* type_colours[] = {"#b03030", "#2060a0", "#207040", "#507020", "#206868", "#6a5a10", "#703080"};  // in hal_type's order
+constexpr const char* type_colours[] = {"#b03030", "#2060a0", "#207040", "#507020",
+                                        "#206868", "#6a5a10", "#703080"};  // in hal_type's order
 constexpr const char* thread_colours[] = {"#cfe3ff", "#ffe2b8", "#d8f0c8", "#f3d0ee", "#fff3a8", "#d5d5f5", "#c8efe9", "#f7cfc8"};
 
 std::string escaped(std::string_view text) {
@@ -38,17 +39,21 @@ std::string quoted(std::string_view text) {
 
 /// What is behind the dot of the instance's name; the whole name when it is not of that form.
 std::string_view below(const std::string& name, const std::string& owner) {
-    if (name.size() > owner.size() + 1 && name.starts_with(owner) && name[owner.size()] == '.') return std::string_view(name).substr(owner.size() + 1);
+    if (name.size() > owner.size() + 1 && name.starts_with(owner) && name[owner.size()] == '.')
+        return std::string_view(name).substr(owner.size() + 1);
     return name;
 }
 
 class Drawing {
 public:
     Drawing(const Model& model, const std::string& title) : model_(model) {
-        text_ = fmt::format("digraph {} {{\n    graph [rankdir=LR, fontname=\"sans-serif\", ranksep=1.2, nodesep=0.3];\n"
-                            "    node [shape=plain, fontname=\"sans-serif\", fontsize=10];\n    edge [fontname=\"sans-serif\", fontsize=9, arrowsize=0.6];\n",
-                            quoted(title));
-        for (const auto& thread : model.threads) colours_.emplace(thread.get(), thread_colours[colours_.size() % std::size(thread_colours)]);
+        text_ = fmt::format(
+            "digraph {} {{\n    graph [rankdir=LR, fontname=\"sans-serif\", ranksep=1.2, nodesep=0.3];\n"
+            "    node [shape=plain, fontname=\"sans-serif\", fontsize=10];\n    edge [fontname=\"sans-serif\", fontsize=9, "
+            "arrowsize=0.6];\n",
+            quoted(title));
+        for (const auto& thread : model.threads)
+            colours_.emplace(thread.get(), thread_colours[colours_.size() % std::size(thread_colours)]);
         legend();
         for (const auto& component : model.components)
             for (const auto& item : component->instances) instance(*item);
@@ -83,16 +88,18 @@ private:
             if (pin->dir == HAL_DIR_PARAM) continue;
             (pin->dir == HAL_DIR_OUT ? right : left).push_back(pin.get());
         }
-        text_ += fmt::format("    {} [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" color=\"#808080\">"
-                             "<tr><td colspan=\"2\"><b>{}</b>{}</td></tr>",
-                             node, escaped(item.name), item.component->name == item.name ? "" : " (" + escaped(item.component->name) + ")");
+        text_ += fmt::format(
+            "    {} [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" color=\"#808080\">"
+            "<tr><td colspan=\"2\"><b>{}</b>{}</td></tr>",
+            node, escaped(item.name), item.component->name == item.name ? "" : " (" + escaped(item.component->name) + ")");
         for (const Function* function : item.functions) {
             const std::size_t order = place(*function);
             const std::string where = order != 0       ? fmt::format("{}. in {}", order, escaped(function->thread->name))
                                       : function->init ? fmt::format("once in {}", escaped(function->thread->name))
                                                        : "in no thread";
-            text_ += fmt::format("<tr><td colspan=\"2\" bgcolor=\"{}\">{}: {}</td></tr>", function->thread ? colours_.at(function->thread) : "#f4f4f4",
-                                 escaped(below(function->name, item.name)), where);
+            text_ +=
+                fmt::format("<tr><td colspan=\"2\" bgcolor=\"{}\">{}: {}</td></tr>",
+                            function->thread ? colours_.at(function->thread) : "#f4f4f4", escaped(below(function->name, item.name)), where);
         }
         for (std::size_t i = 0; i < std::max(left.size(), right.size()); ++i) {
             text_ += "<tr>";
@@ -111,8 +118,9 @@ private:
         const Pin& pin = *pins[i];
         const std::string port = fmt::format("p{}", ids_.size());
         ids_.emplace(&pin, ids_.at(&item) + ":" + port);
-        text_ += fmt::format("<td port=\"{}\" align=\"{}\"><font color=\"{}\">{}</font></td>", port, align,
-                             pin.signal ? type_colours[static_cast<std::size_t>(pin.type)] : "#a0a0a0", escaped(below(pin.name, item.name)));
+        text_ +=
+            fmt::format("<td port=\"{}\" align=\"{}\"><font color=\"{}\">{}</font></td>", port, align,
+                        pin.signal ? type_colours[static_cast<std::size_t>(pin.type)] : "#a0a0a0", escaped(below(pin.name, item.name)));
     }
 
     /// A pin of a thread or of a function's times is a small node of its own.
@@ -148,8 +156,9 @@ private:
     }
 
     void edge(const std::string& from, const std::string& to, const Signal& signal, const char* style, bool labelled, bool both) {
-        text_ += fmt::format("    {} -> {} [color=\"{}\", style={}, tooltip={}{}{}];\n", from, to, type_colours[static_cast<std::size_t>(signal.type)], style,
-                             quoted(signal.name), labelled ? ", label=" + quoted(signal.name) : "", both ? ", dir=both" : "");
+        text_ += fmt::format("    {} -> {} [color=\"{}\", style={}, tooltip={}{}{}];\n", from, to,
+                             type_colours[static_cast<std::size_t>(signal.type)], style, quoted(signal.name),
+                             labelled ? ", label=" + quoted(signal.name) : "", both ? ", dir=both" : "");
     }
 
     void signal(const Signal& item) {
@@ -168,7 +177,8 @@ private:
         const std::string from = node_of(*source) + (source->dir == HAL_DIR_OUT && source->instance ? ":e" : "");
         for (const Pin* pin : item.pins) {
             if (pin == source) continue;
-            edge(from, node_of(*pin) + (pin->instance ? ":w" : ""), item, style(*source, *pin), first, source->dir == HAL_DIR_IO && pin->dir == HAL_DIR_IO);
+            edge(from, node_of(*pin) + (pin->instance ? ":w" : ""), item, style(*source, *pin), first,
+                 source->dir == HAL_DIR_IO && pin->dir == HAL_DIR_IO);
             first = false;
         }
         if (first) {  // nobody reads it: it is drawn all the same

@@ -27,7 +27,9 @@ ShellOptions shell_options(const Options& options) {
     how.echo = options.echo;
     how.script = options.script;
     how.color = colours(STDERR_FILENO);
-    how.level = options.loudness == Loudness::nothing ? Level::nothing : options.loudness == Loudness::results ? Level::results : Level::errors;
+    how.level = options.loudness == Loudness::nothing   ? Level::nothing
+                : options.loudness == Loudness::results ? Level::results
+                                                        : Level::errors;
     return how;
 }
 

@@ -49,7 +49,8 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
 }
 
 const char* take_argument(const hal_host* host, const hal_argument_decl* decl) {
-    of(host).page.arguments.push_back({text(decl->name), text(decl->doc), text(decl->fallback), (decl->flags & HAL_ARGUMENT_PER_INSTANCE) != 0});
+    of(host).page.arguments.push_back(
+        {text(decl->name), text(decl->doc), text(decl->fallback), (decl->flags & HAL_ARGUMENT_PER_INSTANCE) != 0});
     return decl->fallback;
 }
 
@@ -97,7 +98,8 @@ Page threads_page() {
     page.name = "threads";
     page.summary = "Makes up to three real-time threads";
     page.doc =
-        "Fastest first; a slower thread's period is a whole multiple of the fastest one's. `newthread NAME PERIOD` makes any number of threads, "
+        "Fastest first; a slower thread's period is a whole multiple of the fastest one's. `newthread NAME PERIOD` makes any number of "
+        "threads, "
         "one by one, with more options.\n\n"
         "Each thread has pins of its own: `NAME.time` and `NAME.tmax` (ns), `NAME.tmax-increased`, `NAME.threadbeat` (cycles), and what "
         "`show thread NAME` prints.\n";

@@ -38,7 +38,9 @@ struct Row {
 
 /// The two names differ in one number only, and the second's is one more.
 bool follows(const Page::Pin& a, const Page::Pin& b) {
-    if (a.type != b.type || a.dir != b.dir || a.doc != b.doc || a.unit != b.unit || a.function != b.function || a.initial.raw != b.initial.raw) return false;
+    if (a.type != b.type || a.dir != b.dir || a.doc != b.doc || a.unit != b.unit || a.function != b.function ||
+        a.initial.raw != b.initial.raw)
+        return false;
     const auto digit = [](char c) { return c >= '0' && c <= '9'; };
     std::size_t from = 0;
     while (from < a.name.size() && from < b.name.size() && a.name[from] == b.name[from]) ++from;
@@ -47,7 +49,8 @@ bool follows(const Page::Pin& a, const Page::Pin& b) {
     while (a_end < a.name.size() && digit(a.name[a_end])) ++a_end;
     while (b_end < b.name.size() && digit(b.name[b_end])) ++b_end;
     constexpr std::size_t longest = 9;
-    if (a_end == from || b_end == from || a_end - from > longest || b_end - from > longest || a.name.substr(a_end) != b.name.substr(b_end)) return false;
+    if (a_end == from || b_end == from || a_end - from > longest || b_end - from > longest || a.name.substr(a_end) != b.name.substr(b_end))
+        return false;
     return std::stoul(a.name.substr(from, a_end - from)) + 1 == std::stoul(b.name.substr(from, b_end - from));
 }
 
@@ -107,14 +110,16 @@ void walk(const Page& page, Writer& to) {
     for (const auto& argument : page.arguments) rows.push_back({argument.name + "=", described(argument)});
     table("Arguments", rows);
     rows.clear();
-    for (const auto& function : page.functions) rows.push_back({page.full_name(function), function.doc + (function.shared ? " (one for all instances)" : "")});
+    for (const auto& function : page.functions)
+        rows.push_back({page.full_name(function), function.doc + (function.shared ? " (one for all instances)" : "")});
     table("Functions", rows);
     if (!rows.empty()) to.prose(times_sentence);
     for (const bool parameters : {false, true}) {
         rows.clear();
         for (const Row& row : rows_of(page, parameters)) {
             const std::string more = remarks(*row.pin, several(page));
-            rows.push_back({row.name, name(row.pin->type), direction(row.pin->dir), row.pin->doc + (more.empty() ? "" : " (" + more + ")")});
+            rows.push_back(
+                {row.name, name(row.pin->type), direction(row.pin->dir), row.pin->doc + (more.empty() ? "" : " (" + more + ")")});
         }
         table(parameters ? "Parameters" : "Pins", rows);
     }
@@ -197,7 +202,8 @@ struct ManWriter {
             const std::size_t end = std::min(doc.find('\n', from), doc.size());
             const std::string line = doc.substr(from, end - from);
             from = end + 1;
-            if (line.starts_with("```") || (line.starts_with("    ") != code && !line.starts_with("```") && (line.starts_with("    ") || code))) {
+            if (line.starts_with("```") ||
+                (line.starts_with("    ") != code && !line.starts_with("```") && (line.starts_with("    ") || code))) {
                 code = !code;
                 text += code ? ".nf\n" : ".fi\n";
                 if (line.starts_with("```")) continue;
@@ -228,18 +234,25 @@ std::string as_markdown(const Page& page) {
 }
 
 std::string as_man(const Page& page) {
-    ManWriter writer{fmt::format(".TH \"{}\" 9 \"\" \"Halcyon\" \"HAL component\"\n.SH NAME\n{} \\- {}\n", troff(page.name), troff(page.name), troff(page.summary))};
+    ManWriter writer{fmt::format(".TH \"{}\" 9 \"\" \"Halcyon\" \"HAL component\"\n.SH NAME\n{} \\- {}\n", troff(page.name),
+                                 troff(page.name), troff(page.summary))};
     walk(page, writer);
     return writer.text;
 }
 
 std::string as_json(const Page& page) {
-    ordered_json json{{"name", page.name}, {"summary", page.summary}, {"doc", page.doc}, {"singleton", page.singleton}, {"default_count", page.default_count}};
+    ordered_json json{{"name", page.name},
+                      {"summary", page.summary},
+                      {"doc", page.doc},
+                      {"singleton", page.singleton},
+                      {"default_count", page.default_count}};
     json["arguments"] = json["functions"] = json["pins"] = ordered_json::array();
-    for (const auto& a : page.arguments) json["arguments"].push_back({{"name", a.name}, {"doc", a.doc}, {"default", a.fallback}, {"per_instance", a.per_instance}});
+    for (const auto& a : page.arguments)
+        json["arguments"].push_back({{"name", a.name}, {"doc", a.doc}, {"default", a.fallback}, {"per_instance", a.per_instance}});
     for (const auto& f : page.functions) json["functions"].push_back({{"name", f.name}, {"doc", f.doc}, {"shared", f.shared}});
     for (const auto& p : page.pins) {
-        ordered_json pin{{"name", p.name}, {"type", name(p.type)}, {"dir", direction(p.dir)}, {"doc", p.doc}, {"initial", value_of(p.type, p.initial)}};
+        ordered_json pin{
+            {"name", p.name}, {"type", name(p.type)}, {"dir", direction(p.dir)}, {"doc", p.doc}, {"initial", value_of(p.type, p.initial)}};
         if (!p.unit.empty()) pin["unit"] = p.unit;
         if (!p.function.empty()) pin["function"] = p.function;
         if (p.has_safe) pin["safe"] = value_of(p.type, p.safe);

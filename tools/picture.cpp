@@ -30,11 +30,14 @@ std::vector<std::string> beside(const char* left_title, const Canvas& left, cons
     return lines;
 }
 
-std::string degrees(double radians) { return fmt::format("{:8.1f}{}", std::remainder(radians, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi, " deg"); }
+std::string degrees(double radians) {
+    return fmt::format("{:8.1f}{}", std::remainder(radians, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi, " deg");
+}
 
 std::string status_line(const Scene& scene) {
-    return fmt::format("  t {:6.1f} s   {} wake-up late p50 {} p99 {}   missed {}{}", scene.seconds, scene.thread.name, format_duration(scene.thread.wakeup_p50_ns),
-                       format_duration(scene.thread.wakeup_p99_ns), scene.missed, scene.faults != 0 ? fmt::format("   faults {}: show fault", scene.faults) : "");
+    return fmt::format("  t {:6.1f} s   {} wake-up late p50 {} p99 {}   missed {}{}", scene.seconds, scene.thread.name,
+                       format_duration(scene.thread.wakeup_p50_ns), format_duration(scene.thread.wakeup_p99_ns), scene.missed,
+                       scene.faults != 0 ? fmt::format("   faults {}: show fault", scene.faults) : "");
 }
 
 /// Angles in rad: the arm's from straight ahead, seen from above; the pendulum's from hanging, seen from the arm's end.
@@ -45,7 +48,8 @@ std::vector<std::string> draw_furuta(const Scene& scene, bool unicode) {
     above.circle(0, 0, 0.08);
     above.line(0, 0, 0.85 * std::cos(arm), 0.85 * std::sin(arm));
     const double reach = 0.3 * std::sin(pendulum), end = 0.85;  // the pendulum swings across the arm
-    above.line(end * std::cos(arm), end * std::sin(arm), end * std::cos(arm) - reach * std::sin(arm), end * std::sin(arm) + reach * std::cos(arm));
+    above.line(end * std::cos(arm), end * std::sin(arm), end * std::cos(arm) - reach * std::sin(arm),
+               end * std::sin(arm) + reach * std::cos(arm));
     side.circle(0, 0, 0.06);
     side.line(-0.25, 0, 0.25, 0);
     const double x = 0.85 * std::sin(pendulum), y = -0.85 * std::cos(pendulum);
@@ -68,7 +72,8 @@ std::vector<std::string> draw_axis(const Scene& scene, bool unicode) {
     for (std::size_t i = 0; i < columns; ++i) rail += unicode ? "─" : "-";
     const std::string roof = unicode ? "┌───┐" : "+---+", floor = unicode ? "└─┴─┘" : "+-+-+";
     return {"  " + std::string(at, ' ') + roof, "  " + std::string(at, ' ') + floor, "  " + rail,
-            fmt::format("  {:<{}.4g}{:>{}.4g}", -farthest, columns / 2, farthest, columns / 2), fmt::format("  position {:10.4f}", position)};
+            fmt::format("  {:<{}.4g}{:>{}.4g}", -farthest, columns / 2, farthest, columns / 2),
+            fmt::format("  position {:10.4f}", position)};
 }
 
 const Motif motifs[] = {
@@ -161,7 +166,8 @@ Picture::~Picture() {
 std::unique_ptr<Picture> Picture::start(Session& session) {
     winsize size{};
     const char* term = std::getenv("TERM");
-    if (!::isatty(STDOUT_FILENO) || !term || std::string_view(term) == "dumb" || ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0) return nullptr;
+    if (!::isatty(STDOUT_FILENO) || !term || std::string_view(term) == "dumb" || ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0)
+        return nullptr;
     if ((size.ws_col != 0 && size.ws_col < 80) || (size.ws_row != 0 && size.ws_row < 16)) return nullptr;
     const Motif* motif = nullptr;
     {

@@ -43,9 +43,11 @@ bool header(const std::string& line, const std::vector<std::string>& fields, con
 
 /// What is wrong with a record, or empty.
 std::string problem_of(const std::vector<std::string>& fields, const Stream& stream) {
-    if (fields.size() != stream.types.size()) return fmt::format("{} values, but '{}' has {} pins", fields.size(), stream.name, stream.types.size());
+    if (fields.size() != stream.types.size())
+        return fmt::format("{} values, but '{}' has {} pins", fields.size(), stream.name, stream.types.size());
     for (std::size_t i = 0; i < fields.size(); ++i)
-        if (const Parsed value = parse_value(stream.types[i], fields[i]); !value.problem.empty()) return fmt::format("value {} ({}): {}", i + 1, name(stream.types[i]), value.problem);
+        if (const Parsed value = parse_value(stream.types[i], fields[i]); !value.problem.empty())
+            return fmt::format("value {} ({}): {}", i + 1, name(stream.types[i]), value.problem);
     return {};
 }
 

@@ -19,7 +19,9 @@ namespace {
 
 using nlohmann::json;
 
-double real_of(const json& value) { return value.is_string() ? std::strtod(value.get_ref<const std::string&>().c_str(), nullptr) : value.get<double>(); }
+double real_of(const json& value) {
+    return value.is_string() ? std::strtod(value.get_ref<const std::string&>().c_str(), nullptr) : value.get<double>();
+}
 
 /// LinuxCNC's form: bits 0 and 1, floats with six decimals, a blank after each value.
 void append_plain(std::string& to, hal_type type, const json& value) {
@@ -48,7 +50,8 @@ std::string csv_header(Stream& stream, bool tag) {
     for (std::size_t i = 0; i < names.size(); ++i) names[i] = fmt::format("{}.pin.{}", stream.name, i);
     const json pins = stream.client->request({{"describe", "pin"}, {"patterns", json::array({stream.name + ".pin."})}});
     for (const json& pin : pins.value("objects", json::array()))
-        if (const auto at = std::find(names.begin(), names.end(), pin.value("name", "")); at != names.end() && pin.contains("signal")) *at = pin["signal"];
+        if (const auto at = std::find(names.begin(), names.end(), pin.value("name", "")); at != names.end() && pin.contains("signal"))
+            *at = pin["signal"];
     std::string line = tag ? "sample" : "";
     for (const std::string& name : names) line += (line.empty() ? "" : ",") + csv_field(name);
     return line + "\n";
@@ -99,9 +102,7 @@ int follow(Stream& stream, const Options& options, int descriptor) {
         constexpr std::uint64_t at_once = 4096;
         const std::uint64_t wanted = options.count == 0 ? at_once : std::min(at_once, options.count - taken);
         const json reply = stream.client->request({{"stream", stream.name}, {"take", wanted}});
-        if (!reply.value("ok", false)) {
-            return fail(options, stream.lost());
-        }
+        if (!reply.value("ok", false)) { return fail(options, stream.lost()); }
         const std::size_t got = reply.at("records").size();
         if (!write(lines.of(reply))) return 1;
         taken += got;

@@ -65,8 +65,9 @@ std::string loaded_summary(Session& session) {
             width = std::max(width, component->name.size());
         }
     for (const auto& thread : model.threads) width = std::max(width, thread->name.size());
-    std::string text = fmt::format("{} of {}, {}, {}\n", counted(instances, "instance", "instances"), counted(shown.size(), "component", "components"),
-                                   counted(model.signals.size(), "signal", "signals"), counted(model.threads.size(), "thread", "threads"));
+    std::string text =
+        fmt::format("{} of {}, {}, {}\n", counted(instances, "instance", "instances"), counted(shown.size(), "component", "components"),
+                    counted(model.signals.size(), "signal", "signals"), counted(model.threads.size(), "thread", "threads"));
     for (const Component* component : shown) {
         std::vector<std::string> names;
         for (const auto& instance : component->instances) names.push_back(instance->name);
@@ -76,7 +77,9 @@ std::string loaded_summary(Session& session) {
         std::vector<std::string> names;
         for (const Function* function : thread->functions) names.push_back(function->name);
         if (names.empty()) names.emplace_back("(no functions)");
-        text += wrapped(fmt::format("  {:{}}  every {}: ", thread->name, width, format_duration(static_cast<double>(thread->options.period_ns))), names, 24);
+        text += wrapped(
+            fmt::format("  {:{}}  every {}: ", thread->name, width, format_duration(static_cast<double>(thread->options.period_ns))), names,
+            24);
     }
     for (const std::string& line : session.missing_privileges()) text += line + "\n";
     return text;
@@ -92,9 +95,9 @@ std::string timing_report(Session& session) {
     constexpr const char* columns = "{:{}}  {:>9} {:>10} {:>7}  {:>11} {:>9} {:>9}  {:>9} {:>9} {:>9}\n";
     text += fmt::format(columns, "thread", width, "period", "cycles", "missed", "wake-up p50", "p99", "max", "busy p50", "p99", "max");
     for (const ThreadReport& r : reports) {
-        text += fmt::format(columns, r.name, width, format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed, format_duration(r.wakeup_p50_ns),
-                            format_duration(r.wakeup_p99_ns), format_duration(r.wakeup_max_ns), format_duration(r.busy_p50_ns), format_duration(r.busy_p99_ns),
-                            format_duration(r.busy_max_ns));
+        text += fmt::format(columns, r.name, width, format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed,
+                            format_duration(r.wakeup_p50_ns), format_duration(r.wakeup_p99_ns), format_duration(r.wakeup_max_ns),
+                            format_duration(r.busy_p50_ns), format_duration(r.busy_p99_ns), format_duration(r.busy_max_ns));
     }
     std::string policies;
     for (const ThreadReport& r : reports) {

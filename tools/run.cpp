@@ -31,7 +31,8 @@ int run_plain(Machine& machine, const Options& options) {
     if (options.interactive) {
         status = std::max(status, machine.talk({"hal> ", "hal+> "}));
     } else {
-        print(fmt::format("{}; in another terminal: hal shell{}\n", options.for_ns >= 0 ? "running" : "running until Ctrl-C", name == "default" ? "" : " --name " + name));
+        print(fmt::format("{}; in another terminal: hal shell{}\n", options.for_ns >= 0 ? "running" : "running until Ctrl-C",
+                          name == "default" ? "" : " --name " + name));
         const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
         machine.stop.wait_ns(options.for_ns);
     }
@@ -45,7 +46,8 @@ int run_plain(Machine& machine, const Options& options) {
 }  // namespace
 
 int run_run(const Options& options) {
-    if (options.words.empty() && !options.interactive && !options.classic) return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
+    if (options.words.empty() && !options.interactive && !options.classic)
+        return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
     if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
     Machine machine(options, own_name(options), false);
     if (!machine.serve(true)) return 1;

@@ -29,7 +29,8 @@ int fail(const Options& options, std::string_view sentence) {
 bool print(std::string_view text) {
     if (write_all(STDOUT_FILENO, text)) return true;
     static bool said = false;
-    if (errno != EPIPE && !said) write_all(STDERR_FILENO, std::string("hal: cannot write to standard output: ") + std::strerror(errno) + "\n");
+    if (errno != EPIPE && !said)
+        write_all(STDERR_FILENO, std::string("hal: cannot write to standard output: ") + std::strerror(errno) + "\n");
     said = true;
     return false;
 }
@@ -37,7 +38,7 @@ bool print(std::string_view text) {
 bool read_file(const std::string& path, std::string& text) {
     const bool standard = path == "-";
     const int descriptor = standard ? STDIN_FILENO : ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    struct stat about {};
+    struct stat about{};
     int problem = 0;
     if (descriptor < 0 || ::fstat(descriptor, &about) != 0) problem = errno;
     else if (S_ISDIR(about.st_mode)) problem = EISDIR;

@@ -58,7 +58,7 @@ Client::Options client_options(const Options& options) {
 /// Commands on standard input that is no terminal: a file as a whole; from a pipe, each line when it comes, so that a
 /// program can wait for the answer.
 int follow_input(Client& client, const Options& options) {
-    struct stat about {};
+    struct stat about{};
     if (::fstat(STDIN_FILENO, &about) == 0 && S_ISREG(about.st_mode)) {
         std::string text;
         if (!read_file("-", text)) return fail(options, fmt::format("cannot read standard input: {}", text));
@@ -67,7 +67,8 @@ int follow_input(Client& client, const Options& options) {
     RemoteShell listener(client, "<stdin>");
     LineReader input(STDIN_FILENO);
     int status = 0;
-    for (std::string line; !listener.over() && (status == 0 || options.keep_going) && input.read(line);) status = std::max(status, listener.execute(line));
+    for (std::string line; !listener.over() && (status == 0 || options.keep_going) && input.read(line);)
+        status = std::max(status, listener.execute(line));
     return status;
 }
 
@@ -114,7 +115,8 @@ int run_shell(const Options& options) {
     std::string problem;
     const auto client = Client::connect(instance_wanted(options.name), problem);
     if (!client) return fail(options, problem);
-    if (!client->set_options(client_options(options)) && !client->connected()) return fail(options, fmt::format("instance '{}' does not answer", client->instance()));
+    if (!client->set_options(client_options(options)) && !client->connected())
+        return fail(options, fmt::format("instance '{}' does not answer", client->instance()));
     if (options.from_file && !options.words.empty()) return follow_file(*client, options);
     if (!options.execute.empty()) {
         int status = 0;
@@ -124,9 +126,12 @@ int run_shell(const Options& options) {
     }
     if (!options.words.empty() && !options.from_file) return show(client->run(joined(options.words), "<commandline>"));
     if (!::isatty(STDIN_FILENO)) return follow_input(*client, options);
-    if (!options.classic) print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n", client->instance(), client->pid()));
+    if (!options.classic)
+        print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n", client->instance(), client->pid()));
     RemoteShell listener(*client, "<shell>");
-    const Prompt prompt = options.script ? Prompt{"%%\n", "%%\n"} : options.classic ? Prompt{"halcmd: ", "halcmd+: "} : Prompt{"hal> ", "hal+> "};
+    const Prompt prompt = options.script    ? Prompt{"%%\n", "%%\n"}
+                          : options.classic ? Prompt{"halcmd: ", "halcmd+: "}
+                                            : Prompt{"hal> ", "hal+> "};
     const int status = talk(listener, prompt);
     return client->connected() ? status : fail(options, fmt::format("instance '{}' has ended", client->instance()));
 }

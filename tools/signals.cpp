@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "signals.hpp"
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
 #include <system_error>
-#include <time.h>
 #include <unistd.h>
 
 namespace hal::tools {
@@ -20,12 +21,6 @@ sigset_t ending_signals() {
     sigemptyset(&set);
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, number);
     return set;
-}
-
-std::int64_t now_ns() {
-    timespec t{};
-    ::clock_gettime(CLOCK_MONOTONIC, &t);
-    return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
 }  // namespace
@@ -79,15 +74,16 @@ void StopRequest::serve() {
 }
 
 bool StopRequest::wait_ns(std::int64_t ns) const {
-    const std::int64_t end = ns < 0 ? 0 : now_ns() + ns;
+    using namespace std::chrono;
+    const auto end = steady_clock::now() + nanoseconds(std::max<std::int64_t>(ns, 0));
     while (!requested()) {
-        pollfd event{event_, POLLIN, 0};
-        const std::int64_t left = ns < 0 ? -1 : end - now_ns();
-        if (ns >= 0 && left <= 0) return requested();
+        const std::int64_t left = ns < 0 ? 0 : nanoseconds(end - steady_clock::now()).count();
+        if (ns >= 0 && left <= 0) break;
         const timespec patience{static_cast<time_t>(left / 1'000'000'000), static_cast<long>(left % 1'000'000'000)};
+        pollfd event{event_, POLLIN, 0};
         ::ppoll(&event, 1, ns < 0 ? nullptr : &patience, nullptr);
     }
-    return true;
+    return requested();
 }
 
 }  // namespace hal::tools

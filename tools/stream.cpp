@@ -27,7 +27,8 @@ bool Stream::open(const Options& options, const char* component) {
         words.erase(words.begin());
     }
     if (words.size() > 1) {
-        fail(options, fmt::format("nothing is expected at '{}'; a channel is a number, or --channel NAME", words.size() == 2 ? words.front() : words.back()));
+        fail(options, fmt::format("nothing is expected at '{}'; a channel is a number, or --channel NAME",
+                                  words.size() == 2 ? words.front() : words.back()));
         return false;
     }
     if (!words.empty()) file = words.front();
@@ -50,11 +51,13 @@ bool Stream::open(const Options& options, const char* component) {
 }
 
 std::string Stream::lost() const {
-    return client->connected() ? fmt::format("'{}' is gone: it was unloaded, or its machine has ended", name) : fmt::format("instance '{}' has ended", client->instance());
+    return client->connected() ? fmt::format("'{}' is gone: it was unloaded, or its machine has ended", name)
+                               : fmt::format("instance '{}' has ended", client->instance());
 }
 
 bool Stream::announce(const Options& options) const {
-    const std::string component = options.name_as_component.empty() ? fmt::format("{}{}", options.program, ::getpid()) : options.name_as_component;
+    const std::string component =
+        options.name_as_component.empty() ? fmt::format("{}{}", options.program, ::getpid()) : options.name_as_component;
     const nlohmann::json reply = client->request({{"component", component}});
     if (!reply.value("ok", false)) fail(options, reply.value("error", "no answer"));
     return reply.value("ok", false);

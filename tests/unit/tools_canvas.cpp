@@ -71,9 +71,7 @@ TEST(Canvas, a_circle_keeps_its_radius) {
     for (double x = -0.15; x <= 0.15; x += 0.01) inside.dot(x, 0);
     const std::string ring = canvas.rows()[2], middle = inside.rows()[2];
     for (std::size_t i = 0; i < ring.size(); i += 3)
-        if (middle.compare(i, 3, "\u2800") != 0) {
-            EXPECT_EQ(ring.substr(i, 3), "\u2800") << i;
-        }
+        if (middle.compare(i, 3, "\u2800") != 0) { EXPECT_EQ(ring.substr(i, 3), "\u2800") << i; }
 }
 
 }  // namespace

@@ -21,7 +21,8 @@ Page example() {
     page.summary = "Does things";
     page.arguments = {{"size", "how big", "4", true}};
     page.functions = {{"read", "reads", false}, {"write", "writes | all", true}};
-    page.pins = {pin("in-08"), pin("in-09"), pin("in-10"), pin("out", HAL_TYPE_FLOAT, HAL_DIR_OUT), pin("gain", HAL_TYPE_FLOAT, HAL_DIR_PARAM)};
+    page.pins = {pin("in-08"), pin("in-09"), pin("in-10"), pin("out", HAL_TYPE_FLOAT, HAL_DIR_OUT),
+                 pin("gain", HAL_TYPE_FLOAT, HAL_DIR_PARAM)};
     page.pins[3].unit = "V";
     page.pins[3].has_safe = page.pins[3].finite = true;
     page.pins[3].function = "thing.N.read";
