@@ -25,12 +25,16 @@
 namespace hal {
 namespace {
 
+#if defined(__SANITIZE_THREAD__)
+constexpr std::size_t stack_bytes = 1 << 22;  // the sanitizer keeps more than half a megabyte of its own on each stack
+#else
 constexpr std::size_t stack_bytes = 1 << 20;
+#endif
 constexpr std::int64_t calm_ns = 5'000;  // before the deadline nothing but the clock is looked at
 constexpr std::size_t signal_stack_bytes = 1 << 16;
 
 void prefault_stack() noexcept {
-    volatile char room[stack_bytes / 2];
+    volatile char room[1 << 19];
     for (std::size_t i = 0; i < sizeof room; i += 4096) room[i] = 0;
 }
 

@@ -47,11 +47,11 @@ bool Session::State::end_threads(std::vector<std::unique_ptr<Thread>>& threads, 
         Thread* const thread = owned.get();
         Core* const leaving = core(thread);
         if (!leaving) continue;
+        collect_faults(*thread);
         if (!executor->remove(*leaving, answer_timeout_ns)) {
             diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' does not end: one of its functions hangs");
             return false;
         }
-        collect_faults(*thread);
         cores.erase(thread);
         // it writes nothing any more: the session owns what it owned (its last plan's image stays until the swap)
         for (const auto& signal : model.signals) {
