@@ -56,20 +56,8 @@ public:
         const Model& model = runtime_.session.model();
         Thread& t = *model.threads.front();
         auto core = std::make_unique<Core>(1u, t.options.period_ns, ThreadPins{&t.time, &t.tmax, &t.tmax_increased, &t.beat, &t.missed, &t.wakeup}, board_, running_, measure);
-        CompileInput input;
-        input.epoch = ++epoch_;
-        const std::unordered_set<const Function*> none;
-        const std::unordered_map<Pin*, hal_value> pins;
-        const std::unordered_map<Signal*, hal_value> signals;
-        const std::unordered_map<Signal*, Pin*> inherited;
-        input.without = &none;
-        input.pin_values = &pins;
-        input.signal_values = &signals;
-        input.inherited = &inherited;
-        input.core_of = [&](const Thread&) -> void* { return core.get(); };
-        input.check_finite = check_finite;
-        plans_.push_back(std::move(compile(model, input).plans.front().second));
-        core->offer(plans_.back().get());
+        if (!plan_) compile_for(*core);
+        core->offer(plan_.get());
         core->service();
         return core;
     }
@@ -80,13 +68,29 @@ public:
     std::size_t count() const { return instances_.size(); }
 
 private:
-    std::vector<std::unique_ptr<plan::Plan>> plans_;  // before the session: it writes through the pins when it ends
+    void compile_for(Core& core) {
+        CompileInput input;
+        input.epoch = 1'000'000;
+        const std::unordered_set<const Function*> none;
+        const std::unordered_map<Pin*, hal_value> pins;
+        const std::unordered_map<Signal*, hal_value> signals;
+        const std::unordered_map<Signal*, Pin*> inherited;
+        input.without = &none;
+        input.pin_values = &pins;
+        input.signal_values = &signals;
+        input.inherited = &inherited;
+        input.core_of = [&](const Thread&) -> void* { return &core; };
+        input.check_finite = check_finite;
+        plan_ = std::move(compile(runtime_.session.model(), input).plans.front().second);
+    }
+
+    // One for all cores, so that they work on the same memory; before the session, which writes through the pins at its end.
+    std::unique_ptr<plan::Plan> plan_;
     Runtime runtime_;
     Loop loop_;
     std::vector<void*> instances_;
     FaultBoard board_;
     std::atomic<bool> running_{true};
-    std::uint64_t epoch_ = 1'000'000;
 };
 
 struct Hot {
@@ -96,7 +100,7 @@ struct Hot {
 /// Cycles back to back in a real-time thread, the three in turn; medians of single cycles.
 Hot measure_hot(const Options& options, const Case& c) {
     Bed bed(c);
-    const auto measured = bed.core(true), bare = bed.core(false);  // of one layout: the second plan is the first again
+    const auto measured = bed.core(true), bare = bed.core(false);
     std::vector<double> ours, loop, without;
     const int rounds = options.quick ? 4 : 10, cycles = options.quick ? 500 : 2000;
     const auto time = [&](std::vector<double>& samples, auto cycle) {

@@ -65,7 +65,7 @@ void shell(const Options& options, Report& report) {
     report.section("shell: commands from another process, wall time");
     if (access((options.programs + "/hal").c_str(), X_OK) != 0) return report.note("the program hal is not built here");
     const int spawns = options.quick ? 40 : 200, sessions = options.quick ? 5 : 15;
-    double save_small = 0, save_large = 0;
+    double save_small = 0, save_large = 0, nothing_done = 0;
     constexpr std::size_t small = 1000, large = 10'000;
     for (const std::size_t count : {std::size_t{10}, small, large}) {
         const Instance instance(options, count);
@@ -85,6 +85,7 @@ void shell(const Options& options, Report& report) {
         const auto [setp, halcmd_setp] = wall_ms(sessions, instance.shell({"-f", file}), peer ? &their_setp : nullptr);
         report.row({"1000 setp in one session" + size, "ms", setp, peer_name, halcmd_setp, limit(3)});
 
+        if (count == large) nothing_done = wall_ms(sessions, instance.shell({"-f", instance.file("empty.hal", "")})).first;
         if (count == small) save_small = wall_ms(sessions, instance.shell({"save"})).first - getp;
         if (count == large) save_large = wall_ms(sessions, instance.shell({"save"})).first - getp;
     }
@@ -92,6 +93,7 @@ void shell(const Options& options, Report& report) {
     report.row({.what = fmt::format("save, growth from {} to {}: time ~ size ^ b, b", small, large), .unit = "", .ours = exponent(small, save_small, large, save_large), .goal = limit(1.25)});
     const Start nothing{.arguments = {"true"}};
     report.row({.what = "reference: start of `true`", .unit = "ms", .ours = wall_ms(spawns, nothing).first});
+    report.note(fmt::format("Of a session {:.2f} ms are the start of the program and its connection.", nothing_done));
     report.note(fmt::format("Medians of {} one-shots and {} sessions (hal shell -f, halcmd -f), the program's start included, in turn with the peer.", spawns, sessions));
 }
 
