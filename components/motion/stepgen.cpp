@@ -61,7 +61,7 @@ struct Stepgen : hal::Component {
     hal::Function run{*this, "update-freq", &Stepgen::update_freq, "takes new commands; in the servo thread, after the controller", {.shared = true}};
     hal::In<bool> enable{*this, run, "enable", "FALSE: no steps"};
     std::optional<hal::In<double>> position_cmd, velocity_cmd;
-    hal::Io<double> position_scale{*this, run, "position-scale", "steps per length unit", {.initial = 1.0}};
+    hal::Param<double> position_scale{*this, run, "position-scale", "steps per length unit; 0 counts as 1", {.initial = 1.0}};
     hal::Param<double> max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: what the timing allows"};
     hal::Param<double> max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: none"};
     hal::Out<double> frequency{*this, run, "frequency", "steps per second asked for", {.unit = "Hz"}};
@@ -124,11 +124,10 @@ struct Stepgen : hal::Component {
     }
 
     void update_freq(hal::Cycle cycle) noexcept {
-        if (position_scale == 0.0 || !std::isfinite(position_scale)) position_scale = 1.0;
-        scale_.store(position_scale, std::memory_order_relaxed);
+        scale_.store(position_scale != 0.0 && std::isfinite(position_scale) ? position_scale : 1.0, std::memory_order_relaxed);
         const std::int64_t known_ns = tick_ns_.load(std::memory_order_relaxed), tick_ns = known_ns > 0 ? known_ns : cycle.period_ns();
         const double wanted = enable ? limited(command(cycle.seconds()), tick_ns, cycle.seconds()) : 0.0;
-        if (!enable && position_cmd) last_command_ = *position_cmd * position_scale;
+        if (!enable && position_cmd) last_command_ = *position_cmd * scale();
         frequency = wanted;
         Order next;
         next.on = enable;
@@ -148,8 +147,8 @@ private:
     /// the period T; from v to w it covers (v + w) T / 2, and what is left must still be enough to brake from w:
     ///     e - (v + w) T / 2 = w^2 / 2a,  so  w = sqrt((a T / 2)^2 + 2 a (e - v T / 2)) - a T / 2
     double command(double dt) noexcept {
-        if (velocity_cmd) return *velocity_cmd * position_scale;
-        const double target = *position_cmd * position_scale;
+        if (velocity_cmd) return *velocity_cmd * scale();
+        const double target = *position_cmd * scale();
         const double own = (target - last_command_) / dt;
         last_command_ = target;
         const double distance = target - position_out_.load(std::memory_order_relaxed);
@@ -166,12 +165,12 @@ private:
         const std::int64_t shortest = type <= up_down ? std::max<std::int64_t>(1, ticks(step_length) + (*step_space > 0 ? ticks(*step_space) : 0))
                                                       : std::max<std::int64_t>(1, ticks(step_length));
         double highest = 1e9 / static_cast<double>(shortest * tick_ns);
-        if (const double asked = std::fabs(max_velocity * position_scale); asked > 0.0) highest = std::min(highest, asked);
+        if (const double asked = std::fabs(max_velocity * scale()); asked > 0.0) highest = std::min(highest, asked);
         if (const double a = acceleration(); a > 0.0) wanted = std::clamp(wanted, frequency - a * dt, frequency + a * dt);
         return std::clamp(wanted, -highest, highest);
     }
 
-    double acceleration() const noexcept { return std::fabs(max_acceleration * position_scale); }
+    double acceleration() const noexcept { return std::fabs(max_acceleration * scale()); }
     double scale() const noexcept { return scale_.load(std::memory_order_relaxed); }
 
     /// Makes one step in `direction` if the timing allows it now. A step that must wait is made later: none is lost.
