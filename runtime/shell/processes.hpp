@@ -52,6 +52,7 @@ struct Processes {
     Entry* find(std::string_view name);
     Entry* find(pid_t pid);
     std::vector<std::string> names() const;
+    bool idle() const { return entries_.empty(); }  ///< no program is known
     /// Takes the entry of a waited child out of the list.
     void collect(pid_t pid);
     /// Nobody waits for it any more.

@@ -1,0 +1,402 @@
+// SPDX-License-Identifier: MIT
+// The control socket: who gets in, what clients may do to it, and that the machine goes on whatever they do.
+#include <cstdlib>
+#include <memory>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include "machine.hpp"
+#include "shell/address.hpp"
+#include "shell/client.hpp"
+#include "shell/server.hpp"
+#include "shell_machine.hpp"
+
+namespace hal::test {
+namespace {
+
+using Json = nlohmann::json;
+
+/// A raw connection: what a badly behaved program would do.
+class Wire {
+public:
+    explicit Wire(const std::string& path) : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+        sockaddr_un address{};
+        address.sun_family = AF_UNIX;
+        path.copy(address.sun_path, sizeof address.sun_path - 1);
+        connected = ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    }
+    ~Wire() { close(fd_); }
+    Wire(const Wire&) = delete;
+    /// False when the other side has closed.
+    bool send(std::string_view text) {
+        while (!text.empty()) {
+            const ssize_t gone = ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL);
+            if (gone <= 0) return false;
+            text.remove_prefix(static_cast<std::size_t>(gone));
+        }
+        return true;
+    }
+    /// As much as the kernel takes without waiting.
+    std::size_t push(std::string_view text) {
+        const ssize_t gone = ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        return gone > 0 ? static_cast<std::size_t>(gone) : 0;
+    }
+    /// The next line; empty when the other side has closed.
+    std::string line() {
+        std::size_t end;
+        while ((end = in_.find('\n')) == in_.npos) {
+            char part[4096];
+            const ssize_t got = recv(fd_, part, sizeof part, 0);
+            if (got <= 0) return "";
+            in_.append(part, static_cast<std::size_t>(got));
+        }
+        const std::string text = in_.substr(0, end);
+        in_.erase(0, end + 1);
+        return text;
+    }
+    void shut() { shutdown(fd_, SHUT_RDWR); }
+
+    bool connected = false;
+
+private:
+    int fd_;
+    std::string in_;
+};
+
+struct ServerTest : testing::Test {
+    ServerTest() {
+        setenv("XDG_RUNTIME_DIR", folder.path.c_str(), 1);
+        machine = std::make_unique<ShellMachine>();
+        machine->must("loadrt and2 names=a,b\nloadrt sum2 names=s\nnewthread t 1000000\naddf s t\n");
+    }
+    ~ServerTest() override { server.reset(); }
+    void serve(ServerOptions options = {}) {
+        options.log = [this](std::string_view sentence) {
+            const std::scoped_lock lock(log_mutex);
+            logged += std::string(sentence) + "\n";
+        };
+        server = std::make_unique<Server>(machine->shell, std::move(options));
+        Diagnostics diagnostics;
+        ASSERT_TRUE(server->start(diagnostics)) << render(diagnostics, machine->session.sources);
+    }
+    std::unique_ptr<Client> client() {
+        std::string problem;
+        auto made = Client::connect("test", problem);
+        EXPECT_NE(made, nullptr) << problem;
+        return made;
+    }
+    /// True when an ordinary client is still served.
+    bool alive() {
+        const auto probe = client();
+        return probe && probe->run("getp a.out").out == "FALSE\n";
+    }
+    std::string log() {
+        const std::scoped_lock lock(log_mutex);
+        return logged;
+    }
+
+    Folder folder;
+    std::unique_ptr<ShellMachine> machine;
+    std::mutex log_mutex;
+    std::string logged;
+    std::unique_ptr<Server> server;
+};
+
+TEST_F(ServerTest, a_client_runs_commands_reads_and_completes) {
+    serve();
+    const auto c = client();
+    EXPECT_EQ(c->instance(), "test");
+    EXPECT_EQ(c->pid(), getpid());
+    EXPECT_EQ(c->run("setp a.in0 1").status, 0);
+    EXPECT_EQ(c->run("getp a.in0").out, "TRUE\n");
+    const auto failed = c->run("getp nothing", "<commandline>");
+    EXPECT_EQ(failed.status, 1);
+    EXPECT_NE(failed.err.find("<commandline>:1:6"), std::string::npos) << failed.err;
+    EXPECT_EQ(c->complete("getp a.o", 8).candidates[0].text, "a.out");
+    EXPECT_TRUE(c->set_options({.script = true}));
+    EXPECT_EQ(c->run("show pin a.out").out, "and2 bit   OUT FALSE a.out\n\n");
+    setenv("HALCYON_TEST_VALUE", "2.5", 1);
+    EXPECT_EQ(c->run("setp s.in0 $HALCYON_TEST_VALUE").status, 0);
+    EXPECT_EQ(c->run_text("x.hal", "setp s.in1 $(HALCYON_TEST_VALUE)\ngetp s.in0\n").out, "2.5\n");
+    EXPECT_TRUE(c->run("quit").quit);
+    EXPECT_TRUE(c->run("begin").collecting);
+}
+
+TEST_F(ServerTest, requests_in_a_row_are_answered_in_a_row) {
+    serve();
+    const auto c = client();
+    std::vector<std::uint64_t> ids;
+    for (int i = 0; i < 5000; ++i) ids.push_back(c->send({{"run", "setp s.in0 " + std::to_string(i)}}));
+    for (const auto id : ids) EXPECT_EQ(c->wait(id)["status"], 0);
+    EXPECT_EQ(c->run("getp s.in0").out, "4999\n");
+    EXPECT_EQ(server->counts().requests, 5001U);
+}
+
+TEST_F(ServerTest, many_clients_are_served_at_once) {
+    serve();
+    std::vector<std::unique_ptr<Client>> clients;
+    for (int i = 0; i < 40; ++i) clients.push_back(client());
+    std::vector<std::uint64_t> ids;
+    for (auto& c : clients) ids.push_back(c->send({{"read", {"a.in0"}}}));
+    for (std::size_t i = clients.size(); i-- > 0;) EXPECT_EQ(clients[i]->wait(ids[i])["ok"], true);
+    EXPECT_EQ(server->counts().clients, 40U);
+    clients.clear();
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
+}
+
+TEST_F(ServerTest, subscriptions_send_values_by_themselves) {
+    serve();
+    const auto c = client();
+    EXPECT_EQ(c->request({{"subscribe", {"a.in0"}}, {"every_ms", 1}})["ok"], true);
+    Json event;
+    ASSERT_TRUE(c->next_event(event, 10'000));
+    EXPECT_EQ(event["values"], (Json{false}));
+    EXPECT_EQ(c->run("setp a.in0 1").status, 0);
+    EXPECT_TRUE(eventually([&] { return c->next_event(event, 10'000) && event["values"] == Json{true}; }));
+}
+
+TEST_F(ServerTest, a_waiting_command_holds_up_nobody_else_and_ends_with_its_client) {
+    serve();
+    auto waiting = client();
+    const auto id = waiting->send({{"run", "loadusr -w sleep 1000"}});
+    const auto after = waiting->send({{"run", "getp a.in0"}});
+    EXPECT_TRUE(alive());
+    waiting->send({{"cancel", true}});
+    EXPECT_NE(waiting->wait(id)["err"].get<std::string>().find("[interrupted]"), std::string::npos);
+    EXPECT_EQ(waiting->wait(after)["out"], "FALSE\n");
+
+    const auto second = waiting->send({{"run", "loadusr -Wn nobody sleep 1000"}});
+    (void)second;
+    EXPECT_TRUE(eventually([&] { return client()->run("list comp nobody").out == "nobody \n"; }));
+    waiting.reset();
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
+    EXPECT_TRUE(alive());
+}
+
+TEST_F(ServerTest, an_open_begin_goes_with_its_client) {
+    serve();
+    auto c = client();
+    c->run("begin");
+    c->run("setp a.in0 1");
+    c.reset();
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
+    EXPECT_EQ(client()->run("getp a.in0").out, "FALSE\n");
+}
+
+// --- clients that behave badly ---------------------------------------------------------------------------------------------
+
+TEST_F(ServerTest, rubbish_is_answered_and_the_connection_goes_on) {
+    serve();
+    Wire wire(server->path());
+    ASSERT_TRUE(wire.connected);
+    EXPECT_EQ(Json::parse(wire.line())["halcyon"], 1);
+    wire.send("hello?\r\n\n\xff\xfe\n{\"id\":1,\"run\":\"getp a.out\"}\r\n");
+    EXPECT_EQ(Json::parse(wire.line())["ok"], false);
+    EXPECT_EQ(Json::parse(wire.line())["ok"], false);
+    EXPECT_EQ(Json::parse(wire.line())["out"], "FALSE\n");
+    EXPECT_TRUE(eventually([&] { return server->counts().rubbish == 2; }));
+}
+
+TEST_F(ServerTest, a_line_in_pieces_is_one_request) {
+    serve();
+    Wire wire(server->path());
+    wire.line();
+    for (const char c : std::string("{\"id\":1,\"run\":\"getp a.out\"}\n")) wire.send(std::string_view(&c, 1));
+    EXPECT_EQ(Json::parse(wire.line())["out"], "FALSE\n");
+}
+
+TEST_F(ServerTest, half_a_request_is_never_executed) {
+    serve();
+    {
+        Wire wire(server->path());
+        wire.line();
+        wire.send("{\"id\":1,\"run\":\"setp a.in0 1\"}");  // no end of line
+    }
+    EXPECT_TRUE(eventually([&] { return server->counts().accepted == 1 && server->counts().clients == 0; }));
+    EXPECT_EQ(client()->run("getp a.in0").out, "FALSE\n");
+    EXPECT_EQ(server->counts().requests, 1U);
+}
+
+TEST_F(ServerTest, a_line_of_100_megabytes_is_refused_and_skipped) {
+    serve();
+    Wire wire(server->path());
+    wire.line();
+    const std::string megabyte(1 << 20, 'x');
+    wire.send("{\"run\":\"");
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(wire.send(megabyte));
+    EXPECT_TRUE(alive());
+    wire.send("\"}\n{\"id\":2,\"run\":\"getp a.out\"}\n");
+    const Json refused = Json::parse(wire.line());
+    EXPECT_EQ(refused["ok"], false);
+    EXPECT_NE(refused["error"].get<std::string>().find("longer than 16777216 bytes"), std::string::npos) << refused;
+    EXPECT_EQ(Json::parse(wire.line())["id"], 2);
+}
+
+TEST_F(ServerTest, a_client_that_never_reads_is_dropped_with_a_reason) {
+    ServerOptions options;
+    options.queue = 10'000;
+    options.stall_ms = 20;
+    serve(options);
+    Wire wire(server->path());
+    const std::string request = "{\"run\":\"help\"}\n";
+    std::string many;
+    for (int i = 0; i < 1000; ++i) many += request;
+    EXPECT_TRUE(eventually([&] {
+        wire.push(many);
+        return server->counts().dropped == 1;
+    }));
+    EXPECT_NE(log().find("read nothing"), std::string::npos) << log();
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
+    EXPECT_TRUE(alive());
+}
+
+TEST_F(ServerTest, a_subscriber_that_sleeps_misses_values_but_stays) {
+    ServerOptions options;
+    options.stall_ms = 20;
+    serve(options);
+    Wire wire(server->path());
+    wire.line();
+    std::string names = "\"a.in0\"";
+    for (int i = 0; i < 5000; ++i) names += ",\"a.in0\"";
+    wire.send("{\"subscribe\":[" + names + "],\"every_ms\":1}\n");
+    EXPECT_EQ(Json::parse(wire.line())["subscription"], 1);
+    // Nothing is read while others are served; then it goes on, and some event says how many were skipped.
+    for (int i = 0; i < 100; ++i) EXPECT_TRUE(alive());
+    EXPECT_TRUE(eventually([&] { return Json::parse(wire.line()).contains("skipped"); }));
+    EXPECT_EQ(server->counts().dropped, 0U);
+}
+
+TEST_F(ServerTest, clients_that_come_and_go_leave_nothing) {
+    serve();
+    for (int i = 0; i < 200; ++i) {
+        Wire wire(server->path());
+        if (i % 3 == 0) wire.send("{\"run\":\"show pin\"}\n{\"run\":\"advance 100 cycles\"}\n{\"run\":\"loadusr -w sleep 1000\"}\n");
+        if (i % 3 == 1) wire.send("{\"subscribe\":[\"a.in0\"],\"every_ms\":1}\n{\"ru");
+        wire.shut();
+    }
+    EXPECT_TRUE(eventually([&] { return server->counts().accepted == 200 && server->counts().clients == 0; }));
+    EXPECT_TRUE(alive());
+    const std::scoped_lock lock(machine->session.mutex);
+    EXPECT_FALSE(machine->session.in_transaction());
+}
+
+TEST_F(ServerTest, too_many_clients_wait_until_one_leaves) {
+    ServerOptions options;
+    options.max_clients = 2;
+    serve(options);
+    auto first = client(), second = client();
+    Wire third(server->path());
+    third.send("{\"id\":1,\"run\":\"getp a.out\"}\n");
+    EXPECT_EQ(first->run("getp a.out").out, "FALSE\n");
+    EXPECT_EQ(server->counts().clients, 2U);
+    second.reset();
+    EXPECT_EQ(Json::parse(third.line())["halcyon"], 1);
+    EXPECT_EQ(Json::parse(third.line())["out"], "FALSE\n");
+}
+
+// --- the socket itself -----------------------------------------------------------------------------------------------------
+
+TEST_F(ServerTest, the_socket_is_its_users_alone) {
+    serve();
+    struct stat about{};
+    ASSERT_EQ(stat(server->path().c_str(), &about), 0);
+    EXPECT_EQ(about.st_mode & 0777, 0600U);
+    ASSERT_EQ(stat(socket_folder().c_str(), &about), 0);
+    EXPECT_EQ(about.st_mode & 0777, 0700U);
+    EXPECT_EQ(server->path(), folder.path + "/halcyon/test.sock");
+}
+
+TEST_F(ServerTest, a_second_instance_of_the_name_is_refused_and_another_name_is_not) {
+    serve();
+    ShellMachine second;
+    Server refused(second.shell);
+    Diagnostics diagnostics;
+    EXPECT_FALSE(refused.start(diagnostics));
+    const std::string said = render(diagnostics, second.session.sources);
+    EXPECT_NE(said.find("an instance named 'test' runs already (process " + std::to_string(getpid()) + ") [instance-running]"), std::string::npos) << said;
+    EXPECT_TRUE(alive());
+    ShellMachine third({}, shell_session("third"));
+    Server other(third.shell);
+    Diagnostics none;
+    EXPECT_TRUE(other.start(none));
+    EXPECT_EQ(running_instances(), (std::vector<std::string>{"test", "third"}));
+    std::string problem;
+    EXPECT_EQ(Client::connect("fourth", problem), nullptr);
+    EXPECT_EQ(problem, "no instance 'fourth' runs here; running: test, third (choose with --name)");
+}
+
+TEST_F(ServerTest, what_a_dead_process_left_is_replaced) {
+    std::filesystem::create_directory(folder.path + "/halcyon");
+    std::filesystem::permissions(folder.path + "/halcyon", std::filesystem::perms::owner_all);
+    folder.write("halcyon/test.lock", "1\n");
+    {  // a socket nobody listens on
+        const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+        sockaddr_un address{};
+        address.sun_family = AF_UNIX;
+        (folder.path + "/halcyon/test.sock").copy(address.sun_path, sizeof address.sun_path - 1);
+        ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+        close(fd);
+    }
+    EXPECT_TRUE(running_instances().empty());
+    serve();
+    EXPECT_TRUE(alive());
+    server.reset();
+    EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/test.sock"));
+    EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/test.lock"));
+    std::string problem;
+    EXPECT_EQ(Client::connect("test", problem), nullptr);
+    EXPECT_EQ(problem, "no instance 'test' runs here; start one with `hal run FILE.hal`");
+}
+
+TEST_F(ServerTest, a_folder_that_is_not_ours_is_refused) {
+    const auto said = [&](const std::string& name) {
+        ShellMachine other({}, shell_session(name));
+        Server refused(other.shell);
+        Diagnostics diagnostics;
+        EXPECT_FALSE(refused.start(diagnostics));
+        return render(diagnostics, other.session.sources);
+    };
+    std::filesystem::create_directory_symlink("/tmp", folder.path + "/halcyon");
+    EXPECT_NE(said("x").find("is not yours alone [no-socket]"), std::string::npos) << said("x");
+    std::filesystem::remove(folder.path + "/halcyon");
+    folder.write("halcyon", "a file");
+    EXPECT_NE(said("x").find("[no-socket]"), std::string::npos);
+    for (const char* name : {"../x", "", ".x", "a b", "x/y"}) EXPECT_NE(said(name).find("no name for an instance"), std::string::npos) << name;
+    EXPECT_NE(said(std::string(65, 'x')).find("[no-socket]"), std::string::npos);
+    setenv("XDG_RUNTIME_DIR", (folder.path + "/" + std::string(100, 'd')).c_str(), 1);
+    EXPECT_NE(said("x").find("too long"), std::string::npos);
+}
+
+TEST_F(ServerTest, stop_calls_back_and_the_end_is_clean) {
+    std::atomic<bool> stopped{false};
+    ServerOptions options;
+    options.stop = [&] { stopped = true; };
+    serve(std::move(options));
+    const auto c = client();
+    EXPECT_EQ(c->stop().status, 0);
+    EXPECT_TRUE(eventually([&] { return stopped.load(); }));
+    server.reset();
+    EXPECT_EQ(c->run("getp a.out").err, "the connection to instance 'test' is lost\n");
+    EXPECT_FALSE(c->connected());
+    Json event;
+    EXPECT_FALSE(c->next_event(event, -1));
+}
+
+TEST_F(ServerTest, the_instance_meant_is_the_named_one_or_the_only_one) {
+    EXPECT_EQ(instance_wanted("x"), "x");
+    unsetenv("HALCYON_INSTANCE");
+    EXPECT_EQ(instance_wanted(""), "default");
+    serve();
+    EXPECT_EQ(instance_wanted(""), "test");
+    setenv("HALCYON_INSTANCE", "from-environment", 1);
+    EXPECT_EQ(instance_wanted(""), "from-environment");
+    unsetenv("HALCYON_INSTANCE");
+}
+
+}  // namespace
+}  // namespace hal::test
