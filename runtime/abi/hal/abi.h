@@ -36,8 +36,9 @@ typedef struct hal_port {
     uint8_t *data;
 } hal_port;
 
-/* One slot: eight bytes, whatever the type. */
+/* One slot: eight bytes, whatever the type. `raw` stands first, so that `= {0}` clears all of them. */
 typedef union hal_value {
+    uint64_t raw;
     bool bit;
     double real;
     int32_t s32;
@@ -45,7 +46,6 @@ typedef union hal_value {
     int64_t s64;
     uint64_t u64;
     hal_port *port;
-    uint64_t raw;
 } hal_value;
 
 /* A pin as it stands in the instance's memory. While the pin is not linked, `slot` points at `own`. Only
