@@ -191,7 +191,7 @@ bool check_lock(const CommandRow& row, const Command& command, unsigned lock, Di
     if (!refused) return true;
     for (const auto& entry : lock_bits) {
         if (!(refused & entry.bit)) continue;
-        diagnostics.error("locked", command.name.span, std::string(entry.what) + " is locked", std::string("needs: unlock ") + entry.level,
+        diagnostics.error("locked", command.name.span, "'" + command.name.text + "' is locked (" + entry.what + ")", std::string("needs: unlock ") + entry.level,
                           "type `unlock` to take all locks off; `status lock` shows them");
         break;
     }

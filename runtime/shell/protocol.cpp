@@ -164,23 +164,31 @@ constexpr Verb verbs[] = {
     {"cancel", &Connection::State::nothing, ""},
 };
 
+/// True when `word` is one of those in `words`, each followed by a blank.
+bool listed_in(std::string_view words, std::string_view word) {
+    for (std::size_t at = 0, blank; (blank = words.find(' ', at)) != words.npos; at = blank + 1)
+        if (words.substr(at, blank - at) == word) return true;
+    return false;
+}
+
 /// The one verb of a request; refuses what is not understood, so that a misspelt member is not silently without effect.
 const Verb& verb_of(const Json& body) {
     const Verb* found = nullptr;
-    for (const auto& [key, value] : body.items())
-        for (const Verb& verb : verbs)
-            if (key == verb.name) {
-                if (found) throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb.name};
-                found = &verb;
-            }
+    for (auto entry = body.begin(); entry != body.end(); ++entry) {
+        const auto verb = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return entry.key() == v.name; });
+        if (verb == std::end(verbs)) continue;
+        if (found) throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
+        found = verb;
+    }
     if (!found) {
         std::vector<std::string> names;
         for (const Verb& verb : verbs) names.emplace_back(verb.name);
         throw Refusal{"there is no verb in this request; the verbs are: " + listed(names, names.size())};
     }
-    const std::string known = std::string(" id ") + found->name + " " + found->members;
-    for (const auto& [key, value] : body.items())
-        if (key.empty() || key.find(' ') != key.npos || known.find(" " + key + " ") == known.npos) throw Refusal{"'" + key.substr(0, 60) + "' is no member of a request to " + found->name};
+    for (auto entry = body.begin(); entry != body.end(); ++entry) {
+        const std::string& key = entry.key();
+        if (key != "id" && key != found->name && !listed_in(found->members, key)) throw Refusal{"'" + key.substr(0, 60) + "' is no member of a request to " + found->name};
+    }
     return *found;
 }
 

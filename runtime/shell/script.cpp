@@ -54,6 +54,11 @@ Script::Script(Shell& shell, Shell::State& state, Output& output)
 
 Script::~Script() = default;
 
+std::string Script::own_path(std::uint32_t source) const {
+    const std::string& name = session_.sources.get(source).name;
+    return name.starts_with('<') ? "" : canonical_path(resolve_path(name, shell_.options.directory));
+}
+
 Script::Parsed Script::parse_text(std::uint32_t source) {
     Parsed parsed;
     parsed.commands = parse(session_.sources, source, {&session_.ini, state_.variable}, parsed.problems);
@@ -62,7 +67,7 @@ Script::Parsed Script::parse_text(std::uint32_t source) {
 
 int Script::run(std::uint32_t source) {
     const bool collecting_before = state_.collecting;
-    files_.push_back({canonical_path(resolve_path(session_.sources.get(source).name, shell_.options.directory)), {}});
+    files_.push_back({own_path(source), {}});
     run_commands(source);
     files_.pop_back();
     finish();
@@ -236,7 +241,7 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
             opted_out.push_back(text);
             continue;
         }
-        files_.push_back({canonical_path(resolve_path(session_.sources.get(text).name, shell_.options.directory)), {}});
+        files_.push_back({own_path(text), {}});
         sort_in(sort_in, text);
         files_.pop_back();
     }

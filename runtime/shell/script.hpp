@@ -43,6 +43,8 @@ private:
         std::vector<Command> commands;
         Diagnostics problems;  ///< of the text itself
     };
+    /// The canonical path of a text that is a file, else "".
+    std::string own_path(std::uint32_t source) const;
     Parsed parse_text(std::uint32_t source);
     void run_commands(std::uint32_t source);
     void run_line(const Command& command);

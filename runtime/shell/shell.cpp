@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "shell/shell.hpp"
 
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <utility>
+#include <vector>
 
 #include "session/session.hpp"
 #include "shell/commands.hpp"
@@ -147,10 +150,14 @@ int Shell::run_ini(const std::string& path, Output& output) {
 }
 
 bool Shell::may_wait(std::string_view text) {
+    static const auto waiting = [] {
+        std::vector<std::string_view> names;
+        for (const auto& row : command_table())
+            if (row.flags & command_waits) names.push_back(row.name);
+        return names;
+    }();
     // A word anywhere is enough: running a harmless text in a thread of its own costs little.
-    for (const auto& row : command_table())
-        if (row.flags & command_waits && text.find(row.name) != text.npos) return true;
-    return false;
+    return std::any_of(waiting.begin(), waiting.end(), [&](std::string_view name) { return text.find(name) != text.npos; });
 }
 
 }  // namespace hal
