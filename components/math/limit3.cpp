@@ -62,7 +62,8 @@ struct Limit3 : hal::Component {
     hal::In<double>        max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>        max_velocity{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
     hal::In<double>        max_acceleration{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
-    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop over which the acceleration fades out; 2 or less: the fastest stop", {.initial = 2}};
+    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop in which acceleration fades out; 2: the fastest stop",
+                                        {.initial = 2}};
     hal::Function          run{*this, "", &Limit3::update, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
