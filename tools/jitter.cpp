@@ -24,7 +24,8 @@ Jitter measure_jitter(std::int64_t period_ns, std::int64_t spin_ns, std::int64_t
         const Wait wait{spin_ns};
         const std::int64_t start = monotonic_ns() + 10 * period_ns, end = start + duration_ns;
         for (std::int64_t due = start; due < end; ++result.cycles) {
-            const std::int64_t woke = wait.until(due);
+            wait.sleep(due);
+            const std::int64_t woke = Wait::spin(due);
             lateness->add(woke - due);
             due += period_ns;
             if (woke >= due) due += (woke - due) / period_ns * period_ns + period_ns;  // the grid stays, as in the executor
