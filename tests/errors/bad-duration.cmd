@@ -1,0 +1,1 @@
+hal sim bad-duration.hal

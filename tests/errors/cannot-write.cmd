@@ -1,0 +1,1 @@
+hal sim cannot-write.hal

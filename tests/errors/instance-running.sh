@@ -1,0 +1,7 @@
+# two instances of one name; the first lives until the second has been refused
+mkfifo "$HOME/ready"
+hal run --name twice instance-running.hal >"$HOME/ready" 2>/dev/null &
+grep -q running "$HOME/ready"
+hal run --name twice instance-running.hal 2>&1 >/dev/null | sed 's/process [0-9]*/process N/' >&2
+kill -INT $!
+wait

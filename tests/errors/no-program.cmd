@@ -1,0 +1,1 @@
+hal sim no-program.hal

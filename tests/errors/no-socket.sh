@@ -1,0 +1,2 @@
+# a folder in which nobody can make another
+XDG_RUNTIME_DIR=/proc hal run no-socket.hal

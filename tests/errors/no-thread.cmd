@@ -1,0 +1,1 @@
+hal sim no-thread.hal

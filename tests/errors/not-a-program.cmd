@@ -1,0 +1,1 @@
+hal sim not-a-program.hal

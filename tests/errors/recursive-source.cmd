@@ -1,0 +1,1 @@
+hal sim recursive-source.hal

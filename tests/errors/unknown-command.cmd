@@ -1,0 +1,1 @@
+hal sim unknown-command.hal

@@ -1,0 +1,1 @@
+hal sim unsupported-file.tcl
