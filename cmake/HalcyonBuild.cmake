@@ -22,7 +22,7 @@ set(HALCYON_COMPONENT_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/components")
 # No fused multiply-add behind our back: the same netlist gives the same bytes on every machine.
 add_compile_options(-Wall -Wextra -Wpedantic "$<$<COMPILE_LANGUAGE:CXX>:-Wconversion;-Wshadow>" -ffp-contract=off)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-    add_compile_options(-Wno-restrict)  # g++ 12 warns about its own std::string::insert (GCC bug 105651)
+    add_compile_options(-Wno-restrict -Wno-array-bounds)  # g++ 12 warns about its own std::string (GCC bugs 105651, 105329)
 endif()
 if(HALCYON_WERROR)
     add_compile_options(-Werror)

@@ -118,7 +118,9 @@ TEST_F(ServerTest, a_client_runs_commands_reads_and_completes) {
     EXPECT_EQ(failed.status, 1);
     EXPECT_NE(failed.err.find("<commandline>:1:6"), std::string::npos) << failed.err;
     EXPECT_EQ(c->complete("getp a.o", 8).candidates[0].text, "a.out");
-    EXPECT_TRUE(c->set_options({.script = true}));
+    Client::Options options;
+    options.script = true;
+    EXPECT_TRUE(c->set_options(options));
     EXPECT_EQ(c->run("show pin a.out").out, "and2 bit   OUT FALSE a.out\n\n");
     setenv("HALCYON_TEST_VALUE", "2.5", 1);
     EXPECT_EQ(c->run("setp s.in0 $HALCYON_TEST_VALUE").status, 0);
