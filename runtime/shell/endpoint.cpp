@@ -68,7 +68,7 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
             const std::string pid = content_of(lock_);
             diagnostics.error("instance-running", {}, "an instance named '" + std::string(name) + "' runs already" + (pid.empty() ? "" : " (process " + pid + ")"), "",
-                              "give this one another name with --name, or end that one: hal shell --name " + std::string(name) + " --stop");
+                              "give this one another name with --name" + (pid.empty() ? "" : ", or end that one: kill " + pid));
             close(lock_);
             lock_ = -1;
             return false;
