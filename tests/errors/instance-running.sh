@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # two instances of one name; the first lives until the second has been refused
 mkfifo "$HOME/ready"
 hal run --name twice instance-running.hal >"$HOME/ready" 2>/dev/null &

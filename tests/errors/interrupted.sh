@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # SIGINT while a command waits
 mkfifo "$HOME/started"
 hal sim interrupted.hal >"$HOME/started" &

@@ -19,7 +19,8 @@ struct Protocol : testing::Test {
         return replies;
     }
     Json ask(const Json& request) {
-        const std::string reply = raw(request.dump());
+        std::string reply = raw(request.dump());
+        if (handled == Connection::Handled::wants_thread) handled = connection.handle(request.dump(), reply, true);
         EXPECT_TRUE(reply.ends_with("\n")) << reply;
         return Json::parse(reply);
     }
