@@ -218,8 +218,8 @@ struct Editor::State {
         el_set(line, EL_HIST, ::history, history);
         el_set(line, EL_PROMPT, &show_prompt);
         el_set(line, EL_GETCFN, &next_character);
-        el_set(line, EL_ADDFN, "hal-complete", "complete a name", &on_tab);
-        el_set(line, EL_ADDFN, "hal-interrupt", "drop the line", &on_interrupt);
+        el_wset(line, EL_ADDFN, L"hal-complete", L"complete a name", &on_tab);  // el_set would leak copies of the texts
+        el_wset(line, EL_ADDFN, L"hal-interrupt", L"drop the line", &on_interrupt);
         el_set(line, EL_BIND, "^I", "hal-complete", nullptr);
         el_set(line, EL_BIND, "^R", "em-inc-search-prev", nullptr);
         el_set(line, EL_BIND, "^C", "hal-interrupt", nullptr);

@@ -46,8 +46,10 @@ void StopRequest::release() {
     signalfd_siginfo info{};
     while (::read(signals_, &info, sizeof info) == sizeof info) {  // an impatient second Ctrl-C is no reason to skip the tidying up
     }
-    const sigset_t set = ending_signals();
-    ::pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+    sigset_t impatient;
+    sigemptyset(&impatient);
+    sigaddset(&impatient, SIGINT);
+    ::pthread_sigmask(SIG_UNBLOCK, &impatient, nullptr);
 }
 
 StopRequest::~StopRequest() {

@@ -28,8 +28,8 @@ public:
     bool wait_ns(std::int64_t ns) const;
     /// From now on on_signal may be called.
     void listen();
-    /// From now on it is not called any more, and a further signal ends the process as it would any other: for the time
-    /// when outputs are safe and the rest is tidying up.
+    /// From now on it is not called any more. A further Ctrl-C ends the process at once, as it would any other: for the
+    /// time when outputs are safe and the rest is tidying up.
     void release();
 
 private:

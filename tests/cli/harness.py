@@ -31,6 +31,8 @@ def program():
 HAL = program()
 PLUGINS = os.environ.get("HALCYON_PLUGIN_PATH") or str(HAL.parent.parent / "tests" / "components")
 
+SANITIZED = any(name in HAL.read_bytes() for name in (b"__asan_init", b"__tsan_init"))  # then the sanitizer takes crash signals
+
 SERVO = """loadrt threads name1=servo period1=1000000
 loadrt sum2 names=adder
 addf adder servo

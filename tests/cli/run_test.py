@@ -4,7 +4,7 @@ import os
 import signal
 import unittest
 
-from harness import SERVO, Case, Terminal, wait_until
+from harness import SANITIZED, SERVO, Case, Terminal, wait_until
 
 FURUTA_SIGNALS = """loadrt threads name1=servo period1=1000000
 loadrt siggen
@@ -97,6 +97,7 @@ class End(Case):
         self.assertTrue((self.folder / "end.txt").read_text().endswith("stop out=-1\n"))
         machine.stdout = open(os.devnull)
 
+    @unittest.skipIf(SANITIZED, "a sanitizer reports crashes itself")
     def test_crash_makes_outputs_safe_and_names_the_function(self):
         machine = self.start("run", self.write("a.hal", self.WITNESS))
         self.shell("setp", "witness.0.crash", "1")
