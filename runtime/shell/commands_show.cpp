@@ -106,14 +106,14 @@ void show_funct(Request& request) {
 
 void show_thread(Request& request) {
     request.title("Realtime Threads:\n     Period  FP     Name               (     Time, Max-Time )\n");
-    for (const Thread* const thread : threads_slowest_first(request.model(), request.patterns)) {
-        const Pin *time = request.model().find_pin(thread->name + ".time"), *tmax = request.model().find_pin(thread->name + ".tmax");
-        std::int32_t last = 0, longest = 0;
-        if (time && tmax) {
-            const auto values = request.context.session.read_pins({time, tmax});
-            last = values[0].s32;
-            longest = values[1].s32;
-        }
+    const auto threads = threads_slowest_first(request.model(), request.patterns);
+    std::vector<const Pin*> times;
+    for (const Thread* const thread : threads)
+        for (const char* const pin : {".time", ".tmax"}) times.push_back(request.model().find_pin(thread->name + pin));
+    const auto values = request.context.session.read_pins(times);
+    for (std::size_t i = 0; i < threads.size(); ++i) {
+        const Thread* const thread = threads[i];
+        const std::int32_t last = values[2 * i].s32, longest = values[2 * i + 1].s32;
         if (request.script()) request.add("{} YES {} {:>8} {}", thread->options.period_ns, thread->name, last, longest);
         else request.add("{:>11}  YES  {:>20} ( {:>8}, {:>8} )\n", thread->options.period_ns, thread->name, last, longest);
         int number = 1;

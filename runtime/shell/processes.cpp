@@ -63,7 +63,11 @@ Processes::~Processes() {
 pid_t Processes::start(const ProcessStart& start, bool waited, std::string& problem) {
     if (wake_ < 0) {
         wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+        sigset_t all_signals, before;  // signals are for the program's own thread
+        sigfillset(&all_signals);
+        pthread_sigmask(SIG_SETMASK, &all_signals, &before);
         reaper_ = std::thread([this] { reap(); });
+        pthread_sigmask(SIG_SETMASK, &before, nullptr);
     }
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);

@@ -27,6 +27,7 @@ namespace hal {
 namespace {
 
 constexpr std::size_t read_at_once = 65536;
+constexpr std::int64_t no_files_ns = 100'000'000;          // before accept is tried again after the system had no file left
 constexpr int lines_at_once = 1000;                        // of one client before the others have a turn
 constexpr std::size_t slow_reader = std::size_t{64} << 10; // bytes waiting for a client that skip its subscriptions
 
@@ -76,6 +77,7 @@ struct Server::State {
     int wake = -1;                     ///< eventfd: a worker has finished, or the server is to end
     std::atomic<bool> ending{false};
     std::thread thread;
+    std::int64_t accepts_from = 0;     ///< on the steady clock
     std::vector<std::unique_ptr<Client>> clients;
     std::atomic<std::uint64_t> connected{0}, accepted{0}, dropped{0}, refused{0}, requests{0}, rubbish{0};
 
@@ -129,7 +131,8 @@ void Server::State::serve() {
     std::vector<pollfd> ready;
     while (!ending) {
         ready.clear();
-        ready.push_back({endpoint.fd(), static_cast<short>(clients.size() < options.max_clients ? POLLIN : 0), 0});
+        const bool accepts = clients.size() < options.max_clients && steady_ns() >= accepts_from;
+        ready.push_back({endpoint.fd(), static_cast<short>(accepts ? POLLIN : 0), 0});
         ready.push_back({wake, POLLIN, 0});
         for (const auto& client : clients) {
             const int reads = listens_to(*client) ? POLLIN | POLLRDHUP : POLLRDHUP;
@@ -174,7 +177,7 @@ void Server::State::serve() {
 /// Until the next subscription or the end of a client's patience; at once while complete requests lie here.
 int Server::State::sleep_ms() const {
     const std::int64_t now = steady_ns();
-    std::int64_t until = std::numeric_limits<std::int64_t>::max();
+    std::int64_t until = accepts_from > now ? accepts_from : std::numeric_limits<std::int64_t>::max();
     for (const auto& client : clients) {
         if (client->gone) continue;
         if (!client->busy() && client->waiting() <= options.queue && client->line_end() != std::string::npos) return 0;
@@ -188,7 +191,10 @@ int Server::State::sleep_ms() const {
 void Server::State::accept_clients() {
     while (clients.size() < options.max_clients) {
         const int fd = accept4(endpoint.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-        if (fd < 0) return;
+        if (fd < 0) {
+            if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) accepts_from = steady_ns() + no_files_ns;
+            return;
+        }
         ucred peer{};
         socklen_t size = sizeof peer;
         if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 || (peer.uid != geteuid() && peer.uid != 0)) {

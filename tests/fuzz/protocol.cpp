@@ -23,7 +23,7 @@ void require(bool holds, const char* what, std::string_view line) {
 }
 
 bool leaves_the_process(std::string_view line) {
-    for (const char* word : {"save", "usr", "source", "unlock", "\\u"})
+    for (const char* word : {"save", "usr", "source", "unlock", "advance", "\\u"})
         if (line.find(word) != line.npos) return true;
     return false;
 }
@@ -55,8 +55,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             if (leaves_the_process(line)) continue;
             std::string reply;
             connection.cancels(line);
-            if (connection.handle(line, reply) == hal::Connection::Handled::wants_thread) require(reply.empty(), "what waits has no reply yet", line);
-            else check_reply(reply, line);
+            if (connection.handle(line, reply) == hal::Connection::Handled::wants_thread) {
+                require(reply.empty(), "what waits has no reply yet", line);
+                if (line.find("env") != line.npos) continue;  // a word that waits could be put together from parts
+                connection.handle(line, reply, true);
+            }
+            check_reply(reply, line);
             require(!session.in_transaction(), "no transaction is left open", line);
         }
         std::string events;

@@ -225,6 +225,8 @@ TEST_F(Protocol, what_may_wait_asks_for_a_thread_first) {
     std::string reply;
     EXPECT_EQ(connection.handle(R"({"id":1,"run":"loadusr -w echo hi"})", reply, true), Connection::Handled::done);
     EXPECT_EQ(Json::parse(reply)["out"], "hi\n");
+    raw(R"({"run":"$COMMAND -w true"})");  // what it stands for may wait
+    EXPECT_EQ(handled, Connection::Handled::wants_thread);
     EXPECT_TRUE(connection.cancels(R"({"cancel":true})"));
     EXPECT_FALSE(connection.cancels(R"({"run":"print \"cancel\""})"));
     EXPECT_FALSE(connection.cancels("\"cancel\" rubbish"));
