@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 # shellcheck shell=sh
-# `./hal test [quick]`; read by the script `hal`, whose functions it uses. Runs everything, then says what failed.
+# `./hal test [sanitizers]`; read by the script `hal`, whose functions it uses. Runs everything, then says what failed.
 case ${1-} in
-    "" | quick) ;;
-    *) die "usage: ./hal test [quick]" ;;
+    "" | sanitizers) ;;
+    *) die "usage: ./hal test [sanitizers]" ;;
 esac
 tests=ON
 failed=
@@ -28,7 +28,7 @@ run_tests() {
 compile_release "the program, its components, tests and benchmarks" all bench
 run_tests release
 
-if [ "${1-}" != quick ]; then
+if [ "${1-}" = sanitizers ]; then
     need "/usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.rtsan-$(uname -m).a=libclang-rt-19-dev"
 
     compile rt-guard "everything under the real-time guard" all
