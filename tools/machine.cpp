@@ -54,9 +54,9 @@ public:
     OwnShell(Shell& shell, StopRequest& stop, Output& output) : shell_(shell), stop_(stop), output_(output) {}
     int execute(std::string_view line) override {
         shell_.cancel(false);
-        stop_.spare = true;  // Ctrl-C is for the command now
+        stop_.spare(true);  // Ctrl-C is for the command now
         const int status = shell_.execute(line, output_);
-        stop_.spare = false;
+        stop_.spare(false);
         return status;
     }
     Completion complete(std::string_view line, std::size_t cursor) override { return shell_.complete(line, cursor); }

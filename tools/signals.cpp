@@ -63,15 +63,27 @@ void StopRequest::request() noexcept {
     [[maybe_unused]] const ssize_t n = ::write(event_, &one, sizeof one);  // an eventfd can only be full, and then it is readable
 }
 
+void StopRequest::take_signals() {
+    signalfd_siginfo info{};
+    while (::read(signals_, &info, sizeof info) == sizeof info) {
+        if (!(info.ssi_signo == SIGINT && spare_)) request();
+        if (on_signal) on_signal();
+    }
+}
+
+void StopRequest::spare(bool on) {
+    const std::lock_guard lock(mutex_);
+    take_signals();
+    spare_ = on;
+}
+
 void StopRequest::serve() {
     for (;;) {
         pollfd both[2] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}};
         if (::poll(both, 2, -1) < 0) continue;
         if (both[1].revents != 0) return;
-        signalfd_siginfo info{};
-        if (::read(signals_, &info, sizeof info) != sizeof info) continue;
-        if (!(info.ssi_signo == SIGINT && spare)) request();
-        if (on_signal) on_signal();
+        const std::lock_guard lock(mutex_);
+        take_signals();
     }
 }
 

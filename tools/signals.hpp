@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <mutex>
 #include <thread>
 
 namespace hal::tools {
@@ -17,8 +18,9 @@ public:
 
     /// Called in a thread of its own when a signal comes, to end what the main thread waits for.
     std::function<void()> on_signal;
-    /// While set, SIGINT only calls on_signal: it is for the command that runs, not for the machine.
-    std::atomic<bool> spare{false};
+    /// While on, SIGINT only calls on_signal: it is for the command that runs, not for the machine. Switching takes what
+    /// has come so far first: a Ctrl-C that ended the command's program still belongs to the command.
+    void spare(bool on);
 
     void request() noexcept;      ///< [any]
     bool requested() const noexcept { return requested_.load(std::memory_order_acquire); }
@@ -34,8 +36,11 @@ public:
 
 private:
     void serve();
+    void take_signals();
     int event_ = -1, signals_ = -1, done_ = -1;
     std::atomic<bool> requested_{false};
+    std::mutex mutex_;    // of taking signals and what they mean
+    bool spare_ = false;
     std::thread thread_;
 };
 
