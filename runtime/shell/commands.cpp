@@ -16,8 +16,8 @@ constexpr CommandRow rows[] = {
      "names=a,b gives the instances' names, count=N makes N numbered ones; some components take num_chan=N and\n"
      "personality=N,N. `hal doc COMPONENT` lists the other arguments. Loading a component again adds instances.",
      edit, load, command_plain},
-    {"unloadrt", "", "LOADED|all", "unload a component with all its instances", "", edit, load, command_plain},
-    {"unload", "", "LOADED|all", "unload a component, or end a program started by loadusr", "", edit, load, command_plain},
+    {"unloadrt", "", "LOADED|all", "unload a component with all its instances, or one instance", "", edit, load, command_plain},
+    {"unload", "", "LOADED|all", "unload a component or an instance, or end a program started by loadusr", "", edit, load, command_plain},
     {"loadusr", "", "[-W] [-Wn NAME] [-w] [-i] PROGRAM [ARGUMENT]...", "start a program",
      "-W waits until a component named like the program is ready, -Wn NAME until NAME is; a program says so over the\n"
      "control socket. -w waits for the program's end and fails when its exit status is not 0; -i ignores the status.",
@@ -25,7 +25,7 @@ constexpr CommandRow rows[] = {
     {"waitusr", "", "PROCESS", "wait until a program started by loadusr has ended", "", command_waitusr, 0, command_waits},
     {"unloadusr", "", "PROCESS|all", "end a program started by loadusr (SIGTERM)", "", command_unloadusr, load, command_plain},
     // --- threads and functions
-    {"newthread", "", "NAME PERIOD_NS [fp] [cpu=N] [policy=fifo|deadline|other] [spin=TIME] [budget=TIME] [profile=every]",
+    {"newthread", "", "NAME PERIOD_NS [fp] [cpu=N] [policy=fifo|deadline|other] [priority=N] [spin=TIME] [budget=TIME] [profile=every]",
      "make a real-time thread",
      "All periods are multiples of the fastest. spin= is how long before its deadline the thread stops sleeping and spins;\n"
      "budget= is the execution time that counts as a fault; profile=every times every function in every cycle.",

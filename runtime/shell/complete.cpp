@@ -133,7 +133,10 @@ struct Kind {
 constexpr Kind kinds[] = {
     {"COMPONENT", [](Search& s) { for (const auto& name : s.session.available_components()) s.add(name); }},
     {"ARGUMENT=VALUE", add_load_arguments},
-    {"LOADED", [](Search& s) { for (const auto& c : s.model().components) s.add(c->name, c->process ? "program" : fmt::format("{} instances", c->instances.size())); }},
+    {"LOADED", [](Search& s) {
+        for (const auto& c : s.model().components) s.add(c->name, c->process ? "program" : fmt::format("{} instances", c->instances.size()));
+        for (const auto& [name, instance] : s.model().instance) s.add(std::string(name), instance->component->name);
+    }},
     {"PROCESS", [](Search& s) { for (const auto& name : s.processes.names()) s.add(name); }},
     {"PROGRAM", add_files},
     {"FILE", add_files},

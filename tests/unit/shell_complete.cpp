@@ -104,8 +104,8 @@ TEST_F(Complete, words_of_a_choice_and_options) {
 TEST_F(Complete, components_and_files) {
     EXPECT_EQ(after("loadrt conv_bit_fl"), "conv_bit_float");
     EXPECT_EQ(after("loadrt and2 na"), "names=");
-    EXPECT_EQ(after("unloadrt s"), "sum2");
-    EXPECT_EQ(after("unload a"), "all and2");
+    EXPECT_EQ(after("unloadrt s"), "s sum2");
+    EXPECT_EQ(after("unload a"), "a all and2");
     const Folder folder;
     folder.write("one.hal", "");
     std::filesystem::create_directory(folder.path + "/one.d");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which commands form a transaction, when it takes effect, and what the user reads about it.
+#include "shell/commands.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -170,6 +171,14 @@ TEST(Script, quit_stops_reading) {
     EXPECT_FALSE(machine.shell.quit());
     EXPECT_EQ(machine.line("exit"), 0);
     EXPECT_TRUE(machine.shell.quit());
+}
+
+TEST(Script, the_table_has_exactly_the_sessions_edits) {
+    for (const CommandRow& row : command_table()) {
+        EXPECT_EQ(row.handler == nullptr, Session::edits({{row.name, {}}, {}, {}})) << row.name;
+        EXPECT_EQ(find_command(row.name), &row);
+        EXPECT_TRUE(*row.summary) << row.name;
+    }
 }
 
 TEST(Script, help_knows_every_command) {
