@@ -10,6 +10,8 @@ namespace hal::paths {
 extern const std::string_view version;             ///< of Halcyon, "1.2.3"
 extern const std::string_view build_components;    ///< folder of the plugins in the build tree
 extern const std::string_view install_components;  ///< folder of the plugins once installed
+extern const std::string_view build_python;        ///< folder of the Python module in the build tree
+extern const std::string_view install_python;      ///< folder of the Python module once installed
 extern const std::string_view build_includes;      ///< include path of the sdk in this tree, parts separated by `:`
 extern const std::string_view install_includes;    ///< include path of the sdk once installed
 

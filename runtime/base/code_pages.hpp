@@ -18,6 +18,11 @@ inline constexpr CodePage code_pages[] = {
      "A load argument has a value its component does not accept: not a number where one is needed, out of its limits, or a "
      "list that does not fit the number of instances.\n\n"
      "`hal doc COMPONENT` lists a component's arguments with their defaults and limits."},
+    {"bad-component-source",
+     "A `.comp` file is declarations, each ended by a `;`, then a line that consists of `;;`, then C code. Here the declarations cannot be "
+     "read, or contradict each other or the code. All mistakes are reported at once; the C compiler sees the code only when there are none.\n\n"
+     "`component NAME \"…\"; pin in float in; pin out float out; function _; license \"GPL\"; ;;` and `out = in;`, the `;;` on a line of its "
+     "own. docs/tutorials/linuxcnc-components.md has examples."},
     {"bad-duration",
      "`advance` lets time pass: so many cycles of the fastest thread, or so long. A bare number says neither.\n\n"
      "Examples: `advance 10 cycles`, `advance 250ms`, `advance 2s`. Units: ns us ms s min h."},
@@ -72,6 +77,26 @@ inline constexpr CodePage code_pages[] = {
     {"dos-line-endings",
      "Lines of this file end in CR LF. They are read as if they ended in LF; this is said once per file.\n\n"
      "`hal fmt` or `sed -i 's/\\r$//' FILE` converts the file."},
+    {"eds-count",
+     "A number in a device description (EDS, DCF, XDD) and what it counts do not agree: objects in a list, sub-indices of an object, lines "
+     "of a comment, PDOs. What is described counts, the number does not.\n\n"
+     "`SubNumber` counts sub-index 0, too."},
+    {"eds-missing",
+     "A key or a section that CiA 306 demands is not there, or is empty. The message says what was assumed.\n\n"
+     "An object without `DataType` can be read and written as bytes only."},
+    {"eds-object",
+     "Something about an object as a whole: a kind, data type or access type that does not exist, sub-indices of a plain variable, a "
+     "default mapping that names what is not there or has another length."},
+    {"eds-syntax",
+     "A line of a device description that is neither a [section] nor Key=Value, a section or key that comes twice, a comment where none may "
+     "be, or text in an unusual encoding. Comments begin with `;` and have a line of their own.\n\n"
+     "When something is said twice the last one counts."},
+    {"eds-unreadable",
+     "The file is no device description, so nothing of it was used: it is empty, no text, or has neither objects nor [DeviceInfo]."},
+    {"eds-value",
+     "A value that is no number, does not fit into its data type or lies outside of its limits, or is spelled in a way that other tools "
+     "understand differently.\n\n"
+     "Numbers are decimal, or hexadecimal with 0x. A leading 0 makes a number octal, as in C; `$NODEID+0x180` adds the node-id."},
     {"function-in-thread",
      "A function runs in one thread, at one place. It was added a second time.\n\n"
      "Move it with `delf FUNCTION THREAD` followed by addf."},
@@ -84,6 +109,10 @@ inline constexpr CodePage code_pages[] = {
     {"interrupted",
      "A command that was waiting (loadusr -w, loadusr -W, waitusr, advance) was told to stop, or the one who gave it has gone.\n\n"
      "What was done before it stays done."},
+    {"is-a-program",
+     "unloadrt unloads what is loaded into this process. The component is a program of its own: loadusr started it, or it registered "
+     "over the control socket.\n\n"
+     "`unloadusr NAME` asks the program to end (SIGTERM); of one that is dead it removes the pins that are left."},
     {"linked-set",
      "A linked pin takes its value from its signal; setp would be overwritten at once, so it is refused.\n\n"
      "Set the signal with sets (when nothing writes it), or unlink the pin with unlinkp first."},
@@ -171,6 +200,16 @@ inline constexpr CodePage code_pages[] = {
     {"recursive-source",
      "A file reads itself by `source`, directly or through others; it would never end. The places show the way round.\n\n"
      "Put what both need into a third file."},
+    {"reload-conflict",
+     "`reload` puts a new version of a plugin in the place of the loaded one. What the machine uses of the old version must be there in "
+     "the new one: pins on signals with the same type and direction, functions that are in threads, the component's name. Nothing was "
+     "changed; the old version runs on.\n\n"
+     "Take the pin off its signal (`unlinkp PIN`) or the function out of its thread (`delf FUNCTION THREAD`) first; both and the reload "
+     "can take effect together between `begin` and `commit`."},
+    {"reload-dropped",
+     "A parameter or an input that had been set is not in the new version of the component, or has another type there. The reload took "
+     "effect, and the value is lost.\n\n"
+     "A `setp` of it in the netlist will fail the next time the netlist is loaded."},
     {"signal-named-like-pin",
      "net takes the signal's name first, then pins. The first name is a pin's, so the signal's name was probably forgotten.\n\n"
      "`net SIGNAL pin pin …`"},
@@ -228,6 +267,10 @@ inline constexpr CodePage code_pages[] = {
     {"unset-variable",
      "`$NAME` and `$(NAME)` stand for an environment variable, and this one is not set. A name may contain letters, digits, `.`, `_` and "
      "`-`, so `$HOME-x` is the variable `HOME-x`; write `$(HOME)-x`. Quotes do not protect a `$`."},
+    {"unsupported-component",
+     "The `.comp` file is correct, but asks for something that exists only inside of LinuxCNC: a part of its motion controller, or a program "
+     "of its own that shares HAL's memory.\n\n"
+     "The message says what to do instead."},
     {"unsupported-file",
      "Tcl files are not read: they are programs, not netlists.\n\n"
      "Most are loops over names, which a .hal file says with ranges and sets: `net j[0..5]-cmd traj.out-[0..5] => pid.[0..5].command`."},

@@ -5,8 +5,15 @@
 
 namespace hal {
 
-std::uint32_t Sources::add(std::string name, std::string text) {
-    sources_.push_back({.name = std::move(name), .text = std::move(text)});
+namespace {
+
+/// A byte-order mark before the first line, which nobody sees or counts.
+std::size_t mark_bytes(std::string_view text) { return text.starts_with("\xEF\xBB\xBF") ? 3 : 0; }
+
+}  // namespace
+
+std::uint32_t Sources::add(std::string name, std::string text, std::uint32_t first_line) {
+    sources_.push_back({.name = std::move(name), .text = std::move(text), .first_line = first_line});
     return static_cast<std::uint32_t>(sources_.size());
 }
 
@@ -37,9 +44,10 @@ std::size_t Sources::line_index(const Source& source, std::uint32_t at) {
 Place Sources::place(Span span) const {
     const Source& source = get(span.source);
     const std::size_t line = line_index(source, span.begin);
-    const std::string_view row = std::string_view(source.text).substr(0, span.begin).substr(source.line_starts[line]);
+    std::string_view row = std::string_view(source.text).substr(0, span.begin).substr(source.line_starts[line]);
+    if (line == 0) row.remove_prefix(mark_bytes(row));
     const auto characters = std::count_if(row.begin(), row.end(), [](char c) { return (c & 0xC0) != 0x80; });
-    return {static_cast<std::uint32_t>(line + 1), static_cast<std::uint32_t>(characters + 1)};
+    return {source.first_line + static_cast<std::uint32_t>(line), static_cast<std::uint32_t>(characters + 1)};
 }
 
 std::string_view Sources::line(Span span) const {
@@ -48,6 +56,7 @@ std::string_view Sources::line(Span span) const {
     if (span.begin > all.size()) return {};
     const std::size_t first = source.line_starts[line_index(source, span.begin)];
     auto row = all.substr(first, all.find('\n', first) - first);
+    if (first == 0) row.remove_prefix(mark_bytes(row));
     if (!row.empty() && row.back() == '\r') row.remove_suffix(1);
     return row;
 }

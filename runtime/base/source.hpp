@@ -27,11 +27,12 @@ public:
     struct Source {
         std::string name;  ///< as messages print it: a path, "<shell>", "<commandline>", "<stdin>"
         std::string text;
+        std::uint32_t first_line = 1;  ///< the number of the text's first line: a text may be a part of what messages call `name`
         mutable std::vector<std::uint32_t> line_starts = {};  ///< filled by the first question about a place
     };
 
     /// Adds a text and returns its number.
-    std::uint32_t add(std::string name, std::string text);
+    std::uint32_t add(std::string name, std::string text, std::uint32_t first_line = 1);
     /// Gives the newest text back when no span points into it any more: what a shell line leaves behind that made
     /// nothing. Its number is used again. Any other text stays.
     void drop(std::uint32_t source);

@@ -112,6 +112,7 @@ void Core::take(plan::Plan* plan) noexcept {
         plan->scratch[i] = carry.from ? carry.from->raw : carry.value.raw;
     }
     for (const plan::Rebind& rebind : plan->rebinds) rebind.pin->slot = rebind.slot;
+    for (const plan::Pointer& pointer : plan->pointers) *pointer.to = pointer.slot;
     for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
     plan_ = plan;
     sampled_ = 0;

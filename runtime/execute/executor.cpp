@@ -3,14 +3,16 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <fcntl.h>
 #include <fstream>
 #include <limits>
-#include <chrono>
+#include <linux/capability.h>
 #include <stdexcept>
 #include <pthread.h>
 #include <sched.h>
@@ -20,6 +22,7 @@
 #include <thread>
 #include <unistd.h>
 
+#include "base/keep.hpp"
 #include "execute/wait.hpp"
 
 namespace hal {
@@ -105,6 +108,7 @@ struct Executor::Runner {
     std::atomic<int> tid{0};
     Granted granted;                          // written before `ready`
     std::unique_ptr<char[]> signal_stack = std::make_unique<char[]>(signal_stack_bytes);
+    stack_t signal_stack_before{};            // a sanitizer's; it looks for it when the thread ends
     std::int64_t epoch_ns = 0;
 
     bool callable() const { return options.period_ns >= Wait::callable_period_ns; }
@@ -132,7 +136,7 @@ struct Executor::Runner {
         stack_t other{};
         other.ss_sp = signal_stack.get();
         other.ss_size = signal_stack_bytes;
-        sigaltstack(&other, nullptr);
+        sigaltstack(&other, &signal_stack_before);
         prefault_stack();
         ready.store(true, std::memory_order_release);
     }
@@ -163,6 +167,7 @@ struct Executor::Runner {
             due += period;
         }
         core.make_safe();
+        sigaltstack(&signal_stack_before, nullptr);
         ended.store(true, std::memory_order_release);
     }
 };
@@ -182,7 +187,7 @@ Executor::Executor(bool virtual_clock) : virtual_(virtual_clock) {
 Executor::~Executor() {
     while (!runners_.empty()) {
         if (remove(runners_.back()->core, 2'000'000'000)) continue;
-        runners_.back().release();  // a thread that hangs in a component still uses it
+        keep_for_good(std::move(runners_.back()));  // a thread that hangs in a component still uses it
         runners_.pop_back();
     }
 }
@@ -371,13 +376,25 @@ std::uint64_t Executor::page_faults(const Core& core) const {
     return minor + major > before ? minor + major - before : 0;
 }
 
+namespace {
+
+/// CAP_IPC_LOCK: no limit counts (mlockall(2)).
+bool may_lock_memory() {
+    std::ifstream file("/proc/self/status");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("CapEff:")) return std::strtoull(line.c_str() + 7, nullptr, 16) >> CAP_IPC_LOCK & 1;
+    return false;
+}
+
+}  // namespace
+
 std::vector<std::string> Executor::prepare_process() {
     std::vector<std::string> refused;
     // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page fault.
     const rlimit all{RLIM_INFINITY, RLIM_INFINITY};
     rlimit now{};
     const bool unlimited = setrlimit(RLIMIT_MEMLOCK, &all) == 0 || (getrlimit(RLIMIT_MEMLOCK, &now) == 0 && now.rlim_cur == RLIM_INFINITY);
-    if (!unlimited || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) refused.emplace_back("memory locking");
+    if ((!unlimited && !may_lock_memory()) || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) refused.emplace_back("memory locking");
     // keeps the CPU out of deep sleep states for as long as the file stays open
     static const int latency = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
     if (latency >= 0) {

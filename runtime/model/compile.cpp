@@ -46,7 +46,13 @@ public:
     }
 
 private:
-    bool excluded(const Function* function) const { return input_.without && input_.without->contains(function); }
+    bool excluded(const Function* function) const { return function->halted || (input_.without && input_.without->contains(function)); }
+
+    // Where a pin's value is before the plan is taken: in the instance the threads know.
+    const hal_pin& present(const Pin& pin) const {
+        const auto old = input_.old_memory->find(&pin);
+        return old == input_.old_memory->end() ? *pin.memory : *old->second;
+    }
 
     Thread* thread_for(const Pin& pin) const {
         if (pin.of_thread) return pin.of_thread;
@@ -56,11 +62,29 @@ private:
         return nullptr;
     }
 
+    // A loose pin whose functions are in two threads; what it is linked to cannot live with one of them.
+    bool spread(const Pin& pin) const {
+        if (!is_loose(pin)) return false;
+        const Thread* first = nullptr;
+        for (const Function* function : pin.instance->functions) {
+            if (!function->thread || excluded(function)) continue;
+            if (first && function->thread != first) return true;
+            first = function->thread;
+        }
+        return false;
+    }
+
+    // The pin's slot is the cell itself, not a copy of it.
+    bool in_cell(const Compiled::Place& place, const Pin& pin) const { return place.cell && (pin.dir != HAL_DIR_IN || spread(pin)); }
+
     // Values live with their writer: an OUT pin's thread, the thread of all I/O pins, or a cell they share.
     void find_home(Signal& signal) {
         Compiled::Place& place = out_.places[signal.index];
         place = {&signal, nullptr, nullptr, {}, nullptr};
-        if (signal.writer) {
+        if (signal.type != HAL_TYPE_PORT && std::any_of(signal.pins.begin(), signal.pins.end(), [this](const Pin* pin) { return spread(*pin); })) {
+            place.cell = signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
+            place.slot = place.cell.get();
+        } else if (signal.writer) {
             place.home = thread_for(*signal.writer);
         } else if (signal.ios != 0) {
             bool several = false;
@@ -82,7 +106,7 @@ private:
     // For a cell made now, before any thread takes part: what the session knows.
     hal_value known_value(const Signal& signal) const {
         if (const auto at = input_.signal_values->find(const_cast<Signal*>(&signal)); at != input_.signal_values->end()) return at->second;
-        if (const auto at = input_.inherited->find(const_cast<Signal*>(&signal)); at != input_.inherited->end()) return *at->second->memory->slot;
+        if (const auto at = input_.inherited->find(const_cast<Signal*>(&signal)); at != input_.inherited->end()) return *present(*at->second).slot;
         return *signal.slot;
     }
 
@@ -92,7 +116,7 @@ private:
         const auto want = [&](const Pin& pin) {
             if (!pin.signal || thread_for(pin) != &thread) return;
             Compiled::Place& place = out_.places[pin.signal->index];
-            if (place.cell && pin.dir == HAL_DIR_IO) return;
+            if (in_cell(place, pin)) return;
             const bool there = place.home == &thread ? place.slot != nullptr
                                                      : std::any_of(place.copies.begin(), place.copies.end(), [&](const auto& c) { return c.first == &thread; });
             if (there) return;
@@ -219,9 +243,9 @@ private:
         } else if (const auto given = input_.inherited->find(&signal); given != input_.inherited->end()) {
             const Pin& pin = *given->second;
             if (const auto pinned = input_.pin_values->find(given->second); pinned != input_.pin_values->end()) value = pinned->second;
-            else if (pin.home == thread) from = pin.memory->slot;
-            else if (!pin.home) value = *pin.memory->slot;
-            else return unknown(thread, to, pin.memory->slot, pin.home);
+            else if (pin.home == thread) from = present(pin).slot;
+            else if (!pin.home) value = *present(pin).slot;
+            else return unknown(thread, to, present(pin).slot, pin.home);
         } else if (signal.cell) {
             from = signal.cell.get();
         } else if (signal.home == thread) {
@@ -247,26 +271,28 @@ private:
         if (thread != pin.home) out_.homes.emplace_back(&pin, thread);
         plan::Plan* const plan = thread ? plans_[thread] : nullptr;
         hal_value* slot = &pin.memory->own;
+        const hal_pin& now = present(pin);
         if (pin.signal) {
             const Compiled::Place& place = out_.places[pin.signal->index];
-            if (!thread) slot = place.cell && pin.dir == HAL_DIR_IO ? place.slot : &pin.signal->value;
-            else if (place.cell && pin.dir == HAL_DIR_IO) slot = place.slot;
+            if (!thread) slot = in_cell(place, pin) ? place.slot : &pin.signal->value;
+            else if (in_cell(place, pin)) slot = place.slot;
             else if (place.home == thread) slot = place.slot;
             else
                 for (const auto& [reader, copy] : place.copies)
                     if (reader == thread) slot = copy;
         } else if (const auto set = input_.pin_values->find(&pin); set != input_.pin_values->end() && plan) {
             plan->carries.push_back({slot, nullptr, set->second});
-        } else if (pin.memory->slot != slot && plan) {
+        } else if (now.slot != slot && plan) {
             // an unlinked pin keeps the last value; a stream's buffer stays with its signal
             if (pin.type == HAL_TYPE_PORT) plan->carries.push_back({slot, nullptr, {.raw = 0}});
-            else if (pin.home == thread) plan->carries.push_back({slot, pin.memory->slot, {}});
-            else plan->carries.push_back({slot, nullptr, *pin.memory->slot});
+            else if (pin.home == thread) plan->carries.push_back({slot, now.slot, {}});
+            else plan->carries.push_back({slot, nullptr, *now.slot});
         }
-        if (pin.memory->slot != slot) {
+        if (pin.memory->slot != slot || (&now != pin.memory && !plan)) {
             if (plan) plan->rebinds.push_back({pin.memory, slot});
-            else out_.session_rebinds.push_back({pin.memory, slot, pin.type != HAL_TYPE_PORT});
+            else out_.session_rebinds.push_back({pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
         }
+        if (pin.pointer) (plan ? plan->pointers : out_.session_pointers).push_back({pin.pointer, slot});
         if (plan && (pin.flags & HAL_PIN_SAFE)) plan->safe.push_back({pin.memory, pin.safe});
     }
 

@@ -23,6 +23,7 @@ struct CompileInput {
     const std::unordered_map<Pin*, hal_value>* pin_values = nullptr;
     const std::unordered_map<Signal*, hal_value>* signal_values = nullptr;
     const std::unordered_map<Signal*, Pin*>* inherited = nullptr;
+    const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;  ///< of pins whose instance was replaced
     std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
     hal_step check_finite = nullptr;
 };
@@ -42,9 +43,11 @@ struct Compiled {
     struct SessionRebind {
         hal_pin* pin;
         hal_value* slot;
+        const hal_value* from;  ///< where its value is now
         bool keeps_value;  ///< what it had when it was linked; false for a port, whose buffer stays with its signal
     };
     std::vector<SessionRebind> session_rebinds;       ///< of pins that no thread uses; done after the swap
+    std::vector<plan::Pointer> session_pointers;      ///< with them
     /// Carries whose value another thread owns now: to be observed and filled in before the swap.
     struct Unknown {
         plan::Carry* carry;

@@ -48,6 +48,7 @@ void Edit::undo() {
     pin_values.clear();
     signal_values.clear();
     inherited.clear();
+    old_memory.clear();
     added_instances_.clear();
     structural_ = false;
 }
@@ -223,10 +224,15 @@ std::uint32_t Edit::take_number(Component& component) {
     return component.next_number++;
 }
 
-void Edit::note_arguments(Component& component, std::string text) {
+void Edit::note_arguments(Component& component, std::string text, Load load) {
     make_room(component.arguments);
-    on_undo([&component] { component.arguments.pop_back(); });
+    make_room(component.loads);
+    on_undo([&component] {
+        component.arguments.pop_back();
+        component.loads.pop_back();
+    });
     component.arguments.push_back(std::move(text));
+    component.loads.push_back(std::move(load));
 }
 
 void Edit::reorder(Thread& thread, std::vector<Function*> functions) {
@@ -280,6 +286,26 @@ bool Edit::add_instance(Component& component, std::unique_ptr<Instance>& owned, 
         for (const auto& pin : (*function)->pins) model_.pin.emplace(pin->name, pin.get());
     }
     return true;
+}
+
+bool Edit::add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at) {
+    for (const auto& pin : pins)
+        if (!name_free(pin->name, at, "its pin")) return false;
+    make_room(instance.pins, pins.size());
+    on_undo([this, &instance, before = instance.pins.size()] {
+        for (; instance.pins.size() > before; instance.pins.pop_back()) leave(model_, *instance.pins.back());
+    });
+    std::move(pins.begin(), pins.end(), std::back_inserter(instance.pins));
+    for (auto pin = instance.pins.end() - static_cast<std::ptrdiff_t>(pins.size()); pin != instance.pins.end(); ++pin) enter(model_, **pin);
+    return true;
+}
+
+void Edit::remove_pins(Instance& instance, const std::vector<Pin*>& pins) {
+    std::erase_if(instance.pins, [&](const auto& pin) {
+        if (std::find(pins.begin(), pins.end(), pin.get()) == pins.end()) return false;
+        leave(model_, *pin);
+        return true;
+    });
 }
 
 void Edit::extend_function(Function& function, const plan::Step& step, Instance& instance) {

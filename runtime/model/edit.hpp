@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -62,17 +63,25 @@ public:
     /// Takes an instance with its pins and functions into the indices; reports names that are taken.
     /// Leaves `instance` alone when it refuses.
     bool add_instance(Component& component, std::unique_ptr<Instance>& instance, std::vector<std::unique_ptr<Function>> functions);
+    /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names that are taken.
+    bool add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at);
+    /// Takes pins out that are in no signal.
+    void remove_pins(Instance& instance, const std::vector<Pin*>& pins);
     /// The number of the next unnamed instance.
     std::uint32_t take_number(Component& component);
     /// Puts a thread's functions into another order.
     void reorder(Thread& thread, std::vector<Function*> functions);
-    /// `loadrt` arguments as they were written, for `save`.
-    void note_arguments(Component& component, std::string text);
+    /// `loadrt` arguments as they were written, for `save`, and taken apart, for `reload`.
+    void note_arguments(Component& component, std::string text, Load load);
     /// A shared function gets one more instance.
     void extend_function(Function& function, const plan::Step& step, Instance& instance);
     void remove_instance(Instance& instance);
     void remove_component(Component& component);
     void add_time_pins(Function& function);
+    /// Exchanges a component's code and instances with those of `fresh`, which was made beside the model and has an instance for
+    /// each. Pins and functions that both declare stay the same objects: links, values, places in threads and times are kept.
+    /// False after reporting what stands against it; then `fresh` is as it was.
+    bool replace(Component& component, std::unique_ptr<Component>& fresh, Span at);
 
     // --- look-ups that report ---------------------------------------------------------------------------------------
     Pin* pin(Word name);
@@ -95,11 +104,24 @@ public:
     };
     Removed& removed() { return removed_; }
     const std::vector<Instance*>& added_instances() const { return added_instances_; }
+    /// A component that was replaced, and the one that is not in the model: the old one; after undo() the new one.
+    struct Replaced {
+        Component* component;
+        std::unique_ptr<Component> other;
+        bool stopped = false;  ///< the old instances have been stopped for the new ones
+    };
+    std::deque<Replaced>& replaced() { return replaced_; }
 
     // New values of what the threads own now; for the compiler (structural) or the write queues (not).
     std::unordered_map<Pin*, hal_value> pin_values;
     std::unordered_map<Signal*, hal_value> signal_values;
     std::unordered_map<Signal*, Pin*> inherited;  ///< a signal that takes the value the pin has
+    std::unordered_map<const Pin*, hal_pin*> old_memory;  ///< of pins that were replaced: what the threads know until they take the new plan
+    /// Where a pin's value is now.
+    const hal_pin& present(const Pin& pin) const {
+        const auto old = old_memory.find(&pin);
+        return old == old_memory.end() ? *pin.memory : *old->second;
+    }
 
 private:
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
@@ -116,6 +138,7 @@ private:
     Model& model_;
     std::vector<std::function<void()>> undo_;
     Removed removed_;
+    std::deque<Replaced> replaced_;
     std::vector<Instance*> added_instances_;
     bool structural_ = false;
 };

@@ -223,8 +223,10 @@ void Edit::unlink(Pin& pin) {
         } else if (const auto given = inherited.find(signal); given != inherited.end() && given->second != &pin) {
             Pin& giver = *given->second;
             const auto own = pin_values.find(&giver);
-            const hal_value value = own != pin_values.end() ? own->second : hal_value{.raw = __atomic_load_n(&giver.memory->slot->raw, __ATOMIC_RELAXED)};
+            const hal_value value = own != pin_values.end() ? own->second : hal_value{.raw = __atomic_load_n(&present(giver).slot->raw, __ATOMIC_RELAXED)};
             pin_values[&pin] = value;
+        } else if (!pin.home && (signal->home || signal->cell)) {  // of no thread: it has no slot where the value is
+            pin_values[&pin] = hal_value{.raw = __atomic_load_n(&signal->slot->raw, __ATOMIC_RELAXED)};
         }
     }
     on_undo([signal, &pin, position = at - signal->pins.begin()] {
@@ -252,6 +254,7 @@ bool Edit::set_pin(Word name, Word value) {
     if (!target) return false;
     const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
     if (target->dir == HAL_DIR_OUT) return fail("output-set", name.span, "pin " + quoted(name.text) + " is an output: only its component writes it", "output");
+    if (target->read_only()) return fail("output-set", name.span, "parameter " + quoted(name.text) + " is read-only: only its component sets it", "read-only");
     if (target->signal) {
         Diagnostic d{Severity::error, "linked-set", "pin " + quoted(name.text) + " takes its value from signal " + quoted(target->signal->name), {{name.span, "linked"}}, {}};
         if (target->linked_at.known()) d.labels.push_back({target->linked_at, "linked here"});

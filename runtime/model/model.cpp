@@ -66,6 +66,14 @@ const char* Model::keep(std::string_view text) {
     return texts_->all.emplace(text).first->c_str();
 }
 
+Model Model::beside() {
+    keep("");
+    Model other;
+    other.texts_ = texts_;
+    other.next_id = next_id;
+    return other;
+}
+
 Thread* thread_of(const Pin& pin) {
     if (pin.of_thread) return pin.of_thread;
     if (pin.function) return pin.function->thread;
@@ -74,5 +82,7 @@ Thread* thread_of(const Pin& pin) {
             if (function->thread) return function->thread;
     return nullptr;
 }
+
+bool is_loose(const Pin& pin) { return pin.instance && pin.instance->component->plugin && (pin.instance->component->plugin->flags & HAL_COMPONENT_LOOSE_PINS); }
 
 }  // namespace hal

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -33,6 +34,7 @@ struct Pin {
     const char* unit = "";
     hal_value initial{}, safe{};
     hal_pin* memory = nullptr;       ///< in the instance
+    hal_value** pointer = nullptr;   ///< a second pointer to the slot, in the plugin's own memory
     Instance* instance = nullptr;    ///< nullptr: a pin of a thread or of a function's times
     Function* function = nullptr;    ///< the one function that uses it, or nullptr: all of the instance
     Thread* of_thread = nullptr;     ///< pins of a thread itself
@@ -42,6 +44,9 @@ struct Pin {
     std::uint32_t id = 0;
     // Where it is now (set by the compiler when a plan has been taken; nullptr home: the session owns it).
     Thread* home = nullptr;
+
+    /// A parameter that only its component sets.
+    bool read_only() const { return dir == HAL_DIR_PARAM && (flags & HAL_PIN_READ_ONLY); }
 };
 
 struct Signal {
@@ -70,6 +75,7 @@ struct Function {
     bool shared = false;
     Thread* thread = nullptr;
     bool init = false;               ///< placed by initf rather than addf
+    bool halted = false;             ///< not run: a reload failed and the old instance did not start again
     Span added;
     std::vector<std::unique_ptr<Pin>> pins;  ///< its .time, .tmax, .tmax-increased
     std::unique_ptr<plan::FunctionTimes> times = std::make_unique<plan::FunctionTimes>();
@@ -89,6 +95,13 @@ struct Instance {
     std::vector<Pin*> finite;        ///< its declared-finite outputs
     bool constructed = false, started = false;
     Span loaded;
+    std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances
+};
+
+/// What one loadrt gave its instances beside their names.
+struct Load {
+    std::map<std::string, std::string> arguments;
+    std::vector<std::string> personalities;
 };
 
 /// A component that is loaded: a plugin, or one the runtime provides itself (`threads`).
@@ -98,11 +111,12 @@ struct Component {
     std::shared_ptr<void> library;
     std::string path;
     std::vector<std::string> arguments;     ///< one text per loadrt, for `save`
+    std::vector<Load> loads;                ///< the same, taken apart, for `reload`
     std::vector<std::unique_ptr<Instance>> instances;
     std::vector<std::unique_ptr<Function>> functions;
     std::uint32_t next_number = 0;   ///< of the next unnamed instance
     std::uint32_t id = 0;
-    std::int64_t process = 0;        ///< of a loadusr component: its process
+    std::int64_t process = 0;        ///< of a program's component: its process. Its instance, if any, has pins only
     Span loaded;
 };
 
@@ -158,6 +172,8 @@ struct Model {
 
     /// Keeps a text for as long as the model lives; equal texts share.
     const char* keep(std::string_view text);
+    /// An empty model that shares the pool of texts and goes on with the numbers: what is made in it can move here.
+    Model beside();
 
     std::uint32_t next_id = 1;            ///< of pins and functions, for fault records
     std::uint32_t next_component_id = 7;  ///< `show comp` numbers them as LinuxCNC does: real-time modules take every third
@@ -169,5 +185,8 @@ private:
 
 /// The thread whose functions use this pin now, or nullptr. Follows Pin::function, else the instance's functions.
 Thread* thread_of(const Pin& pin);
+
+/// The pin's component declared loose pins: any of its functions may use it, in whichever thread.
+bool is_loose(const Pin& pin);
 
 }  // namespace hal

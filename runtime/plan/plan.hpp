@@ -90,6 +90,12 @@ struct Rebind {
     hal_value* slot;
 };
 
+/// The second pointer to a pin's slot that its component declared.
+struct Pointer {
+    hal_value** to;
+    hal_value* slot;
+};
+
 /// A declared safe value of an output.
 struct Safe {
     hal_pin* pin;
@@ -113,6 +119,7 @@ struct Plan {
     std::vector<Export> exports;
     std::vector<Carry> carries;
     std::vector<Rebind> rebinds;
+    std::vector<Pointer> pointers;
     std::vector<Safe> safe;
     std::vector<Step> emergency;             ///< made safe by a call: instances of this thread with a hal::Emergency
     std::unique_ptr<FiniteCheck[]> finite_checks;

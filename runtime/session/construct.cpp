@@ -5,6 +5,8 @@
 #include <cstring>
 #include <set>
 
+#include "hal/naming.h"
+
 namespace hal {
 namespace {
 
@@ -43,7 +45,11 @@ struct Construction {
     std::vector<std::string> texts;      // keeps what argument() gave
     std::string failure;
     bool no_memory = false;
+    std::string serial = {};             // of an instance that is named after its component
+    bool whole_function_names = false;
 };
+
+bool whole_names(const Instance& instance) { return instance.component->plugin->flags & HAL_COMPONENT_WHOLE_NAMES; }
 
 Construction& of(const hal_host* host) { return *static_cast<Construction*>(host->data); }
 
@@ -65,10 +71,10 @@ Result guarded(Construction& c, Result otherwise, Action action) noexcept {
 
 bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Construction& c = of(host);
-    if (decl->size < sizeof *decl || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT || decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
+    if (decl->size < HAL_PIN_DECL_SIZE_1_0 || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT || decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
         return refuse(c, "it declares a pin that is none");
     auto pin = std::make_unique<Pin>();
-    pin->name = c.instance.name + "." + decl->name;
+    pin->name = whole_names(c.instance) ? decl->name : c.instance.name + "." + decl->name;
     pin->type = decl->type;
     pin->dir = decl->dir;
     pin->flags = decl->flags;
@@ -81,6 +87,10 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     pin->id = c.model.next_id++;
     memory->own = decl->initial;
     memory->slot = &memory->own;
+    if (decl->size >= sizeof *decl && decl->pointer) {
+        pin->pointer = decl->pointer;
+        *decl->pointer = memory->slot;
+    }
     if (decl->function && std::none_of(c.functions.begin(), c.functions.end(), [&](const auto& f) { return f.identity == decl->function; }))
         return refuse(c, "pin '" + std::string(decl->name) + "' uses a function that is declared below it; move that member up");
     c.pins.emplace_back(std::move(pin), decl->function);
@@ -95,8 +105,9 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
         return true;
     }
     const bool shared = decl->flags & HAL_FUNCTION_SHARED;
-    std::string full = shared ? dashed(c.instance.component->name) : c.instance.name;
-    if (*decl->name) full += std::string(".") + decl->name;
+    const bool whole = c.whole_function_names || whole_names(c.instance);
+    std::string full = whole ? decl->name : shared ? dashed(c.instance.component->name) : c.instance.name;
+    if (*decl->name && !whole) full += std::string(".") + decl->name;
     c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step, decl->self, decl->identity, shared});
     return true;
 }
@@ -146,11 +157,31 @@ void record_failure(const hal_host* host, const char* reason) {
     guarded(of(host), false, [&] { return refuse(of(host), reason ? reason : ""); });
 }
 
-const void* no_extension(const hal_host*, const char*) { return nullptr; }
+// Names that LinuxCNC makes otherwise than COMPONENT.N.
+void name_instance(const hal_host* host, const char* prefix, unsigned digits) {
+    Construction& c = of(host);
+    guarded(c, false, [&] {
+        if (!c.pins.empty() || !c.functions.empty()) return refuse(c, "an instance is named before its first pin");
+        if (c.serial.empty()) return true;  // it has a name of its own
+        std::string number = c.serial;
+        if (number.size() < digits) number.insert(0, digits - number.size(), '0');
+        c.instance.name = std::string(prefix) + "." + number;
+        return true;
+    });
+}
+constexpr hal_naming naming{sizeof naming, name_instance, [](const hal_host* host) { of(host).whole_function_names = true; },
+                            [](const hal_host* host, const char* argument, uint64_t instances) {
+                                Construction& c = of(host);
+                                guarded(c, false, [&] { return c.lists.insert(argument).second; });
+                                c.list_length = std::max(c.list_length, static_cast<std::size_t>(instances));
+                            },
+                            [](const hal_host* host) { return of(host).instance.name.c_str(); }};
+
+const void* extension_of(const hal_host*, const char* id) { return std::strcmp(id, HAL_NAMING) == 0 ? &naming : nullptr; }
 
 // One instance: memory, constructor, declarations into the model.
 bool construct_one(Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics, std::unique_ptr<Instance> instance, Construction& c) {
-    const hal_host host{sizeof host, &c, declare_pin, declare_function, give_argument, allocate, record_failure, no_extension};
+    const hal_host host{sizeof host, &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of};
     c.texts.reserve(request.arguments.size());  // pointers into it are handed out
     if (!component.plugin->create(&host, instance->memory)) {
         if (c.no_memory) throw std::bad_alloc();
@@ -216,16 +247,62 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
 
 }  // namespace
 
+namespace {
+
+std::size_t stride_of(const hal_component& plugin) { return (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align; }
+
+// Cleared memory for so many instances in a row.
+std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
+    const std::align_val_t align{std::max<std::size_t>(plugin.instance_align, 64)};
+    void* const memory = ::operator new(count * stride_of(plugin), align);
+    std::memset(memory, 0, count * stride_of(plugin));
+    return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
+}
+
+bool all_known(const Component& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+    for (const auto& [name, given] : request.arguments) {
+        if (asked.contains(name)) continue;
+        std::vector<std::string> all(asked.begin(), asked.end());
+        all.insert(all.end(), {"names", "count", "personality"});
+        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", did_you_mean(name, all),
+                          "its arguments: " + listed(all));
+        return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+bool construct_again(Model& beside, Edit& edit, const Component& old, Component& fresh, Span at, Diagnostics& diagnostics) {
+    edit.diagnostics = &diagnostics;
+    const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
+    for (std::size_t i = 0; i < old.instances.size(); ++i) {
+        const Instance& before = *old.instances[i];
+        const Load& load = old.loads[before.load];
+        LoadRequest request;
+        request.at = at;
+        for (const auto& [name, value] : load.arguments) request.arguments.emplace(name, GivenArgument{value, at});
+        auto instance = std::make_unique<Instance>();
+        instance->component = &fresh;
+        instance->loaded = before.loaded;
+        instance->name = before.name;
+        instance->load = before.load;
+        instance->number = before.number;
+        instance->memory = static_cast<char*>(storage.get()) + i * stride_of(*fresh.plugin);
+        instance->storage = storage;
+        const std::string personality = load.personalities.empty() ? "" : load.personalities[before.number % load.personalities.size()];
+        Construction c{beside, request, *instance, before.number, personality, {}, {}, {}, {}, 0, {}, {}};
+        if (!construct_one(edit, fresh, request, diagnostics, std::move(instance), c)) return false;
+        if (!all_known(fresh, request, c.asked, diagnostics)) return false;
+    }
+    return true;
+}
+
 bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics) {
     const hal_component& plugin = *component.plugin;
     const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
-    const std::size_t stride = (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align;
-    const auto block = [&](std::size_t count) {
-        const std::align_val_t align{std::max<std::size_t>(plugin.instance_align, 64)};
-        void* const memory = ::operator new(count * stride, align);
-        std::memset(memory, 0, count * stride);
-        return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
-    };
+    const std::size_t stride = stride_of(plugin);
+    const auto block = [&](std::size_t count) { return block_of(plugin, count); };
     bool known = singleton || !request.names.empty() || request.count >= 0;
     std::size_t total = singleton ? 1 : !request.names.empty() ? request.names.size() : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
     if (singleton && (request.names.size() > 1 || request.count > 1)) {
@@ -239,30 +316,27 @@ bool construct(Model& model, Edit& edit, Component& component, const LoadRequest
         auto instance = std::make_unique<Instance>();
         instance->component = &component;
         instance->loaded = request.at;
-        instance->name = !request.names.empty() ? request.names[i] : singleton ? dashed(component.name) : dashed(component.name) + "." + std::to_string(edit.take_number(component));
+        const std::string serial = !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
+        instance->name = !request.names.empty() ? request.names[i] : singleton ? dashed(component.name) : dashed(component.name) + "." + serial;
         instance->memory = static_cast<char*>(storage.get()) + in_block++ * stride;
         instance->storage = storage;
+        instance->load = component.loads.empty() ? 0 : component.loads.size() - 1;
+        instance->number = i;
         Construction c{model, request, *instance, i, request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()], {}, {}, {}, {}, 0, {}, {}};
+        c.serial = serial;
         if (!construct_one(edit, component, request, diagnostics, std::move(instance), c)) return false;
         asked.insert(c.asked.begin(), c.asked.end());
         if (i == 0) {
-            for (const auto& [name, given] : request.arguments) {
-                if (c.asked.contains(name)) continue;
-                std::vector<std::string> all(c.asked.begin(), c.asked.end());
-                all.insert(all.end(), {"names", "count", "personality"});
-                diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", did_you_mean(name, all),
-                                  "its arguments: " + listed(all));
-                return false;
-            }
+            if (!all_known(component, request, c.asked, diagnostics)) return false;
             if (!known) {
                 known = true;
                 total = c.list_length > 0 ? c.list_length : plugin.default_count;
                 if (total > 1) storage = block(total - 1);
                 in_block = 0;
-            } else if (c.list_length > total) {
-                const std::string& list = *c.lists.begin();
-                diagnostics.error("bad-argument", request.arguments.at(list).at,
-                                  "argument '" + list + "' lists " + std::to_string(c.list_length) + " values for " + std::to_string(total) + (total == 1 ? " instance" : " instances"));
+            } else if (const auto list = c.list_length > total ? request.arguments.find(*c.lists.begin()) : request.arguments.end();
+                       list != request.arguments.end()) {  // a default may say more instances than are wanted
+                diagnostics.error("bad-argument", list->second.at,
+                                  "argument '" + list->first + "' lists " + std::to_string(c.list_length) + " values for " + std::to_string(total) + (total == 1 ? " instance" : " instances"));
                 return false;
             }
         }

@@ -27,6 +27,9 @@ struct LoadRequest {
     std::map<std::string, GivenArgument> arguments;
 };
 
+/// The instances of a component once more, from another plugin and in a model beside: same names, arguments and personalities.
+bool construct_again(Model& beside, Edit& edit, const Component& old, Component& fresh, Span at, Diagnostics& diagnostics);
+
 /// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes with the commit.
 bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics);
 

@@ -91,12 +91,12 @@ void on_signal(int signal) {
 
 void watch_for_crashes(Session::State* state) {
     static const bool installed = [] {
+        std::set_terminate(on_terminate);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         // for the program's own thread, which runs the cycles of a virtual clock; the executor's threads have one each
         alignas(16) static char room[1 << 15];
         const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
         sigaltstack(&other, nullptr);
-        std::set_terminate(on_terminate);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         struct sigaction action{};
         action.sa_handler = on_signal;
         action.sa_flags = SA_RESETHAND | SA_NODEFER | SA_ONSTACK;

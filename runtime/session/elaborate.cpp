@@ -37,11 +37,19 @@ void load_threads(Elaboration& on, const Token& name, Args args, const std::stri
     if (!parse_threads(args, name.span, threads, on.diagnostics)) return;
     Component* component = on.model.find_component("threads");
     if (!component) component = &on.edit.add_component("threads", name.span);
-    on.edit.note_arguments(*component, written);
+    on.edit.note_arguments(*component, written, {});
     for (NewThread& thread : threads) {
         fit_period(on.model, thread, on.diagnostics);
         if (Thread* const made = on.edit.add_thread({thread.name, thread.at}, thread.options)) made->component = component;
     }
+}
+
+// count=, names= … are the component's own arguments: it names its pins itself.
+bool names_itself(Elaboration& on, const Token& name) {
+    if (const Component* const loaded = on.model.find_component(name.text)) return loaded->plugin && (loaded->plugin->flags & HAL_COMPONENT_WHOLE_NAMES);
+    Diagnostics ignored;
+    const auto plugin = on.plugins.open(name.text, name.span, ignored);
+    return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
 }
 
 void loadrt(Elaboration& on, const Command& command, Args args) {
@@ -62,7 +70,8 @@ void loadrt(Elaboration& on, const Command& command, Args args) {
             continue;
         }
         const std::string key = token.text.substr(0, equals), value = unquoted(token.text.substr(equals + 1));
-        if (key == "names") {
+        const bool says_instances = (key == "names" || key == "count" || key == "num_chan" || key == "personality") && !names_itself(on, name);
+        if (says_instances && key == "names") {
             request.names = split_list(value);
             names_at = token.span;
             for (const std::string& one : request.names)
@@ -70,14 +79,14 @@ void loadrt(Elaboration& on, const Command& command, Args args) {
                     on.diagnostics.error("bad-argument", token.span, "names= lists an empty name", "", "write names=first,second without blanks");
                     good = false;
                 }
-        } else if (key == "count" || key == "num_chan") {
+        } else if (says_instances && key != "personality") {
             const auto [end, problem] = std::from_chars(value.data(), value.data() + value.size(), request.count);
             request.count_at = token.span;
             if (problem != std::errc{} || end != value.data() + value.size() || request.count < 1 || request.count > 10'000'000) {
                 on.diagnostics.error("bad-argument", token.span, quoted(value) + " is not a number of instances", "1 or more");
                 good = false;
             }
-        } else if (key == "personality") {
+        } else if (says_instances) {
             request.personalities = split_list(value);
         } else if (!request.arguments.emplace(key, GivenArgument{value, token.span}).second) {
             on.diagnostics.error("bad-argument", token.span, "argument '" + key + "' is given twice", "second time");
@@ -104,9 +113,22 @@ void loadrt(Elaboration& on, const Command& command, Args args) {
         component->library = plugin->library;
         component->path = plugin->path;
     }
-    on.edit.note_arguments(*component, written);
+    Load load;
+    for (const auto& [key, given] : request.arguments) load.arguments.emplace(key, given.value);
+    load.personalities = request.personalities;
+    on.edit.note_arguments(*component, written, std::move(load));
     construct(on.model, on.edit, *component, request, on.diagnostics);
     (void)command;
+}
+
+Component* loaded_component(Elaboration& on, const Token& name) {
+    Component* const component = on.model.find_component(name.text);
+    if (component) return component;
+    std::vector<std::string> loaded;
+    for (const auto& one : on.model.components) loaded.push_back(one->name);
+    on.diagnostics.error("no-such-component", name.span, "there is no component " + quoted(name.text) + " here", did_you_mean(name.text, loaded),
+                         loaded.empty() ? "nothing is loaded" : "loaded: " + listed(loaded));
+    return nullptr;
 }
 
 void unload(Elaboration& on, const Command&, Args args) {
@@ -125,18 +147,56 @@ void unload(Elaboration& on, const Command&, Args args) {
         if (component.instances.empty()) on.edit.remove_component(component);
         return;
     }
-    Component* const component = on.model.find_component(args[0].text);
-    if (!component) {
-        std::vector<std::string> loaded;
-        for (const auto& one : on.model.components) loaded.push_back(one->name);
-        on.diagnostics.error("no-such-component", args[0].span, "there is no component " + quoted(args[0].text) + " here", did_you_mean(args[0].text, loaded),
-                             loaded.empty() ? "nothing is loaded" : "loaded: " + listed(loaded));
+    Component* const component = loaded_component(on, args[0]);
+    if (!component) return;
+    if (component->process != 0) {
+        on.diagnostics.error("is-a-program", args[0].span, quoted(args[0].text) + " is a program's component", "", "unloadusr " + component->name + " ends it");
         return;
     }
     if (component->name == "threads")
         for (std::size_t i = on.model.threads.size(); i-- > 0;)
             if (on.model.threads[i]->component == component) on.edit.remove_thread({on.model.threads[i]->name, args[0].span});
     on.edit.remove_component(*component);
+}
+
+void reload(Elaboration& on, const Command&, Args args) {
+    const Token& name = args[0];
+    if (const Instance* const instance = on.model.find_instance(name.text); instance && !on.model.find_component(name.text)) {
+        on.diagnostics.error("no-such-component", name.span, quoted(name.text) + " is an instance; a component is reloaded with all its instances", "", "reload " + instance->component->name);
+        return;
+    }
+    Component* const component = loaded_component(on, name);
+    if (!component) return;
+    if (!component->plugin) {
+        on.diagnostics.error("no-such-component", name.span, component->process != 0 ? quoted(name.text) + " is a program, not a plugin" : quoted(name.text) + " belongs to the runtime", "",
+                             component->process != 0 ? "unload it and start it again by loadusr" : "its threads are removed by delthread");
+        return;
+    }
+    auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
+    if (!plugin) return;
+    if (std::string_view(plugin->component->name) != component->name) {
+        on.diagnostics.error("reload-conflict", name.span, "'" + plugin->path + "' holds component '" + plugin->component->name + "' now, not '" + component->name + "'", "",
+                             "load it beside the old one: loadrt " + std::string(plugin->component->name));
+        return;
+    }
+    // constructed beside the model; what was made and is not taken over is destroyed here
+    Model beside = on.model.beside();
+    Edit making(beside);
+    Component& fresh = making.add_component(component->name, name.span);
+    fresh.plugin = plugin->component;
+    fresh.library = plugin->library;
+    fresh.path = plugin->path;
+    struct Undo {
+        Component& component;
+        bool taken = false;
+        ~Undo() {
+            if (taken) return;
+            for (auto it = component.instances.rbegin(); it != component.instances.rend(); ++it) destroy_instance(**it);
+        }
+    } undo{fresh};
+    const bool made = construct_again(beside, making, *component, fresh, name.span, on.diagnostics);
+    on.model.next_id = beside.next_id;
+    if (made) undo.taken = on.edit.replace(*component, beside.components.front(), name.span);
 }
 
 void newthread(Elaboration& on, const Command&, Args args) {
@@ -297,6 +357,7 @@ constexpr Row rows[] = {
     {"net", 1, any, "net SIGNAL PIN…", net},
     {"newsig", 2, 2, "newsig SIGNAL TYPE", newsig},
     {"newthread", 2, any, "newthread NAME PERIOD_NS [cpu=N] [policy=fifo|deadline|other] [priority=N] [spin=TIME] [budget=TIME] [profile=every]", newthread},
+    {"reload", 1, 1, "reload COMPONENT", reload},
     {"setp", 2, 2, "setp PIN VALUE", setp},
     {"sets", 2, 2, "sets SIGNAL VALUE", sets},
     {"unalias", 2, 2, "unalias pin|param ALIAS", unalias},

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
@@ -11,6 +12,8 @@
 #include <link.h>
 #include <set>
 #include <sstream>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "paths.hpp"
 
@@ -18,12 +21,6 @@ namespace hal {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string user_folder() {
-    if (const char* data = std::getenv("XDG_DATA_HOME"); data && *data) return std::string(data) + "/halcyon/components";
-    if (const char* home = std::getenv("HOME"); home && *home) return std::string(home) + "/.local/share/halcyon/components";
-    return {};
-}
 
 // why a description cannot be used, or empty
 std::string problem_of(const hal_component& component) {
@@ -59,7 +56,39 @@ std::string problem_of_file(const std::string& path) {
     return needed > size ? "the file is cut short: " + std::to_string(size) + " of " + std::to_string(needed) + " bytes" : "";
 }
 
+// The loader knows a library by its path and would give the one that is loaded for a file that has since been written anew; and
+// who writes over a mapped file pulls the code from under a running machine. So what is loaded is a copy in memory, each with a
+// path of its own, under which debuggers find it too. nullptr when there can be none; then the file itself is loaded.
+std::shared_ptr<void> open_copy(const std::string& path) {
+    const std::string name = path.substr(path.rfind('/') + 1);
+    std::ifstream file(path, std::ios::binary);
+    const std::string content((std::istreambuf_iterator<char>(file)), {});
+    const int copy = memfd_create(name.c_str(), MFD_CLOEXEC);
+    if (copy < 0) return nullptr;
+    void* library = nullptr;
+    for (std::size_t at = 0; at < content.size();) {
+        const ssize_t wrote = write(copy, content.data() + at, content.size() - at);
+        if (wrote <= 0) return close(copy), nullptr;
+        at += static_cast<std::size_t>(wrote);
+    }
+    char place[64];
+    std::snprintf(place, sizeof place, "/proc/%d/fd/%d", static_cast<int>(getpid()), copy);
+    if (file) library = dlopen(place, RTLD_NOW | RTLD_LOCAL);
+    if (!library) return close(copy), nullptr;
+    return {library, [copy, path = std::string(place)](void* handle) {
+                dlclose(handle);
+                // Only when the library is really gone may another have the number, and with it the path.
+                if (!dlopen(path.c_str(), RTLD_LAZY | RTLD_NOLOAD)) close(copy);
+            }};
+}
+
 }  // namespace
+
+std::string user_folder(std::string_view kind) {
+    if (const char* data = std::getenv("XDG_DATA_HOME"); data && *data) return std::string(data) + "/halcyon/" + std::string(kind);
+    if (const char* home = std::getenv("HOME"); home && *home) return std::string(home) + "/.local/share/halcyon/" + std::string(kind);
+    return {};
+}
 
 Plugins::Plugins(std::vector<std::string> first) : path_(std::move(first)) {
     const auto add = [this](std::string folder) {
@@ -69,7 +98,7 @@ Plugins::Plugins(std::vector<std::string> first) : path_(std::move(first)) {
         std::istringstream folders(variable);
         for (std::string folder; std::getline(folders, folder, ':');) add(folder);
     }
-    add(user_folder());
+    add(user_folder("components"));
     // beside the program first, so that a moved tree finds its own
     std::error_code none;
     const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
@@ -104,14 +133,18 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics&
         return std::nullopt;
     };
     if (const std::string why = problem_of_file(found); !why.empty()) return bad(why);
-    void* const library = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
+    std::shared_ptr<void> library = open_copy(found);
     if (!library) {
-        std::string why = dlerror();
-        if (why.starts_with(found + ": ")) why.erase(0, found.size() + 2);
-        return bad(why);
+        void* const direct = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (!direct) {
+            std::string why = dlerror();
+            if (why.starts_with(found + ": ")) why.erase(0, found.size() + 2);
+            return bad(why);
+        }
+        library = {direct, [](void* handle) { dlclose(handle); }};
     }
-    Plugin plugin{nullptr, std::shared_ptr<void>(library, [](void* handle) { dlclose(handle); }), found};
-    plugin.component = static_cast<const hal_component*>(dlsym(library, "hal_plugin"));
+    Plugin plugin{nullptr, library, found};
+    plugin.component = static_cast<const hal_component*>(dlsym(library.get(), "hal_plugin"));
     if (!plugin.component) return bad("it exports no symbol hal_plugin");
     if (const std::string why = problem_of(*plugin.component); !why.empty()) return bad(why);
     return plugin;

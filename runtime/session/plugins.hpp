@@ -18,6 +18,9 @@ struct Plugin {
     std::string path;
 };
 
+/// ~/.local/share/halcyon/KIND, or below $XDG_DATA_HOME: `components` and `bin`, where `hal compile` installs. Empty: there is no home.
+std::string user_folder(std::string_view kind);
+
 /// Finds and opens plugins. The only place that calls dlopen; only folders of the search path are looked in.
 class Plugins {
 public:

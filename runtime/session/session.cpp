@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/keep.hpp"
 #include "model/check/check.hpp"
 #include "session/construct.hpp"
 #include "session/state.hpp"
@@ -22,7 +23,7 @@ Session::Session(SessionOptions options) : state_(std::make_unique<State>(std::m
 Session::~Session() {
     shut_down();
     watch_for_crashes(nullptr);
-    if (state_->abandoned) (void)state_.release();
+    if (state_->abandoned) keep_for_good(std::move(state_));
 }
 
 const SessionOptions& Session::options() const { return state_->options; }
@@ -82,7 +83,7 @@ bool Session::commit(Diagnostics& diagnostics) {
     } catch (const std::bad_alloc&) {
         s.out_of_memory(diagnostics);
     }
-    if (!good) s.withdraw();
+    if (!good) s.withdraw(&diagnostics);
     return good;
 }
 
@@ -100,12 +101,13 @@ bool Session::State::carry_out(Diagnostics& diagnostics) {
     if (!all_answer(diagnostics)) return false;
 
     for (Instance* const instance : edit->added_instances()) {
-        if (!instance->constructed || model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
+        if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
         if (const std::string why = start_instance(*instance, &executor->board().shared); !why.empty())
             diagnostics.error("start-failed", instance->loaded, "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
     }
     if (diagnostics.failed()) return false;
     touched = true;
+    if (!start_replaced(diagnostics)) return false;
     if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) || !synchronise(diagnostics)) return false;
     stuck.clear();
     close_edit();
@@ -151,6 +153,9 @@ void Session::State::close_edit() {
     collect_faults();  // before the plugins whose words they use
     auto& removed = edit->removed();
     for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) destroy_instance(**it);
+    auto& replaced = edit->replaced();
+    for (auto one = replaced.rbegin(); one != replaced.rend(); ++one)
+        for (auto it = one->other->instances.rbegin(); it != one->other->instances.rend(); ++it) destroy_instance(**it);
     edit.reset();
     auto_orders.clear();
     before.pins.clear();
@@ -222,16 +227,18 @@ namespace {
 struct Source {
     const hal_value* from;
     const Thread* owner;   // nullptr: the session may read it itself
+    bool shared = false;   // the session writes it, too
 };
 
 Source source(const Signal& signal) {
     if (signal.cell || !signal.home) return {signal.slot, nullptr};
-    return {signal.slot, signal.home};
+    return {signal.slot, signal.home, signal.ios != 0};
 }
 
-Source source(const Pin& pin) { return pin.signal ? source(*pin.signal) : Source{pin.memory->slot, pin.home}; }
+Source source(const Pin& pin) { return pin.signal ? source(*pin.signal) : Source{pin.memory->slot, pin.home, true}; }
 
-std::vector<hal_value> read_all(Session::State& s, const std::vector<Source>& sources) {
+// `together`: all values of one thread are of one cycle.
+std::vector<hal_value> read_all(Session::State& s, const std::vector<Source>& sources, bool together = true) {
     struct Group {
         std::vector<const hal_value*> from;
         std::vector<std::size_t> at;
@@ -244,7 +251,8 @@ std::vector<hal_value> read_all(Session::State& s, const std::vector<Source>& so
         const Source from = sources[i];
         Core* const core = from.owner ? s.core(from.owner) : nullptr;
         // a single value is coherent with itself: no need to wait for the thread, unless it has news of it in its queue
-        if (!core || (sources.size() == 1 && core->settled())) {
+        const bool alone = !together || sources.size() == 1;
+        if (!core || (alone && (core->settled() || (!together && !from.shared)))) {
             values[i].raw = __atomic_load_n(&from.from->raw, __ATOMIC_RELAXED);
             continue;
         }
@@ -280,6 +288,11 @@ std::vector<Source> sources_of(const std::vector<const Object*>& objects) {
 }  // namespace
 
 std::vector<hal_value> Session::read_pins(const std::vector<const Pin*>& pins) { return read_all(*state_, sources_of(pins)); }
+std::vector<hal_value> Session::peek_pins(const std::vector<Pin*>& pins) {
+    std::vector<Source> all;
+    for (const Pin* const pin : pins) all.push_back(source(*pin));
+    return read_all(*state_, all, false);
+}
 std::vector<hal_value> Session::read_signals(const std::vector<const Signal*>& signals) { return read_all(*state_, sources_of(signals)); }
 
 std::vector<std::optional<Reading>> Session::read(const std::vector<std::string>& names) {
@@ -321,20 +334,16 @@ std::vector<std::string> Session::stream_names() const {
     return names;
 }
 
-void Session::add_process(const std::string& name, std::int64_t pid, const Command& command) {
-    Edit once(state_->model);
-    Component& component = once.add_component(name, command.span);
-    component.process = pid;
-    std::string text;
-    for (const Token& token : command.args) text += (text.empty() ? "" : " ") + token.text;
-    component.arguments.push_back(std::move(text));
-}
-
-void Session::remove_process(std::string_view name) {
-    Edit once(state_->model);
-    if (Component* const component = state_->model.find_component(name); component && component->process != 0) once.remove_component(*component);
-}
-
 std::vector<std::string> Session::available_components() const { return state_->plugins.available(); }
+
+std::optional<Declared> Session::declared(std::string_view component) const {
+    Diagnostics ignored;
+    const Component* const loaded = model().find_component(component);
+    const std::optional<Plugin> plugin = loaded && loaded->plugin ? Plugin{loaded->plugin, loaded->library, loaded->path} : state_->plugins.open(component, {}, ignored);
+    Declared found;
+    std::string problem;
+    if (!plugin || !gather(*plugin->component, found, problem)) return {};
+    return found;
+}
 
 }  // namespace hal

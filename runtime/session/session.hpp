@@ -15,6 +15,7 @@
 #include "base/diagnostic.hpp"
 #include "model/model.hpp"
 #include "netlist/netlist.hpp"
+#include "session/declared.hpp"
 
 namespace hal {
 
@@ -31,6 +32,17 @@ struct SessionOptions {
 struct Reading {
     hal_type type = HAL_TYPE_BIT;
     hal_value value{};
+};
+
+/// A pin or parameter of a component that is a program of its own.
+struct OutsidePin {
+    std::string name;                ///< full name
+    hal_type type = HAL_TYPE_BIT;
+    hal_dir dir = HAL_DIR_IN;
+    bool read_only = false;          ///< a parameter that only the program sets
+    hal_value initial{};
+    std::optional<hal_value> safe = {};  ///< what it goes to when the program is dead; none: it keeps its value
+    std::string doc = {}, unit = {};
 };
 
 /// What a thread has done so far, for `show thread`, the report at the end and the protocol.
@@ -69,7 +81,7 @@ public:
     const Model& model() const;
 
     // --- edits: one transaction at a time ---------------------------------------------------------------------
-    /// True for the commands apply() takes: loadrt unloadrt unload(of plugins) newthread delthread addf delf initf net
+    /// True for the commands apply() takes: loadrt unloadrt unload(of plugins) reload newthread delthread addf delf initf net
     /// newsig delsig linkps linksp linkpp unlinkp setp sets alias unalias, and `NAME = VALUE`.
     static bool edits(const Command& command);
     /// Opens a transaction (if none is open) and elaborates one command into it. Problems go to `diagnostics`.
@@ -98,6 +110,8 @@ public:
     /// The same for objects of the model, without look-up.
     std::vector<hal_value> read_pins(const std::vector<const Pin*>& pins);
     std::vector<hal_value> read_signals(const std::vector<const Signal*>& signals);
+    /// The same at once: each value by itself, as it is now. For programs that look often.
+    std::vector<hal_value> peek_pins(const std::vector<Pin*>& pins);
 
     // --- reports ----------------------------------------------------------------------------------------------------
     std::vector<ThreadReport> thread_reports() const;
@@ -116,9 +130,18 @@ public:
     std::vector<std::string> stream_names() const;
     /// Registers a process started by loadusr as a component, so that unloadusr and show find it.
     void add_process(const std::string& name, std::int64_t pid, const Command& command);
-    void remove_process(std::string_view name);
+    void set_process(std::string_view name, std::int64_t pid);   ///< another process has taken its place
+    void remove_process(std::string_view name);  ///< with its pins; what they drove goes to its declared values
+    /// Gives a program's component a pin, owned by the session: it is linked like any other, and no thread runs it.
+    /// nullptr: `problem` is a sentence that says why not.
+    Pin* add_outside_pin(std::string_view component, const OutsidePin& pin, std::string& problem);
+    void remove_outside_pins(std::string_view component, const std::vector<Pin*>& pins);
+    /// Values for such pins, in one cycle of each thread that reads them. An input takes its value only while nothing writes it.
+    void write_outside(const std::vector<std::pair<Pin*, hal_value>>& values);
     /// All plugin names that can be loaded, from the search path.
     std::vector<std::string> available_components() const;
+    /// What a component that can be loaded declares with default arguments; nothing when it cannot be constructed so.
+    std::optional<Declared> declared(std::string_view component) const;
 
     struct State;
 

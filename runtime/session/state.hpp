@@ -29,6 +29,7 @@ struct Session::State {
     std::unordered_map<const Thread*, Core*> cores;
     std::unordered_map<const Thread*, std::unique_ptr<plan::Plan>> plans;  ///< what each thread runs
     std::vector<std::unique_ptr<plan::Plan>> stuck;  ///< kept after an edit that a thread did not answer: places in them may be in use
+    std::vector<std::shared_ptr<void>> left_cells;   ///< of the swap before: a loose pin's other thread may use one a moment longer
     std::uint64_t epoch = 0;
 
     std::unique_ptr<Edit> edit;              ///< the open transaction
@@ -60,13 +61,17 @@ struct Session::State {
     /// Makes the open transaction take effect. False after reporting; then it is to be withdrawn.
     bool carry_out(Diagnostics& diagnostics);
     /// Undoes the open transaction, in the model and in threads that have taken it.
-    void withdraw();
+    void withdraw(Diagnostics* diagnostics = nullptr);
     /// Reports that there is no memory left, and makes some.
     void out_of_memory(Diagnostics& diagnostics);
     void collect_faults();
+    /// The values of the open transaction, which has nothing else, into the threads' queues.
+    bool write_values(Diagnostics& diagnostics);
+    bool start_replaced(Diagnostics& diagnostics);
+    void restart_replaced(Diagnostics& diagnostics);
+    void retire();
 
 private:
-    bool write_values(Diagnostics& diagnostics);
     bool all_answer(Diagnostics& diagnostics);
     bool swap(const std::unordered_set<const Function*>& without, Diagnostics& diagnostics);
     void keep_values();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "base/keep.hpp"
 #include "session/construct.hpp"
 #include "session/state.hpp"
 
@@ -89,10 +90,11 @@ void Session::State::silent_thread(const Core* hangs, Diagnostics& diagnostics) 
                               "show thread and show fault say more");
 }
 
-void Session::State::withdraw() {
+void Session::State::withdraw(Diagnostics* diagnostics) {
     edit->undo();
     bool in_step = true;
     if (touched) {
+        Diagnostics ignored;
         // Threads that took the new plan take one of the old model again, with the values it had.
         std::vector<const Thread*> orphans;
         for (const auto& [thread, core] : cores)
@@ -105,14 +107,15 @@ void Session::State::withdraw() {
         for (const auto& signal : model.signals)
             if (const auto value = before.signals.find(signal.get()); value != before.signals.end()) edit->signal_values.insert(*value);
         try {
-            Diagnostics ignored;
+            restart_replaced(diagnostics ? *diagnostics : ignored);
             make_threads(ignored);
-            synchronise(ignored);
+            // a thread that does not take the old instances again may go on with the new ones
+            if (!synchronise(ignored) && !edit->replaced().empty()) in_step = false;
         } catch (const std::bad_alloc&) {
             in_step = false;
         }
     }
-    if (!in_step) (void)edit.release();  // a thread may still use what the edit made: it stays for good
+    if (!in_step) keep_for_good(std::move(edit));  // a thread may still use what the edit made: it stays for good
     else close_edit();
 }
 
@@ -129,12 +132,21 @@ bool Session::State::swap(const std::unordered_set<const Function*>& without, Di
     input.pin_values = &edit->pin_values;
     input.signal_values = &edit->signal_values;
     input.inherited = &edit->inherited;
+    input.old_memory = &edit->old_memory;
     input.core_of = [this](const Thread& thread) -> void* { return core(&thread); };
     input.check_finite = check_finite;
     Compiled compiled = compile(model, input);
     observe_unknowns(compiled);
     keep_values();
 
+    std::vector<std::shared_ptr<void>> cells;
+    const auto note_cells = [&](const auto& signals) {
+        for (const auto& signal : signals)
+            if (signal->cell) cells.push_back(signal->cell);
+    };
+    note_cells(model.signals);
+    note_cells(edit->removed().signals);
+    left_cells.reserve(left_cells.size() + cells.size());
     std::vector<std::pair<Core*, plan::Plan*>> offers;
     stuck.reserve(stuck.size() + 2 * compiled.plans.size());
     for (auto& [thread, plan] : compiled.plans) {
@@ -144,6 +156,9 @@ bool Session::State::swap(const std::unordered_set<const Function*>& without, Di
     }
     const std::vector<Core*> silent = executor->swap(offers, answer_timeout_ns);
     settle(compiled, silent);
+    // every thread that answered has begun a cycle since the swap before, so nobody looks into that one's cells any more
+    if (silent.empty()) left_cells.clear();
+    left_cells.insert(left_cells.end(), cells.begin(), cells.end());
     for (const Core* const hangs : silent) silent_thread(hangs, diagnostics);
     return silent.empty();
 }
@@ -151,7 +166,7 @@ bool Session::State::swap(const std::unordered_set<const Function*>& without, Di
 void Session::State::keep_values() {
     const auto value = [](const hal_value* slot) { return hal_value{.raw = __atomic_load_n(&slot->raw, __ATOMIC_RELAXED)}; };
     for (const auto& [pin, unused] : edit->pin_values)
-        if (pin->home) before.pins.try_emplace(pin, value(pin->memory->slot));
+        if (pin->home) before.pins.try_emplace(pin, value(edit->present(*pin).slot));
     for (const auto& [signal, unused] : edit->signal_values) before.signals.try_emplace(signal, value(signal->slot));
     for (const auto& [signal, unused] : edit->inherited) before.signals.try_emplace(signal, value(signal->slot));
 }
@@ -186,6 +201,25 @@ void Session::State::observe_unknowns(Compiled& compiled) {
     }
 }
 
+// No thread uses the old instances of a reload, nor those that were unloaded: their pins stand alone, with the values they have,
+// before the images they point into go.
+void Session::State::retire() {
+    const auto alone = [](const Pin& pin) {
+        hal_pin& memory = *pin.memory;
+        if (memory.slot == &memory.own) return;
+        memory.own.raw = pin.type == HAL_TYPE_PORT ? 0 : __atomic_load_n(&memory.slot->raw, __ATOMIC_RELAXED);
+        memory.slot = &memory.own;
+        if (pin.pointer) *pin.pointer = memory.slot;
+    };
+    const auto all_alone = [&](const std::vector<std::unique_ptr<Instance>>& instances) {
+        for (const auto& instance : instances)
+            for (const auto& pin : instance->pins) alone(*pin);
+    };
+    all_alone(edit->removed().instances);
+    for (const auto& one : edit->replaced()) all_alone(one.other->instances);
+    edit->old_memory.clear();
+}
+
 // All threads that answered run the new plans; the old images are still there, and nobody writes them any more. A thread
 // that did not answer still runs its old plan, so what is known of its places stays.
 void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent) {
@@ -197,7 +231,7 @@ void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent
             if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end()) signal.value = set->second;
             else if (const auto from = edit->inherited.find(&signal); from != edit->inherited.end()) {
                 const auto pinned = edit->pin_values.find(from->second);
-                signal.value = pinned != edit->pin_values.end() ? pinned->second : *from->second->memory->slot;
+                signal.value = pinned != edit->pin_values.end() ? pinned->second : *edit->present(*from->second).slot;
             } else if (signal.cell) signal.value.raw = __atomic_load_n(&signal.cell->raw, __ATOMIC_RELAXED);
             else if (signal.home) signal.value = *signal.slot;
         } else if (place.cell) {
@@ -205,9 +239,10 @@ void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent
         }
     }
     for (const auto& rebind : compiled.session_rebinds) {
-        if (rebind.slot == &rebind.pin->own) rebind.pin->own = rebind.keeps_value ? *rebind.pin->slot : hal_value{.raw = 0};
+        if (rebind.slot == &rebind.pin->own) rebind.pin->own = rebind.keeps_value ? *rebind.from : hal_value{.raw = 0};
         rebind.pin->slot = rebind.slot;
     }
+    for (const auto& pointer : compiled.session_pointers) *pointer.to = pointer.slot;
     for (const auto& [pin, thread] : compiled.homes)
         if (!hangs(pin->home) && !hangs(thread)) pin->home = thread;
     for (Compiled::Place& place : compiled.places) {
@@ -231,6 +266,7 @@ void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent
     edit->pin_values.clear();
     edit->signal_values.clear();
     edit->inherited.clear();
+    if (silent.empty()) retire();
     for (auto& [thread, plan] : compiled.plans) {
         std::unique_ptr<plan::Plan>& running = plans.at(thread);
         if (!silent.empty()) stuck.push_back(std::move(hangs(thread) ? plan : running));

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <deque>
 #include <map>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 #include <poll.h>
@@ -23,6 +24,8 @@ using Json = nlohmann::json;
 
 struct Client::State {
     int fd = -1;
+    int cancel = -1;  ///< readable: the user wants no more of what is waited for
+    bool cancelled = false;
     std::string instance, version;
     std::int64_t pid = 0;
     std::uint64_t next_id = 1;
@@ -69,12 +72,24 @@ struct Client::State {
         taken = 0;
     }
 
+    /// The first time asks the other side to end the command; it may be one that does not listen.
+    void on_cancel() {
+        drain_cancel();
+        if (std::exchange(cancelled, true)) return lose();
+        write_all("{\"cancel\":true}\n");
+    }
+    void drain_cancel() const {
+        std::array<char, 4096> news;
+        while (cancel >= 0 && read(cancel, news.data(), news.size()) > 0) {}
+    }
+
     /// Waits until something can be read (or written, when asked). False after the time-out.
     bool wait_for(short what, int timeout_ms) {
-        pollfd ready{fd, what, 0};
-        const int count = poll(&ready, 1, timeout_ms);
+        pollfd ready[] = {{fd, what, 0}, {cancel, POLLIN, 0}};
+        const int count = poll(ready, 2, timeout_ms);
         if (count < 0 && errno != EINTR) lose();
-        if (count > 0 && ready.revents & (POLLIN | POLLHUP | POLLERR)) read_lines();
+        if (count > 0 && ready[0].revents & (POLLIN | POLLHUP | POLLERR)) read_lines();
+        if (count > 0 && (ready[1].revents & POLLIN)) on_cancel();
         return count != 0;
     }
 
@@ -146,6 +161,7 @@ const std::string& Client::version() const { return state_->version; }
 std::int64_t Client::pid() const { return state_->pid; }
 bool Client::connected() const { return state_->fd >= 0; }
 int Client::fd() const { return state_->fd; }
+void Client::cancel_on(int descriptor) { state_->cancel = descriptor; }
 
 std::uint64_t Client::send(Json body) {
     const std::uint64_t id = state_->next_id++;
@@ -167,7 +183,10 @@ Json Client::wait(std::uint64_t id) {
     }
 }
 
-Json Client::request(Json body) { return wait(send(std::move(body))); }
+Json Client::request(Json body) {
+    state_->cancelled = false;
+    return wait(send(std::move(body)));
+}
 
 bool Client::next_event(Json& event, int timeout_ms) {
     State& s = *state_;
@@ -222,7 +241,9 @@ bool Client::set_options(const Options& o) {
     return request({{"options", std::move(options)}}).value("ok", false);
 }
 
-Client::Answer Client::run(std::string_view line, std::string_view name) { return answer_of(request({{"run", line}, {"name", name}, {"env", environment_for(line)}})); }
+Client::Answer Client::run(std::string_view line, std::string_view name, std::uint32_t number) {
+    return answer_of(request({{"run", line}, {"name", name}, {"line", number}, {"env", environment_for(line)}}));
+}
 
 Client::Answer Client::run_text(std::string_view name, std::string_view text) {
     return answer_of(request({{"script", text}, {"name", name}, {"env", environment_for(text)}}));

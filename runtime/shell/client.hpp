@@ -27,6 +27,9 @@ public:
     /// False once the other side has gone; then every answer has status 1 and says so.
     bool connected() const;
     int fd() const;  ///< for poll(); readable when next_event() may have something
+    /// A non-blocking descriptor (a signalfd, say) that becomes readable when the user wants no more of the command that
+    /// runs: then it is emptied and the command cancelled; a second time, the connection is given up.
+    void cancel_on(int descriptor);
 
     struct Options {
         bool keep_going = false, echo = false, script = false, json = false, color = false, notes = false;
@@ -42,8 +45,8 @@ public:
         bool quit = false;        ///< the command was quit or exit
         bool collecting = false;  ///< between begin and commit
     };
-    /// Runs one line; waits for its end.
-    Answer run(std::string_view line, std::string_view name = "<shell>");
+    /// Runs one line; waits for its end. `number` is the line's in what messages call `name`.
+    Answer run(std::string_view line, std::string_view name = "<shell>", std::uint32_t number = 1);
     /// Runs a text as a file; $NAME in it is looked up in this process's environment.
     Answer run_text(std::string_view name, std::string_view text);
     Completion complete(std::string_view line, std::size_t cursor);

@@ -18,9 +18,16 @@ constexpr CommandRow rows[] = {
      edit, load, command_plain},
     {"unloadrt", "", "LOADED|all", "unload a component with all its instances, or one instance", "", edit, load, command_plain},
     {"unload", "", "LOADED|all", "unload a component or an instance, or end a program started by loadusr", "", edit, load, command_plain},
-    {"loadusr", "", "[-W] [-Wn NAME] [-w] [-i] PROGRAM [ARGUMENT]...", "start a program",
-     "-W waits until a component named like the program is ready, -Wn NAME until NAME is; a program says so over the\n"
-     "control socket. -w waits for the program's end and fails when its exit status is not 0; -i ignores the status.",
+    {"reload", "", "RELOADABLE", "put the plugin that is on the plugin path now in the place of the loaded one, at a cycle boundary",
+     "The new version is constructed with the same arguments. Pins of the same name and type keep links and values, functions\n"
+     "their places in the threads; new pins have their initial values. A linked pin or a function in a thread that the new\n"
+     "version has not, or has otherwise, refuses the reload, and nothing changes.",
+     edit, load, command_plain},
+    {"loadusr", "", "[-W] [-Wn NAME] [-w] [-i] [--restart=no|on-failure|always] [--restart-delay=TIME] PROGRAM [ARGUMENT]...", "start a program",
+     "-W waits until the program's component is ready, -Wn NAME until NAME is; a program says so over the control socket.\n"
+     "-w waits for the program's end and fails when its exit status is not 0; -i ignores the status.\n"
+     "--restart=on-failure starts the program again, after --restart-delay (1s), when it has ended by a signal or with an exit\n"
+     "status other than 0; always: whenever it has ended. unloadusr ends it for good, and 5 restarts within 10 s are the last.",
      command_loadusr, load, command_waits},
     {"waitusr", "", "PROCESS", "wait until a program started by loadusr has ended", "", command_waitusr, 0, command_waits},
     {"unloadusr", "", "PROCESS|all", "end a program started by loadusr (SIGTERM)", "", command_unloadusr, load, command_plain},

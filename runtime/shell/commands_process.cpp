@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // loadusr, waitusr, unloadusr: programs outside the runtime.
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdlib>
@@ -18,9 +19,30 @@ using namespace std::chrono_literals;
 
 struct Plan {
     bool wait_ready = false, wait_end = false, ignore_status = false;
+    bool any_name = true;  ///< no -Wn: whatever the program calls its component
+    RestartPolicy restart;
     std::string name;  ///< as component
     std::size_t program = 0;
 };
+
+constexpr const char* usage = "usage: loadusr [-W] [-Wn NAME] [-w] [-i] [--restart=no|on-failure|always] [--restart-delay=TIME] PROGRAM [ARGUMENT]...";
+
+/// True for an option about restarts, which it has then taken or reported.
+bool restart_option(Context& context, Plan& plan, std::size_t i, const std::string& option) {
+    const auto equals = option.find('=');
+    const std::string key = option.substr(0, equals), value = equals == option.npos ? "" : option.substr(equals + 1);
+    if (key == "--restart") {
+        static constexpr std::pair<const char*, Restart> words[] = {{"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
+        const auto word = std::find_if(std::begin(words), std::end(words), [&](const auto& w) { return value == w.first; });
+        if (word != std::end(words)) plan.restart.when = word->second;
+        else context.diagnostics.error("unknown-option", context.span(i), "--restart is no, on-failure or always", "", usage);
+        return true;
+    }
+    if (key != "--restart-delay") return false;
+    if (const auto delay = parse_duration_ns(value, false); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000) plan.restart.delay_ns = *delay;
+    else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay is a time from 10ms to 1h", "", usage);
+    return true;
+}
 
 /// The options before the program. False after reporting.
 bool read_options(Context& context, Plan& plan) {
@@ -31,19 +53,26 @@ bool read_options(Context& context, Plan& plan) {
         else if (option == "-w") plan.wait_end = true;
         else if (option == "-i") plan.ignore_status = true;
         else if (option == "-iw" || option == "-wi") plan.wait_end = plan.ignore_status = true;
-        else if (option == "-Wn" && i + 1 < context.count()) {
+        else if (restart_option(context, plan, i, option)) {
+            if (context.diagnostics.failed()) return false;
+        } else if (option == "-Wn" && i + 1 < context.count()) {
             plan.wait_ready = true;
+            plan.any_name = false;
             plan.name = context.argument(++i);
         } else {
             context.diagnostics.error("unknown-option", context.span(i), "loadusr has no option '" + option + "'" + (option == "-Wn" ? " without a name" : ""), "",
-                                      "usage: loadusr [-W] [-Wn NAME] [-w] [-i] PROGRAM [ARGUMENT]...");
+                                      usage);
             return false;
         }
     }
     plan.program = i;
+    if (plan.wait_end && plan.restart.when != Restart::no) {
+        context.diagnostics.error("unknown-option", context.span(0), "-w waits for a program's end, --restart does not let it end", "", usage);
+        return false;
+    }
     if (i == context.count()) {
         context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' needs a program to start", "something is missing",
-                                  "usage: loadusr [-W] [-Wn NAME] [-w] [-i] PROGRAM [ARGUMENT]...");
+                                  usage);
         return false;
     }
     if (plan.name.empty()) {
@@ -106,7 +135,9 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid) {
     while (true) {
         const auto* const entry = context.processes.find(plan.name);
         if (entry && entry->ready) return;
-        if (!context.processes.find(pid)) {
+        const auto* const started = context.processes.find(pid);
+        if (plan.any_name && started && started->ready) return;
+        if (!started && !(entry && entry->dead() && (entry->restart_ns != 0 || !entry->ended))) {
             context.diagnostics.error("program-ended", context.span(plan.program),
                                       "'" + context.argument(plan.program) + "' ended before a component '" + plan.name + "' was ready", "",
                                       "a program says that it is ready over the control socket; without -W nobody waits for it");
@@ -171,6 +202,7 @@ void command_loadusr(Context& context) {
     if (plan.wait_end) return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr);
     // A program that will say its name itself is entered under its process's name until then.
     context.processes.add(pid, plan.name, context.command);
+    context.processes.keep_alive(pid, start, plan.restart);
     if (plan.wait_ready) wait_until_ready(context, plan, pid);
 }
 
@@ -183,7 +215,11 @@ void command_waitusr(Context& context) {
                                       "waitusr waits for programs started by loadusr");
         return;  // gone already: that is what was waited for
     }
-    while (context.processes.find(name) && !context.interrupted()) context.processes.wait(context.lock, 100ms);
+    const auto lives = [&] {
+        const auto* const entry = context.processes.find(name);
+        return entry && (!entry->dead() || entry->restart_ns != 0 || (entry->child && !entry->ended));
+    };
+    while (lives() && !context.interrupted()) context.processes.wait(context.lock, 100ms);
 }
 
 namespace {

@@ -148,7 +148,7 @@ void save_values(Context& context, Text& text, const std::vector<const Pin*>& pi
 void save_param(Context& context, Text& text) {
     text.add("# parameter values\n");
     auto parameters = pins_by_name(context.session.model(), true, {});
-    std::erase_if(parameters, [](const Pin* pin) { return pin->dir != HAL_DIR_PARAM; });
+    std::erase_if(parameters, [](const Pin* pin) { return pin->dir != HAL_DIR_PARAM || pin->read_only(); });
     save_values(context, text, parameters);
 }
 

@@ -43,7 +43,7 @@ void show_comp(Request& request) {
         const auto* const program = component->process ? request.context.processes.find(component->name) : nullptr;
         const std::string pid = component->process ? std::to_string(component->process) : "";
         request.add("{:>6}  {:<4}  {:<47} {:>5} {}\n", component->id, component->process ? "User" : "RT", component->name, pid,
-                    component->process && !(program && program->ready) ? "initializing" : "ready");
+                    component->process == 0 ? "ready" : program ? program->state() : "initializing");
     }
     request.text += '\n';
 }

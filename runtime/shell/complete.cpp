@@ -121,6 +121,10 @@ void add_listed(Search& search) {
 }
 
 void add_load_arguments(Search& search) {
+    const auto declared = search.words.size() > 1 ? search.session.declared(search.words[1]) : std::nullopt;
+    if (declared)
+        for (const auto& argument : declared->arguments) search.add(argument.name + "=", argument.doc);
+    if (declared && (declared->singleton || declared->whole_names)) return;
     for (const char* argument : {"names=", "count=", "num_chan=", "personality="}) search.add(argument);
 }
 
@@ -136,6 +140,10 @@ constexpr Kind kinds[] = {
     {"LOADED", [](Search& s) {
         for (const auto& c : s.model().components) s.add(c->name, c->process ? "program" : fmt::format("{} instances", c->instances.size()));
         for (const auto& [name, instance] : s.model().instance) s.add(std::string(name), instance->component->name);
+    }},
+    {"RELOADABLE", [](Search& s) {
+        for (const auto& c : s.model().components)
+            if (c->plugin) s.add(c->name, fmt::format("{} instances", c->instances.size()));
     }},
     {"PROCESS", [](Search& s) { for (const auto& name : s.processes.names()) s.add(name); }},
     {"PROGRAM", add_files},
@@ -157,7 +165,7 @@ constexpr Kind kinds[] = {
         else add_pins(s, [](const Pin& pin) { return !pin.signal && pin.dir != HAL_DIR_PARAM; });
     }},
     {"LINKED-PIN", [](Search& s) { add_pins(s, [](const Pin& pin) { return pin.signal != nullptr; }); }},
-    {"SETTABLE", [](Search& s) { add_pins(s, [](const Pin& pin) { return pin.dir != HAL_DIR_OUT && !pin.signal; }); }},
+    {"SETTABLE", [](Search& s) { add_pins(s, [](const Pin& pin) { return pin.dir != HAL_DIR_OUT && !pin.read_only() && !pin.signal; }); }},
     {"PIN-OR-PARAMETER", [](Search& s) {
         const bool aliasing = s.words[0] == "alias" && s.words.size() > 1;
         add_pins(s, [&](const Pin& pin) { return !aliasing || (is_parameter(pin) == (s.words[1] == "param") && pin.alias.empty()); });

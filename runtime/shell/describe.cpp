@@ -101,6 +101,7 @@ void describe_components(std::string& to, Session& session, Processes& processes
             const auto* const program = processes.find(component->name);
             object.number("pid", component->process);
             object.flag("ready", program && program->ready);
+            object.text("state", program ? program->state() : "initializing");
             return;
         }
         if (component->plugin) {

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -14,19 +16,57 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "paths.hpp"
+#include "session/plugins.hpp"
 #include "session/session.hpp"
-#include "shell/address.hpp"
 
 namespace hal {
 namespace {
 
-/// The environment of a child: ours, plus which instance started it, so that `hal shell` in it talks to that one.
+/// `folders` before those of a variable like PATH, as far as they are there and not among those already.
+std::string with_folders(const char* variable, const std::vector<std::string>& folders) {
+    const char* const before = std::getenv(variable);
+    const std::string there = before ? before : "";
+    std::string all;
+    for (const std::string& folder : folders) {
+        std::error_code ignored;
+        if ((":" + there + ":").find(":" + folder + ":") == std::string::npos && std::filesystem::is_directory(folder, ignored)) all += folder + ":";
+    }
+    all += there;
+    if (all.ends_with(':')) all.pop_back();
+    return all;
+}
+
+/// The environment of a child: ours, plus which instance started it, so that `hal shell` in it talks to that one; and our own
+/// programs and Python module are found.
 std::vector<std::string> environment_of(const std::string& instance) {
+    std::error_code ignored;
+    const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+    const std::pair<std::string, std::string> ours[] = {
+        {"HALCYON_INSTANCE=", instance},
+        {"PATH=", with_folders("PATH", {program.parent_path().string(), user_folder("bin")})},
+        {"PYTHONPATH=", with_folders("PYTHONPATH", {std::string(paths::build_python), std::string(paths::install_python)})}};
     std::vector<std::string> all;
     for (char** entry = environ; *entry; ++entry)
-        if (std::strncmp(*entry, "HALCYON_INSTANCE=", 17) != 0) all.push_back(*entry);
-    all.push_back("HALCYON_INSTANCE=" + instance);
+        if (std::none_of(std::begin(ours), std::end(ours), [&](const auto& one) { return std::string_view(*entry).starts_with(one.first); })) all.push_back(*entry);
+    for (const auto& [name, value] : ours)
+        if (!value.empty()) all.push_back(name + value);
     return all;
+}
+
+/// Where the PATH of `environment` has the program; `name` itself when it is a path, or nowhere.
+std::string program_in(const std::vector<std::string>& environment, const std::string& name) {
+    if (name.find('/') != std::string::npos) return name;
+    for (const std::string& entry : environment) {
+        if (!entry.starts_with("PATH=")) continue;
+        for (std::size_t at = 5, end = 0; at < entry.size(); at = end + 1) {
+            end = std::min(entry.find(':', at), entry.size());
+            const std::string file = entry.substr(at, end - at) + "/" + name;
+            std::error_code ignored;
+            if (access(file.c_str(), X_OK) == 0 && !std::filesystem::is_directory(file, ignored)) return file;
+        }
+    }
+    return name;
 }
 
 std::vector<char*> pointers(std::vector<std::string>& texts) {
@@ -46,8 +86,9 @@ Processes::~Processes() {
         const auto living = [&] {
             return std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.child && !e.ended; });
         };
+        ending_children_ = true;
         for (auto& entry : entries_)
-            if (entry.child) terminate(entry);
+            if (entry.child && !entry.ended) kill(entry.pid, SIGTERM);
         changed_.wait_for(lock, std::chrono::seconds(2), [&] { return !living(); });
         for (const auto& entry : entries_)
             if (entry.child && !entry.ended) kill(entry.pid, SIGKILL);
@@ -60,15 +101,26 @@ Processes::~Processes() {
     for (const auto& child : watched_) close(child.pidfd);
 }
 
-pid_t Processes::start(const ProcessStart& start, bool waited, std::string& problem) {
-    if (wake_ < 0) {
-        wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-        sigset_t all_signals, before;  // signals are for the program's own thread
-        sigfillset(&all_signals);
-        pthread_sigmask(SIG_SETMASK, &all_signals, &before);
-        reaper_ = std::thread([this] { reap(); });
-        pthread_sigmask(SIG_SETMASK, &before, nullptr);
+void Processes::work() {
+    if (wake_ >= 0) {
+        eventfd_write(wake_, 1);
+        return;
     }
+    wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    sigset_t all_signals, before;  // signals are for the program's own thread
+    sigfillset(&all_signals);
+    pthread_sigmask(SIG_SETMASK, &all_signals, &before);
+    reaper_ = std::thread([this] { reap(); });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+pid_t Processes::start(const ProcessStart& start, bool waited, std::string& problem) {
+    const pid_t pid = spawn(start, problem);
+    if (pid != 0) entries_.push_back({.pid = pid, .child = true, .waited = waited});
+    return pid;
+}
+
+pid_t Processes::spawn(const ProcessStart& start, std::string& problem) {
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     if (!start.keep_stdin) posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
@@ -92,7 +144,7 @@ pid_t Processes::start(const ProcessStart& start, bool waited, std::string& prob
     auto arguments = start.arguments;
     auto environment = environment_of(session_.options().name);
     pid_t pid = 0;
-    const int error = posix_spawnp(&pid, arguments[0].c_str(), &actions, &attributes, pointers(arguments).data(), pointers(environment).data());
+    const int error = posix_spawnp(&pid, program_in(environment, arguments[0]).c_str(), &actions, &attributes, pointers(arguments).data(), pointers(environment).data());
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     if (error != 0) {
@@ -106,9 +158,8 @@ pid_t Processes::start(const ProcessStart& start, bool waited, std::string& prob
         waitpid(pid, nullptr, 0);
         return 0;
     }
-    entries_.push_back({.pid = pid, .child = true, .waited = waited});
     watched_.push_back({pid, pidfd});
-    eventfd_write(wake_, 1);
+    work();
     return pid;
 }
 
@@ -122,38 +173,13 @@ std::string Processes::add(pid_t pid, const std::string& name, const Command& co
     return unique;
 }
 
-std::string Processes::announce(pid_t pid, const std::string& name) {
-    if (!good_instance_name(name)) return "'" + name + "' is no good name for a component";
-    Entry* entry = find(name);
-    if (entry && entry->ready) return "a component '" + name + "' is there already";
-    if (!entry) {
-        if (session_.model().find_component(name)) return "a component '" + name + "' is there already";
-        entry = find(pid);
-        if (entry && entry->ready) return "process " + std::to_string(pid) + " is the component '" + entry->name + "' already";
-        if (!entry) entry = &entries_.emplace_back(Entry{.pid = pid});
-        if (!entry->name.empty()) session_.remove_process(entry->name);
-        entry->name = name;
-        session_.add_process(name, pid, Command{});
-    }
-    entry->ready = true;
-    changed_.notify_all();
-    return "";
-}
-
-void Processes::withdraw(const std::string& name) {
-    if (Entry* const entry = find(name)) {
-        entry->ready = false;
-        if (!entry->child) forget(*entry);
-    }
-}
-
 Processes::Entry* Processes::find(std::string_view name) {
     const auto at = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return !e.name.empty() && e.name == name; });
     return at == entries_.end() ? nullptr : &*at;
 }
 
 Processes::Entry* Processes::find(pid_t pid) {
-    const auto at = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.pid == pid; });
+    const auto at = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.pid == pid && (!e.dead() || (e.child && !e.ended)); });
     return at == entries_.end() ? nullptr : &*at;
 }
 
@@ -165,7 +191,7 @@ std::vector<std::string> Processes::names() const {
 }
 
 void Processes::collect(pid_t pid) {
-    std::erase_if(entries_, [&](const Entry& e) { return e.pid == pid; });
+    std::erase_if(entries_, [&](const Entry& e) { return e.pid == pid && !e.dead(); });
 }
 
 void Processes::abandon(pid_t pid) {
@@ -175,14 +201,6 @@ void Processes::abandon(pid_t pid) {
     }
 }
 
-bool Processes::terminate(Entry& entry) { return !entry.ended && kill(entry.pid, SIGTERM) == 0; }
-
-void Processes::forget(Entry& entry) {
-    if (!entry.name.empty()) session_.remove_process(entry.name);
-    entry.name.clear();
-    if (!entry.waited) collect(entry.pid);
-    changed_.notify_all();
-}
 
 void Processes::reap() {
     std::vector<pollfd> waiting;
@@ -190,8 +208,9 @@ void Processes::reap() {
     while (!ending_) {
         waiting.assign(1, {wake_, POLLIN, 0});
         for (const auto& child : watched_) waiting.push_back({child.pidfd, POLLIN, 0});
+        const int most = sleep_ms();
         lock.unlock();
-        poll(waiting.data(), waiting.size(), -1);
+        poll(waiting.data(), waiting.size(), most);
         lock.lock();
         eventfd_t ignored;
         eventfd_read(wake_, &ignored);
@@ -201,14 +220,12 @@ void Processes::reap() {
                 ++child;
                 continue;
             }
-            if (Entry* const entry = find(child->pid)) {
-                entry->ended = true;
-                entry->status = info.si_code == CLD_EXITED ? info.si_status : 128 + info.si_status;
-                forget(*entry);
-            }
+            const pid_t pid = child->pid;
             close(child->pidfd);
             child = watched_.erase(child);
+            child_ended(pid, info.si_code == CLD_EXITED ? info.si_status : 128 + info.si_status);
         }
+        if (!ending_) act_in_time();
         changed_.notify_all();
     }
 }

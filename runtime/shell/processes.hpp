@@ -5,6 +5,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -13,17 +14,36 @@
 
 #include <sys/types.h>
 
+#include "hal/abi.h"
 #include "netlist/netlist.hpp"
 
 namespace hal {
 
 class Session;
+struct Pin;
+
+enum class Restart { no, on_failure, always };
+
+/// Whether a program that has ended is started again, in the spirit of systemd's Restart=, RestartSec= and StartLimit….
+struct RestartPolicy {
+    Restart when = Restart::no;
+    std::int64_t delay_ns = 1'000'000'000;
+    static constexpr std::size_t most = 5;                       ///< restarts within …
+    static constexpr std::int64_t within_ns = 10'000'000'000;    ///< … so long; then it is given up
+};
 
 struct ProcessStart {
     std::vector<std::string> arguments;  ///< the program first; looked up in PATH
     std::string directory;               ///< to run in; empty: this process's
     int out = -1, err = -1;              ///< file descriptors for its stdout and stderr; -1: this process's
     bool keep_stdin = false;             ///< false: it reads /dev/null
+};
+
+/// A stream between programs: one feeds it, one reads it.
+struct ProgramStream {
+    std::string name, types;
+    std::vector<hal_value> memory;
+    hal_stream stream{};
 };
 
 /// All members need Session::mutex held, and those that take a lock give it back while they wait.
@@ -36,6 +56,23 @@ struct Processes {
         bool waited = false;    ///< a `loadusr -w` waits for its status: kept after its end, until collect()
         bool ended = false;
         int status = 0;         ///< exit status, or 128 + signal
+        std::uint64_t owner = 0;        ///< the connection that answers for the component; 0: none
+        std::vector<Pin*> pins = {};    ///< of the living program, by its numbers
+        std::int64_t timeout_ns = 1'000'000'000;  ///< from its death until its pins take their declared values; < 0: never
+        std::int64_t dead_ns = 0;       ///< since when it is dead, on the steady clock; 0: it lives
+        std::string obituary = {};      ///< "since 12:34:56 (exit status 1)"
+        bool declared = false;          ///< dead, and its pins have taken their declared values
+        bool stopping = false;          ///< told to end: not started again
+        RestartPolicy restart = {};
+        ProcessStart start = {};        ///< how to start it again
+        std::vector<std::int64_t> restarts = {};  ///< when it was, lately
+        std::int64_t restart_ns = 0;    ///< when it is to be started again; 0: not
+
+        std::vector<std::shared_ptr<ProgramStream>> streams = {};  ///< it made; they go with it
+
+        bool dead() const { return dead_ns != 0; }
+        /// As `show comp` says it.
+        std::string state() const;
     };
 
     explicit Processes(Session& session);
@@ -45,10 +82,22 @@ struct Processes {
     pid_t start(const ProcessStart& start, bool waited, std::string& problem);
     /// Makes a started program a component of the session. Its name, made unique if it is taken.
     std::string add(pid_t pid, const std::string& name, const Command& command);
-    /// A program says that it is the component `name` and is ready. Empty, or why not.
-    std::string announce(pid_t pid, const std::string& name);
-    /// A program that announced itself is gone (its connection ended).
-    void withdraw(const std::string& name);
+    /// A started program is started again when it ends, as the policy says.
+    void keep_alive(pid_t pid, const ProcessStart& start, const RestartPolicy& policy);
+    /// A program says that it is the component `name`, and ready unless told otherwise. A dead one's place is taken over,
+    /// pins and all. Empty, or why not. `owner` is the connection that says so.
+    std::string announce(pid_t pid, const std::string& name, std::uint64_t owner = 0, bool ready = true);
+    /// The component of that name if this connection answers for it, or nullptr.
+    Entry* owned(std::string_view name, std::uint64_t owner);
+    void set_ready(Entry& entry, bool ready);
+    /// A component leaves in good order: its pins go.
+    void leave(Entry& entry);
+    /// A connection has ended; what it answered for and did not leave() is dead.
+    void withdraw(std::uint64_t owner);
+    /// The next connection's number.
+    std::uint64_t new_owner() { return ++owners_; }
+    ProgramStream* find_stream(std::string_view name);
+    std::vector<std::string> stream_names() const;
     Entry* find(std::string_view name);
     Entry* find(pid_t pid);
     std::vector<std::string> names() const;
@@ -57,21 +106,31 @@ struct Processes {
     void collect(pid_t pid);
     /// Nobody waits for it any more.
     void abandon(pid_t pid);
-    bool terminate(Entry& entry);  ///< SIGTERM
+    bool terminate(Entry& entry);  ///< SIGTERM, and no restart; a dead one is forgotten
 
     /// Sleeps until something about a process changes, at most so long.
     void wait(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds most) { changed_.wait_for(lock, most); }
 
 private:
+    void work();          // starts the thread below
     void reap();
+    void child_ended(pid_t pid, int status);
+    void die(Entry& entry, const std::string& how);
+    void schedule(Entry& entry);
+    void act_in_time();
+    int sleep_ms() const;
+    pid_t spawn(const ProcessStart& start, std::string& problem);
+    bool has_pins(const Entry& entry) const;
     void forget(Entry& entry);
 
     Session& session_;
     std::vector<Entry> entries_;
     std::condition_variable changed_;
-    std::thread reaper_;   // sleeps in poll() on the children's pidfds
-    int wake_ = -1;        // eventfd: the list of children has changed, or the reaper is to end
+    std::uint64_t owners_ = 0;
+    std::thread reaper_;   // sleeps in poll() on the children's pidfds, and until something is due
+    int wake_ = -1;        // eventfd: the list of children has changed, something is due, or the reaper is to end
     bool ending_ = false;
+    bool ending_children_ = false;  // nothing is started again
     struct Watched {
         pid_t pid;
         int pidfd;

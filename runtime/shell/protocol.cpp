@@ -18,6 +18,8 @@
 #include "shell/commands.hpp"
 #include "shell/describe.hpp"
 #include "shell/processes.hpp"
+#include "shell/program_requests.hpp"
+#include "shell/request.hpp"
 #include "shell/shell.hpp"
 #include "shell/streams.hpp"
 
@@ -27,7 +29,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int deepest = 16;  // brackets within brackets of a request
-constexpr std::size_t most_subscriptions = 64, most_names = 100'000;
+constexpr std::size_t most_subscriptions = 64;
 
 /// Arrays and objects in each other, counted without building them: a hostile line costs one pass.
 bool too_deep(std::string_view line) {
@@ -74,37 +76,6 @@ bool same(const std::vector<std::optional<Reading>>& a, const std::vector<std::o
     });
 }
 
-/// A value of "set" as setp and sets read it; empty when it is not a value.
-std::string value_word(const Json& value) {
-    if (value.is_boolean()) return value.get<bool>() ? "TRUE" : "FALSE";
-    if (value.is_string()) return value.get<std::string>();
-    return value.is_number() ? value.dump() : "";
-}
-
-/// Why a request cannot be executed; becomes {"ok":false,"error":…}.
-struct Refusal {
-    std::string sentence;
-};
-
-const std::string& text_of(const Json& value, const char* what) {
-    if (!value.is_string()) throw Refusal{std::string(what) + " must be a string"};
-    return value.get_ref<const std::string&>();
-}
-
-std::vector<std::string> names_in(const Json& value, const char* what) {
-    if (!value.is_array()) throw Refusal{std::string(what) + " must be an array of names"};
-    if (value.size() > most_names) throw Refusal{std::string(what) + " has more than " + std::to_string(most_names) + " names"};
-    std::vector<std::string> names;
-    for (const Json& name : value) names.push_back(text_of(name, "a name"));
-    return names;
-}
-
-std::int64_t whole(const Json& value, const char* what, std::int64_t least, std::int64_t most) {
-    if (!value.is_number_integer() || value < least || value > most)
-        throw Refusal{std::string(what) + " must be a whole number from " + std::to_string(least) + " to " + std::to_string(most)};
-    return value.get<std::int64_t>();
-}
-
 }  // namespace
 
 struct Connection::State {
@@ -113,7 +84,7 @@ struct Connection::State {
     Shell shell;
     Session& session;
     pid_t peer;
-    std::vector<std::string> components;  ///< registered by this client
+    const std::uint64_t owner = shell.processes().new_owner();  ///< of the components that this client answers for
     std::vector<Subscription> subscriptions;
     std::uint64_t next_subscription = 1, requests = 0, rubbish = 0;
     std::map<std::string, std::string> environment;  ///< what $NAME is in the request being executed
@@ -130,7 +101,10 @@ struct Connection::State {
     void list(const Json& body, std::string& reply);
     void describe_kind(const Json& body, std::string& reply);
     void complete(const Json& body, std::string& reply);
-    void component(const Json& body, std::string& reply);
+    void component(const Json& body, std::string& reply) { declare_component({shell, session, peer, owner}, body, reply); }
+    void exchange(const Json& body, std::string& reply) { exchange_values({shell, session, peer, owner}, body, reply); }
+    void exit(const Json& body, std::string&) { leave_component({shell, session, peer, owner}, body); }
+    void port(const Json& body, std::string& reply) { use_port({shell, session, peer, owner}, body, reply); }
     void stream(const Json& body, std::string& reply);
     void end(const Json& body, std::string& reply);
     void nothing(const Json&, std::string&) {}
@@ -148,7 +122,7 @@ struct Verb {
 };
 
 constexpr Verb verbs[] = {
-    {"run", &Connection::State::run, "name env "},
+    {"run", &Connection::State::run, "name line env "},
     {"script", &Connection::State::script, "name env "},
     {"options", &Connection::State::options, ""},
     {"read", &Connection::State::read, ""},
@@ -158,8 +132,11 @@ constexpr Verb verbs[] = {
     {"list", &Connection::State::list, "patterns "},
     {"describe", &Connection::State::describe_kind, "patterns type "},
     {"complete", &Connection::State::complete, "cursor "},
-    {"component", &Connection::State::component, ""},
-    {"stream", &Connection::State::stream, "take records "},
+    {"component", &Connection::State::component, "prefix pins ready timeout_ms "},
+    {"exchange", &Connection::State::exchange, "write read "},
+    {"exit", &Connection::State::exit, ""},
+    {"port", &Connection::State::port, "read peek write "},
+    {"stream", &Connection::State::stream, "take records create owner "},
     {"stop", &Connection::State::end, ""},
     {"cancel", &Connection::State::nothing, ""},
 };
@@ -177,7 +154,8 @@ const Verb& verb_of(const Json& body) {
     for (auto entry = body.begin(); entry != body.end(); ++entry) {
         const auto verb = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return entry.key() == v.name; });
         if (verb == std::end(verbs)) continue;
-        if (found) throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
+        if (found && listed_in(found->members, verb->name)) continue;  // read is a member of exchange, too
+        if (found && !listed_in(verb->members, found->name)) throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
         found = verb;
     }
     if (!found) {
@@ -192,12 +170,6 @@ const Verb& verb_of(const Json& body) {
     return *found;
 }
 
-const Json& member(const Json& body, const char* key) {
-    static const Json none;
-    const auto at = body.find(key);
-    return at == body.end() ? none : *at;
-}
-
 }  // namespace
 
 // --- the verbs -----------------------------------------------------------------------------------------------------------
@@ -210,6 +182,11 @@ void Connection::State::execute(const Json& body, const std::string& text, bool 
     const Json& name = member(body, "name");
     const Json& env = member(body, "env");
     if (!name.is_null()) text_of(name, "name");
+    std::uint32_t number = 1;
+    if (const Json& line = member(body, "line"); !line.is_null()) {
+        if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) throw Refusal{"line must be a number from 1"};
+        number = line.get<std::uint32_t>();
+    }
     if (!env.is_null()) {
         if (!env.is_object()) throw Refusal{"env must be an object of names and strings"};
         environment.clear();
@@ -221,7 +198,7 @@ void Connection::State::execute(const Json& body, const std::string& text, bool 
     }
     TextOutput output;
     const std::string source = name.is_string() ? name.get<std::string>() : script ? "<stdin>" : "<shell>";
-    const int status = script ? shell.run_text(source, text, output) : shell.execute(text, output, source);
+    const int status = script ? shell.run_text(source, text, output) : shell.execute(text, output, source, number);
     shell.look_up({});
     reply += ",\"status\":" + std::to_string(status) + ",\"out\":";
     json_quote(reply, output.out_text);
@@ -370,42 +347,7 @@ void Connection::State::complete(const Json& body, std::string& reply) {
     reply += ']';
 }
 
-void Connection::State::component(const Json& body, std::string&) {
-    const std::string& name = text_of(body["component"], "component");
-    const std::scoped_lock lock(session.mutex);
-    if (const std::string why = shell.processes().announce(peer, name); !why.empty()) throw Refusal{why};
-    components.push_back(name);
-}
-
-void Connection::State::stream(const Json& body, std::string& reply) {
-    const std::string& name = text_of(body["stream"], "stream");
-    const Json& take = member(body, "take");
-    const Json& records = member(body, "records");
-    const std::scoped_lock lock(session.mutex);
-    hal_stream* const stream = session.find_stream(name);
-    if (!stream) {
-        const auto names = session.stream_names();
-        const std::string meant = did_you_mean(name, names);
-        throw Refusal{"there is no stream '" + name.substr(0, 60) + "'; " + (names.empty() ? "nothing here has one (sampler and streamer do)" : meant.empty() ? "there is: " + listed(names) : meant)};
-    }
-    if (!take.is_null() && !records.is_null()) throw Refusal{"a stream is read (take) or fed (records), not both"};
-    std::string why;
-    if (!take.is_null()) {
-        const auto most = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
-        if (!take_records(*stream, most, reply, why)) throw Refusal{why};
-    } else if (!records.is_null()) {
-        if (!records.is_array()) throw Refusal{"records must be an array of arrays"};
-        std::vector<std::vector<std::string>> words;
-        for (const Json& record : records) {
-            if (!record.is_array()) throw Refusal{"records must be an array of arrays"};
-            std::vector<std::string> row;
-            for (const Json& value : record) row.push_back(value_word(value));
-            words.push_back(std::move(row));
-        }
-        if (!feed_records(*stream, words, reply, why)) throw Refusal{why};
-    }
-    describe_stream(*stream, reply);
-}
+void Connection::State::stream(const Json& body, std::string& reply) { use_stream({shell, session, peer, owner}, body, reply); }
 
 void Connection::State::end(const Json&, std::string&) { stop = true; }
 
@@ -415,7 +357,7 @@ Connection::Connection(Shell& shell, pid_t peer) : state_(new State(shell, peer)
 
 Connection::~Connection() {
     const std::scoped_lock lock(state_->session.mutex);
-    for (const auto& name : state_->components) state_->shell.processes().withdraw(name);
+    state_->shell.processes().withdraw(state_->owner);
 }
 
 std::string Connection::hello() const {

@@ -24,7 +24,7 @@ std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes)
 
 /// Edits that leave nothing in the model that points into their text.
 bool makes_nothing(const Command& command) {
-    static constexpr std::string_view names[] = {"setp", "sets", "delf", "delsig", "unlinkp", "unalias", "unload", "unloadrt", "delthread"};
+    static constexpr std::string_view names[] = {"setp", "sets", "delf", "delsig", "unlinkp", "unalias", "unload", "unloadrt", "reload", "delthread"};
     if (!command.args.empty() && command.args[0].text == "=") return true;
     return std::find(std::begin(names), std::end(names), command.name.text) != std::end(names);
 }

@@ -54,10 +54,10 @@ void Shell::cancel(bool on) { state_->cancelled.store(on, std::memory_order_rela
 
 void Shell::look_up(std::function<std::optional<std::string>(const std::string&)> variable) { state_->variable = std::move(variable); }
 
-int Shell::execute(std::string_view line, Output& output, std::string_view name) {
+int Shell::execute(std::string_view line, Output& output, std::string_view name, std::uint32_t number) {
     Script script(*this, *state_, output);
     Session& session = state_->session;
-    const std::uint32_t source = session.sources.add(std::string(name), std::string(line));
+    const std::uint32_t source = session.sources.add(std::string(name), std::string(line), number);
     const int status = script.run(source);
     if (script.quit_seen()) state_->quit = true;
     if (script.text_can_go()) session.sources.drop(source);

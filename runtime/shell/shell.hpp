@@ -74,8 +74,8 @@ public:
     Session& session() const;
 
     /// Runs one line. Returns LinuxCNC's exit status: 0 all good, 1 something failed. `name` is what messages call the
-    /// source: "<shell>" or "<commandline>".
-    int execute(std::string_view line, Output& output, std::string_view name = "<shell>");
+    /// source: "<shell>" or "<commandline>"; `number` is the line's in it.
+    int execute(std::string_view line, Output& output, std::string_view name = "<shell>", std::uint32_t number = 1);
     /// Runs a text as a file: consecutive edits are one transaction, ended by commands that act and by the end.
     int run_text(std::string name, std::string text, Output& output);
     /// Runs a .hal file, or an .ini file with its [HAL] section: HALFILE=, HALCMD=, TWOPASS=. An .ini file also becomes

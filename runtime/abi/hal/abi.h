@@ -22,7 +22,7 @@ extern "C" {
 #endif
 
 #define HAL_ABI_MAJOR 1
-#define HAL_ABI_MINOR 0
+#define HAL_ABI_MINOR 1
 
 typedef enum hal_type { HAL_TYPE_BIT, HAL_TYPE_FLOAT, HAL_TYPE_S32, HAL_TYPE_U32, HAL_TYPE_S64, HAL_TYPE_U64, HAL_TYPE_PORT } hal_type;
 typedef enum hal_dir { HAL_DIR_IN, HAL_DIR_OUT, HAL_DIR_IO, HAL_DIR_PARAM } hal_dir;
@@ -57,7 +57,8 @@ typedef struct hal_pin {
 
 enum {
     HAL_PIN_FINITE = 1, /* NaN or infinity on this float output is a fault */
-    HAL_PIN_SAFE = 2    /* `safe` is written on stop, unload, a fault that stops the thread, end of process */
+    HAL_PIN_SAFE = 2,   /* `safe` is written on stop, unload, a fault that stops the thread, end of process */
+    HAL_PIN_READ_ONLY = 4 /* since 1.1: a parameter that only its component sets */
 };
 
 typedef struct hal_pin_decl {
@@ -70,7 +71,10 @@ typedef struct hal_pin_decl {
     const char *unit;
     hal_value initial, safe;
     const void *function; /* `identity` of the one function that uses the pin; NULL: all of them do */
+    hal_value **pointer;  /* since 1.1: NULL, or a place of the plugin's that the host sets whenever it sets `slot`, to the same */
 } hal_pin_decl;
+
+#define HAL_PIN_DECL_SIZE_1_0 offsetof(hal_pin_decl, pointer)
 
 /* One cycle, as a function sees it. Valid during the call only. */
 typedef struct hal_cycle {
@@ -124,7 +128,12 @@ typedef struct hal_host {
 } hal_host;
 
 enum {
-    HAL_COMPONENT_SINGLETON = 1 /* one instance, named like the component without a number */
+    HAL_COMPONENT_SINGLETON = 1, /* one instance, named like the component without a number */
+    HAL_COMPONENT_STARTS = 2,    /* start or stop does something (since 1.1): a reload stops the old before it starts the new */
+    HAL_COMPONENT_WHOLE_NAMES = 4, /* since 1.1: names of pins and functions stand for themselves, not below the instance's;
+                                      names=, count=, num_chan= and personality= are arguments like others */
+    HAL_COMPONENT_LOOSE_PINS = 8   /* since 1.1: a pin may be used by every function, in whichever threads they are: then its
+                                      signal is one cell that all of them see at once */
 };
 
 typedef struct hal_component {

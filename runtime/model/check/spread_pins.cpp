@@ -9,7 +9,7 @@ void check_spread_pins(const Model& model, Diagnostics& diagnostics) {
             const Pin* shared = nullptr;
             for (const auto& pin : instance->pins)
                 if (!pin->function) shared = shared ? shared : pin.get();
-            if (!shared) continue;
+            if (!shared || is_loose(*shared)) continue;
             const Function* first = nullptr;
             for (const Function* function : instance->functions) {
                 if (!function->thread) continue;

@@ -382,6 +382,11 @@ constexpr Traits traits_of() {
     else return {};
 }
 
+template <class C>
+constexpr bool starts() {
+    return requires(C& c, const hal_host& host) { c.start(host); } || requires(C& c) { c.start(); } || requires(C& c) { c.stop(); };
+}
+
 template <class Action>
 bool guarded(const hal_host* host, Action action) noexcept {
     try {
@@ -400,7 +405,7 @@ constexpr hal_component component(const char* name, const char* summary, const c
     constexpr Traits traits = traits_of<C>();
     return {
         sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name, summary, doc,
-        traits.singleton ? unsigned{HAL_COMPONENT_SINGLETON} : 0u, traits.default_count, sizeof(C), alignof(C),
+        (traits.singleton ? unsigned{HAL_COMPONENT_SINGLETON} : 0u) | (starts<C>() ? unsigned{HAL_COMPONENT_STARTS} : 0u), traits.default_count, sizeof(C), alignof(C),
         [](const hal_host* host, void* memory) { return guarded(host, [&] { new (memory) C(host); }); },
         [](void* self, const hal_host* host) {
             return guarded(host, [&] {

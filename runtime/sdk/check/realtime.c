@@ -1,0 +1,251 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * realtime PLUGIN.so [NAME=VALUE...]: what `hal compile --check-rt` compiles and runs. A host of the component interface that
+ * stands before the C library: it runs each function of one instance a thousand cycles with random and extreme values, and prints
+ * a line for each function that does in a cycle what may wait, takes longer than a period, or crashes. Exit code 2: there are some.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <math.h>
+#include <poll.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "hal/abi.h"
+
+enum { cycles = 1000, most = 4096 };
+static const int64_t period_ns = 1000000;
+
+static __thread bool in_cycle;
+static const char *forbidden; /* the first call of the function that runs */
+
+static void check(const char *call) {
+    if (in_cycle && !forbidden) forbidden = call;
+}
+
+/* --- what stands before the C library -------------------------------------------------------------------------------- */
+
+void *__libc_malloc(size_t);
+void *__libc_calloc(size_t, size_t);
+void *__libc_realloc(void *, size_t);
+void *__libc_memalign(size_t, size_t);
+void __libc_free(void *);
+void *malloc(size_t bytes) { return check("malloc"), __libc_malloc(bytes); }
+void *calloc(size_t count, size_t bytes) { return check("calloc"), __libc_calloc(count, bytes); }
+void *realloc(void *memory, size_t bytes) { return check("realloc"), __libc_realloc(memory, bytes); }
+void *aligned_alloc(size_t align, size_t bytes) { return check("aligned_alloc"), __libc_memalign(align, bytes); }
+void *memalign(size_t align, size_t bytes) { return check("memalign"), __libc_memalign(align, bytes); }
+int posix_memalign(void **memory, size_t align, size_t bytes) {
+    check("posix_memalign");
+    *memory = __libc_memalign(align, bytes);
+    return *memory ? 0 : ENOMEM;
+}
+void free(void *memory) {
+    if (memory) check("free");
+    __libc_free(memory);
+}
+
+#define GUARDED(result, name, parameters, arguments)                          \
+    result name parameters {                                                  \
+        static result(*real) parameters;                                      \
+        check(#name);                                                         \
+        if (!real) real = (result(*) parameters)dlsym(RTLD_NEXT, #name);      \
+        return real arguments;                                                \
+    }
+GUARDED(int, pthread_mutex_lock, (pthread_mutex_t * mutex), (mutex))
+GUARDED(int, pthread_mutex_timedlock, (pthread_mutex_t * mutex, const struct timespec *until), (mutex, until))
+GUARDED(int, pthread_rwlock_rdlock, (pthread_rwlock_t * lock), (lock))
+GUARDED(int, pthread_rwlock_wrlock, (pthread_rwlock_t * lock), (lock))
+GUARDED(int, pthread_cond_wait, (pthread_cond_t * condition, pthread_mutex_t *mutex), (condition, mutex))
+GUARDED(int, pthread_join, (pthread_t thread, void **result), (thread, result))
+GUARDED(int, pthread_create, (pthread_t * thread, const pthread_attr_t *attributes, void *(*run)(void *), void *self), (thread, attributes, run, self))
+GUARDED(int, sem_wait, (sem_t * semaphore), (semaphore))
+GUARDED(int, sched_yield, (void), ())
+GUARDED(unsigned, sleep, (unsigned seconds), (seconds))
+GUARDED(int, usleep, (useconds_t us), (us))
+GUARDED(int, nanosleep, (const struct timespec *wanted, struct timespec *left), (wanted, left))
+GUARDED(int, clock_nanosleep, (clockid_t clock, int flags, const struct timespec *wanted, struct timespec *left), (clock, flags, wanted, left))
+GUARDED(int, poll, (struct pollfd * files, nfds_t count, int ms), (files, count, ms))
+GUARDED(ssize_t, read, (int file, void *to, size_t bytes), (file, to, bytes))
+GUARDED(ssize_t, write, (int file, const void *from, size_t bytes), (file, from, bytes))
+GUARDED(ssize_t, recv, (int file, void *to, size_t bytes, int flags), (file, to, bytes, flags))
+GUARDED(ssize_t, send, (int file, const void *from, size_t bytes, int flags), (file, from, bytes, flags))
+GUARDED(int, close, (int file), (file))
+GUARDED(FILE *, fopen, (const char *path, const char *mode), (path, mode))
+GUARDED(int, puts, (const char *text), (text))
+GUARDED(int, putchar, (int character), (character))
+GUARDED(int, vprintf, (const char *format, va_list arguments), (format, arguments))
+GUARDED(int, vfprintf, (FILE * file, const char *format, va_list arguments), (file, format, arguments))
+GUARDED(size_t, fwrite, (const void *from, size_t size, size_t count, FILE *file), (from, size, count, file))
+GUARDED(char *, getenv, (const char *name), (name))
+int printf(const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    check("printf");
+    const int length = vprintf(format, arguments);
+    va_end(arguments);
+    return length;
+}
+int fprintf(FILE *file, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    check("fprintf");
+    const int length = vfprintf(file, format, arguments);
+    va_end(arguments);
+    return length;
+}
+/* what the two above become under _FORTIFY_SOURCE */
+int __printf_chk(int flag, const char *format, ...) {
+    va_list arguments;
+    (void)flag;
+    va_start(arguments, format);
+    check("printf");
+    const int length = vprintf(format, arguments);
+    va_end(arguments);
+    return length;
+}
+
+/* --- host ------------------------------------------------------------------------------------------------------------- */
+
+static struct {
+    hal_pin *memory;
+    hal_type type;
+    hal_dir dir;
+} pins[most];
+static struct {
+    char name[160];
+    hal_step step;
+    void *self;
+} functions[most];
+static int pin_count, function_count, argument_count;
+static char **arguments_given;
+static const hal_component *component;
+static const char *running = "";
+
+static bool take_pin(const hal_host *host, const hal_pin_decl *decl, hal_pin *memory) {
+    (void)host;
+    memory->own = decl->initial;
+    memory->slot = &memory->own;
+    if (decl->size >= sizeof *decl && decl->pointer) *decl->pointer = memory->slot;
+    if (pin_count < most) pins[pin_count].memory = memory, pins[pin_count].type = decl->type, pins[pin_count++].dir = decl->dir;
+    return true;
+}
+static bool take_function(const hal_host *host, const hal_function_decl *decl) {
+    (void)host;
+    if ((decl->flags & HAL_FUNCTION_EMERGENCY) || function_count == most) return true;
+    const bool whole = component->flags & HAL_COMPONENT_WHOLE_NAMES;
+    snprintf(functions[function_count].name, sizeof functions->name, "%s%s%s", whole ? "" : component->name, !whole && *decl->name ? "." : "", decl->name);
+    functions[function_count].step = decl->step;
+    functions[function_count++].self = decl->self;
+    return true;
+}
+static const char *give_argument(const hal_host *host, const hal_argument_decl *decl) {
+    (void)host;
+    const size_t length = strlen(decl->name);
+    for (int i = 0; i < argument_count; ++i)
+        if (strncmp(arguments_given[i], decl->name, length) == 0 && arguments_given[i][length] == '=') return arguments_given[i] + length + 1;
+    return decl->fallback;
+}
+static void *allocate(const hal_host *host, size_t bytes, size_t align) {
+    (void)host;
+    void *const memory = __libc_memalign(align < 16 ? 16 : align, bytes ? bytes : 1);
+    return memory ? memset(memory, 0, bytes) : NULL;
+}
+static void take_failure(const hal_host *host, const char *reason) {
+    (void)host;
+    printf("refused: %s\n", reason);
+}
+static const void *no_extension(const hal_host *host, const char *id) { return (void)host, (void)id, NULL; }
+
+/* --- values ------------------------------------------------------------------------------------------------------------- */
+
+static uint64_t random_bits(void) {
+    static uint64_t state = 88172645463325252u;
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return state;
+}
+
+static hal_value some_value(hal_type type, bool extreme) {
+    static const double edges[] = {0.0, -0.0, -1.0, 1e300, -1e300, 1e-310, INFINITY, -INFINITY, NAN};
+    const uint64_t bits = random_bits() >> 11;
+    hal_value value = {0};
+    switch (type) {
+    case HAL_TYPE_BIT: value.bit = bits & 1; break;
+    case HAL_TYPE_FLOAT: value.real = extreme ? edges[bits % (sizeof edges / sizeof *edges)] : (double)bits / 9007199254740992.0 * 20.0 - 10.0; break;
+    case HAL_TYPE_S32: value.s32 = extreme ? (bits & 1 ? INT32_MIN : INT32_MAX) : (int32_t)(bits % 21) - 10; break;
+    case HAL_TYPE_U32: value.u32 = extreme ? (bits & 1 ? 0 : UINT32_MAX) : (uint32_t)(bits % 20); break;
+    case HAL_TYPE_S64: value.s64 = extreme ? (bits & 1 ? INT64_MIN : INT64_MAX) : (int64_t)(bits % 21) - 10; break;
+    case HAL_TYPE_U64: value.u64 = extreme ? (bits & 1 ? 0 : UINT64_MAX) : bits % 20; break;
+    case HAL_TYPE_PORT: break;
+    }
+    return value;
+}
+
+static int64_t now_ns(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now); /* what others do to this machine is not the component's fault */
+    return now.tv_sec * 1000000000ll + now.tv_nsec;
+}
+
+static void ended(int number) {
+    static const char *const what[] = {" does not come back: it ran for ten seconds\n", " crashes in a cycle\n"};
+    const char *const text = what[number != SIGALRM];
+    in_cycle = false;
+    if (write(STDOUT_FILENO, "function '", 10) < 0 || write(STDOUT_FILENO, running, strlen(running)) < 0 || write(STDOUT_FILENO, "'", 1) < 0 ||
+        write(STDOUT_FILENO, text, strlen(text)) < 0) _exit(3);
+    _exit(2);
+}
+
+static int run_function(int f) {
+    int64_t shortest = INT64_MAX;
+    forbidden = NULL;
+    running = functions[f].name;
+    alarm(10);
+    hal_cycle cycle = {.size = sizeof cycle, .period_ns = period_ns, .period_s = 1e-3};
+    for (int i = 0; i < cycles && !forbidden; ++i, ++cycle.number, cycle.start_ns += period_ns) {
+        for (int p = 0; p < pin_count; ++p)
+            if (pins[p].type != HAL_TYPE_PORT && pins[p].dir != HAL_DIR_OUT && random_bits() % 4 == 0)
+                *pins[p].memory->slot = some_value(pins[p].type, i >= cycles / 2 && random_bits() % 4 == 0);
+        const int64_t begin = now_ns();
+        in_cycle = true;
+        functions[f].step(functions[f].self, &cycle);
+        in_cycle = false;
+        const int64_t took = now_ns() - begin;
+        if (took < shortest) shortest = took;
+        if (took > 5 * period_ns) shortest = took, i = cycles; /* once is no accident */
+    }
+    alarm(0);
+    if (forbidden) printf("function '%s' calls %s in a cycle\n", running, forbidden);
+    else if (shortest > period_ns) printf("function '%s' takes %.3g ms, longer than a period of 1 ms\n", running, (double)shortest * 1e-6);
+    return forbidden || shortest > period_ns;
+}
+
+int main(int argc, char **argv) {
+    void *const library = argc > 1 ? dlopen(argv[1], RTLD_NOW) : NULL;
+    component = library ? dlsym(library, "hal_plugin") : NULL;
+    if (!component) return printf("refused: it cannot be opened\n"), 3;
+    arguments_given = argv + 2;
+    argument_count = argc - 2;
+    for (int number = 0; number < 5; ++number) signal((const int[]){SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGALRM}[number], ended);
+    const hal_host host = {sizeof host, NULL, take_pin, take_function, give_argument, allocate, take_failure, no_extension};
+    void *const instance = allocate(&host, component->instance_size, component->instance_align);
+    if (!component->create(&host, instance) || !component->start(instance, &host)) return fflush(stdout), 3;
+    int bad = 0;
+    for (int f = 0; f < function_count; ++f) bad += run_function(f);
+    component->stop(instance);
+    component->destroy(instance);
+    if (!bad) printf("%d function%s ran %d cycles each with random and extreme values\n", function_count, function_count == 1 ? "" : "s", cycles);
+    fflush(stdout);
+    return bad ? 2 : 0;
+}

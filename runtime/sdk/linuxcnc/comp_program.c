@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * main() of a program made of a .comp file with `option userspace`: makes the instances that count= or names= ask for, then runs the
+ * file's user_mainloop(). Other words are left to its userinit().
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "inside.h"
+#include "program.h"
+
+enum { most_names = 16 };
+
+int count;
+char *names[most_names];
+void user_mainloop(void);
+void userinit(int argc, char **argv) __attribute__((weak));
+extern const hal_component hal_plugin;
+
+/* True when the word is one of ours. */
+static bool take_word(char *word) {
+    char *end = NULL;
+    if (strncmp(word, "count=", 6) == 0) {
+        const long wanted = strtol(word + 6, &end, 0);
+        if (end == word + 6 || *end || wanted < 0 || wanted > 1000) {
+            fprintf(stderr, "%s: %s is no number of instances\n", hal_plugin.name, word);
+            exit(1);
+        }
+        count = (int)wanted;
+        return true;
+    }
+    if (strncmp(word, "names=", 6) != 0) return false;
+    char *rest = NULL;
+    int found = 0;
+    for (char *name = strtok_r(word + 6, ",", &rest); name; name = strtok_r(NULL, ",", &rest)) {
+        if (found == most_names) {
+            fprintf(stderr, "%s: names= has more than %d names\n", hal_plugin.name, most_names);
+            exit(1);
+        }
+        names[found++] = name;
+    }
+    return true;
+}
+
+int main(int argc, char **argv) {
+    int kept = argc > 0;
+    for (int i = 1; i < argc; ++i)
+        if (!take_word(argv[i])) argv[kept++] = argv[i];
+    argv[kept] = NULL;
+    if (count > 0 && names[0]) {
+        fprintf(stderr, "%s: count= and names= exclude each other\n", hal_plugin.name);
+        return 1;
+    }
+    if (userinit) userinit(kept, argv);
+    const int component = hal_init(hal_plugin.name);
+    if (component < 0) return 1;
+
+    char stem[64];
+    snprintf(stem, sizeof stem, "%s", hal_plugin.name);
+    for (char *at = stem; *at; ++at)
+        if (*at == '_') *at = '-';
+    const char *const usual = strncmp(stem, "hal-", 4) == 0 ? stem + 4 : stem;
+    const bool single = hal_plugin.flags & HAL_COMPONENT_SINGLETON;
+    const int wanted = single ? 1 : count > 0 ? count : (int)hal_plugin.default_count;
+    for (int i = 0; names[0] ? i < most_names && names[i] : i < wanted; ++i) {
+        if (names[0]) snprintf(program_prefix, sizeof program_prefix, "%s", names[i]);
+        else if (single) snprintf(program_prefix, sizeof program_prefix, "%s", usual);
+        else snprintf(program_prefix, sizeof program_prefix, "%s.%d", usual, i);
+        void *const instance = program_host.allocate(&program_host, hal_plugin.instance_size, hal_plugin.instance_align);
+        if (!instance || !hal_plugin.create(&program_host, instance)) {
+            hal_exit(component);
+            return 1;
+        }
+    }
+    if (hal_ready(component) < 0) return 1;
+    user_mainloop();
+    hal_exit(component);
+    return 0;
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: MIT */
+/* What program.c gives component.c and comp_program.c; nothing for users. */
+#ifndef HALCYON_LINUXCNC_PROGRAM_H
+#define HALCYON_LINUXCNC_PROGRAM_H
+#include "hal/abi.h"
+#include "hal/naming.h"
+
+extern const hal_host program_host;
+extern char program_prefix[256]; /* of a .comp file's instance; "": names are whole */
+
+int program_begin(const char *name); /* finds the machine; negative after saying why it is none */
+int program_ready(bool ready);       /* from then on the values are exchanged */
+void program_end(void);
+
+#endif

@@ -1,0 +1,5 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef RTAPI_ATOMIC_H
+#define RTAPI_ATOMIC_H
+#include <stdatomic.h>
+#endif

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+// Components that are programs of their own: in the model an instance without a plugin, whose pins no thread runs. So the
+// session owns them, and their values reach threads as those of signals that nothing writes.
+#include <deque>
+
+#include "session/construct.hpp"
+#include "session/session.hpp"
+#include "session/state.hpp"
+
+namespace hal {
+namespace {
+
+using Memory = std::deque<hal_pin>;  // pins come one by one and never move
+
+Instance* instance_of(const Component& component) { return component.instances.empty() ? nullptr : component.instances.front().get(); }
+
+}  // namespace
+
+void Session::add_process(const std::string& name, std::int64_t pid, const Command& command) {
+    Edit once(state_->model);
+    Component& component = once.add_component(name, command.span);
+    component.process = pid;
+    std::string text;
+    for (const Token& token : command.args) text += (text.empty() ? "" : " ") + token.text;
+    component.arguments.push_back(std::move(text));
+}
+
+void Session::set_process(std::string_view name, std::int64_t pid) {
+    if (Component* const component = state_->model.find_component(name); component && component->process != 0) component->process = pid;
+}
+
+void Session::remove_process(std::string_view name) {
+    State& s = *state_;
+    Component* const component = s.model.find_component(name);
+    if (!component || component->process == 0) return;
+    if (Instance* const instance = instance_of(*component)) {
+        bool linked = false;
+        for (const auto& pin : instance->pins) linked = linked || pin->signal;
+        if (linked) {
+            s.edit = std::make_unique<Edit>(s.model);
+            s.commands = 1;
+            Diagnostics diagnostics;
+            s.edit->diagnostics = &diagnostics;
+            s.edit->remove_component(*component);
+            if (!commit(diagnostics)) component->process = 0;  // a thread hangs: it stays, and is nobody's
+            return;
+        }
+    }
+    Edit once(s.model);
+    once.remove_component(*component);
+}
+
+Pin* Session::add_outside_pin(std::string_view component_name, const OutsidePin& wanted, std::string& problem) {
+    State& s = *state_;
+    Component* const component = s.model.find_component(component_name);
+    if (!component || component->process == 0) {
+        problem = "there is no program '" + std::string(component_name) + "'";
+        return nullptr;
+    }
+    Diagnostics diagnostics;
+    Edit once(s.model);
+    once.diagnostics = &diagnostics;
+    Instance* instance = instance_of(*component);
+    if (!instance) {
+        auto made = std::make_unique<Instance>();
+        made->name = component->name;
+        made->component = component;
+        made->storage = std::make_shared<Memory>();
+        made->loaded = component->loaded;
+        instance = made.get();
+        once.add_instance(*component, made, {});
+    }
+    if (!diagnostics.failed()) {
+        hal_pin& memory = static_cast<Memory*>(instance->storage.get())->emplace_back();
+        auto pin = std::make_unique<Pin>();
+        pin->name = wanted.name;
+        pin->type = wanted.type;
+        pin->dir = wanted.dir;
+        if (wanted.read_only) pin->flags |= HAL_PIN_READ_ONLY;
+        pin->doc = s.model.keep(wanted.doc);
+        pin->unit = s.model.keep(wanted.unit);
+        pin->initial = wanted.initial;
+        if (wanted.safe) {
+            pin->flags |= HAL_PIN_SAFE;
+            pin->safe = *wanted.safe;
+        }
+        pin->memory = &memory;
+        memory.own = wanted.initial;
+        memory.slot = &memory.own;
+        pin->instance = instance;
+        pin->id = s.model.next_id++;
+        Pin* const made = pin.get();
+        std::vector<std::unique_ptr<Pin>> row;
+        row.push_back(std::move(pin));
+        if (once.add_pins(*instance, std::move(row), component->loaded)) return made;
+    }
+    problem = diagnostics.all().front().message;
+    return nullptr;
+}
+
+void Session::remove_outside_pins(std::string_view component_name, const std::vector<Pin*>& pins) {
+    State& s = *state_;
+    Component* const component = s.model.find_component(component_name);
+    Instance* const instance = component ? instance_of(*component) : nullptr;
+    if (!instance || pins.empty()) return;
+    std::vector<Pin*> leaving;
+    for (Pin* const pin : pins)
+        if (!pin->signal) leaving.push_back(pin);
+    if (leaving.size() != pins.size()) {
+        s.edit = std::make_unique<Edit>(s.model);
+        s.commands = 1;
+        Diagnostics diagnostics;
+        s.edit->diagnostics = &diagnostics;
+        for (Pin* const pin : pins) s.edit->unlink(*pin);
+        if (commit(diagnostics)) leaving = pins;
+    }
+    Edit once(s.model);
+    once.remove_pins(*instance, leaving);
+}
+
+void Session::write_outside(const std::vector<std::pair<Pin*, hal_value>>& values) {
+    State& s = *state_;
+    const auto flush = [&] {
+        Diagnostics ignored;  // a thread that hangs is found by every edit; it takes no values
+        if (!s.edit->signal_values.empty() && !s.write_values(ignored)) s.withdraw();
+        s.edit.reset();
+    };
+    for (const auto& [pin, value] : values) {
+        Signal* const signal = pin->signal;
+        if (!signal) {
+            __atomic_store_n(&pin->memory->slot->raw, value.raw, __ATOMIC_RELAXED);
+            continue;
+        }
+        if (pin->type == HAL_TYPE_PORT || (pin->dir == HAL_DIR_IN && (signal->writer || signal->home))) continue;
+        if (!s.edit) s.edit = std::make_unique<Edit>(s.model);
+        s.edit->signal_values[signal] = value;
+        if (s.edit->signal_values.size() >= Core::most_writes / 2) flush();
+    }
+    if (s.edit) flush();
+}
+
+}  // namespace hal

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// What the verbs of the control protocol share: how they look at a request and refuse it. Internal to the shell.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace hal {
+
+/// Why a request cannot be executed; becomes {"ok":false,"error":…}.
+struct Refusal {
+    std::string sentence;
+};
+
+/// The member of that name, or null.
+inline const nlohmann::json& member(const nlohmann::json& body, const char* key) {
+    static const nlohmann::json none;
+    const auto at = body.find(key);
+    return at == body.end() ? none : *at;
+}
+
+inline const std::string& text_of(const nlohmann::json& value, const char* what) {
+    if (!value.is_string()) throw Refusal{std::string(what) + " must be a string"};
+    return value.get_ref<const std::string&>();
+}
+
+inline std::vector<std::string> names_in(const nlohmann::json& value, const char* what) {
+    constexpr std::size_t most = 100'000;
+    if (!value.is_array()) throw Refusal{std::string(what) + " must be an array of names"};
+    if (value.size() > most) throw Refusal{std::string(what) + " has more than " + std::to_string(most) + " names"};
+    std::vector<std::string> names;
+    for (const nlohmann::json& name : value) names.push_back(text_of(name, "a name"));
+    return names;
+}
+
+inline std::int64_t whole(const nlohmann::json& value, const char* what, std::int64_t least, std::int64_t most) {
+    if (!value.is_number_integer() || value < least || value > most)
+        throw Refusal{std::string(what) + " must be a whole number from " + std::to_string(least) + " to " + std::to_string(most)};
+    return value.get<std::int64_t>();
+}
+
+/// A value as setp and sets read it; empty when it is not a value.
+inline std::string value_word(const nlohmann::json& value) {
+    if (value.is_boolean()) return value.get<bool>() ? "TRUE" : "FALSE";
+    if (value.is_string()) return value.get<std::string>();
+    return value.is_number() ? value.dump() : "";
+}
+
+}  // namespace hal
