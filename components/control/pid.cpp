@@ -60,7 +60,7 @@ struct alignas(64) Pid : hal::Component {
 private:
     // The memory of the loop stands beside the pins of every cycle, so that a cycle touches few cache lines.
     double integral_ = 0.0, pushing_ = 0.0;
-    double last_command_ = 0.0, last_feedback_ = 0.0, last_e_ = 0.0;
+    double last_command_ = 0.0, last_feedback_ = 0.0, slope_ = 0.0;
     double error_d_ = 0.0, feedback_d_ = 0.0, command_d_ = 0.0, command_dd_ = 0.0, command_ddd_ = 0.0;
     bool has_previous_ = false, was_index_enable_ = false, tuning_ = false;
 
@@ -92,10 +92,9 @@ public:
         error = deviation;
         const double e = beyond_deadband(limited(deviation, max_error));
         const bool valid = std::isfinite(command - feedback);
-        if (valid & has_previous_ & !at_index) differentiate(e, 1.0 / dt);
+        if (valid & has_previous_) differentiate(at_index, 1.0 / dt);
         last_command_ = command;
         last_feedback_ = feedback;
-        last_e_ = e;
         has_previous_ = valid;
 
         if (enable & tune_mode) tune(deviation, dt);
@@ -113,14 +112,17 @@ private:
         return e > band ? e - band : e < -band ? e + band : e * 0.0;  // 0, or still not a number
     }
 
-    /// Estimates all derivatives, also while disabled, so that enabling causes no spike.
-    void differentiate(double e, double rate) {
-        const bool either_given = command_deriv.linked() | feedback_deriv.linked();
-        const double raw_command_d = command_deriv.linked() ? command_deriv.get() : (command - last_command_) * rate;
-        feedback_d_ = feedback_deriv.linked() ? feedback_deriv.get() : (feedback - last_feedback_) * rate;
-        error_d_ = limited(either_given ? raw_command_d - feedback_d_ : (e - last_e_) * rate, max_error_d);
+    /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope of the error is that of
+    /// command less that of feedback as they are: it damps also where maxerror or deadband take the error away.
+    void differentiate(bool at_index, double rate) {
+        double slope = command_deriv.linked() ? command_deriv.get() : (command - last_command_) * rate;
+        if (at_index & !command_deriv.linked()) slope = slope_;
+        if (feedback_deriv.linked()) feedback_d_ = feedback_deriv;
+        else if (!at_index) feedback_d_ = (feedback - last_feedback_) * rate;
+        error_d_ = limited(slope - feedback_d_, max_error_d);
+        slope_ = slope;
 
-        const double command_d = limited(raw_command_d, max_command_d);
+        const double command_d = limited(slope, max_command_d);
         const double command_dd = limited((command_d - command_d_) * rate, max_command_dd);
         command_ddd_ = limited((command_dd - command_dd_) * rate, max_command_ddd);
         command_dd_ = command_dd;
@@ -232,14 +234,22 @@ private:
 HAL_COMPONENT(Pid, "pid", "Proportional/integral/derivative controller with feed-forward, limits and auto-tuning", R"(
     error     = command - feedback, limited to ±maxerror, reduced by deadband
     errorI   += error * period, limited to ±maxerrorI, held while it would push further into saturation
-    errorD    = slope of error (of command-deriv and feedback-deriv when linked), limited to ±maxerrorD
+    errorD    = slope of command - slope of feedback, limited to ±maxerrorD
     commandD, commandDD, commandDDD = derivatives of command, limited to ±maxcmdD, ±maxcmdDD, ±maxcmdDDD
     output    = bias + error * Pgain + errorI * Igain + errorD * Dgain
               + command * FF0 + commandD * FF1 + commandDD * FF2 + commandDDD * FF3, limited to ±maxoutput
 
 A limit of 0 is no limit. With `error-previous-target` (the default) the error is taken against the target of the
-previous cycle, the one the feedback had time to follow. While an input is not a number `output` is 0; the integral
-and the derivatives survive.
+previous cycle, the one the feedback had time to follow. The slopes are `command-deriv` and `feedback-deriv` when those are
+linked, else differences of this cycle and the one before; `maxerror`, `deadband` and `error-previous-target` do not change
+them, so Dgain damps inside the deadband too. In the cycle in which `index-enable` falls, a slope that is a difference stays as
+it was. While an input is not a number `output` is 0; the integral and the derivatives survive.
+
+**Otherwise than LinuxCNC's**, whose output is else the same to the last bits: the first cycle has no cycle before, so its slopes
+are 0 and its error is that of the present command (there everything jumps from 0, which kicks FF1 and Dgain). A `maxoutput` that
+is set to 0 while it limits ends the saturation (there `saturated` and the held integral stay). A negative limit or deadband counts
+as positive (there the output jumps between its ends). While an input is not a number there the output is none either.
+Auto-tuning leaves out the first two half cycles, which are the way to the oscillation (there they are averaged in).
 
 **Auto-tuning** measures the loop by the relay method and sets the gains after Ziegler and Nichols. Hold `command`
 still near the middle of the travel; set `tune-effort` small, `enable`, `tune-mode`, then `tune-start`. If the loop

@@ -66,7 +66,7 @@ and the numbers have a gap. The number of pins is not limited.
 
     loadrt sampler depth=2000 cfg=ffb
     addf sampler.0 servo-thread
-    net position  x.position => sampler.0.pin.0
-    net velocity  x.velocity => sampler.0.pin.1
-    net in-place  x-near.out => sampler.0.pin.2
+    net position  => sampler.0.pin.0
+    net velocity  => sampler.0.pin.1
+    net in-place  => sampler.0.pin.2
 )")

@@ -75,6 +75,8 @@ In every cycle in which a record is due, the next one goes from the FIFO to the 
 The number of pins is not limited.
 
     loadrt streamer depth=2000 cfg=fb
+    loadrt pid
     addf streamer.0 servo-thread
+    addf pid.0.do-pid-calcs servo-thread
     net x-command  streamer.0.pin.0 => pid.0.command
 )")

@@ -30,6 +30,8 @@ HAL_COMPONENT(Supply, "supply", "Outputs that a user sets by hand", R"(
 netlists that have it: `setp` on an unlinked input and `sets` on a signal without writer do the same.
 
     loadrt supply num_chan=1
+    loadrt pid
     addf supply.0.update servo-thread
+    addf pid.0.do-pid-calcs servo-thread
     net command  supply.0.variable => pid.0.command
 )")

@@ -5,35 +5,35 @@ namespace {
 
 struct Toggle : hal::Component {
     using Component::Component;
-    hal::In<bool>             in{*this, "in", "the push button"};
-    hal::Io<bool>             out{*this, "out", "changes with every press"};
-    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles the button must hold before it counts as pressed or released", {.initial = 2}};
-    hal::Function             run{*this, "", &Toggle::update, "watches the button"};
+    hal::In<bool>             in{*this, "in", "the button"};
+    hal::Io<bool>             out{*this, "out", "turns over with each press; others may write it, too"};
+    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles the button must hold its new state; 0 and 1: it counts at once",
+                                       {.initial = 2}};
+    hal::Function             run{*this, "", &Toggle::read, "reads the button"};
 
-    void update(hal::Cycle) noexcept {
-        if (in == pressed_) {
-            differing_ = 0;
-            return;
-        }
-        if (++differing_ < debounce) return;
-        differing_ = 0;
-        pressed_ = !pressed_;
-        if (pressed_) out = !out;
+    void read(hal::Cycle) noexcept {
+        const std::uint32_t enough = std::max<std::uint32_t>(debounce, 1);
+        if (in) count_ += count_ < enough ? 1 : 0;
+        else count_ -= count_ > 0 ? 1 : 0;
+        if (count_ >= enough && !pressed_) {
+            pressed_ = true;
+            out = !out;
+        } else if (count_ == 0) pressed_ = false;
     }
 
 private:
-    std::uint32_t differing_ = 0;  // cycles in a row in which the button was not as it counts
+    std::uint32_t count_ = 0;  // up to debounce while the button is down, down to 0 while it is up
     bool pressed_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(Toggle, "toggle", "Push-on, push-off from a push button", R"(
-Each press turns `out` over. The button counts as pressed, or as released, once it has been so for `debounce` cycles in a
-row. `out` is an input/output pin: another writer on its signal, or another `toggle`, may turn it over too.
+HAL_COMPONENT(Toggle, "toggle", "Push on, push off", R"(
+A press that outlasts its bouncing by `debounce` cycles turns `out` over; so must the release before the next press counts. `out` is an
+io pin: what others write into the signal is where the next press starts.
 
-    loadrt toggle names=lamp
-    addf lamp servo
-    net lamp-button => lamp.in
-    net lamp        <=> lamp.out
+    loadrt toggle names=lamp-button
+    addf lamp-button servo
+    net button => lamp-button.in
+    net lamp   <=> lamp-button.out
 )")

@@ -143,6 +143,12 @@ jittering input.
 `out` starts at 0; `load` puts it on the input. While the input is not a number its last value counts. With `maxa` not
 positive `out` stands still. When `min` is above `max`, `max` wins.
 
+**Otherwise than LinuxCNC's**, which accelerates and cruises the same to the last bits: it stops with `maxa` and is then exactly
+there (there each of the last cycles goes half of what is left, for some 30 cycles). It keeps `min` and `max` also with `maxv` and
+`maxa` as they are by default (there `out` goes beyond). It leaves `min` and `max` with the input (there some cycles before the
+input is back, to have its speed by then). An input that comes nearer faster than `maxv` it brakes towards (there it turns round).
+It leaves `load` with the speed at which it was carried and within `maxa` (there within `maxv` at once).
+
     loadrt limit3 names=jog
     addf jog servo
     setp jog.maxv 50

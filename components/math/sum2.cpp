@@ -7,25 +7,23 @@ struct Sum2 : hal::Component {
     using Component::Component;
     hal::In<double>    in0{*this, "in0", "first summand"};
     hal::In<double>    in1{*this, "in1", "second summand"};
-    hal::Out<double>   out{*this, "out", "in0 * gain0 + in1 * gain1 + offset"};
     hal::Param<double> gain0{*this, "gain0", "factor of in0", {.initial = 1.0}};
     hal::Param<double> gain1{*this, "gain1", "factor of in1", {.initial = 1.0}};
-    hal::Param<double> offset{*this, "offset", "added to the sum"};
-    hal::Function      run{*this, "", &Sum2::update, "computes out"};
+    hal::Param<double> offset{*this, "offset", "always added"};
+    hal::Out<double>   out{*this, "out", "the sum"};
+    hal::Function      run{*this, "", &Sum2::add, "adds up"};
 
-    void update(hal::Cycle) noexcept { out = in0 * gain0 + in1 * gain1 + offset; }
+    void add(hal::Cycle) noexcept { out = gain0 * in0 + gain1 * in1 + offset; }
 };
 
 }  // namespace
 
-HAL_COMPONENT(Sum2, "sum2", "Sum of two values, each with a gain, and an offset", R"(
-`out = in0 * gain0 + in1 * gain1 + offset`
+HAL_COMPONENT(Sum2, "sum2", "Weighted sum of two numbers", R"(
+`out = in0 * gain0 + in1 * gain1 + offset`. With `gain1` -1 it is the difference.
 
-    # deviation = command - feedback
-    loadrt sum2 names=deviation
-    addf deviation servo
-    setp deviation.gain1 -1
-    net command   => deviation.in0
-    net feedback  => deviation.in1
-    net deviation <= deviation.out
+    loadrt sum2 names=drive-command
+    addf drive-command servo
+    net pid-effort  => drive-command.in0
+    net friction-ff => drive-command.in1
+    net drive-value <= drive-command.out
 )")

@@ -13,6 +13,7 @@ namespace {
 struct Seen {
     std::int64_t raw = 0;
     std::int64_t now_ns = 0;       // the fast function's own time: the sum of its periods
+    std::int64_t tick_ns = 0;      // the newest of them
     std::int64_t edge = 0;         // exact place of the newest edge: between count edge - 1 and count edge
     std::int64_t edge_ns = 0;      // and when it was
     std::uint32_t indexes = 0;     // index marks that counted, so far
@@ -51,7 +52,8 @@ struct Encoder : hal::Component {
     hal::Out<double> velocity_rpm{*this, capture, "velocity-rpm", "velocity * 60"};
 
     void update_counters(hal::Cycle cycle) noexcept {
-        seen_.now_ns += cycle.period_ns();
+        seen_.tick_ns = cycle.period_ns();
+        seen_.now_ns += seen_.tick_ns;
         const bool a = phase_a, b = phase_b, z = phase_z, latch = latch_input;
         if (!started_) {  // the first sample says where the phases stand; nothing has moved yet
             started_ = true;
@@ -135,15 +137,16 @@ private:
     }
 
     /// Speed in counts per second: from one edge to another, each at its exact place, so that a shaft that trembles over
-    /// one edge has none. While no edge comes, the next one is at most a count away, which bounds the speed.
+    /// one edge has none; the first edge alone gives none either. While no edge comes, the speed is at most what the next one
+    /// would give if it came in the next cycle of the fast function.
     void estimate(const Seen& now) noexcept {
         if (now.edge_ns != edge_ns_) {
-            speed_ = static_cast<double>(now.edge - edge_) * 1e9 / static_cast<double>(now.edge_ns - edge_ns_);
+            if (edge_ns_ > 0) speed_ = static_cast<double>(now.edge - edge_) * 1e9 / static_cast<double>(now.edge_ns - edge_ns_);
             edge_ = now.edge;
             edge_ns_ = now.edge_ns;
         }
         if (now.now_ns > edge_ns_) {
-            const double bound = 1e9 / static_cast<double>(now.now_ns - edge_ns_);
+            const double bound = 1e9 / static_cast<double>(now.now_ns + now.tick_ns - edge_ns_);
             speed_ = std::clamp(speed_, -bound, bound);
         }
     }
@@ -183,16 +186,24 @@ phases change at once, edges are lost and `quad-errors` counts it.
   low. With `counter-mode` each rising edge of A counts up, whatever B does.
 * **Index.** Set `index-enable`; at the next rising edge of phase-Z the position becomes 0 and `index-enable` FALSE. With
   `counter-mode` and `missing-teeth` (a wheel with a gap: 58 teeth, 2 missing, scale 60) the end of the gap is the index.
-* **Velocity** is the distance between two edges by the time between them. While no edge comes the estimate falls as
-  one count by the time since the last; below `min-speed-estimate` it is 0.
+* **Velocity** is the distance between two edges by the time between them. While no edge comes the estimate falls to what
+  the next one would give; below `min-speed-estimate` it is 0. An edge that comes back gives 0: it is the same place again.
 
 Counts are kept in 64 bits, so `position` goes on where the 32 bits of `counts` wrap.
+
+**Otherwise than LinuxCNC's**, whose `counts`, `position` and `velocity` are else the same to the last bits: counting starts where
+the phases stand in the first cycle (there from both FALSE, so a phase that is TRUE counts). `velocity` begins with the second
+edge (there with the third), is 0 after the first edge back (there a count by the time since the last edge, so a shaft that
+trembles over one edge seems to turn), and never less than `min-speed-estimate` but 0. `position-interpolated` is `position` at an
+edge forwards, and the same at that place backwards (there a count lower, and a fast period further on). `rawcounts` is what
+this cycle counted (there what the cycle before did). With `missing-teeth` each of the first teeth counts one (there each counts
+as a gap, until the pitch is known, and as the index).
 
     loadrt encoder names=x
     addf encoder.update-counters base-thread
     addf encoder.capture-position servo-thread
     setp x.position-scale 2000
-    net x-A  parport.0.pin-10-in => x.phase-A
-    net x-B  parport.0.pin-11-in => x.phase-B
-    net x-position  x.position => pid.0.feedback
+    net x-A  => x.phase-A
+    net x-B  => x.phase-B
+    net x-position  <= x.position
 )")

@@ -59,7 +59,8 @@ struct Pwmgen : hal::Component {
             drive(false, false);
             return;
         }
-        drive(wanted.period > 0.0 ? pulse(wanted) : dense(wanted), reverse_);
+        const bool level = wanted.period > 0.0 ? pulse(wanted) : dense(wanted);  // decides on reverse_ too, so it comes first
+        drive(level, reverse_);
     }
 
     void update(hal::Cycle) noexcept {
@@ -163,8 +164,16 @@ HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in sof
 
 All outputs go low on stop, unload and faults.
 
+**Otherwise than LinuxCNC's**, whose waveforms are else the same: the first PWM period begins when `enable` is seen (there the
+outputs stay low for up to a period, and all periods begin one fast period earlier than here). `dir` changes with a period, so that
+none has both directions (there within one, and in `update`, a fast period earlier). `dir` is FALSE and `curr-dc` 0 while disabled
+(there both go on). PDM makes its first pulse when the duties add up to one (there at once). A `scale` set before the first cycle
+counts (there 2 does not).
+
     loadrt pwmgen output_type=1
+    loadrt pid
     addf pwmgen.make-pulses base-thread
+    addf pid.0.do-pid-calcs servo-thread
     addf pwmgen.update servo-thread
     setp pwmgen.0.pwm-freq 1000
     setp pwmgen.0.scale 24

@@ -56,7 +56,9 @@ Makes the phases an encoder of `ppr` pulses per turn shows while its shaft turns
 edge per period, so the speed is limited to 1 / (4 ppr T) turns per second.
 
     loadrt sim_encoder num_chan=1
+    loadrt encoder num_chan=1
     addf sim-encoder.make-pulses base-thread
+    addf encoder.update-counters base-thread
     addf sim-encoder.update-speed servo-thread
     net A sim-encoder.0.phase-A => encoder.0.phase-A
     net B sim-encoder.0.phase-B => encoder.0.phase-B

@@ -265,6 +265,11 @@ wait for one of the times below is made later, none is lost. A step is made wher
 All times are in nanoseconds and met in whole periods of the fast thread. With `stepspace` 0 a pulse may come in every period,
 for ports that take it back themselves.
 
+**Otherwise than LinuxCNC's**, whose steps come in other periods: a command that moves steadily is followed one update behind (there
+two and a half), and a move is braked as late as can be. `position-fb` is exact (there it has the steps of a fixed point number,
+2e-8 of it). Without `maxaccel` a speed is taken at once (there within an update). `dir` changes before the first step back (there
+when the speed changes its sign, also where no step follows).
+
     loadrt stepgen step_type=0,0 ctrl_type=p,v
     addf stepgen.make-pulses base-thread
     addf stepgen.capture-position servo-thread

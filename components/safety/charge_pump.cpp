@@ -36,6 +36,6 @@ state when the thread stops, whatever level the last output had. `out` has half 
 
     loadrt charge_pump
     addf charge-pump servo-thread
-    net alive  charge-pump.out => parport.0.pin-16-out
-    net well   estop-latch.0.ok-out => charge-pump.enable
+    net alive  <= charge-pump.out
+    net well   => charge-pump.enable
 )")

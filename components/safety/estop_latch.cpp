@@ -38,6 +38,6 @@ or a charge pump that trips when this function stops running. Links are chained 
 
     loadrt estop_latch
     addf estop-latch.0 servo-thread
-    net button  parport.0.pin-12-in => estop-latch.0.ok-in
-    net chain   estop-latch.0.ok-out => safety-switch.0.in-a
+    net button  => estop-latch.0.ok-in
+    net chain   <= estop-latch.0.ok-out
 )")

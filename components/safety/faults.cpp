@@ -53,6 +53,8 @@ that fell silent is a fault; `show fault` words them. Here they are pins: `ok` b
 | 5 | raised by a component |
 
     loadrt faults
+    loadrt estop_latch
     addf faults servo-thread
+    addf estop-latch.0 servo-thread
     net runtime-ok faults.ok => estop-latch.0.ok-in
 )")

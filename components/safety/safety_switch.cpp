@@ -254,7 +254,7 @@ PLCopen Safety Part 1 (SF_Equivalent, SF_Antivalent). It is software on one comp
     loadrt safety_switch names=base-switch
     addf base-switch servo-thread
     setp base-switch.antivalent 1
-    net base-down   furuta.base-down   => base-switch.in-a
-    net base-lifted furuta.base-lifted => base-switch.in-b
-    net base-safe   base-switch.safe   => estop-latch.0.ok-in
+    net base-down   => base-switch.in-a
+    net base-lifted => base-switch.in-b
+    net base-safe   <= base-switch.safe
 )")

@@ -70,8 +70,12 @@ FALSE: a watch nobody configured must not say that all is well. `set-timeouts` h
 taken; the one of `process` has to be fast enough to see each change.
 
     loadrt watchdog num_inputs=2
+    loadrt charge_pump
+    loadrt estop_latch
+    addf charge-pump servo-thread
     addf watchdog.process servo-thread
     addf watchdog.set-timeouts servo-thread
+    addf estop-latch.0 servo-thread
     setp watchdog.timeout-0 0.01
     setp watchdog.timeout-1 0.1
     net alive  charge-pump.out => watchdog.input-0

@@ -107,6 +107,6 @@ count: at 2000 counts per turn and 100 us up to 31 rad/s, at 50 us up to 62 rad/
     loadrt dc_motor names=x-motor
     addf x-motor.update base-thread
     setp x-motor.pitch 5
-    net x-pwm pwmgen.0.pwm => x-motor.pwm
-    net x-dir pwmgen.0.dir => x-motor.dir
+    net x-pwm => x-motor.pwm
+    net x-dir => x-motor.dir
 )")

@@ -178,7 +178,7 @@ private:
 
         const std::int64_t per_turn = encoder_counts;
         const std::int64_t arm = sim::counts_at(state_.arm, per_turn);
-        const auto delay_ns = static_cast<std::int64_t>(std::clamp(radio_delay.get(), 0.0, 10.0) * 1e9);
+        const auto delay_ns = nanoseconds(radio_delay);
         const std::int64_t pendulum = delayed_.pass(sim::counts_at(state_.pendulum, per_turn), now_ns_, delay_ns);
         const sim::Quadrature of_arm(arm, per_turn), of_pendulum(pendulum, per_turn);
         arm_a = of_arm.a, arm_b = of_arm.b, arm_z = of_arm.z;
@@ -187,10 +187,13 @@ private:
         pendulum_counts = static_cast<std::int32_t>(pendulum);
     }
 
+    /// Up to ten seconds; what is no number is none.
+    static std::int64_t nanoseconds(double seconds) noexcept { return seconds > 0.0 ? static_cast<std::int64_t>(std::min(seconds, 10.0) * 1e9) : 0; }
+
     void stand(const sim::FurutaDynamics& rig, double torque, std::int64_t period_ns) noexcept {
         tip_ratio = rig.tip_ratio(state_, rig.acceleration(state_, torque));
         lifted_ns_ = std::max<std::int64_t>(0, lifted_ns_ - period_ns);
-        if (tip_ratio > 1.0) lifted_ns_ = static_cast<std::int64_t>(std::clamp(lift_hold.get(), 0.0, 10.0) * 1e9) + 1;
+        if (tip_ratio > 1.0) lifted_ns_ = nanoseconds(lift_hold) + 1;
         base_lifted = lift || lifted_ns_ > 0;
         base_down = !base_lifted;
     }
@@ -245,7 +248,9 @@ axes. Torque constant and resistance follow from 85 W at 4 A if that is at 3000 
 ## Example
 
     loadrt furuta
+    loadrt encoder
     addf furuta.update base-thread
+    addf encoder.update-counters base-thread
     net arm-A furuta.arm-phase-A => encoder.0.phase-A
     setp furuta.push 0.2
 )")

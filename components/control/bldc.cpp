@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "bldc_angles.hpp"
+#include "hal/component.hpp"
+
+namespace {
+
+/// What the letters of cfg= ask for.
+struct Config {
+    explicit Config(const std::string& text) {
+        for (const char letter : text) {
+            switch (letter) {
+            case 'n': break;
+            case 'h': hall = true; break;
+            case 'a': absolute = true; break;
+            case 'q': counting = true; break;
+            case 'i': index = true; break;
+            case 'f': gray = true; break;
+            case 'B': bits = true; break;
+            case '6': six = true; break;
+            case 'H': hall_out = true; break;
+            case 'F': gray_out = true; break;
+            case 'T': trapezoid = true; break;
+            default: throw std::invalid_argument(std::string("cfg has the letter '") + letter + "'; it may have n h a q i f B 6 H F T");
+            }
+        }
+    }
+    bool hall = false, absolute = false, counting = false, index = false, gray = false;
+    bool bits = false, six = false, hall_out = false, gray_out = false, trapezoid = false;
+    bool encoder() const { return absolute || counting; }
+    bool aligns() const { return counting && !hall && !absolute; }
+    bool free() const { return !hall && !encoder() && !index; }
+    bool phases() const { return !hall_out && !gray_out; }
+};
+
+struct Bldc : hal::Component {
+    using Component::Component;
+    hal::TextArgument cfg{*this, "cfg", "n", "letters for inputs and outputs, a group per instance", {.per_instance = true}};
+    const Config has{cfg.get()};
+
+    hal::Ins<bool> hall{*this, "hall#", has.hall ? 3 : 0, 1, "Hall sensor #"};
+    hal::Outs<bool> hall_error{*this, "hall-error", has.hall, "TRUE once the Hall sensors did not fit the pattern, until it is changed"};
+    std::array<std::optional<hal::In<bool>>, 4> gray;
+    hal::In<double> value{*this, "value", "amplitude; negative: the other way round"};
+    hal::Ins<double> lead_angle{*this, "lead-angle", has.encoder(), "how far the field leads the rotor", {.initial = 90.0, .unit = "deg"}};
+    hal::In<bool> rev{*this, "rev", "TRUE: the other way round"};
+    hal::Ins<double> frequency{*this, "frequency", has.free(), "turns of the field per second, without any feedback", {.unit = "Hz"}};
+    hal::Ins<double> init_value{*this, "initvalue", has.counting, "amplitude while aligning", {.initial = 0.2}};
+    hal::Ins<std::int32_t> raw_counts{*this, "rawcounts", has.encoder(), "counts of the encoder, which no index resets"};
+    hal::Ios<bool> index_enable{*this, "index-enable", has.index, "TRUE: waits for the encoder's index"};
+    hal::Ins<bool> init{*this, "init", has.aligns(), "rising edge: aligns the motor"};
+    hal::Outs<bool> init_done{*this, "init-done", has.aligns(), "TRUE: the motor is aligned"};
+
+    std::array<std::optional<hal::Out<double>>, 6> levels;  // A B C, or A-high A-low B-high ...
+    std::array<std::optional<hal::Out<bool>>, 6> switches;
+    hal::Outs<bool> hall_out{*this, "hall#-out", has.hall_out ? 3 : 0, 1, "emulated Hall sensor #"};
+    std::array<std::optional<hal::Out<bool>>, 4> gray_out;
+    hal::Out<double> phase_angle{*this, "phase-angle", "angle of the field, 0 to 1 per electrical turn", {.unit = "turn", .finite = true}};
+    hal::Out<double> rotor_angle{*this, "rotor-angle", "angle of the rotor, 0 to 1 per electrical turn", {.unit = "turn", .finite = true}};
+    hal::Out<double> out{*this, "out", "amplitude in use, with its sign", {.safe = 0.0, .finite = true}};
+    hal::Out<bool> out_dir{*this, "out-dir", "TRUE: out is negative"};
+    hal::Out<double> out_abs{*this, "out-abs", "magnitude of out", {.safe = 0.0, .finite = true}};
+
+    hal::Out<std::int32_t> in_type{
+        *this, "in-type", "source of the angle: 0 frequency, 1 Hall, 2 encoder, 3 Gray code, 4 alignment, 5 none yet", {.initial = -1}};
+    hal::Out<std::int32_t> out_type{*this, "out-type", "0 sine, 1 trapezoid", {.initial = -1}};
+    hal::Params<std::int32_t> scale{*this, "scale", has.encoder(), "counts per turn of the motor", {.initial = 512}};
+    hal::Params<std::int32_t> poles{*this, "poles", has.encoder(), "magnetic poles; two per electrical turn", {.initial = 4}};
+    hal::Params<std::int32_t> encoder_offset{*this, "encoder-offset", has.absolute || has.index,
+                                             "counts at the motor's zero, from the encoder's zero or index"};
+    hal::Outs<std::int32_t> offset_measured{*this, "offset-measured", has.counting, "counts at the motor's zero, as found"};
+    hal::Param<double> drive_offset{*this, "drive-offset", "what the drive adds to rotor-angle, heeded while aligning", {.unit = "deg"}};
+    hal::Params<std::uint32_t> output_pattern{*this, "output-pattern", has.hall_out, "Hall pattern to emulate, 0 to 47", {.initial = 25}};
+    hal::Params<std::uint32_t> pattern{*this, "pattern", has.hall, "Hall pattern of the motor, 0 to 47", {.initial = 25}};
+
+    hal::Function run{*this, "", &Bldc::update, "computes angles and phases"};
+
+    explicit Bldc(const hal_host* host);
+
+    void update(hal::Cycle cycle) noexcept {
+        amplitude_ = std::fabs(value) <= 1e300 ? value.get() : 0.0;
+        if (rev) amplitude_ = -amplitude_;
+        trapezoid_ = has.trapezoid || (has.bits && has.six);
+        count();
+        double rotor = 0.0;
+        if (has.encoder() && found()) rotor = from_encoder();
+        else if (has.hall) rotor = from_hall();
+        else if (has.counting) rotor = align(cycle.seconds());
+        else if (has.gray) source_ = 3, rotor = from_gray();
+        else source_ = 0, rotor = advance(cycle.seconds());
+        publish(bldc::fraction(rotor));
+    }
+
+private:
+    /// The motor's zero is known.
+    bool found() const noexcept { return has.absolute || state_ == State::found; }
+    double per_turn() const noexcept {  // counts per electrical turn
+        const double turns = 0.5 * static_cast<double>(poles[0]);
+        return scale[0] != 0 && turns != 0.0 ? static_cast<double>(scale[0]) / turns : 1.0;
+    }
+
+    void count() noexcept {
+        if (!has.encoder()) return;
+        const std::int32_t raw = raw_counts[0];
+        // By its differences, so that a counter that overflows is no jump.
+        moved_ = started_ ? static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(last_raw_)) : 0;
+        counts_ = started_ ? counts_ + moved_ : raw;
+        last_raw_ = raw;
+        started_ = true;
+        if (!has.counting || has.absolute) return;
+        if (has.aligns()) {
+            if (init[0] && !was_init_) {
+                state_ = State::aligning;
+                elapsed_ = 0.0;
+                if (has.index) index_enable[0] = true;
+            }
+            was_init_ = init[0];
+            if (has.index && state_ == State::aligning && !index_enable[0]) set_zero(counts_ + encoder_offset[0]);
+            init_done[0] = state_ == State::found;
+        } else if (has.index && state_ != State::found) {
+            if (state_ == State::waiting) index_enable[0] = true, state_ = State::aligning;
+            else if (!index_enable[0]) set_zero(counts_ + encoder_offset[0]);
+        }
+    }
+
+    void set_zero(std::int64_t counts) noexcept {
+        offset_ = counts;
+        offset_measured[0] = static_cast<std::int32_t>(counts);
+        state_ = State::found;
+        if (has.aligns()) init_done[0] = true;
+    }
+
+    double from_encoder() noexcept {
+        source_ = 2;
+        // What is given now holds until the next cycle: the angle is that of the rotor half a period ahead.
+        const std::int64_t zero = has.absolute ? encoder_offset[0] : offset_;
+        return (static_cast<double>(counts_ - zero) + 0.5 * static_cast<double>(moved_)) / per_turn();
+    }
+
+    double from_hall() noexcept {
+        source_ = 1;
+        trapezoid_ = true;
+        if (pattern[0] != used_pattern_) used_pattern_ = pattern[0], hall_state_ = -1, error_ = false;
+        const unsigned code = (hall[0] ? 4u : 0u) | (hall[1] ? 2u : 0u) | (hall[2] ? 1u : 0u);
+        const int state = bldc::state_of(code, used_pattern_);
+        const int moved = state < 0 || hall_state_ < 0 ? 0 : (state - hall_state_ + 9) % 6 - 3;
+        error_ = error_ || state < 0 || moved > 1 || moved < -1;
+        hall_error[0] = error_;
+        const double centre = static_cast<double>(state + 1) / 6.0;
+        if (has.counting && !has.index && !has.absolute && (moved == 1 || moved == -1)) {  // the edge between two states is an exact angle
+            const double edge = centre - static_cast<double>(moved) / 12.0;
+            set_zero(counts_ - static_cast<std::int64_t>(std::clamp(std::round(edge * per_turn()), -1e9, 1e9)));
+        }
+        if (state >= 0) hall_state_ = state;
+        else amplitude_ = 0.0;
+        return centre;
+    }
+
+    double from_gray() const noexcept {
+        unsigned code = 0, binary = 0;
+        for (unsigned i = 0; i < 4; ++i) code |= *gray[i] ? 1u << i : 0u;
+        for (; code != 0; code >>= 1) binary ^= code;
+        return (static_cast<double>(binary) + 0.5) / 16.0;
+    }
+
+    double advance(double dt) noexcept {
+        if (has.free() && std::isfinite(frequency[0])) {
+            const double step = bldc::fraction(frequency[0] * dt);
+            free_angle_ = bldc::fraction(free_angle_ + (amplitude_ < 0.0 ? -step : step));
+        }
+        return free_angle_;
+    }
+
+    // With an index: turns slowly until it comes. Without: lets the current grow at angle 0, then swings the field
+    // to both sides, less and less, so that a rotor that stood just opposite does not stay there.
+    double align(double dt) noexcept {
+        const double current = std::fabs(init_value[0]) <= 1e300 ? init_value[0].get() : 0.0;
+        source_ = state_ == State::aligning ? 4 : 5;
+        if (state_ != State::aligning) return amplitude_ = 0.0;
+        elapsed_ = std::min(elapsed_ + dt, 1e6);
+        if (has.index) {
+            amplitude_ = rev ? -current : current;
+            return bldc::fraction(rev ? -elapsed_ : elapsed_);
+        }
+        constexpr double rise = 0.5, swing = 2.0, rest = 0.5;
+        amplitude_ = current * std::min(elapsed_ / rise, 1.0);
+        if (elapsed_ >= rise + swing + rest) set_zero(counts_);
+        const double t = elapsed_ - rise;
+        return t > 0.0 && t < swing ? 0.2 * (1.0 - t / swing) * std::sin(2.0 * std::numbers::pi * t) : 0.0;
+    }
+
+    void publish(double rotor) noexcept {
+        double lead = has.free() && !has.gray ? 0.0 : has.index && !has.encoder() && !has.hall ? 0.0 : 0.25;
+        if (has.encoder() && std::isfinite(lead_angle[0])) lead = lead_angle[0] / 360.0;
+        if (source_ >= 4) lead = 0.0;
+        const double phase = bldc::fraction(rotor + (amplitude_ < 0.0 ? -lead : lead)), size = std::fabs(amplitude_);
+        const double back = source_ == 4 && std::isfinite(drive_offset) ? drive_offset / 360.0 : 0.0;
+        rotor_angle = bldc::fraction(rotor - back);
+        phase_angle = phase;
+        out = amplitude_;
+        out_abs = size;
+        out_dir = amplitude_ < 0.0;
+        in_type = source_;
+        out_type = trapezoid_ ? 1 : 0;
+        if (has.phases()) drive(phase, size);
+        if (has.hall_out) {
+            const unsigned code = bldc::code_of(rotor, output_pattern[0]);
+            for (unsigned i = 0; i < 3; ++i) hall_out[i] = (code >> (2 - i) & 1u) != 0;
+        }
+        if (has.gray_out) {
+            const auto at = static_cast<unsigned>(rotor * 16.0) & 15u;
+            for (unsigned i = 0; i < 4; ++i) *gray_out[i] = ((at ^ (at >> 1)) >> i & 1u) != 0;
+        }
+    }
+
+    void drive(double phase, double size) noexcept {
+        const auto values = trapezoid_ ? bldc::trapezoid(phase) : bldc::sine(phase);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double v = values[i] * size;
+            if (has.bits && has.six) {
+                *switches[2 * i] = v > 0.0;
+                *switches[2 * i + 1] = v < 0.0;
+            } else if (has.bits) {
+                *switches[i] = v > 0.0;
+            } else if (has.six) {
+                *levels[2 * i] = v > 0.0 ? v : 0.0;
+                *levels[2 * i + 1] = v < 0.0 ? -v : 0.0;
+            } else {
+                *levels[i] = v + 0.0;
+            }
+        }
+    }
+
+    enum class State : std::uint8_t { waiting, aligning, found };
+    State state_ = State::waiting;
+    bool started_ = false, was_init_ = false, trapezoid_ = false, error_ = false;
+    int source_ = 0, hall_state_ = -1;
+    std::uint32_t used_pattern_ = 25;
+    std::int64_t counts_ = 0, offset_ = 0;
+    std::int32_t last_raw_ = 0, moved_ = 0;
+    double amplitude_ = 0.0, free_angle_ = 0.0, elapsed_ = 0.0;
+};
+
+Bldc::Bldc(const hal_host* host) : Component(host) {
+    constexpr const char* bits[] = {"C1", "C2", "C4", "C8"};
+    for (std::size_t i = 0; i < 4; ++i) {
+        if (has.gray) gray[i].emplace(*this, bits[i], "bit of the Gray code of a Fanuc motor");
+        if (has.gray_out) gray_out[i].emplace(*this, (std::string(bits[i]) + "-out").c_str(), "bit of the emulated Gray code");
+    }
+    if (!has.phases()) return;
+    const hal::PinOptions<bool> off{.safe = false};
+    const hal::PinOptions<double> zero{.safe = 0.0, .finite = true};
+    std::size_t i = 0;
+    for (const std::string phase : {"A", "B", "C"}) {
+        for (const char* side : {"-high", "-low"}) {
+            if (!has.six && side[1] == 'l') break;
+            const std::string name = has.six ? phase + side : phase;
+            if (has.bits) switches[i].emplace(*this, (name + "-on").c_str(), "TRUE: this phase, or this side of it, conducts", off);
+            else levels[i].emplace(*this, (has.six ? name : name + "-value").c_str(), "amplitude of this phase, or this side of it", zero);
+            ++i;
+        }
+    }
+}
+
+}  // namespace
+
+HAL_COMPONENT(Bldc, "bldc", "Commutation of a three-phase motor: from its feedback to the drive", R"(
+`cfg=` has a group of letters per instance; lower case says what the motor has, upper case what the drive wants.
+
+| input | | output | |
+| --- | --- | --- | --- |
+| n | nothing: the field turns at `frequency` | (none) | A-value, B-value, C-value |
+| h | Hall sensors | 6 | two numbers per phase, high and low side |
+| a | absolute encoder | B | a bit per phase |
+| q | counting encoder, has to find its zero | B6 | two bits per phase |
+| i | its index | H | emulated Hall sensors |
+| f | 4-bit Gray code of Fanuc "red cap" motors | F | emulated Gray code |
+| | | T | trapezoid, where sine would be possible |
+
+The angle of the field, `phase-angle`, leads `rotor-angle` by `lead-angle` (90 degrees where there is no such pin), or lags when `out`
+is negative. Motor zero is where a rotor stands with A positive, B and C negative. With sines A = cos(phase), B and C a third of a turn
+later and earlier; a trapezoid takes the two phases that fit best, each for a third of a turn. An encoder's angle is taken half a period
+ahead, as what is given holds for a period. With H and F there are no phase outputs.
+
+**Finding zero.** *a*: known; `encoder-offset` counts. *qh*: trapezoid from the Hall sensors until their first edge. *qhi*: the same until
+the index, `encoder-offset` counts before zero. *qi*: the rising edge of `init` lets the field turn, one electrical turn per second, with
+`initvalue` until the index comes. *q*: `init` pulls the rotor to zero with `initvalue`, in three seconds. Until zero is
+found there is no output. `rawcounts` has to be the encoder's pin of that name.
+
+**Hall patterns** 0 to 47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees). `hall-error` says that a code is not in the
+pattern, which also makes all outputs 0, or that a state was left out.
+
+    loadrt bldc cfg=qh names=spindle
+    addf spindle servo
+    setp spindle.scale 4000
+    setp spindle.poles 8
+    net torque     => spindle.value
+    net raw-counts => spindle.rawcounts
+    net hall-1     => spindle.hall1
+    net hall-2     => spindle.hall2
+    net hall-3     => spindle.hall3
+    net phase-u    <= spindle.A-value
+    net phase-v    <= spindle.B-value
+    net phase-w    <= spindle.C-value
+
+Where LinuxCNC's own differs: there trapezoids and emulated Hall sensors from an encoder lead by 60 degrees more than `lead-angle` says,
+`phase-angle` from Hall sensors alone has the wrong sign, the bits of three outputs are not symmetrical, and a negative `value` does not
+turn a field without feedback round.
+)")

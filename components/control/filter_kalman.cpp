@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+// The Kalman filter of one value that is measured with the variance Rk and wanders by the variance Qk per cycle:
+//     p = p + Qk,  k = p / (p + Rk),  x = x + k (z - x),  p = (1 - k) p
+struct FilterKalman : hal::Component {
+    using Component::Component;
+    static constexpr double tiny = 1.17549e-38;
+    hal::In<bool>      debug{*this, "debug", "has no effect here: record zk and xk-out instead"};
+    hal::In<bool>      passthrough{*this, "passthrough", "TRUE: xk-out is zk"};
+    hal::In<bool>      reset{*this, "reset", "TRUE: the filter starts anew, xk-out is 0"};
+    hal::In<double>    zk{*this, "zk", "the measured value"};
+    hal::Out<double>   xk_out{*this, "xk-out", "the estimated value"};
+    hal::Param<double> rk{*this, "Rk", "variance of the measurement", {.initial = tiny}};
+    hal::Param<double> qk{*this, "Qk", "variance by which the true value wanders in a cycle", {.initial = tiny}};
+    hal::Function      run{*this, "", &FilterKalman::update, "estimates"};
+
+    void update(hal::Cycle) noexcept {
+        if (reset) x_ = 0.0, p_ = 1.0;
+        else if (passthrough) {
+            xk_out = zk.get();
+            return;
+        } else estimate(zk);
+        xk_out = x_;
+    }
+
+private:
+    void estimate(double z) noexcept {
+        const double before = p_ + std::fmax(qk, 0.0), noise = std::fmax(rk, 0.0);  // what is not a number counts as 0
+        const double gain = before + noise > 0.0 ? before / (before + noise) : 1.0;
+        const double x = x_ + gain * (z - x_), p = (1.0 - gain) * before;
+        if (!std::isfinite(x) || !std::isfinite(p)) return;
+        x_ = x;
+        p_ = p;
+    }
+
+    double x_ = 0.0, p_ = 1.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(FilterKalman, "filter_kalman", "Kalman filter of one value", R"(
+Estimates a value from noisy measurements. `Rk` is the variance of the sensor: record it at rest and compute the variance of the
+samples. `Qk` is how much the true value may wander in a cycle: the smaller, the smoother and slower the estimate. Only their
+ratio matters once it has settled. Set both; the defaults say nothing about your sensor. Negative values count as 0. A
+measurement that is not a number is left out.
+
+    loadrt filter_kalman names=coolant-filter
+    addf coolant-filter servo
+    setp coolant-filter.Rk 0.25
+    setp coolant-filter.Qk 0.001
+    net coolant-raw         => coolant-filter.zk
+    net coolant-temperature <= coolant-filter.xk-out
+)")

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+/// The component may correct it.
+class CorrectedParam : public hal::Param<double> {
+public:
+    using Param::Param;
+    void correct(double value) noexcept { put(value); }
+};
+
+struct Gearchange : hal::Component {
+    using Component::Component;
+    hal::In<bool>      sel{*this, "sel", "TRUE: gear 2, FALSE: gear 1"};
+    hal::In<double>    speed_in{*this, "speed-in", "wanted spindle speed"};
+    hal::Out<double>   speed_out{*this, "speed-out", "speed for the drive, as if in gear 1"};
+    hal::In<bool>      dir_in{*this, "dir-in", "wanted direction"};
+    hal::Out<bool>     dir_out{*this, "dir-out", "direction for the drive"};
+    hal::Param<double> min1{*this, "min1", "lowest speed in gear 1"};
+    hal::Param<double> max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
+    hal::Param<double> min2{*this, "min2", "lowest speed in gear 2"};
+    hal::Param<double> max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
+    CorrectedParam     scale2{*this, "scale2", "how many times faster gear 2 turns the spindle; at least 1", {.initial = 1.0}};
+    hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 turns the spindle the other way round"};
+    hal::Function      run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};
+
+    void update(hal::Cycle) noexcept {
+        if (!(scale2 >= 1.0)) scale2.correct(1.0);
+        if (sel) {
+            speed_out = within(speed_in, min2, max2) / scale2;
+            dir_out = dir_in != reverse;
+        } else {
+            speed_out = within(speed_in, min1, max1);
+            dir_out = dir_in;
+        }
+    }
+
+private:
+    static double within(double speed, double min, double max) noexcept {  // limits of the magnitude, for both directions
+        return std::copysign(std::min(std::max(min, std::fabs(speed)), max), speed);
+    }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Gearchange, "gearchange", "Scales and limits a spindle speed for one of two gears", R"(
+| sel   | speed-out | dir-out |
+| ----- | --- | --- |
+| FALSE | speed-in between min1 and max1 | dir-in |
+| TRUE  | (speed-in between min2 and max2) / scale2 | dir-in, inverted while reverse is TRUE |
+
+Scale the drive for gear 1; `scale2` says how many times faster gear 2 turns the spindle at the same drive speed. Gear 2 is the high
+one: a `scale2` below 1 is set to 1. The limits are speeds of the spindle, in either direction: a negative `speed-in` is kept between
+-max and -min. When a minimum is above its maximum, the maximum wins; while `speed-in` is not a number, the minimum counts.
+
+    loadrt gearchange names=gears
+    addf gears servo
+    setp gears.max1 800
+    setp gears.min2 500
+    setp gears.max2 2500
+    setp gears.scale2 3.2
+    net high-gear    => gears.sel
+    net spindle-cmd  => gears.speed-in
+    net spindle-volt <= gears.speed-out
+)")

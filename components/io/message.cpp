@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct Message : hal::Component {
+    using Component::Component;
+    hal::TextArgument text{*this, "messages", "message", "the texts in quotes, with commas, one per instance", {.per_instance = true}};
+    hal::In<bool>     trigger{*this, "trigger", "its edge shows the message"};
+    hal::In<bool>     force{*this, "force", "rising edge: shows it again if trigger is still as it was"};
+    hal::Param<bool>  edge{*this, "edge", "TRUE: a rising edge of trigger, FALSE: a falling one", {.initial = true}};
+    hal::Function     run{*this, "", &Message::update, "watches trigger and force"};
+
+    void start() {
+        ended_.store(false);
+        printer_.emplace([this] { print(); });
+    }
+    void stop() noexcept {
+        ended_.store(true);
+        if (printer_ && printer_->joinable()) printer_->join();
+        printer_.reset();
+    }
+
+    void update(hal::Cycle) noexcept {
+        const bool is_active = trigger == edge;
+        const bool triggered = is_active && trigger != was_trigger_, forced = is_active && force && !was_forced_;
+        was_trigger_ = trigger;
+        was_forced_ = force;
+        if (triggered || forced) wanted_.fetch_add(1, std::memory_order_relaxed);
+    }
+
+private:
+    void print() noexcept {
+        for (bool last = false; !last;) {
+            last = ended_.load();  // looked at before the count, so that what came before the end is still printed
+            for (; printed_ != wanted_.load(std::memory_order_relaxed); ++printed_) {
+                std::fputs(line_.c_str(), stderr);
+                std::fflush(stderr);
+            }
+            if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
+    }
+    const std::string line_ = text.get() + "\n";
+    std::atomic<std::uint32_t> wanted_{0};  // the cycle counts up, the printer follows
+    std::uint32_t printed_ = 0;             // the printer only
+    std::atomic<bool> ended_{false};
+    std::optional<std::thread> printer_;
+    bool was_trigger_ = false, was_forced_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Message, "message", "Shows a message when a bit changes", R"(
+An edge of `trigger` puts the instance's text on the standard error of the process that runs the netlist. The cycle only counts; a thread
+of its own prints, some hundredths of a second later. Before the first cycle `trigger` counts as FALSE. A text that is not given is
+`message`.
+
+    loadrt message names=oillow,inverterfail messages="Slideway oil low,Spindle inverter fault"
+    addf oillow servo
+    addf inverterfail servo
+    setp oillow.edge FALSE
+    net oil-level => oillow.trigger
+    net fault     => inverterfail.trigger
+)")

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "hal/component.hpp"
+
+namespace {
+
+enum BitMode : std::uint32_t { bit_unused = 0, bit_rises = 1, bit_falls = 2, bit_changes = 3, bit_true = 4, bit_false = 5 };
+enum ValueMode : std::uint32_t {
+    value_unused = 0,
+    value_rises = 1,
+    value_falls = 2,
+    value_crosses = 3,
+    value_above = 4,
+    value_below = 5,
+    value_outside = 6,
+    value_inside = 7,
+};
+
+/// Values of pin `state`.
+enum State : std::uint32_t { idle = 0, filling = 1, armed = 2, recording = 3, holding_off = 4 };
+
+struct RecorderTrigger : hal::Component {
+    using Component::Component;
+
+    hal::Argument channels{*this, "channels", 4, "how many values are delayed", {.min = 0, .max = 64}};
+    hal::Argument bit_channels{*this, "bits", 0, "how many bits are delayed", {.min = 0, .max = 64}};
+    hal::Argument depth{*this, "depth", 1000, "the largest pre-trigger, in cycles", {.min = 1, .max = 10'000'000}};
+
+    hal::In<bool> arm{*this, "arm", "a rising edge arms; FALSE disarms"};
+    hal::In<bool> again{*this, "auto-arm", "TRUE: arms again after each record"};
+    hal::In<bool> force{*this, "force", "a rising edge triggers whatever the conditions are"};
+    hal::In<bool> bit{*this, "trigger-bit", "the bit of the condition"};
+    hal::In<double> value{*this, "trigger-value", "the value of the condition"};
+    hal::Param<std::uint32_t> bit_mode{*this, "bit-mode",
+                                       "0 unused; trigger-bit 1 rises, 2 falls, 3 changes, 4 is TRUE, 5 is FALSE", {.initial = bit_rises}};
+    hal::Param<std::uint32_t> value_mode{*this, "value-mode",
+                                         "0 unused; trigger-value 1 rises, 2 falls, 3 crosses, 4 is above, 5 is below threshold; "
+                                         "6 is outside, 7 is inside threshold and threshold-2"};
+    hal::Param<double> threshold{*this, "threshold", "of trigger-value"};
+    hal::Param<double> threshold_2{*this, "threshold-2", "the other end of the window"};
+    hal::Param<double> hysteresis{*this, "hysteresis",
+                                  "before it rises again trigger-value has to be lower than threshold by this (falls: higher)"};
+    hal::Param<bool> both{*this, "both", "TRUE: both conditions in the same cycle; FALSE: either"};
+    hal::Param<std::uint32_t> pre{*this, "pre", "cycles to record before the trigger", {.initial = 100}};
+    hal::Param<std::uint32_t> post{*this, "post", "cycles to record from the trigger on", {.initial = 900}};
+    hal::Param<double> hold_off{*this, "hold-off", "auto-arm: rest after a record", {.unit = "s"}};
+
+    hal::Ins<double> in{*this, "in-##", channels, "a value to record"};
+    hal::Ins<bool> bit_in{*this, "bit-in-##", bit_channels, "a bit to record"};
+    hal::Outs<double> out{*this, "out-##", channels, "in-##, pre cycles later"};
+    hal::Outs<bool> bit_out{*this, "bit-out-##", bit_channels, "bit-in-##, pre cycles later"};
+    hal::Out<bool> record{*this, "record", "TRUE for pre + post cycles: to the sampler's enable"};
+    hal::Out<bool> triggered{*this, "triggered", "TRUE in the cycle of the trigger"};
+    hal::Out<bool> done{*this, "done", "TRUE: there is a record, and it is not armed again"};
+    hal::Out<std::uint32_t> state{*this, "state", "0 idle; 1 armed, but the pre-trigger fills; 2 armed; 3 recording; 4 holding off"};
+    hal::Out<std::int32_t> index{*this, "index", "cycle of the record that out-## has: 0 at the trigger, -pre at its start"};
+    hal::Out<std::uint32_t> records{*this, "records", "records begun so far"};
+
+    hal::Function run{*this, "", &RecorderTrigger::update, "delays the values and looks for the trigger"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const bool armed_now = arm && !was_arm_, forced = force && !was_force_;
+        was_arm_ = arm, was_force_ = force;
+        store();
+        const bool fires = looks();
+
+        const std::uint32_t before = std::min(pre.get(), static_cast<std::uint32_t>(size_ - 1));
+        if (!arm && state_ != recording) {
+            state_ = idle;
+        } else if (armed_now && state_ != recording) {
+            state_ = filling;
+            filled_ = 0;  // what was before the arming belongs to no record
+        }
+        if (state_ == holding_off && (waited_ += cycle.seconds()) > hold_off) state_ = filling;
+        if (state_ == filling) {
+            if (filled_ >= before) state_ = armed;
+            else ++filled_;
+        }
+        const bool starts = (state_ == armed && fires) || (forced && state_ != recording);
+        if (starts) begin(before);
+
+        give();
+        record = state_ == recording;
+        triggered = starts;
+        index = state_ == recording ? static_cast<std::int32_t>(at_) : 0;
+        if (state_ == recording && ++at_ >= after_) finish();
+        done = have_ && state_ == idle && !record;
+        state = record ? std::uint32_t{recording} : state_;
+    }
+
+private:
+    void begin(std::uint32_t before) noexcept {
+        state_ = recording;
+        back_ = before;
+        at_ = -static_cast<std::int64_t>(before);
+        after_ = std::max<std::int64_t>(1, std::min<std::uint32_t>(post, INT32_MAX));
+        records = records + 1;
+        have_ = true;
+    }
+    void finish() noexcept {
+        state_ = again && arm ? std::uint32_t{holding_off} : std::uint32_t{idle};
+        waited_ = 0.0;
+    }
+
+    void store() noexcept {
+        newest_ = (newest_ + 1) % size_;
+        for (std::size_t i = 0; i < in.size(); ++i) values_[newest_ * in.size() + i] = in[i];
+        for (std::size_t i = 0; i < bit_in.size(); ++i) bits_[newest_ * bit_in.size() + i] = bit_in[i];
+    }
+    /// While it records the delay is the one of the trigger.
+    void give() noexcept {
+        const std::size_t back = state_ == recording ? back_ : std::min<std::size_t>(pre, size_ - 1);
+        const std::size_t from = (newest_ + size_ - back) % size_;
+        for (std::size_t i = 0; i < out.size(); ++i) out[i] = values_[from * out.size() + i];
+        for (std::size_t i = 0; i < bit_out.size(); ++i) bit_out[i] = bits_[from * bit_out.size() + i];
+    }
+
+    bool looks() noexcept {
+        const bool b = bit_fires(), v = value_fires();
+        if (bit_mode == bit_unused || bit_mode > bit_false) return v;
+        if (value_mode == value_unused || value_mode > value_inside) return b;
+        return both ? b && v : b || v;
+    }
+    bool bit_fires() noexcept {
+        const bool now = bit, before = was_known_ ? was_bit_ : now;
+        was_bit_ = now;
+        was_known_ = true;
+        switch (bit_mode) {
+            case bit_rises: return now && !before;
+            case bit_falls: return !now && before;
+            case bit_changes: return now != before;
+            case bit_true: return now;
+            case bit_false: return !now;
+            default: return false;
+        }
+    }
+    /// An edge counts only after the value has been clearly on the other side.
+    bool value_fires() noexcept {
+        const double x = value, band = std::fabs(hysteresis);
+        const bool rises = was_below_ && x >= threshold, falls = was_above_ && x <= threshold;
+        if (rises) was_below_ = false;
+        if (falls) was_above_ = false;
+        if (x < threshold - band) was_below_ = true;
+        if (x > threshold + band) was_above_ = true;
+        const double low = std::min(threshold.get(), threshold_2.get()), high = std::max(threshold.get(), threshold_2.get());
+        switch (value_mode) {
+            case value_rises: return rises;
+            case value_falls: return falls;
+            case value_crosses: return rises || falls;
+            case value_above: return x > threshold;
+            case value_below: return x < threshold;
+            case value_outside: return x < low || x > high;
+            case value_inside: return x >= low && x <= high;
+            default: return false;
+        }
+    }
+
+    std::size_t size_ = static_cast<std::size_t>(depth) + 1, newest_ = 0, back_ = 0, filled_ = 0;
+    std::unique_ptr<double[]> values_ = std::make_unique<double[]>(size_ * static_cast<std::size_t>(channels));
+    std::unique_ptr<bool[]> bits_ = std::make_unique<bool[]>(size_ * static_cast<std::size_t>(bit_channels));
+    std::int64_t at_ = 0, after_ = 1;
+    double waited_ = 0.0;
+    std::uint32_t state_ = idle;
+    bool was_arm_ = false, was_force_ = false, was_bit_ = false, was_known_ = false, was_below_ = false, was_above_ = false, have_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(RecorderTrigger, "recorder_trigger", "Records what came before and after an event of a bit or a value", R"(
+Makes a transient recorder of `sampler`: the values pass through it `pre` cycles late, and `record` enables the sampler from the trigger
+on for `pre` + `post` cycles, so the record begins `pre` cycles before the trigger. `index` says which cycle it is; record it, too.
+
+A rising edge of `arm` arms; the trigger is looked for once `pre` cycles have been stored. It comes from `trigger-bit` (`bit-mode`), from
+`trigger-value` (`value-mode`, `threshold`), from either or with `both` from both in one cycle, or from `force` at any time. Edges of the
+value need it to have been beyond `hysteresis` on the other side. With `auto-arm` it arms again `hold-off` after each record. `arm` FALSE
+ends the waiting, not a record. A record that is forced before the pre-trigger is full begins with older values.
+
+The memory is taken when the component is loaded: `depth` cycles (more for `pre` is cut), 8 bytes per value. The functions in order: what
+makes the values, this, the sampler.
+
+    loadrt recorder_trigger names=catch channels=2 depth=2000
+    loadrt sampler depth=4000 cfg=ffs
+    addf catch servo
+    addf sampler.0 servo
+    setp catch.bit-mode 0
+    setp catch.value-mode 1
+    setp catch.threshold 0.5
+    setp catch.pre 1000
+    setp catch.post 1000
+    setp catch.arm TRUE
+    net x-error  => catch.in-00 catch.trigger-value
+    net x-effort => catch.in-01
+    net caught   catch.record => sampler.0.enable
+    net error-late   catch.out-00 => sampler.0.pin.0
+    net effort-late  catch.out-01 => sampler.0.pin.1
+    net caught-at    catch.index  => sampler.0.pin.2
+)")

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// When a function really runs, for components that measure a thread.
+#pragma once
+
+#include <ctime>
+
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace measure {
+
+/// Time between the runs of a function. On a virtual clock a cycle runs when it is due; which clock it is shows in the
+/// first cycle: a thread on the real one is not minutes away from when it was due.
+class RunTime {
+public:
+    /// Nanoseconds since the last run; a negative number in the first one. [realtime]
+    std::int64_t since_last(hal::Cycle cycle) noexcept {
+        const std::int64_t clock = now();
+        if (!started_) {
+            constexpr std::int64_t minute = 60'000'000'000;
+            real_ = clock - cycle.start_ns() < minute && cycle.start_ns() - clock < minute;
+        }
+        const std::int64_t time = real_ ? clock : cycle.start_ns(), since = started_ ? time - last_ : -1;
+        started_ = true;
+        last_ = time;
+        return since;
+    }
+
+private:
+    static std::int64_t now() noexcept {
+        timespec t{};
+        clock_gettime(CLOCK_MONOTONIC, &t);
+        return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
+    }
+    std::int64_t last_ = 0;
+    bool started_ = false, real_ = false;
+};
+
+/// Kept in the range of an s32 pin.
+inline std::int32_t to_s32(std::int64_t value) noexcept {
+    return static_cast<std::int32_t>(std::clamp<std::int64_t>(value, INT32_MIN, INT32_MAX));
+}
+
+/// Mean and variance of what was added so far, one by one (Welford).
+class Statistics {
+public:
+    void add(double value) noexcept {
+        ++count_;
+        const double before = value - mean_;
+        mean_ += before / static_cast<double>(count_);
+        squares_ += before * (value - mean_);
+    }
+    std::uint64_t count() const noexcept { return count_; }
+    double mean() const noexcept { return mean_; }
+    double variance() const noexcept { return count_ > 1 ? squares_ / static_cast<double>(count_ - 1) : 0.0; }
+
+private:
+    std::uint64_t count_ = 0;
+    double mean_ = 0.0, squares_ = 0.0;
+};
+
+}  // namespace measure

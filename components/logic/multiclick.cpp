@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Multiclick : hal::Component {
+    using Component::Component;
+    hal::In<bool>  in{*this, "in", "the button"};
+    hal::Out<bool> single{*this, "single-click", "a pulse at the end of a first click"};
+    hal::Out<bool> single_only{*this, "single-click-only", "a pulse when no second click has followed"};
+    hal::Out<bool> twice{*this, "double-click", "a pulse at the end of a second click"};
+    hal::Out<bool> twice_only{*this, "double-click-only", "a pulse when no third click has followed"};
+    hal::Out<bool> triple{*this, "triple-click", "a pulse at the end of a third click"};
+    hal::Out<bool> triple_only{*this, "triple-click-only", "a pulse when no fourth click has followed"};
+    hal::Out<bool> quadruple{*this, "quadruple-click", "a pulse at the end of a fourth click"};
+    hal::Out<bool> quadruple_only{*this, "quadruple-click-only", "a pulse when no fifth click has followed"};
+    hal::Out<std::int32_t>    state{*this, "state", "0 idle; 1, 3, 5, 7 pressed; 2, 4, 6, 8 released; 9 waits for the release"};
+    hal::Param<bool>          invert{*this, "invert-input", "TRUE: clicks begin with falling edges"};
+    hal::Param<std::uint32_t> max_hold{*this, "max-hold-ns", "a longer press is no click", {.initial = 250'000'000, .unit = "ns"}};
+    hal::Param<std::uint32_t> max_space{*this, "max-space-ns", "a longer pause ends the row of clicks",
+                                        {.initial = 250'000'000, .unit = "ns"}};
+    hal::Param<std::uint32_t> output_hold{*this, "output-hold-ns", "length of the output pulses", {.initial = 100'000'000, .unit = "ns"}};
+    hal::Function run{*this, "", &Multiclick::update, "detects clicks"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const std::int64_t period = cycle.period_ns();
+        for (std::size_t i = 0; i < std::size(pulses_); ++i) {
+            Pulse& pulse = pulses_[i];
+            pulse.age_ns += pulse.age_ns < forever ? period : 0;
+            if (*pulse.out && pulse.age_ns >= std::int64_t{output_hold}) *pulse.out = false;
+        }
+        in_state_ns_ += in_state_ns_ < forever ? period : 0;
+        step(in != invert);
+        state = state_;
+    }
+
+private:
+    static constexpr std::int64_t forever = std::int64_t{1} << 62;
+    static constexpr std::int32_t idle = 0, last_release = 8, waiting = 9;
+
+    struct Pulse {
+        hal::Out<bool>* out;
+        std::int64_t age_ns = 0;
+    };
+
+    void step(bool pressed) {
+        if (state_ == waiting) {
+            if (!pressed) enter(idle);
+        } else if (state_ % 2 == 1) {
+            if (!pressed) {
+                start(pulses_[state_ - 1]);
+                enter(state_ + 1);
+            } else if (in_state_ns_ > std::int64_t{max_hold}) enter(waiting);
+        } else if (pressed) {
+            enter(state_ == last_release ? waiting : state_ + 1);  // a fifth click is nothing
+        } else if (state_ != idle && in_state_ns_ > std::int64_t{max_space}) {
+            start(pulses_[state_ - 1]);
+            enter(idle);
+        }
+    }
+    void enter(std::int32_t next) {
+        state_ = next;
+        in_state_ns_ = 0;
+    }
+    void start(Pulse& pulse) {
+        *pulse.out = true;
+        pulse.age_ns = 0;
+    }
+
+    // In the order of the states that start them.
+    Pulse pulses_[8] = {{&single}, {&single_only}, {&twice}, {&twice_only}, {&triple}, {&triple_only}, {&quadruple}, {&quadruple_only}};
+    std::int64_t in_state_ns_ = 0;
+    std::int32_t state_ = idle;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Multiclick, "multiclick", "Detects single, double, triple and quadruple clicks", R"(
+A click is a press of at most `max-hold-ns`. Clicks with pauses of at most `max-space-ns` between them are counted: the
+outputs without `only` are TRUE for `output-hold-ns` from the end of the click, those with `only` from the moment it is clear that no
+further click will come. A press that is too long ends the row without an `only` output. A noisy button needs a `debounce` before it.
+
+    loadrt multiclick names=pendant
+    addf pendant servo
+    net pendant-button => pendant.in
+    net start-program  <= pendant.single-click-only
+    net home-all       <= pendant.double-click-only
+)")

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+/// A parameter that the component moves, too.
+class Position : public hal::Param<std::int32_t> {
+public:
+    using Param::Param;
+    void move(std::int32_t value) noexcept { put(value); }
+};
+
+struct Multiswitch : hal::Component {
+    using Component::Component;
+    hal::Argument             cfg{*this, "cfg", 4, "positions of each switch, a number per switch",
+                                  {.per_instance = true, .min = 1, .max = 100}};
+    hal::In<bool>             up{*this, "up", "a rising edge goes to the next position"};
+    hal::In<bool>             down{*this, "down", "a rising edge goes to the position before"};
+    hal::Outs<bool>           bit{*this, "bit-##", cfg, "TRUE in position #"};
+    hal::Param<std::uint32_t> top{*this, "top-position", "the last position",
+                                  {.initial = static_cast<std::uint32_t>(std::int64_t{cfg}) - 1}};
+    Position                  position{*this, "position", "the present position; may be set"};
+    hal::Function             run{*this, "", &Multiswitch::update, "moves the switch"};
+
+    void update(hal::Cycle) noexcept {
+        const bool up_now = up, down_now = down;
+        const std::int64_t last = std::min<std::int64_t>(top, std::int64_t{cfg} - 1);
+        std::int64_t at = position;
+        at += (up_now && !was_up_ ? 1 : 0) - (down_now && !was_down_ ? 1 : 0);
+        if (at > last) at = 0;
+        if (at < 0) at = last;
+        was_up_ = up_now, was_down_ = down_now;
+        position.move(static_cast<std::int32_t>(at));
+        for (std::size_t i = 0; i < bit.size(); ++i) bit[i] = static_cast<std::int64_t>(i) == at;
+    }
+
+private:
+    bool was_up_ = false, was_down_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Multiswitch, "multiswitch", "A switch of several positions, moved by buttons", R"(
+Each press of `up` or `down` goes one position further; after `top-position` comes 0 and before 0 comes `top-position`.
+The bit of the present position is TRUE. `cfg=3,5` makes two switches, of three and of five positions.
+
+    loadrt multiswitch names=jog-step cfg=3
+    addf jog-step servo
+    net button-up   => jog-step.up
+    net button-down => jog-step.down
+    net step-fine   <= jog-step.bit-00
+    net step-medium <= jog-step.bit-01
+    net step-coarse <= jog-step.bit-02
+)")

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Mux8 : hal::Component {
+    using Component::Component;
+    hal::Ins<bool>   sel{*this, "sel#", 3, "bit # of the choice"};
+    hal::Out<double> out{*this, "out", "the chosen input"};
+    hal::Ins<double> in{*this, "in#", 8, "goes to out while # is chosen"};
+    hal::Function    run{*this, "", &Mux8::update, "computes out"};
+
+    void update(hal::Cycle) noexcept { out = in[(sel[2] ? 4u : 0u) + (sel[1] ? 2u : 0u) + (sel[0] ? 1u : 0u)].get(); }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Mux8, "mux8", "Selects one of eight values", R"(
+The choice is the binary number `sel2 sel1 sel0`: with `sel2` and `sel0` TRUE and `sel1` FALSE `out` follows `in5`.
+
+    loadrt mux8 names=feed-steps
+    addf feed-steps servo
+    setp feed-steps.in1 0.5
+    setp feed-steps.in2 1
+    setp feed-steps.in3 1.2
+    net switch-1      => feed-steps.sel0
+    net switch-2      => feed-steps.sel1
+    net feed-override <= feed-steps.out
+)")

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Updown : hal::Component {
+    using Component::Component;
+    hal::In<bool>            count_up{*this, "countup", "a rising edge counts up"};
+    hal::In<bool>            count_down{*this, "countdown", "a rising edge counts down"};
+    hal::In<bool>            reset{*this, "reset", "while TRUE the count is 0"};
+    hal::Out<std::int32_t>   count{*this, "count", "the count"};
+    hal::Param<bool>         clamp{*this, "clamp", "TRUE: the count stays between min and max"};
+    hal::Param<bool>         wrap{*this, "wrap", "TRUE: after max comes min, and the other way round; clamp is not needed then"};
+    hal::Param<std::int32_t> max{*this, "max", "largest count", {.initial = INT32_MAX}};
+    hal::Param<std::int32_t> min{*this, "min", "smallest count"};
+    hal::Function            run{*this, "", &Updown::update, "counts edges"};
+
+    void update(hal::Cycle) noexcept {
+        const bool up = count_up, down = count_down;
+        std::int64_t n = count_;
+        if (started_) n += (up && !was_up_ ? 1 : 0) - (down && !was_down_ ? 1 : 0);
+        if (reset) n = 0;
+        started_ = true, was_up_ = up, was_down_ = down;
+        if (wrap || clamp) n = n > max ? (wrap ? min : max).get() : n < min ? (wrap ? max : min).get() : n;
+        count_ = static_cast<std::int32_t>(n);
+        count = count_;
+    }
+
+private:
+    std::int32_t count_ = 0;
+    bool started_ = false, was_up_ = false, was_down_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Updown, "updown", "Counts up and down, with limits or wrapping around", R"(
+Rising edges of `countup` and `countdown` count; both in one cycle cancel, and the first cycle has no edges. While `reset` is TRUE the
+count is 0, or with `clamp` and `wrap` the end that is reached from 0. Without these two the count goes round at the ends of its type.
+When `min` is above `max`, `max` is looked at first.
+
+    loadrt updown names=parts
+    addf parts servo
+    setp parts.clamp TRUE
+    net part-done  => parts.countup
+    net shift-done => parts.reset
+    net part-count <= parts.count
+)")

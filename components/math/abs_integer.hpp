@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// abs_s32 and abs_s64.
+#pragma once
+
+#include <limits>
+
+#include "hal/component.hpp"
+
+template <class T>
+struct AbsInteger : hal::Component {
+    using Component::Component;
+    hal::In<T>     in{*this, "in", "the number"};
+    hal::Out<T>    out{*this, "out", "its amount"};
+    hal::Out<bool> sign{*this, "sign", "TRUE while in is negative"};
+    hal::Out<bool> is_positive{*this, "is-positive", "TRUE while in is above 0"};
+    hal::Out<bool> is_negative{*this, "is-negative", "TRUE while in is below 0"};
+    hal::Function  run{*this, "", &AbsInteger::update, "computes the amount"};
+
+    void update(hal::Cycle) noexcept {
+        const T value = in;
+        out = value >= 0 ? value : value > std::numeric_limits<T>::min() ? -value : std::numeric_limits<T>::max();
+        sign = value < 0;
+        is_positive = value > 0;
+        is_negative = value < 0;
+    }
+};

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+#include "abs_integer.hpp"
+
+using AbsS64 = AbsInteger<std::int64_t>;
+
+HAL_COMPONENT(AbsS64, "abs_s64", "Amount and sign of a 64-bit integer", R"(
+The smallest number, -2^63, whose amount the type does not have, gives the largest, 2^63 - 1.
+
+    loadrt abs_s64 names=distance
+    addf distance servo
+    net counts         => distance.in
+    net counts-to-go   <= distance.out
+    net going-backward <= distance.is-negative
+)")

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Near : hal::Component {
+    using Component::Component;
+    hal::In<double>    in1{*this, "in1", "first value"};
+    hal::In<double>    in2{*this, "in2", "second value"};
+    hal::Out<bool>     out{*this, "out", "TRUE while the values are near each other"};
+    hal::Param<double> scale{*this, "scale", "largest ratio of the two", {.initial = 1.0}};
+    hal::Param<double> difference{*this, "difference", "largest difference of the two"};
+    hal::Function      run{*this, "", &Near::update, "compares"};
+
+    void update(hal::Cycle) noexcept {
+        const double a = in1, b = in2;
+        const double small = std::fmin(std::fabs(a), std::fabs(b)), large = std::fmax(std::fabs(a), std::fabs(b));
+        const bool same_side = std::signbit(a) == std::signbit(b) || large == 0.0;
+        const bool ratio = same_side && large <= small * scale && !std::isnan(a + b);
+        out = ratio || std::fabs(a - b) <= difference || a == b;
+    }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Near, "near", "Tells whether two values are roughly equal", R"(
+`out` is TRUE while the larger of two values of the same sign is at most `scale` times the smaller one, or while they
+differ by at most `difference`. Equal values are always near; what is not a number is near nothing.
+
+    loadrt near names=at-speed
+    addf at-speed servo
+    setp at-speed.scale 1.02
+    setp at-speed.difference 5
+    net spindle-command  => at-speed.in1
+    net spindle-speed    => at-speed.in2
+    net spindle-at-speed <= at-speed.out
+)")

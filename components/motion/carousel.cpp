@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: MIT
+#include <cstdint>
+#include <string>
+
+#include "hal/component.hpp"
+
+namespace {
+
+enum class Encoding : std::uint8_t { gray, binary, bcd, single, index, edge, counts };
+
+Encoding encoding_of(const std::string& name) {
+    constexpr const char* names[] = {"gray", "binary", "bcd", "single", "index", "edge", "counts"};
+    for (std::size_t i = 0; i < std::size(names); ++i)
+        if (name == names[i]) return static_cast<Encoding>(i);
+    throw std::invalid_argument("encoding=" + name + " is none of gray, binary, bcd, single, index, edge, counts");
+}
+
+struct Carousel : hal::Component {
+    using Component::Component;
+    static constexpr hal::ArgumentOptions list(std::int64_t min, std::int64_t max) {
+        return {.per_instance = true, .min = min, .max = max};
+    }
+    hal::Argument     pockets{*this, "pockets", 8, "how many pockets", list(1, 1000)};
+    hal::TextArgument encoding_name{*this, "encoding", "gray", "gray, binary, bcd, single, index, edge or counts", {.per_instance = true}};
+    hal::Argument     num_sense{*this, "num_sense", 4, "how many position sensors; index has 2", list(1, 1000)};
+    hal::Argument     directions{*this, "dir", 2, "2: turns both ways, 1: forward only", list(1, 2)};
+    hal::Argument     parity_wanted{*this, "parity", 0, "1: odd, 0: even parity", list(0, 1)};
+    const Encoding    encoding = encoding_of(encoding_name.get());
+
+    hal::In<std::int32_t>  pocket_number{*this, "pocket-number", "pocket to go to; beyond the last it starts again at 1; 0: stays"};
+    hal::In<bool>          enable{*this, "enable", "rising edge: goes to the pocket; FALSE stops it"};
+    hal::Out<bool>         active{*this, "active", "TRUE while it moves, homes, aligns or locks"};
+    hal::Out<bool>         ready{*this, "ready", "TRUE once it is at the pocket, until it moves again"};
+    hal::In<bool>          strobe{*this, "strobe", "FALSE: the sensors do not count", {.initial = true}};
+    hal::In<bool>          parity{*this, "parity", "parity bit of the position encoder"};
+    hal::Ins<bool>         sense{*this, "sense-#", sensors(), "position sensor #"};
+    hal::In<double>        rev_pulse{*this, "rev-pulse", "how long to run in reverse at the pocket, to lock it", {.unit = "s"}};
+    hal::In<double>        fwd_dc{*this, "fwd-dc", "motor-vel while it turns forward"};
+    hal::In<double>        rev_dc{*this, "rev-dc", "motor-vel while it turns in reverse"};
+    hal::In<double>        hold_dc{*this, "hold-dc", "motor-vel while it rests"};
+    hal::In<double>        align_dc{*this, "align-dc", "speed of the last slow move on to the marker; 0: there is none"};
+    hal::In<double>        decel_time{*this, "decel-time", "how long to wait before that move", {.unit = "s"}};
+    hal::In<std::int32_t>  counts{*this, "counts", "counts: rawcounts of the encoder or step generator"};
+    hal::In<std::int32_t>  scale{*this, "scale", "counts: counts from pocket to pocket", {.initial = 100}};
+    hal::In<std::int32_t>  width{*this, "width", "counts: so far from its centre a pocket is reached"};
+    hal::In<std::int32_t>  home_offset{*this, "home-offset", "counts: counts from the index to pocket 1"};
+    hal::Io<bool>          index_enable{*this, "index-enable", "counts: TRUE while it waits for the encoder's index"};
+    hal::In<bool>          jog_fwd{*this, "jog-fwd", "rising edge: one pocket forward"};
+    hal::In<bool>          jog_rev{*this, "jog-rev", "rising edge: one pocket back, if it turns both ways"};
+    hal::Out<bool>         motor_fwd{*this, "motor-fwd", "TRUE: the motor turns to larger numbers", {.safe = false}};
+    hal::Out<bool>         motor_rev{*this, "motor-rev", "TRUE: the motor turns to smaller numbers", {.safe = false}};
+    hal::Out<bool>         parity_error{*this, "parity-error", "TRUE: sensors and parity bit do not fit"};
+    hal::Out<std::int32_t> current_position{*this, "current-position", "the pocket that is there; 0: not known"};
+    hal::Out<double>       motor_vel{*this, "motor-vel", "for a motor with a speed: fwd-dc, rev-dc, align-dc or hold-dc", {.safe = 0.0}};
+    hal::Out<bool>         homed{*this, "homed", "TRUE: the place of pocket 1 has been found"};
+    hal::In<bool>          unhome{*this, "unhome", "TRUE: forgets it"};
+    hal::Out<std::int32_t> state{*this, "state", "0 rests, 1 homes, 2 moves, 3 slows down, 4 5 6 aligns, 7 locks, 8 jogs"};
+    hal::Out<bool>         homing{*this, "homing", "TRUE while it looks for pocket 1"};
+    hal::Out<double>       timer{*this, "timer", "time left of decel-time or rev-pulse", {.unit = "s"}};
+    hal::Out<std::int32_t> motor_dir{*this, "motor-dir", "1 forward, -1 reverse, 0 rests"};
+    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles a reading of gray, binary, bcd or single has to last before it counts"};
+    hal::Function run{*this, "", &Carousel::update, "one step of the carousel"};
+
+    void update(hal::Cycle cycle) noexcept {
+        if (unhome) homed = false;
+        look();
+        if (!enable && state_ != State::homing && state_ != State::jogging && state_ != State::rests) enter(State::rests);
+        const bool called = enable && !was_enabled_;
+        const bool forward = jog_fwd && !was_jog_fwd_, back = jog_rev && !was_jog_rev_ && directions == 2;
+        was_enabled_ = enable, was_jog_fwd_ = jog_fwd, was_jog_rev_ = jog_rev;
+        if (called && (state_ == State::rests || state_ == State::jogging)) begin();
+        else if (state_ == State::rests && !enable && forward != back) {
+            direction_ = forward ? 1 : -1;
+            from_ = position_;
+            enter(State::jogging);
+        }
+        step(cycle.seconds());
+        publish();
+    }
+
+private:
+    enum class State : std::uint8_t { rests, homing, moves, slows, seeks, leaves, returns, locks, jogging };
+
+    std::int64_t sensors() const noexcept {
+        switch (encoding) {
+        case Encoding::single: return std::max<std::int64_t>(num_sense, pockets);
+        case Encoding::index: return 2;
+        case Encoding::edge: return std::max<std::int64_t>(num_sense, 2);
+        default: return num_sense;
+        }
+    }
+    bool absolute() const noexcept { return encoding < Encoding::index; }
+    bool has_place() const noexcept { return absolute() || homed; }
+    /// `pocket` as a number from 1 to pockets.
+    std::int64_t wrapped(std::int64_t pocket) const noexcept { return ((pocket - 1) % pockets + pockets) % pockets + 1; }
+    void enter(State next) noexcept { state_ = next; }
+
+    // ---- where it is
+
+    void look() noexcept {
+        marker_ = false;
+        if (absolute()) look_at_code();
+        else if (encoding == Encoding::counts) look_at_counts();
+        else look_at_pulses();
+        const bool coded = absolute() && encoding != Encoding::single;
+        if (!coded) parity_error = false;
+        else if (strobe) {
+            bool odd = parity;
+            for (const auto& s : sense) odd = odd != s.get();
+            parity_error = odd != (parity_wanted != 0);
+        }
+    }
+
+    std::int64_t code() const noexcept {
+        std::uint64_t bits = 0;
+        for (std::size_t i = 0; i < sense.size(); ++i) {
+            if (!sense[i]) continue;
+            if (encoding == Encoding::single) return static_cast<std::int64_t>(i) + 1;
+            if (i < 32) bits |= std::uint64_t{1} << i;
+        }
+        if (encoding == Encoding::gray)
+            for (unsigned shift = 1; shift < 32; shift *= 2) bits ^= bits >> shift;
+        if (encoding != Encoding::bcd) return static_cast<std::int64_t>(bits);
+        std::int64_t value = 0;
+        for (int digit = 7; digit >= 0; --digit) value = value * 10 + static_cast<std::int64_t>(bits >> (4 * digit) & 15u);
+        return value;
+    }
+
+    void look_at_code() noexcept {
+        if (!strobe) return;
+        const std::int64_t reading = code();
+        stable_ = reading == reading_ ? std::min<std::uint32_t>(stable_, UINT32_MAX - 1) + 1 : 0;
+        reading_ = reading;
+        if (stable_ < debounce) return;
+        marker_ = reading >= 1 && reading <= pockets;
+        if (marker_) position_ = reading;
+    }
+
+    void look_at_pulses() noexcept {
+        const bool index = sense[0], pulse = sense[1], changed = strobe && pulse != was_pulse_;
+        const bool aligning = state_ >= State::slows && state_ <= State::returns;  // it goes over the same marker again
+        if (strobe) was_pulse_ = pulse;
+        marker_ = encoding == Encoding::edge || pulse;
+        if (!strobe) return;
+        if (state_ == State::homing ? index && pulse : changed && index && pulse && !aligning) {
+            position_ = 1;
+            if (state_ == State::homing) homed = true;
+        } else if (changed && !aligning && (pulse || encoding == Encoding::edge) && position_ != 0) {
+            position_ = wrapped(position_ + direction_);
+        }
+    }
+
+    void look_at_counts() noexcept {
+        const std::int64_t now = counts;
+        if (state_ == State::homing && strobe && (sense[0] || (asked_index_ && !index_enable))) {
+            zero_ = now + home_offset;
+            homed = true;
+            index_enable = false;
+            position_ = 1;
+            last_place_ = 0.0;
+        }
+        if (!homed) return;
+        const double step = scale != 0 ? static_cast<double>(scale) : 1.0;
+        const double turned = static_cast<double>(now - zero_), place = turned / step, nearest = std::floor(place + 0.5);
+        if (std::fabs(turned - nearest * step) <= std::fabs(static_cast<double>(width))) reach(nearest);
+        else if (std::floor(place) > std::floor(last_place_)) reach(std::floor(place));  // it has passed the centre between two cycles
+        else if (std::floor(place) < std::floor(last_place_)) reach(std::floor(place) + 1.0);
+        last_place_ = place;
+        marker_ = true;
+    }
+    void reach(double place) noexcept { position_ = wrapped(1 + static_cast<std::int64_t>(std::clamp(place, -1e12, 1e12))); }
+
+    // ---- what it does
+
+    void begin() noexcept {
+        ready = false;
+        if (has_place()) return set_out();
+        asked_index_ = false;
+        enter(State::homing);
+    }
+
+    void set_out() noexcept {
+        target_ = pocket_number == 0 ? position_ : wrapped(pocket_number);
+        const std::int64_t ahead = position_ == 0 ? 0 : wrapped(target_ - position_ + 1) - 1;
+        direction_ = directions == 1 || 2 * ahead <= pockets ? 1 : -1;
+        moved_ = false;
+        enter(State::moves);
+    }
+
+    void step(double dt) noexcept {
+        left_ = std::max(left_ - dt, 0.0);
+        switch (state_) {
+        case State::rests: break;
+        case State::homing:
+            direction_ = 1;
+            if (encoding == Encoding::counts && !asked_index_) index_enable = asked_index_ = true;
+            if (!homed) break;
+            if (enable) set_out();
+            else enter(State::rests);
+            break;
+        case State::moves:
+            if (position_ != target_ || !(marker_ || pocket_number == 0)) moved_ = true;
+            else if (moved_ && align_dc != 0.0) wait(State::slows, decel_time);
+            else arrive();
+            break;
+        case State::slows:
+            if (left_ > 0.0) break;
+            enter(direction_ > 0 && !marker_ ? State::seeks : State::leaves);
+            break;
+        case State::seeks:
+            if (marker_) enter(State::leaves);
+            break;
+        case State::leaves:
+            if (!marker_) enter(State::returns);
+            break;
+        case State::returns:
+            if (marker_) arrive();
+            break;
+        case State::locks:
+            if (left_ > 0.0) break;
+            ready = true;
+            enter(State::rests);
+            break;
+        case State::jogging:
+            ready = false;
+            if (position_ == from_ || !marker_) break;
+            enter(State::rests);
+            break;
+        }
+    }
+
+    void arrive() noexcept {
+        if (rev_pulse > 0.0) return wait(State::locks, rev_pulse);
+        ready = true;
+        enter(State::rests);
+    }
+    void wait(State next, double seconds) noexcept {
+        left_ = seconds > 0.0 ? std::min(seconds, 1e9) : 0.0;
+        enter(next);
+    }
+
+    void publish() noexcept {
+        const double slow = std::fabs(align_dc);
+        int turns = 0;
+        double velocity = hold_dc;
+        switch (state_) {
+        case State::rests: break;
+        case State::homing:
+        case State::moves:
+        case State::jogging: turns = direction_; velocity = turns > 0 ? fwd_dc : rev_dc; break;
+        case State::slows: velocity = 0.0; break;
+        case State::seeks:
+        case State::leaves: turns = -1; velocity = -slow; break;
+        case State::returns: turns = 1; velocity = slow; break;
+        case State::locks: turns = -1; velocity = rev_dc; break;
+        }
+        motor_fwd = turns > 0;
+        motor_rev = turns < 0;
+        motor_dir = turns;
+        motor_vel = velocity;
+        active = state_ != State::rests;
+        homing = state_ == State::homing;
+        state = static_cast<std::int32_t>(state_);
+        timer = left_;
+        current_position = static_cast<std::int32_t>(has_place() ? position_ : 0);
+    }
+
+    State state_ = State::rests;
+    bool was_enabled_ = false, was_jog_fwd_ = false, was_jog_rev_ = false, was_pulse_ = false;
+    bool marker_ = false;  // it stands at a pocket
+    bool moved_ = false, asked_index_ = false;
+    int direction_ = 1;
+    std::uint32_t stable_ = 0;
+    std::int64_t reading_ = -1, position_ = 0, target_ = 0, from_ = 0, zero_ = 0;
+    double left_ = 0.0, last_place_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Carousel, "carousel", "Turns the carousel of a tool changer to a pocket", R"(
+A rising edge of `enable` makes `active` TRUE and turns to `pocket-number`, the shorter way if `dir=2`; then `active` is FALSE and `ready`
+TRUE. `enable` FALSE stops it. Pockets count from 1.
+
+| encoding | sensors |
+| --- | --- |
+| gray, binary, bcd | `sense-N` are the bits of the pocket's number, sense-0 the lowest; with `parity-error` |
+| single | a sensor per pocket, sense-0 for pocket 1 |
+| index | sense-1 is TRUE at each pocket, sense-0 also at pocket 1 |
+| edge | as index, but both edges of sense-1 are pockets |
+| counts | `counts`, `scale` per pocket; sense-0 or the encoder's index (`index-enable`) is the home |
+
+The last three have to find pocket 1: the first `enable` turns it forward until the index, which goes on when `enable` falls. In index and
+edge the count is corrected at each pass of the index. Counts reach a pocket `width` from its centre.
+
+With `align-dc` it stops at the marker for `decel-time`, goes back slowly until the marker has come and gone, and forward on to it. With
+`rev-pulse` it is then driven against its lock in reverse, so long. At rest `motor-vel` is `hold-dc`. `jog-fwd` and `jog-rev` move by
+one pocket while it rests and is not enabled.
+
+All arguments are lists with an element per carousel (`pockets=10,10,8`); what is missing has its default, where LinuxCNC's own repeats
+the last.
+
+    loadrt carousel pockets=12 encoding=index names=tools
+    addf tools servo
+    setp tools.fwd-dc 0.5
+    setp tools.rev-dc -0.5
+    net tool-number => tools.pocket-number
+    net tool-change => tools.enable
+    net pocket-1    => tools.sense-0
+    net pocket      => tools.sense-1
+    net turret-fwd  <= tools.motor-fwd
+    net turret-rev  <= tools.motor-rev
+    net tool-there  <= tools.ready
+)")

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include <cstdint>
+
+#include "hal/component.hpp"
+#include "hal/queue.hpp"
+
+namespace {
+
+/// Counts all edges of two phases; a jump of both at once is no direction and counts nothing.
+class Edges {
+public:
+    int operator()(bool a, bool b) noexcept {
+        const unsigned now = (a != b ? 1u : 0u) | (b ? 2u : 0u);  // 0 1 2 3 in the order in which A leads B
+        const unsigned moved = (now - last_) & 3u;
+        last_ = now;
+        if (!started_) return started_ = true, 0;  // where the phases stand is no edge
+        return moved == 1 ? 1 : moved == 3 ? -1 : 0;
+    }
+
+private:
+    unsigned last_ = 0;
+    bool started_ = false;
+};
+
+struct Counted {
+    std::int64_t master = 0;  // only what it moved while enabled
+    std::int64_t slave = 0;
+};
+
+struct EncoderRatio : hal::Component {
+    using Component::Component;
+
+    hal::Function sample{*this, "sample", &EncoderRatio::sample_phases, "samples and counts; in the fastest thread", {.shared = true}};
+    hal::In<bool> master_a{*this, sample, "master-A", "phase A of the master's encoder"};
+    hal::In<bool> master_b{*this, sample, "master-B", "phase B of the master's encoder"};
+    hal::In<bool> slave_a{*this, sample, "slave-A", "phase A of the slave's encoder"};
+    hal::In<bool> slave_b{*this, sample, "slave-B", "phase B of the slave's encoder"};
+    hal::In<bool> enable{*this, sample, "enable", "TRUE: the slave is to follow the master; FALSE: the master's motion does not count"};
+
+    hal::Function update{*this, "update", &EncoderRatio::update_error, "computes the error; in the servo thread", {.shared = true}};
+    hal::Out<double> error{*this, update, "error", "how far the slave is ahead of where it should be", {.unit = "turn", .finite = true}};
+    hal::Io<std::uint32_t> master_ppr{*this, update, "master-ppr", "counts per turn of the master, four per pulse"};
+    hal::Io<std::uint32_t> slave_ppr{*this, update, "slave-ppr", "counts per turn of the slave, four per pulse"};
+    hal::Io<std::uint32_t> master_teeth{*this, update, "master-teeth", "teeth of the master's gear"};
+    hal::Io<std::uint32_t> slave_teeth{*this, update, "slave-teeth", "teeth of the slave's gear"};
+
+    void sample_phases(hal::Cycle) noexcept {
+        const int master = master_edges_(master_a, master_b);
+        if (enable) counted_.master += master;
+        counted_.slave += slave_edges_(slave_a, slave_b);
+        handed_.put(counted_);
+    }
+
+    void update_error(hal::Cycle) noexcept {
+        const Counted& now = handed_.get();
+        const double master = turns(now.master, master_ppr), slave = turns(now.slave, slave_ppr);
+        const double ratio = slave_teeth != 0 ? static_cast<double>(master_teeth) / static_cast<double>(slave_teeth) : 0.0;
+        error = slave - master * ratio;
+    }
+
+private:
+    static double turns(std::int64_t counts, std::uint32_t per_turn) noexcept {
+        return per_turn != 0 ? static_cast<double>(counts) / static_cast<double>(per_turn) : 0.0;
+    }
+    // sample only
+    Edges master_edges_, slave_edges_;
+    Counted counted_;
+    hal::Mailbox<Counted> handed_;  // sample writes, update reads
+};
+
+}  // namespace
+
+HAL_COMPONENT(EncoderRatio, "encoder_ratio", "Electronic gear: the error of a slave axis that follows a master", R"(
+Counts the encoders of both axes and gives the error for a position loop of the slave:
+
+    error = slave / slave-ppr - master / master-ppr * master-teeth / slave-teeth
+
+The master's counts are those made while `enable` was TRUE, so engaging and releasing the gear is no jump; while it is FALSE the slave
+is held where it is. All edges count: for an encoder of 500 pulses per turn `ppr` is 2000. A `ppr` or `slave-teeth` of 0 stands for an axis
+that does not move. `encoder-ratio.sample` has to run at least twice as often as edges come.
+
+    loadrt encoder_ratio names=hob
+    loadrt pid names=hob-pid
+    addf encoder-ratio.sample base-thread
+    addf encoder-ratio.update servo-thread
+    addf hob-pid.do-pid-calcs servo-thread
+    setp hob.master-ppr 2000
+    setp hob.slave-ppr 4000
+    setp hob.master-teeth 1
+    setp hob.slave-teeth 36
+    net hob-error hob.error => hob-pid.feedback
+)")

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include <cstdint>
+#include <numbers>
+#include <optional>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct EoffsetPerAngle : hal::Component {
+    using Component::Component;
+    hal::In<bool>          active{*this, "active", "TRUE while there is an offset (motion.eoffset-active)"};
+    hal::In<bool>          is_on{*this, "is-on", "TRUE: the machine is on"};
+    hal::In<bool>          enable_in{*this, "enable-in", "TRUE: an offset is computed; FALSE: it is taken back"};
+    hal::In<double>        radius_ref{*this, "radius-ref", "radius of the part", {.initial = 1.0}};
+    hal::In<double>        angle{*this, "angle", "angle of the part", {.unit = "deg"}};
+    hal::In<double>        start_angle{*this, "start-angle", "angle at which the shape begins", {.unit = "deg"}};
+    hal::In<std::int32_t>  fnum{*this, "fnum", "shape: 0 polygon inside, 1 polygon outside, 2 sine, 3 square wave; others are 0"};
+    hal::In<double>        rfraction{*this, "rfraction", "amplitude as a fraction of radius-ref", {.initial = 0.1}};
+    hal::In<double>        fmult{*this, "fmult", "sides of the polygon, or waves per turn", {.initial = 6.0}};
+    hal::In<std::uint32_t> k{*this, "k", "counts per unit; 0 is 10000", {.initial = 10000}};
+    hal::Out<bool>         is_off{*this, "is-off", "the opposite of is-on"};
+    hal::Out<bool>         enable_out{*this, "enable-out", "for axis.L.eoffset-enable"};
+    hal::Out<bool>         clear{*this, "clear", "for axis.L.eoffset-clear"};
+    hal::Out<std::int32_t> kcounts{*this, "kcounts", "the offset in counts, for axis.L.eoffset-counts"};
+    hal::Out<double>       kreciprocal{*this, "kreciprocal", "1 / k, for axis.L.eoffset-scale"};
+    hal::Out<double>       eoffset{*this, "eoffset-dbg", "the offset"};
+    hal::Out<std::uint32_t> state{*this, "state-dbg", "1 waits for enable-in, 2 computes, 3 takes the offset back"};
+    hal::Function          run{*this, "", &EoffsetPerAngle::update, "computes the offset"};
+
+    void update(hal::Cycle) noexcept {
+        const double per_unit = k != 0 ? static_cast<double>(k) : 10000.0;
+        const bool called = enable_in && !was_enabled_;
+        was_enabled_ = enable_in;
+        if (!is_on) state_ = waits;
+        else if (state_ == waits && called) state_ = computes;
+        else if (state_ == computes && !enable_in) state_ = returns;
+        else if (state_ == returns && !active) state_ = waits;
+
+        double offset = 0.0;
+        if (state_ == computes) {
+            if (const auto shape = value()) offset = *shape;
+            else state_ = returns;
+        }
+        const double exact = offset * per_unit;  // a millionth is added: 2500 must not become 2499.9999999999 and then 2499
+        const double counts = std::clamp(std::trunc(exact + std::copysign(1e-6, exact)), -2147483648.0, 2147483647.0);
+        is_off = !is_on;
+        enable_out = state_ != waits;
+        clear = state_ == returns;
+        kcounts = static_cast<std::int32_t>(counts);
+        kreciprocal = 1.0 / per_unit;
+        eoffset = counts / per_unit;
+        state = state_;
+    }
+
+private:
+    static constexpr std::uint32_t waits = 1, computes = 2, returns = 3;
+
+    /// The offset at this angle; nothing when the shape cannot be.
+    std::optional<double> value() const noexcept {
+        const double amplitude = radius_ref * rfraction, wave = (angle - start_angle) / 360.0 * fmult;
+        if (!std::isfinite(amplitude) || !std::isfinite(wave)) return {};
+        const double part = wave - std::floor(wave);  // of a wave, or of a side
+        if (fnum == 2) return 0.5 * amplitude * (1.0 - std::cos(2.0 * std::numbers::pi * part));
+        if (fnum == 3) return part >= 0.25 && part <= 0.75 ? amplitude : 0.0;
+        if (fmult < 3.0) return {};
+        // A side is straight: its distance from the centre is that of its middle, divided by the cosine of the angle from there.
+        const double turn = 2.0 * std::numbers::pi / fmult, outer = radius_ref + amplitude;
+        const double middle = fnum == 1 ? outer * std::cos(0.5 * turn) : outer;
+        return middle / std::cos((part < 0.5 ? part : part - 1.0) * turn) - radius_ref;
+    }
+    std::uint32_t state_ = waits;
+    bool was_enabled_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(EoffsetPerAngle, "eoffset_per_angle", "An external offset that depends on an angle: polygons and waves on a turned part", R"(
+With a = `radius-ref` * `rfraction` and t the angle since `start-angle`:
+
+| fnum | offset | |
+| --- | --- | --- |
+| 0 | (radius-ref + a) / cos(t from the middle of a side) - radius-ref | polygon around the circle of radius-ref + a |
+| 1 | the same with the middles at (radius-ref + a) * cos(180 / fmult) | polygon inside of it |
+| 2 | a / 2 * (1 - cos(fmult t)) | sine |
+| 3 | a in the middle half of each wave, else 0 | square wave |
+
+A polygon needs an `fmult` of 3 or more. `kcounts` is the offset times `k`, without its fraction. A rising edge of `enable-in` starts;
+when it falls `clear` is TRUE until `active` is FALSE. When the shape cannot be, the offset is taken back, and
+`enable-in` has to rise again.
+
+    loadrt eoffset_per_angle names=opa
+    addf opa servo
+    setp opa.fnum 1
+    setp opa.fmult 4
+    setp opa.radius-ref 10
+    net c-angle => opa.angle
+    net machine-on => opa.is-on
+    net go => opa.enable-in
+    net x-offset <= opa.kcounts
+)")

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct Gantry : hal::Component {
+    using Component::Component;
+    hal::Argument personality{*this, "personality", 2, "how many joints", {.per_instance = true, .min = 1, .max = 64}};
+
+    hal::Function read{*this, "read", &Gantry::read_joints, "computes feedback and the combined switches; before the motion"};
+    hal::Function write{*this, "write", &Gantry::write_joints, "computes the commands of the joints; after the motion"};
+    hal::Outs<double> pos_cmd{*this, "joint.##.pos-cmd", personality, "position for joint ##"};
+    hal::Ins<double>  pos_fb{*this, "joint.##.pos-fb", personality, "position of joint ##"};
+    hal::Ins<bool>    joint_home{*this, "joint.##.home", personality, "home switch of joint ##"};
+    hal::Outs<double> offset{*this, "joint.##.offset", personality, "position-cmd - pos-cmd of joint ##, found while homing"};
+    hal::In<double>   position_cmd{*this, "position-cmd", "wanted position"};
+    hal::Out<double>  position_fb{*this, "position-fb", "position, from joint 0"};
+    hal::Out<bool>    home{*this, "home", "TRUE from when all home switches are on until all are off again"};
+    hal::Out<bool>    limit{*this, "limit", "TRUE while any home switch is on"};
+    hal::In<double>   search_vel{*this, "search-vel", "its sign says in which direction the home switches are"};
+
+    void read_joints(hal::Cycle) noexcept {
+        watch_switches();
+        position_fb = pos_fb[0] + offset[0];
+    }
+
+    void write_joints(hal::Cycle) noexcept {
+        watch_switches();
+        const bool valid = std::fabs(position_cmd) <= 1e300;
+        const double command = valid ? position_cmd.get() : last_command_;
+        const double moved = started_ ? command - last_command_ : 0.0;
+        const bool homing = !home && limit && moved * search_vel > 0.0;
+        for (std::size_t joint = 0; joint < pos_cmd.size(); ++joint) {
+            if (homing && joint_home[joint]) offset[joint] = offset[joint] + moved;
+            pos_cmd[joint] = command - offset[joint];
+        }
+        last_command_ = command;
+        started_ = started_ || valid;
+    }
+
+private:
+    void watch_switches() noexcept {
+        bool all = true, any = false;
+        for (const auto& on : joint_home) {
+            all = all && on;
+            any = any || on;
+        }
+        home = all || (any && home);
+        limit = any;
+    }
+    double last_command_ = 0.0;
+    bool started_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Gantry, "gantry", "Drives several joints from one axis and squares them while homing", R"(
+All joints follow `position-cmd`, each with an offset of its own: pos-cmd = position-cmd - offset. While `position-cmd` moves in the
+direction of `search-vel` and some but not all home switches are on, the joints whose switch is on stand still, and their offset takes
+up the motion. When the last switch comes on the offsets are found: all joints move together again, and stay so until all switches have
+been off. The joint stops without a ramp, so home slowly, and let HOME_SEARCH_VEL and HOME_LATCH_VEL have the same sign.
+
+`personality` is the number of joints, 2 when it is not given. `position-fb` is that of joint 0 with its offset. An input that is not
+a number leaves the last command.
+
+    loadrt gantry names=y personality=2
+    addf y.read servo
+    addf y.write servo
+    setp y.search-vel -5
+    net y-cmd   => y.position-cmd
+    net y-fb    <= y.position-fb
+    net y-home  <= y.home
+    net y-left  <= y.joint.00.pos-cmd
+    net y-right <= y.joint.01.pos-cmd
+)")

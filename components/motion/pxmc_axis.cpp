@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "hal/component.hpp"
+#include "profile.hpp"
+
+namespace {
+
+/// The values of pin `error-code`. Published: never renumber.
+enum Error : std::uint32_t {
+    none = 0,
+    following_error = 1,
+    below_min = 2,
+    above_max = 3,
+    too_fast = 4,
+    bad_feedback = 5,
+    bad_parameter = 6,
+};
+
+struct PxmcAxis : hal::Component {
+    using Component::Component;
+
+    hal::In<bool> enable{*this, "enable", "TRUE closes the loop where the axis is; FALSE: output is 0"};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears the error when its cause is gone"};
+    hal::In<double> actual_position{*this, "actual-position", "measured"};
+    hal::In<bool> go{*this, "go", "a rising edge starts a move to requested-position"};
+    hal::In<double> requested_position{*this, "requested-position", "where to go at the next go"};
+    hal::In<bool> speed_mode{*this, "speed-mode", "TRUE: goes at requested-speed instead"};
+    hal::In<double> requested_speed{*this, "requested-speed",
+                                    "speed-mode: the wanted speed; else that of the move, 0: max-speed", {.unit = "1/s"}};
+    hal::In<bool> stop_in{*this, "stop", "TRUE brakes to rest and forgets the move"};
+
+    hal::In<double> max_speed{*this, "max-speed", "of the trajectory", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<double> max_acceleration{*this, "max-acceleration", "of the trajectory", {.initial = 1.0, .unit = "1/s^2"}};
+    hal::In<double> max_jerk{*this, "max-jerk", "of the trajectory; 0: none", {.unit = "1/s^3"}};
+    hal::In<double> p_gain{*this, "P", "output per following error", {.initial = 1.0}};
+    hal::In<double> i_gain{*this, "I", "output per following error and second"};
+    hal::In<double> d_gain{*this, "D", "output per difference of speed"};
+    hal::In<double> feed_forward{*this, "FF", "output per commanded speed"};
+    hal::In<double> max_output{*this, "max-output", "limit on the output; 0: none"};
+
+    hal::In<double> max_following_error{*this, "max-following-error", "beyond it the axis is in error; 0: not watched"};
+    hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -motion::farthest}};
+    hal::In<double> max_position{*this, "max-position", "highest position", {.initial = motion::farthest}};
+    hal::In<double> position_margin{*this, "position-margin", "how far beyond these it may be measured; 0: not watched"};
+    hal::In<double> overspeed{*this, "overspeed", "highest measured speed against max-speed; 0: not watched"};
+    hal::In<double> speed_filter{*this, "speed-filter", "time constant of actual-speed", {.unit = "s"}};
+    hal::In<double> window{*this, "position-window", "busy lasts until the axis is as close; 0: until the trajectory ends"};
+
+    hal::Out<double> output{*this, "output", "to the motor", {.safe = 0.0, .finite = true}};
+    hal::Out<double> position{*this, "commanded-position", "of the trajectory", {.finite = true}};
+    hal::Out<double> speed{*this, "commanded-speed", "of the trajectory", {.unit = "1/s", .finite = true}};
+    hal::Out<double> actual_speed{*this, "actual-speed", "measured", {.unit = "1/s", .finite = true}};
+    hal::Out<double> error_out{*this, "following-error", "commanded - actual position", {.finite = true}};
+    hal::Out<bool> busy{*this, "busy", "TRUE: a move is under way"};
+    hal::Out<bool> error{*this, "error", "TRUE: the axis is switched off by a fault; see error-code"};
+    hal::Out<std::uint32_t> error_code{*this, "error-code", "which; see the table"};
+    hal::Out<bool> request_limited{*this, "request-limited", "TRUE: the position or the speed asked for is beyond a limit and is cut"};
+
+    hal::Function run{*this, "do-control", &PxmcAxis::update, "measures, watches, plans and controls"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double dt = cycle.seconds();
+        const bool gone = go && !was_go_, cleared = reset && !was_reset_;
+        was_go_ = go, was_reset_ = reset;
+
+        const bool measured = std::isfinite(actual_position) && std::fabs(actual_position) <= motion::farthest;
+        if (measured) measure(dt);
+        motion::Limits limits;
+        const bool sound = motion::Limits::from(max_speed, max_acceleration, 0.0, max_jerk, limits) && min_position <= max_position;
+
+        std::uint32_t found = none;  // what would be wrong with an axis that is off
+        if (!sound) found = bad_parameter;
+        else if (!measured) found = bad_feedback;
+        if (cleared && found == none) code_ = none;
+        const bool on = enable && code_ == none;
+        if (on && found == none && was_on_) found = watch(limits);
+        if (on && found != none) code_ = found;
+        was_on_ = enable && code_ == none;
+        if (!was_on_) return rest();
+
+        if (closing_) generator_.put(measured_), integral_ = 0.0, moves_ = false;
+        closing_ = false;
+        command(limits, gone);
+        generator_.advance(dt);
+        control(dt);
+    }
+
+private:
+    void measure(double dt) noexcept {
+        const double raw = has_measured_ ? (actual_position - measured_) / dt : 0.0;
+        const double share = speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
+        speed_ += share * (raw - speed_);
+        if (!std::isfinite(speed_)) speed_ = 0.0;
+        measured_ = actual_position;
+        has_measured_ = true;
+        actual_speed = speed_;
+    }
+
+    std::uint32_t watch(const motion::Limits& limits) const noexcept {
+        if (position_margin > 0.0) {  // an axis that is led back from beyond a limit is no fault: only what moves on outwards
+            if (measured_ < min_position - position_margin && generator_.state().velocity <= 0.0 && speed_ < 0.0) return below_min;
+            if (measured_ > max_position + position_margin && generator_.state().velocity >= 0.0 && speed_ > 0.0) return above_max;
+        }
+        if (overspeed > 0.0 && std::fabs(speed_) > overspeed * limits.velocity) return too_fast;
+        if (max_following_error > 0.0 && std::fabs(generator_.state().position - measured_) > max_following_error) return following_error;
+        return none;
+    }
+
+    void command(motion::Limits limits, bool gone) noexcept {
+        const double low = std::max(min_position.get(), -motion::farthest), high = std::min(max_position.get(), motion::farthest);
+        const double asked = std::isfinite(requested_speed) ? requested_speed.get() : 0.0;
+        if (stop_in) moves_ = false;
+        else if (speed_mode) {
+            // Towards the limit of position at that speed: so it also stops there in time.
+            moves_ = false;
+            request_limited = std::fabs(asked) > limits.velocity;
+            if (asked != 0.0) {
+                limits.velocity = std::clamp(std::fabs(asked), 1e-18, limits.velocity);
+                return generator_.go_to(asked > 0.0 ? high : low, limits);
+            }
+        } else if (gone && std::isfinite(requested_position)) {
+            target_ = requested_position;
+            moves_ = true;
+        }
+        if (!moves_) return generator_.go_at(0.0, limits);
+        const double to = std::clamp(target_, low, high);
+        request_limited = to != target_ || std::fabs(asked) > limits.velocity;
+        if (asked != 0.0) limits.velocity = std::clamp(std::fabs(asked), 1e-18, limits.velocity);
+        generator_.go_to(to, limits);
+    }
+
+    void control(double dt) noexcept {
+        const motion::State& now = generator_.state();
+        const double e = now.position - measured_, most = std::fabs(max_output);
+        double integral = integral_ + e * dt;
+        const auto effort = [&](double sum) {
+            return p_gain * e + i_gain * sum + d_gain * (now.velocity - speed_) + feed_forward * now.velocity;
+        };
+        double wanted = effort(integral);
+        // What would push farther into saturation is not integrated.
+        if (most > 0.0 && std::fabs(wanted) > most && i_gain * e * wanted > 0.0) wanted = effort(integral = integral_);
+        if (!std::isfinite(wanted)) {
+            code_ = bad_parameter;
+            was_on_ = false;
+            return rest();
+        }
+        integral_ = integral;
+        output = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
+        busy = (!generator_.arrived() || generator_.moving() || (moves_ && window > 0.0 && std::fabs(e) > window));
+        show();
+    }
+
+    void rest() noexcept {
+        closing_ = true;
+        moves_ = false;
+        generator_.put(measured_);
+        output = 0.0;
+        busy = false;
+        request_limited = false;
+        show();
+    }
+    void show() noexcept {
+        position = generator_.state().position;
+        speed = generator_.state().velocity;
+        error_out = generator_.state().position - measured_;
+        error = code_ != none;
+        error_code = code_;
+    }
+
+    motion::Generator generator_;
+    double measured_ = 0.0, speed_ = 0.0, integral_ = 0.0, target_ = 0.0;
+    std::uint32_t code_ = none;
+    bool was_go_ = false, was_reset_ = false, was_on_ = false, closing_ = true, moves_ = false, has_measured_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(PxmcAxis, "pxmc_axis", "Position controller of one axis: trajectory, PID, supervision", R"(
+One axis as the motion controllers of small mobile robots have it: it is told a position or a speed, plans the way, closes the loop and
+watches it.
+
+    commanded = time-optimal way to requested-position within max-speed, max-acceleration, max-jerk (see motion_profile)
+    e         = commanded-position - actual-position
+    output    = P e + I * integral of e + D (commanded-speed - actual-speed) + FF commanded-speed,  at most max-output
+
+(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 4.3; the trajectory: T. Kroeger, *On-Line Trajectory
+Generation in Robotic Systems*, Springer 2010.) Units are those of `actual-position`; all limits and gains may change at any time.
+
+* `enable` closes the loop where the axis is, at rest. A rising edge of `go` starts a move; another one, on the way, too.
+* `speed-mode` goes at `requested-speed`, and stops at `min-position` and `max-position`. Positions beyond them are cut
+  (`request-limited`).
+* `stop` brakes by `max-acceleration`. `busy` is TRUE while the trajectory runs (and until the axis is within `position-window`).
+* The integral is held while it would push farther into saturation.
+
+An error takes `output` to 0 in the same cycle and stays until a rising edge of `reset`; after it the axis holds where it is.
+
+| error-code | |
+| --- | --- |
+| 0 | none |
+| 1 | following error above `max-following-error` |
+| 2, 3 | measured below `min-position` or above `max-position` by more than `position-margin`, and moving on outwards |
+| 4 | measured speed above `overspeed` * `max-speed` |
+| 5 | the feedback is not a number |
+| 6 | a limit is 0, negative or not a number, or a gain gives no number |
+
+    loadrt pxmc_axis names=left-wheel
+    addf left-wheel.do-control servo
+    setp left-wheel.max-speed 1
+    setp left-wheel.max-acceleration 5
+    setp left-wheel.max-following-error 0.05
+    setp left-wheel.P 100
+    net left-position => left-wheel.actual-position
+    net left-effort   <= left-wheel.output
+    net left-busy     <= left-wheel.busy
+)")

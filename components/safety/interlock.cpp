@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct Interlock : hal::Component {
+    using Component::Component;
+
+    hal::Argument inputs{*this, "inputs", 8, "how many conditions", {.min = 1, .max = 64}};
+    hal::Ins<bool> in{*this, "in-##", inputs, "condition ##: TRUE is well"};
+    hal::Ins<double> delay{*this, "delay-##", inputs, "how long condition ## has to be bad to count", {.unit = "s"}};
+    hal::In<std::uint64_t> use{*this, "use-mask", "bit n: condition n is watched", {.initial = ~std::uint64_t{0}}};
+    hal::In<std::uint64_t> invert{*this, "invert-mask", "bit n: condition n is well when FALSE"};
+    hal::In<std::uint64_t> latch{*this, "latch-mask", "bit n: condition n stays bad until reset", {.initial = ~std::uint64_t{0}}};
+    hal::In<std::uint64_t> warn{*this, "warn-mask", "bit n: condition n only warns"};
+    hal::In<std::uint64_t> bypass{*this, "bypass-mask", "bit n: condition n is bypassed while bypass-enable is TRUE"};
+    hal::In<bool> bypass_enable{*this, "bypass-enable", "the key for the bypass"};
+    hal::In<double> bypass_time{*this, "bypass-time", "longest bypass; 0: no limit", {.unit = "s"}};
+    hal::In<bool> acknowledge{*this, "acknowledge", "a rising edge silences the horn and stops the flashing"};
+    hal::In<bool> reset{*this, "reset", "a rising edge frees latched conditions that are well again"};
+    hal::In<bool> start_needs_reset{*this, "start-needs-reset", "TRUE: ok waits for a reset after the start, too", {.initial = true}};
+
+    hal::Out<bool> ok{*this, "ok", "TRUE: every condition that is watched is well", {.safe = false}};
+    hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: pressing reset gives ok"};
+    hal::Out<bool> warning{*this, "warning", "TRUE: a condition that only warns is bad"};
+    hal::Out<bool> bypassed{*this, "bypassed", "TRUE: a watched condition is bypassed"};
+    hal::Out<bool> horn{*this, "horn", "TRUE: something new has gone bad, until acknowledge"};
+    hal::Out<std::int32_t> first{*this, "first", "the condition that took ok away first; -1: none", {.initial = -1}};
+    hal::Out<std::uint64_t> first_mask{*this, "first-mask", "bits of all that did in that same cycle"};
+    hal::Out<std::uint64_t> bad{*this, "bad-mask", "bits of the conditions that are bad now"};
+    hal::Out<std::uint64_t> tripped{*this, "tripped-mask", "bits of the conditions that are bad or latched"};
+    hal::Out<double> since{*this, "since", "how long ok has been FALSE", {.unit = "s", .finite = true}};
+    hal::Out<std::uint32_t> trips{*this, "trips", "how often ok has gone FALSE"};
+    hal::Outs<bool> lamp{*this, "lamp-##", inputs, "lamp of condition ##: see the table"};
+
+    hal::Function run{*this, "", &Interlock::update, "looks at all conditions"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const bool pressed = reset && !was_reset_, heard = acknowledge && !was_acknowledged_;
+        was_reset_ = reset, was_acknowledged_ = acknowledge;
+        const double dt = cycle.seconds();
+        phase_ns_ = (phase_ns_ + cycle.period_ns()) % second_ns;
+        const std::uint64_t watched = use & everything();
+
+        bypass_for_ = bypass_enable ? std::min(bypass_for_ + dt, 1e9) : 0.0;
+        const bool key = bypass_enable && !(bypass_time > 0.0 && bypass_for_ > bypass_time);
+        const std::uint64_t skipped = key ? bypass & watched : 0;
+
+        const std::uint64_t now = look(watched & ~skipped, dt), fresh = now & ~tripped_;
+        const std::uint64_t stops = ~warn.get();
+        tripped_ = (tripped_ & latch & watched & ~skipped) | now;
+        if (pressed) tripped_ = now;
+        unheard_ = (unheard_ | fresh) & tripped_;
+        if (heard) unheard_ = 0;
+
+        // After a stop of the runtime, which wrote the safe value, and at the start ok waits for a reset.
+        if (!has_run_ ? start_needs_reset.get() : was_ok_ && !ok) waits_ = true;
+        has_run_ = true;
+        if (pressed && (tripped_ & stops) == 0) waits_ = false;
+        const bool well = (tripped_ & stops) == 0 && !waits_;
+        if (was_ok_ && !well) {
+            trips = trips + 1;
+            since_ = 0.0;
+        } else if (!well) {
+            since_ = std::min(since_ + dt, 1e9);
+        }
+        if (well || (tripped_ & stops) == 0) first_ = 0;
+        else if (first_ == 0) first_ = (fresh & stops) != 0 ? fresh & stops : tripped_ & stops;
+        was_ok_ = well;
+        show(well, now, stops, skipped != 0);
+    }
+
+private:
+    static constexpr std::int64_t second_ns = 1'000'000'000;
+    std::uint64_t everything() const noexcept { return in.size() >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << in.size()) - 1; }
+
+    /// The conditions among `watched` that are bad for as long as they have to be.
+    std::uint64_t look(std::uint64_t watched, double dt) noexcept {
+        std::uint64_t found = 0;
+        for (std::size_t i = 0; i < in.size(); ++i) {
+            const std::uint64_t bit = std::uint64_t{1} << i;
+            const bool well = in[i] != ((invert & bit) != 0);
+            if (well || (watched & bit) == 0) bad_for_[i] = 0.0;
+            else if (!(delay[i] > 0.0) || (bad_for_[i] = std::min(bad_for_[i] + dt, 1e9)) > delay[i] + dt * 1e-6) found |= bit;
+        }
+        return found;
+    }
+
+    void show(bool well, std::uint64_t now, std::uint64_t stops, bool skipping) noexcept {
+        ok = well;
+        ready = !well && (now & stops) == 0;
+        warning = (tripped_ & ~stops) != 0;
+        bypassed = skipping;
+        horn = unheard_ != 0;
+        first = first_ != 0 ? std::countr_zero(first_) : -1;
+        first_mask = first_;
+        bad = now;
+        tripped = tripped_;
+        since = well ? 0.0 : since_;
+        const bool fast = phase_ns_ % (second_ns / 4) < second_ns / 8, slow = phase_ns_ < second_ns / 2;
+        for (std::size_t i = 0; i < lamp.size(); ++i) {
+            const std::uint64_t bit = std::uint64_t{1} << i;
+            const bool flashing = (unheard_ & bit) != 0, is_first = (first_ & bit) != 0;
+            lamp[i] = is_first && flashing ? fast : is_first || flashing ? slow : (tripped_ & bit) != 0;
+        }
+    }
+
+    double bad_for_[64] = {}, since_ = 0.0, bypass_for_ = 0.0;
+    std::uint64_t tripped_ = 0, unheard_ = 0, first_ = 0;
+    std::int64_t phase_ns_ = 0;
+    bool was_reset_ = false, was_acknowledged_ = false, was_ok_ = false, waits_ = false, has_run_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Interlock, "interlock", "A table of conditions that all have to hold, with first-out annunciation", R"(
+`ok` is TRUE while every watched condition is well. When it goes FALSE, `first` says which condition began it, whatever follows from that:
+the first-out sequence of ISA-18.1. Masks have a bit per condition (bit 0 is `in-00`; hexadecimal is welcome: 0x11).
+
+| mask | bit n set |
+| --- | --- |
+| use-mask | condition n is watched |
+| invert-mask | it is well when FALSE |
+| latch-mask | once bad it stays so until a rising edge of `reset` |
+| warn-mask | it does not touch `ok`, only `warning` |
+| bypass-mask | it is not watched while the key `bypass-enable` is TRUE (at most for `bypass-time`) |
+
+| lamp-## | |
+| --- | --- |
+| off | well |
+| flashes 4 times a second | the first one, not acknowledged |
+| flashes once a second | the first one, acknowledged; or another one, not acknowledged |
+| steady | bad or latched, acknowledged, not the first one |
+
+`delay-##` filters a condition that flickers. `acknowledge` silences `horn`; `reset` frees what is well again. With `start-needs-reset`
+the start needs a reset, and a stop or a fault of the runtime always does. This is software on one computer: it is no certified safety
+function.
+
+    loadrt interlock names=spindle-may-run inputs=4
+    addf spindle-may-run servo
+    setp spindle-may-run.invert-mask 0x4
+    setp spindle-may-run.delay-01 0.5
+    net door-closed   => spindle-may-run.in-00
+    net oil-pressure  => spindle-may-run.in-01
+    net overheated    => spindle-may-run.in-02
+    net tool-clamped  => spindle-may-run.in-03
+    net spindle-ok    <= spindle-may-run.ok
+)")

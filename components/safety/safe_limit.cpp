@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace {
+
+/// Values of the reaction pins. Published: never renumber.
+enum Reaction : std::uint32_t { off = 0, warn = 1, limit = 2, stop_2 = 3, stop_1 = 4, stop_0 = 5 };
+
+/// Values of pin `state`.
+enum State : std::uint32_t { running = 0, braking_2 = 1, standing_2 = 2, braking_1 = 3, powerless = 4 };
+
+/// Values of pin `reason`, of which the first to cause a stop is kept.
+enum Reason : std::uint32_t {
+    none = 0,
+    position_below = 1,
+    position_above = 2,
+    speed = 3,
+    slew = 4,
+    no_number = 5,
+    bad_parameter = 6,
+    did_not_stop = 7,
+    did_not_stand = 8,
+    not_reset = 9,
+    asked = 10,
+};
+
+struct SafeLimit : hal::Component {
+    using Component::Component;
+
+    hal::In<double> position{*this, "position", "measured"};
+    hal::In<double> velocity{*this, "velocity", "measured; taken from position while unlinked", {.unit = "1/s"}};
+    hal::In<double> command{*this, "command", "the wanted speed", {.unit = "1/s"}};
+    hal::In<bool> reset{*this, "reset", "a rising edge ends a stop when its cause is gone"};
+    hal::In<bool> stop_in{*this, "stop-in", "TRUE: a stop 1 is asked for from outside"};
+
+    hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -1e15}};
+    hal::In<double> max_position{*this, "max-position", "highest position", {.initial = 1e15}};
+    hal::In<double> max_speed{*this, "max-speed", "largest speed", {.initial = 1e15, .unit = "1/s"}};
+    hal::In<double> max_slew{*this, "max-slew", "largest change of speed", {.initial = 1e15, .unit = "1/s^2"}};
+    hal::Param<std::uint32_t> position_reaction{*this, "position-reaction",
+                                                "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = stop_1}};
+    hal::Param<std::uint32_t> speed_reaction{*this, "speed-reaction",
+                                             "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = stop_1}};
+    hal::Param<std::uint32_t> slew_reaction{*this, "slew-reaction",
+                                            "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = warn}};
+    hal::Param<double> filter_time{*this, "filter-time", "how long a limit may be exceeded; adds to the reaction time", {.unit = "s"}};
+    hal::Param<double> speed_filter{*this, "speed-filter", "time constant of the speed taken from position", {.unit = "s"}};
+    hal::Param<double> stop_deceleration{*this, "stop-deceleration",
+                                         "by which the command is taken to 0 in a stop 1 and 2", {.initial = 1.0, .unit = "1/s^2"}};
+    hal::Param<double> stop_time{*this, "stop-time", "a stop 1 or 2 that lasts longer becomes a stop 0", {.initial = 5.0, .unit = "s"}};
+    hal::Param<double> standstill_speed{*this, "standstill-speed", "below it the axis stands", {.initial = 0.01, .unit = "1/s"}};
+    hal::Param<double> standstill_time{*this, "standstill-time",
+                                       "for so long, so that a swing is not taken for it", {.initial = 0.05, .unit = "s"}};
+    hal::Param<double> standstill_window{*this, "standstill-window", "how far it may move while it stands in a stop 2; 0: not watched"};
+
+    hal::Out<double> command_out{*this, "command-out", "the speed it may have", {.unit = "1/s", .safe = 0.0, .finite = true}};
+    hal::Out<bool> power{*this, "power", "TRUE: the drive may have power", {.safe = false}};
+    hal::Out<bool> ok{*this, "ok", "TRUE: no limit is exceeded and no stop is on", {.safe = false}};
+    hal::Out<bool> warning{*this, "warning", "TRUE: a limit is exceeded"};
+    hal::Out<bool> limiting{*this, "limiting", "TRUE: command-out is less than command"};
+    hal::Out<bool> stopping{*this, "stop", "TRUE: a stop is on, until reset"};
+    hal::Out<std::uint32_t> state{*this, "state",
+                                  "0 runs; 1 brakes, 2 stands in stop 2; 3 brakes in stop 1; 4 without power", {.initial = powerless}};
+    hal::Out<std::uint32_t> reason{*this, "reason", "why it stopped, or what is exceeded; see the table", {.initial = not_reset}};
+    hal::Out<double> speed_out{*this, "speed", "the speed that is watched", {.unit = "1/s", .finite = true}};
+    hal::Out<double> slew_out{*this, "slew", "the change of speed that is watched", {.unit = "1/s^2", .finite = true}};
+
+    hal::Function run{*this, "", &SafeLimit::update, "watches the axis and passes the command"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double dt = cycle.seconds();
+        const bool pressed = reset && !was_reset_;
+        was_reset_ = reset;
+        // The host wrote the safe value (stop, a fault): going on needs a reset.
+        if (state_ != powerless && !power && has_run_) trip(powerless, not_reset);
+        has_run_ = true;
+
+        const bool measured = measure(dt);
+        const std::uint32_t found = check(measured, dt);
+        const bool sound = parameters_sound();
+        if (!sound) trip(powerless, bad_parameter);
+        else if (!measured) trip(powerless, no_number);
+        else if (stop_in) trip(braking_1, asked);
+        else if (pressed && state_ != running && (may_return_ || !stops(found))) release(found);
+        else if (stops(found)) trip(state_of(reaction(found)), found);
+        if (sound && measured) follow_stop(dt);
+        pass(found, dt);
+    }
+
+private:
+    static bool usable(double x) noexcept { return std::fabs(x) <= 1e15; }
+
+    bool parameters_sound() const noexcept {
+        return min_position <= max_position && max_speed >= 0.0 && max_slew >= 0.0 && filter_time >= 0.0 && stop_deceleration > 0.0 &&
+               stop_time >= 0.0 && standstill_speed >= 0.0 && standstill_time >= 0.0 && standstill_window >= 0.0 &&
+               std::max({position_reaction.get(), speed_reaction.get(), slew_reaction.get()}) <= stop_0;
+    }
+
+    bool measure(double dt) noexcept {
+        if (!usable(position) || (velocity.linked() && !usable(velocity))) {
+            known_ = 0;
+            return false;
+        }
+        const double raw = velocity.linked() ? velocity.get() : known_ > 0 ? (position - position_) / dt : 0.0;
+        const double share = !velocity.linked() && speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
+        const double before = speed_;
+        speed_ = known_ > 0 ? speed_ + share * (raw - speed_) : raw;
+        slew_ = known_ > (velocity.linked() ? 0 : 1) ? (speed_ - before) / dt : 0.0;
+        if (!std::isfinite(slew_)) slew_ = 0.0;
+        position_ = position;
+        known_ = std::min(known_ + 1, 2);
+        return true;
+    }
+
+    std::uint32_t reaction(std::uint32_t what) const noexcept {
+        if (what == returning_ && what != none) return std::min<std::uint32_t>(position_reaction, warn);
+        switch (what) {
+            case position_below:
+            case position_above: return position_reaction;
+            case speed: return speed_reaction;
+            case slew: return slew_reaction;
+            default: return off;
+        }
+    }
+    bool stops(std::uint32_t what) const noexcept { return reaction(what) >= stop_2; }
+    static std::uint32_t state_of(std::uint32_t of_reaction) noexcept {
+        return of_reaction == stop_2 ? braking_2 : of_reaction == stop_1 ? braking_1 : powerless;
+    }
+
+    /// What has been exceeded for longer than the filter time; of several what has the strongest reaction.
+    std::uint32_t check(bool measured, double dt) noexcept {
+        const bool exceeded[] = {position < min_position, position > max_position, std::fabs(speed_) > max_speed,
+                                 std::fabs(slew_) > max_slew};
+        const double outwards = returning_ == position_above ? speed_ : -speed_;
+        if (returning_ != none && measured && (!exceeded[returning_ - 1] || outwards > standstill_speed)) returning_ = none;
+        std::uint32_t worst = none;
+        for (std::uint32_t what = position_below; what <= slew; ++what) {
+            double& since = since_[what];
+            if (!measured || !exceeded[what - 1] || reaction(what) == off) {
+                since = 0.0;
+                continue;
+            }
+            since += dt;
+            if (since <= filter_time + dt * 1e-6 && filter_time > 0.0) continue;
+            if (worst == none || reaction(what) > reaction(worst)) worst = what;
+        }
+        may_return_ = (worst == position_below || worst == position_above) && std::fabs(speed_) <= standstill_speed;
+        return worst;
+    }
+
+    /// A stronger stop takes over from a weaker one; the first reason stays.
+    void trip(std::uint32_t to, std::uint32_t why) noexcept {
+        returning_ = none;
+        if (reason_ == not_reset) reason_ = why;  // what keeps the reset from helping
+        if (state_ == running) {
+            reason_ = why;
+            lasted_ = stood_for_ = 0.0;
+            given_ = usable(command_out) ? command_out.get() : 0.0;
+        }
+        if (to == braking_2 && state_ == standing_2) return;
+        if (to > state_) {
+            state_ = to;
+        }
+    }
+    void release(std::uint32_t found) noexcept {
+        if (may_return_) returning_ = found;  // until it is back within, or moves outwards
+        state_ = running;
+        reason_ = none;
+        given_ = 0.0;
+    }
+
+    void follow_stop(double dt) noexcept {
+        if (state_ == running || state_ == powerless) return;
+        lasted_ += dt;
+        stood_for_ = std::fabs(speed_) <= standstill_speed && given_ == 0.0 ? stood_for_ + dt : 0.0;
+        const bool stands = stood_for_ > standstill_time + dt * 1e-6;
+        if (state_ == standing_2) {
+            const bool moved = standstill_window > 0.0 && std::fabs(position_ - stood_at_) > standstill_window;
+            if (moved) state_ = powerless, reason_ = did_not_stand;
+        } else if (stands) {
+            stood_at_ = position_;
+            state_ = state_ == braking_2 ? standing_2 : powerless;
+        } else if (lasted_ > stop_time) {
+            state_ = powerless;
+            reason_ = did_not_stop;
+        }
+    }
+
+    void pass(std::uint32_t found, double dt) noexcept {
+        const double wanted = usable(command) ? command.get() : 0.0;
+        if (state_ == powerless || state_ == standing_2) {
+            given_ = 0.0;
+        } else if (state_ != running) {
+            const double less = stop_deceleration * dt;
+            given_ = std::fabs(given_) <= less ? 0.0 : given_ - std::copysign(less, given_);
+        } else {
+            double allowed = wanted;
+            if (speed_reaction == limit) allowed = std::clamp(allowed, -max_speed, +max_speed);
+            if (slew_reaction == limit) allowed = std::clamp(allowed, given_ - max_slew * dt, given_ + max_slew * dt);
+            // Inwards is always free; also out of a place in which a reset was given.
+            if (position_reaction != off && position_reaction != warn) {
+                if (position_ >= max_position) allowed = std::min(allowed, 0.0);
+                if (position_ <= min_position) allowed = std::max(allowed, 0.0);
+            }
+            given_ = allowed;
+        }
+        command_out = given_;
+        power = state_ != powerless;
+        warning = found != none;
+        limiting = state_ == running && given_ != wanted;
+        stopping = state_ != running;
+        ok = state_ == running && found == none;
+        state = state_;
+        reason = state_ != running ? reason_ : found;
+        speed_out = speed_;
+        slew_out = slew_;
+    }
+
+    double position_ = 0.0, speed_ = 0.0, slew_ = 0.0, given_ = 0.0, lasted_ = 0.0, stood_for_ = 0.0, stood_at_ = 0.0;
+    double since_[5] = {};
+    std::uint32_t state_ = powerless, reason_ = not_reset, returning_ = none;
+    int known_ = 0;  // measurements so far: speed needs two, slew three
+    bool was_reset_ = false, has_run_ = false, may_return_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(SafeLimit, "safe_limit", "Supervision of position, speed and slew, with warning, limiting and stops", R"(
+Stands between what commands the speed of an axis and its drive, and watches the axis itself. Every limit has a reaction, in the sense of
+IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA with STO, SS1, SS2):
+
+| reaction | |
+| --- | --- |
+| 0 | none |
+| 1 | `warning` only |
+| 2 | `command-out` is cut to the limit: to +-`max-speed`; by `max-slew`; to no outward motion at a limit of position |
+| 3 | stop 2: the command goes to 0 by `stop-deceleration`, power stays; moving by more than `standstill-window` then is a stop 0 |
+| 4 | stop 1: the same, then, when it has stood for `standstill-time`, power off |
+| 5 | stop 0: power off in the same cycle |
+
+    speed = velocity, or (position - position before) / period through the filter speed-filter,   slew = change of speed / period
+
+A limit counts as exceeded in the cycle in which it is (plus `filter-time`). A stop stays until a rising edge of `reset` when the cause is
+gone, so it begins: the first reset gives the power. Beyond a limit of position a reset helps when the axis stands, and then it may move
+inwards only. A stop that takes longer than `stop-time`, a value that is not a number, a bad parameter are a stop 0; a stop or a fault of
+the runtime needs a reset. `stop-in` is a stop 1 from outside. Wire `power` to the drive's enable. This is software on one computer: it is
+no certified safety function.
+
+| reason | |
+| --- | --- |
+| 0 | nothing exceeded |
+| 1, 2 | below `min-position`, above `max-position` |
+| 3, 4 | speed, slew |
+| 5 | a measured value is not a number |
+| 6 | a parameter makes no sense |
+| 7, 8 | it did not stop within `stop-time`, it left the place where it stood |
+| 9 | waiting for the first reset, or for that after a stop of the runtime |
+| 10 | `stop-in` |
+
+    loadrt safe_limit names=x-guard
+    addf x-guard servo
+    setp x-guard.max-speed 120
+    setp x-guard.min-position -50
+    setp x-guard.max-position 50
+    setp x-guard.stop-deceleration 500
+    net x-position => x-guard.position
+    net x-wanted   => x-guard.command
+    net x-speed    <= x-guard.command-out
+    net x-power    <= x-guard.power
+)")

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include "hal/component.hpp"
+
+namespace {
+
+struct SafetyLatch : hal::Component {
+    using Component::Component;
+    hal::In<bool>          error_in{*this, "error-in", "TRUE: something is wrong in this cycle"};
+    hal::In<std::int32_t>  heal{*this, "heal", "what a good cycle takes off the count", {.initial = 1}};
+    hal::In<std::int32_t>  harm{*this, "harm", "what a bad cycle adds to the count", {.initial = 1}};
+    hal::In<bool>          latching{*this, "latching", "TRUE: the error stays until reset; FALSE: until the count is low again",
+                                    {.initial = true}};
+    hal::In<bool>          reset{*this, "reset", "a rising edge clears the count and the error"};
+    hal::In<std::int32_t>  threshold{*this, "threshold", "a count above this is an error", {.initial = 100}};
+    hal::In<std::int32_t>  min{*this, "min", "smallest count", {.initial = 0}};
+    hal::In<std::int32_t>  max{*this, "max", "largest count", {.initial = 1000}};
+    hal::In<bool>          enable{*this, "enable", "FALSE: error-out is error-in", {.initial = true}};
+    hal::Out<std::int32_t> count{*this, "count", "the present count"};
+    hal::Out<bool>         error_out{*this, "error-out", "TRUE: there is an error", {.safe = true}};
+    hal::Out<bool>         ok_out{*this, "ok-out", "FALSE: there is an error", {.initial = true, .safe = false}};
+    hal::Function          run{*this, "", &SafetyLatch::update, "counts the errors"};
+
+    void update(hal::Cycle) noexcept {
+        const bool cleared = reset && !was_reset_;
+        was_reset_ = reset;
+        if (!enable || cleared) count_ = 0, latched_ = false;
+        if (enable) count_ += error_in ? std::int64_t{harm} : -std::int64_t{heal};
+        count_ = std::min(std::max(count_, std::int64_t{min}), std::int64_t{max});
+        const bool above = count_ > threshold;
+        latched_ = above || (latched_ && latching);
+        const bool error = enable ? latched_ : error_in.get();
+        count = static_cast<std::int32_t>(count_);
+        error_out = error;
+        ok_out = !error;
+    }
+
+private:
+    std::int64_t count_ = 0;
+    bool latched_ = false, was_reset_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(SafetyLatch, "safety_latch", "Error latch that forgives short disturbances", R"(
+A cycle with `error-in` TRUE adds `harm` to the count, any other takes `heal` off; it stays between `min` and `max`. A
+count above `threshold` makes `error-out` TRUE. With `latching` it stays so until a rising edge of `reset`; without, until the count
+is no longer above the threshold. While the disturbance lasts, `reset` only gives it a new run-up. When `min` is above `max`, `max` wins.
+
+LinuxCNC's manual page says of `latching` the opposite in one place, and is right in the other.
+
+    # tolerate up to 5 bad cycles, forget one in ten good ones
+    loadrt safety_latch names=encoder-watch
+    addf encoder-watch servo
+    setp encoder-watch.harm 10
+    setp encoder-watch.threshold 50
+    net encoder-fault  => encoder-watch.error-in
+    net operator-reset => encoder-watch.reset
+    net encoder-ok     <= encoder-watch.ok-out
+)")

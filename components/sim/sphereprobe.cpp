@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#include <cstdint>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct Sphereprobe : hal::Component {
+    using Component::Component;
+    hal::In<std::int32_t> px{*this, "px", "position of the probe, x, in counts"};
+    hal::In<std::int32_t> py{*this, "py", "position of the probe, y, in counts"};
+    hal::In<std::int32_t> pz{*this, "pz", "position of the probe, z, in counts"};
+    hal::In<std::int32_t> cx{*this, "cx", "centre, x, in counts"};
+    hal::In<std::int32_t> cy{*this, "cy", "centre, y, in counts"};
+    hal::In<std::int32_t> cz{*this, "cz", "centre, z, in counts"};
+    hal::In<std::int32_t> r{*this, "r", "radius in counts"};
+    hal::Out<bool>        probe_out{*this, "probe-out", "TRUE: the probe touches"};
+    hal::Function         run{*this, "", &Sphereprobe::update, "looks whether the probe touches"};
+
+    void update(hal::Cycle) noexcept {
+        const double x = away(px, cx), y = away(py, cy), z = away(pz, cz), radius = static_cast<double>(r);
+        probe_out = z < 0.0 || x * x + y * y + z * z <= radius * radius;
+    }
+
+private:
+    static double away(std::int32_t point, std::int32_t centre) noexcept {
+        return static_cast<double>(point) - static_cast<double>(centre);
+    }
+};
+
+}  // namespace
+
+HAL_COMPONENT(Sphereprobe, "sphereprobe", "Touches a hemisphere that is not there", R"(
+`probe-out` is TRUE while the probe is in or on the hemisphere around the centre (cx, cy, cz) with radius r that lies on a table at height
+cz, or below the table.
+
+    loadrt sphereprobe names=ball
+    addf ball servo
+    setp ball.r 5000
+    net x-counts => ball.px
+    net y-counts => ball.py
+    net z-counts => ball.pz
+    net probe    <= ball.probe-out
+)")

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include "hal/component.hpp"
+#include "linear.hpp"
+
+namespace {
+
+struct SpringDamper : hal::Component {
+    using Component::Component;
+
+    hal::In<double> force{*this, "force", "on the mass", {.unit = "N"}};
+    hal::In<double> base{*this, "base-position", "of the foot of spring and damper; it moves evenly within a period", {.unit = "m"}};
+    hal::In<bool> reset{*this, "reset", "while TRUE the mass rests where base-position is"};
+
+    hal::Param<double> mass{*this, "mass", "0: spring and damper only", {.initial = 1.0, .unit = "kg"}};
+    hal::Param<double> stiffness{*this, "stiffness", "of the spring", {.initial = 100.0, .unit = "N/m"}};
+    hal::Param<double> damping{*this, "damping", "of the damper", {.initial = 2.0, .unit = "N*s/m"}};
+
+    hal::Out<double> position{*this, "position", "of the mass", {.unit = "m", .finite = true}};
+    hal::Out<double> velocity{*this, "velocity", "of the mass", {.unit = "m/s", .finite = true}};
+    hal::Out<double> reaction{*this, "reaction", "of spring and damper on the mass", {.unit = "N", .finite = true}};
+    hal::Out<double> energy{*this, "energy", "of mass and spring", {.unit = "J", .finite = true}};
+
+    hal::Function run{*this, "update", &SpringDamper::update, "moves the mass on by one period"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double h = cycle.seconds(), foot = sim::force(base), pull = sim::force(force);
+        const double c = sim::sane(stiffness, 0.0), d = sim::sane(damping, 0.0), m = sim::sane(mass, 0.0);
+        const double foot_velocity = started_ ? (foot - foot_) / h : 0.0;
+        if (reset || !started_) heavy_.state = {reset ? 0.0 : -foot, 0.0};  // the stretch counts from the foot
+        if (!reset) {
+            if (m > 0.0) move(m, c, d, pull, foot_velocity, h);
+            else creep(c, d, pull, foot_velocity, h);
+        }
+        started_ = true;
+        foot_ = foot;
+        const auto& [stretch, v] = heavy_.state;
+        const double relative = v - (reset ? 0.0 : foot_velocity);
+        position = foot + stretch;
+        velocity = v;
+        reaction = -c * stretch - d * relative;
+        energy = m * v * v / 2 + c * stretch * stretch / 2;
+    }
+
+private:
+    using Plant = sim::Linear<2, 2>;
+
+    void move(double m, double c, double d, double pull, double foot_velocity, double h) noexcept {
+        Plant::Equations equations;
+        equations.a = {{{0, 1}, {-c / m, -d / m}}};
+        equations.b = {{{0, -1}, {1 / m, d / m}}};
+        heavy_.step(equations, {pull, foot_velocity}, h);
+    }
+    /// Without mass: d (x' - foot') = force - c stretch.
+    void creep(double c, double d, double pull, double foot_velocity, double h) noexcept {
+        double& stretch = heavy_.state[0];
+        double slope = 0.0;
+        if (d > 0.0) {
+            const double rate = c / d, gone = rate * h;
+            const double grown = gone > 1e-9 ? -std::expm1(-gone) / rate : h;  // integral of exp(-rate t)
+            const double change = (pull / d - rate * stretch) * grown;
+            stretch += change;
+            slope = (pull - c * stretch) / d;
+        } else if (c > 0.0) {
+            const double before = stretch;
+            stretch = pull / c;
+            slope = (stretch - before) / h;
+        }
+        if (!(std::fabs(stretch) + std::fabs(slope) < 1e100)) stretch = slope = 0.0;
+        heavy_.state[1] = foot_velocity + slope;
+    }
+
+    Plant heavy_;
+    double foot_ = 0.0;
+    bool started_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(SpringDamper, "spring_damper", "A mass on a spring and a damper", R"(
+    mass x'' = force - stiffness (x - base) - damping (x' - base')
+
+(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 2.1.) It swings at sqrt(stiffness / mass) rad/s with a
+damping ratio of damping / (2 sqrt(stiffness mass)), and rests at base + force / stiffness. `reaction` is what the spring and the damper
+do to the mass.
+
+The equations are solved exactly for a force that stays constant and a base that moves evenly over a period, so any period is stable.
+Parameters may change at any time; a cycle in which one does costs some microseconds more. Negative ones count as 0. With `mass` 0 spring
+and damper follow the force at once, by the time constant damping / stiffness; with none of the three nothing moves. The mass starts at 0;
+`reset` rests it on the base.
+
+    loadrt spring_damper names=contact
+    addf contact.update servo
+    setp contact.stiffness 5000
+    setp contact.damping 20
+    net push    => contact.force
+    net surface <= contact.position
+)")
