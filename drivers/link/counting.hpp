@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// What every driver counts, and how busy its bus is as seen from here.
+#pragma once
+
+#include <atomic>
+
+#include "link/can.hpp"
+#include "link/timing.hpp"
+
+namespace hal::can {
+
+/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load.
+class Counting {
+public:
+    using Count = std::atomic<std::uint64_t>;
+    Count sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, dropped{0}, errors{0}, bus_offs{0}, restarts{0};
+    std::atomic<std::uint8_t> send_errors{0}, receive_errors{0};
+    std::atomic<State> state{State::active};
+    std::atomic<std::uint32_t> bit_rate{0}, data_rate{0};  ///< 0: unknown, and no load
+
+    static void add(Count& to, std::uint64_t value = 1) noexcept { to.fetch_add(value, std::memory_order_relaxed); }
+
+    void count_sent(const Frame& f) noexcept {
+        add(sent);
+        add(sent_bytes, f.bytes().size());
+        occupy(f);
+    }
+    void count_received(const Frame& f) noexcept {
+        add(received);
+        add(received_bytes, f.bytes().size());
+        if (!f.own) occupy(f);
+    }
+    /// Closes the window of the load when it is over. Receiving thread, once per call.
+    void tick(std::int64_t now_ns) noexcept {
+        constexpr std::int64_t window_ns = 100'000'000;
+        if (now_ns >= window_start_ && now_ns - window_start_ < window_ns) return;
+        const auto busy = busy_ns_.exchange(0, std::memory_order_relaxed);
+        const auto share = static_cast<double>(busy) / static_cast<double>(now_ns > window_start_ ? now_ns - window_start_ : window_ns);
+        load_.store(share < 1.0 ? share : 1.0, std::memory_order_relaxed);
+        window_start_ = now_ns;
+    }
+    Statistics read(std::size_t queued) const noexcept {
+        const auto of = [](const auto& counter) { return counter.load(std::memory_order_relaxed); };
+        Statistics s;
+        s.state = of(state);
+        s.send_errors = of(send_errors), s.receive_errors = of(receive_errors);
+        s.sent = of(sent), s.sent_bytes = of(sent_bytes);
+        s.received = of(received), s.received_bytes = of(received_bytes);
+        s.lost = of(lost), s.dropped = of(dropped), s.errors = of(errors);
+        s.bus_offs = of(bus_offs), s.restarts = of(restarts);
+        s.queued = static_cast<std::uint32_t>(queued);
+        s.load = of(load_);
+        return s;
+    }
+
+private:
+    void occupy(const Frame& f) noexcept {
+        const auto rate = bit_rate.load(std::memory_order_relaxed);
+        if (rate == 0) return;
+        const auto time = duration_ns(frame_bits(f), rate, data_rate.load(std::memory_order_relaxed));
+        busy_ns_.fetch_add(static_cast<std::uint64_t>(time), std::memory_order_relaxed);
+    }
+    std::int64_t window_start_ = 0;
+    Count busy_ns_{0};
+    std::atomic<double> load_{0.0};
+};
+
+/// Whether any of the filters passes the frame; none: all pass.
+inline bool passes(std::span<const Filter> filters, const Frame& f) noexcept {
+    if (filters.empty()) return true;
+    for (const auto& filter : filters)
+        if (filter.matches(f)) return true;
+    return false;
+}
+
+}  // namespace hal::can

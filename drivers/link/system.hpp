@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// What drivers need of the operating system: an owned descriptor, times, waiting for a descriptor.
+#pragma once
+
+#include <poll.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <utility>
+
+namespace hal::can {
+
+class Descriptor {
+public:
+    Descriptor() = default;
+    explicit Descriptor(int fd) noexcept : fd_(fd) {}
+    Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+    Descriptor& operator=(Descriptor&& other) noexcept {
+        std::swap(fd_, other.fd_);
+        return *this;
+    }
+    ~Descriptor() {
+        if (fd_ >= 0) ::close(fd_);
+    }
+    int get() const noexcept { return fd_; }
+    explicit operator bool() const noexcept { return fd_ >= 0; }
+
+private:
+    int fd_ = -1;
+};
+
+inline std::int64_t clock_ns(clockid_t clock) noexcept {
+    timespec t{};
+    clock_gettime(clock, &t);
+    return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
+}
+inline std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); }
+/// To be added to a time of CLOCK_REALTIME.
+inline std::int64_t real_to_monotonic_ns() noexcept { return monotonic_ns() - clock_ns(CLOCK_REALTIME); }
+
+/// True: something can be read, or the other side has gone. [setup]
+inline bool readable_within(int fd, std::int64_t at_most_ns) noexcept {
+    pollfd p{fd, POLLIN, 0};
+    const timespec limit{at_most_ns > 0 ? at_most_ns / 1'000'000'000 : 0, at_most_ns > 0 ? at_most_ns % 1'000'000'000 : 0};
+    return ppoll(&p, 1, &limit, nullptr) > 0;
+}
+
+inline std::string reason(int error = errno) { return std::strerror(error); }
+
+}  // namespace hal::can

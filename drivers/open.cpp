@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// From an address to a driver: the one list of them.
+#include <algorithm>
+#include <charconv>
+#include <exception>
+#include <optional>
+
+#include "canudp/canudp.hpp"
+#include "link/can.hpp"
+#include "replay/replay.hpp"
+#include "simbus/simbus.hpp"
+#include "slcan/slcan.hpp"
+#include "socketcan/socketcan.hpp"
+
+namespace hal::can {
+
+namespace {
+
+struct Driver {
+    std::string_view name;
+    Opened (*open)(const std::string& place, const Options&);
+};
+constexpr Driver drivers[] = {
+    {"can", socketcan::open}, {"sim", simbus::open}, {"udp", canudp::open}, {"slcan", slcan::open}, {"replay", replay::open},
+};
+
+std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+/// 500000, 500k, 1M, unlimited.
+std::optional<std::uint32_t> rate(std::string_view text) {
+    if (text == "unlimited") return unlimited;
+    double value = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (wrong != std::errc{}) return std::nullopt;
+    const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+    value *= unit == "k" ? 1e3 : unit == "M" ? 1e6 : unit.empty() ? 1.0 : -1.0;
+    if (!(value >= 1.0 && value <= 20e6)) return std::nullopt;
+    return static_cast<std::uint32_t>(value);
+}
+
+std::optional<std::uint32_t> number(std::string_view text) {
+    std::uint32_t value = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (wrong != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+    return value;
+}
+
+/// What is wrong with `key=value`, or nothing.
+std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
+    const auto to_flag = [&](bool& flag) -> std::string {
+        if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
+        flag = !has_value || value == "1";
+        return {};
+    };
+    const auto to_rate = [&](std::uint32_t& to) -> std::string {
+        const auto r = rate(value);
+        if (!r) return std::string(key) + " is " + quoted(value) + "; write bits per second, as in 500000, 500k or 1M";
+        to = *r;
+        return {};
+    };
+    const auto to_number = [&](auto& to, std::uint32_t most) -> std::string {
+        const auto n = number(value);
+        if (!n || *n > most) return std::string(key) + " is " + quoted(value) + "; write a whole number up to " + std::to_string(most);
+        to = *n;
+        return {};
+    };
+    if (key == "bitrate") return to_rate(o.bit_rate);
+    if (key == "datarate") return o.fd = true, to_rate(o.data_rate);
+    if (key == "fd") return to_flag(o.fd);
+    if (key == "listen") return to_flag(o.listen_only);
+    if (key == "own") return to_flag(o.own_frames);
+    if (key == "errors") return to_flag(o.error_frames);
+    if (key == "restart") return to_number(o.restart_ms, 3'600'000);
+    if (key == "sendqueue") return to_number(o.send_capacity, 65536);
+    if (key == "receivequeue") return to_number(o.receive_capacity, 65536);
+    return "there is no option " + quoted(key) + "; there are bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue";
+}
+
+}  // namespace
+
+Opened open(std::string_view address, const Options& given) {
+    const auto colon = address.find(':');
+    const auto name = address.substr(0, colon);
+    for (const auto& driver : drivers) {
+        if (driver.name != name || colon == address.npos) continue;
+        Options options = given;
+        auto place = address.substr(colon + 1);
+        const auto question = place.find('?');
+        auto rest = question == place.npos ? std::string_view{} : place.substr(question + 1);
+        place = place.substr(0, question);
+        while (!rest.empty()) {
+            const auto end = std::min(rest.find('&'), rest.size());
+            const auto item = rest.substr(0, end);
+            rest.remove_prefix(std::min(end + 1, rest.size()));
+            const auto equals = std::min(item.find('='), item.size());
+            const bool has_value = equals < item.size();
+            auto problem = apply(item.substr(0, equals), has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
+            if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
+        }
+        try {
+            auto opened = driver.open(std::string(place), options);
+            if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
+            return opened;
+        } catch (const std::exception& e) {
+            return {nullptr, std::string(address) + ": " + e.what()};
+        }
+    }
+    return {nullptr, quoted(address) +
+                         " is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0 or replay:FILE"};
+}
+
+}  // namespace hal::can

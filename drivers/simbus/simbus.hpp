@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "link/can.hpp"
+
+namespace hal::can::simbus {
+
+/// `sim:NAME`: a node on the bus in memory of that name, which all links of one process share. [setup]
+Opened open(const std::string& name, const Options&);
+
+}  // namespace hal::can::simbus

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Between our frames and the kernel's.
+#pragma once
+
+#include <linux/can.h>
+#include <linux/can/error.h>
+
+#include <cstring>
+
+#include "link/can.hpp"
+
+namespace hal::can::socketcan {
+
+static_assert(error_send_timeout == CAN_ERR_TX_TIMEOUT && error_controller == CAN_ERR_CRTL && error_bus_off == CAN_ERR_BUSOFF &&
+              error_no_acknowledge == CAN_ERR_ACK && error_restarted == CAN_ERR_RESTARTED && error_bus == CAN_ERR_BUSERROR);
+
+/// The kernel's form of a valid frame; how many bytes of it to write. [realtime]
+inline std::size_t to_kernel(const Frame& f, canfd_frame& out) noexcept {
+    out = {};
+    out.can_id = f.id | (f.extended ? CAN_EFF_FLAG : 0U) | (f.remote ? CAN_RTR_FLAG : 0U);
+    out.len = f.length;
+    if (f.fd) {
+        out.flags = static_cast<__u8>((f.bit_rate_switch ? CANFD_BRS : 0) | (f.error_state ? CANFD_ESI : 0));
+#ifdef CANFD_FDF
+        out.flags |= CANFD_FDF;
+#endif
+    }
+    if (!f.bytes().empty()) std::memcpy(out.data, f.bytes().data(), f.bytes().size());
+    return f.fd ? CANFD_MTU : CAN_MTU;
+}
+
+/// False: `size` is not that of a frame. [realtime]
+inline bool from_kernel(const canfd_frame& in, std::size_t size, Frame& f) noexcept {
+    if (size != CAN_MTU && size != CANFD_MTU) return false;
+    f.fd = size == CANFD_MTU;
+    f.error = (in.can_id & CAN_ERR_FLAG) != 0;
+    f.extended = !f.error && (in.can_id & CAN_EFF_FLAG) != 0;
+    f.remote = !f.error && !f.fd && (in.can_id & CAN_RTR_FLAG) != 0;
+    f.id = in.can_id & (f.error || f.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+    f.bit_rate_switch = f.fd && (in.flags & CANFD_BRS) != 0;
+    f.error_state = f.fd && (in.flags & CANFD_ESI) != 0;
+    f.length = in.len < (f.fd ? 64 : 8) ? in.len : static_cast<std::uint8_t>(f.fd ? 64 : 8);
+    f.own = false;
+    if (!f.remote) std::memcpy(f.data.data(), in.data, f.length);
+    return true;
+}
+
+}  // namespace hal::can::socketcan

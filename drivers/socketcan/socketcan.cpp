@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: MIT
+#include "socketcan/socketcan.hpp"
+
+#include <fcntl.h>
+#include <linux/can/raw.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/uio.h>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "link/counting.hpp"
+#include "link/ring.hpp"
+#include "link/system.hpp"
+#include "socketcan/frames.hpp"
+#include "socketcan/keeper.hpp"
+
+namespace hal::can::socketcan {
+
+namespace {
+
+constexpr std::size_t batch = 32;  // frames per system call
+constexpr std::size_t most_filters = CAN_RAW_FILTER_MAX;
+
+template <class T>
+bool set(int fd, int level, int name, const T& value) {
+    return setsockopt(fd, level, name, &value, sizeof value) == 0;
+}
+
+/// A raw socket with all options, bound; nothing and `problem` when it cannot be had.
+Descriptor make_socket(int index, const Options& o, const std::vector<can_filter>& filters, std::string& problem) {
+    Descriptor fd(::socket(AF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
+    if (!fd) {
+        const int error = errno;
+        if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT)
+            problem = "this machine's kernel has no SocketCAN; type: sudo modprobe can-raw, or use a bus without it: "
+                      "sim:NAME, udp:239.74.163.2:43113, slcan:DEVICE";
+        else if (error == EPERM || error == EACCES)
+            problem = "no permission for a raw CAN socket; in a container: start it with the host's network";
+        else
+            problem = "no raw CAN socket: " + reason(error);
+        return {};
+    }
+    const int yes = 1;
+    if (o.fd && !set(fd.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, yes)) {
+        problem = "this machine's kernel does not know CAN FD; leave out fd";
+        return {};
+    }
+    const can_err_mask_t errors = CAN_ERR_MASK & ~static_cast<can_err_mask_t>(CAN_ERR_LOSTARB);
+    set(fd.get(), SOL_CAN_RAW, CAN_RAW_ERR_FILTER, errors);  // the state of the controller comes this way
+    if (o.own_frames) set(fd.get(), SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, yes);
+    set(fd.get(), SOL_CAN_RAW, CAN_RAW_FILTER, can_filter{});
+    if (!filters.empty())
+        setsockopt(fd.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size() * sizeof(can_filter)));
+    set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
+    set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
+    const int room = static_cast<int>(std::min<std::size_t>(o.receive_capacity, 65536) * 1024);  // the kernel's cost of a frame
+    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    sockaddr_can address{};
+    address.can_family = AF_CAN;
+    address.can_ifindex = index;
+    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        problem = "the interface cannot be used: " + reason();
+        return {};
+    }
+    return fd;
+}
+
+class SocketLink final : public Link {
+public:
+    SocketLink(const std::string& name, const Options& options, const Interface& interface, Descriptor socket)
+        : options_(options), socket_(std::move(socket)), outgoing_(options.send_capacity),
+          keeper_(name, counting_, interface.index, options.restart_ms, [this](int index) { return reopen(index); }) {
+        counting_.bit_rate = interface.bit_rate != 0 ? interface.bit_rate : options.bit_rate != unlimited ? options.bit_rate : 0;
+        counting_.data_rate = interface.data_rate != 0 ? interface.data_rate : options.data_rate;
+        if (interface.has_state) counting_.state = interface.state;
+        description_ = {"can:" + name, interface.kind.empty() ? "SocketCAN" : "SocketCAN (" + interface.kind + ")", counting_.bit_rate,
+                        counting_.data_rate, options.fd, false};
+        for (std::size_t i = 0; i < batch; ++i) {
+            parts_[i] = {&raw_[i], sizeof raw_[i]};
+            out_parts_[i] = {&out_raw_[i], 0};
+            out_[i].msg_hdr = {};
+            out_[i].msg_hdr.msg_iov = &out_parts_[i];
+            out_[i].msg_hdr.msg_iovlen = 1;
+        }
+    }
+
+    Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
+        const auto drop = [this](Sent why) {
+            Counting::add(counting_.dropped);
+            return why;
+        };
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::refused);
+        const State state = counting_.state.load(std::memory_order_relaxed);
+        if (state == State::down) return drop(Sent::down);
+        if (state == State::bus_off) return drop(Sent::bus_off);
+        if (outgoing_.push(frame)) return Sent::queued;
+        flush(now_ns);
+        return outgoing_.push(frame) ? Sent::queued : drop(Sent::full);
+    }
+
+    void flush(std::int64_t) noexcept override {
+        // What was queued before the interface went must not come out when it is back.
+        if (state() == State::down)
+            for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
+        for (bool again = true;;) {
+            std::size_t count = 0;
+            for (; count < batch; ++count) {
+                const Frame* f = outgoing_.at(count);
+                if (f == nullptr) break;
+                out_parts_[count].iov_len = to_kernel(*f, out_raw_[count]);
+            }
+            if (count == 0) return;
+            const int sent = ::sendmmsg(socket_.get(), out_, static_cast<unsigned>(count), MSG_DONTWAIT | MSG_NOSIGNAL);
+            const int error = errno;
+            for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
+            if (sent > 0) outgoing_.pop(static_cast<std::size_t>(sent));
+            if (sent == static_cast<int>(count)) continue;
+            if (sent > 0) continue;  // the next try tells why
+            if (error == EINTR) continue;
+            if (error == ENOBUFS || error == EAGAIN) return;  // the interface's queue is full: next time
+            if (error == ENETDOWN || error == ENXIO || error == ENODEV) {
+                if (std::exchange(again, false)) continue;  // the first may be the late report of what is over
+                return lose_interface();
+            }
+            outgoing_.pop();  // the kernel takes everything but this frame
+            Counting::add(counting_.dropped);
+        }
+    }
+
+    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+        if (now_ns != unclocked && now_ns == drained_at_) return 0;  // a cycle asks the kernel once when that was enough
+        std::size_t count = 0;
+        while (count < room.size()) {
+            if (next_ == filled_ && !refill(now_ns)) break;
+            room[count++] = buffer_[next_++];
+        }
+        return count;
+    }
+
+    Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
+    State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }
+    void restart() noexcept override {
+        keeper_.wants_restart.store(true);
+        keeper_.nudge();
+    }
+    bool set_filters(std::span<const Filter> filters) override {
+        if (filters.size() > most_filters) return false;
+        std::vector<can_filter> kernel;
+        for (const auto& f : filters) {
+            const auto whole = f.extended ? CAN_EFF_MASK : CAN_SFF_MASK;
+            kernel.push_back({(f.id & whole) | (f.extended ? CAN_EFF_FLAG : 0U), (f.mask & whole) | CAN_EFF_FLAG});
+        }
+        const std::lock_guard lock(mutex_);
+        filters_ = kernel;
+        if (kernel.empty()) kernel.push_back({0, 0});
+        const auto size = static_cast<socklen_t>(kernel.size() * sizeof(can_filter));
+        return setsockopt(socket_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, kernel.data(), size) == 0;
+    }
+    const Description& description() const noexcept override { return description_; }
+    bool wait(std::int64_t at_most_ns) override { return next_ != filled_ || readable_within(socket_.get(), at_most_ns); }
+    int descriptor() const noexcept override { return socket_.get(); }
+
+private:
+    /// Takes up to a batch from the kernel; false: nothing of interest came.
+    bool refill(std::int64_t now_ns) noexcept {
+        if (last_batch_short_ && now_ns != unclocked && now_ns == refilled_at_) {
+            drained_at_ = now_ns;
+            last_batch_short_ = false;
+            return false;
+        }
+        for (std::size_t i = 0; i < batch; ++i) {
+            in_[i].msg_hdr = {};
+            in_[i].msg_hdr.msg_iov = &parts_[i];
+            in_[i].msg_hdr.msg_iovlen = 1;
+            in_[i].msg_hdr.msg_control = control_[i];
+            in_[i].msg_hdr.msg_controllen = sizeof control_[i];
+        }
+        const int got = ::recvmmsg(socket_.get(), in_, batch, MSG_DONTWAIT, nullptr);
+        if (got < 0 && (errno == ENETDOWN || errno == ENODEV || errno == ENXIO)) lose_interface();
+        next_ = filled_ = 0;
+        const auto offset = got > 0 || now_ns == unclocked ? real_to_monotonic_ns() : 0;
+        counting_.tick(now_ns != unclocked ? now_ns : monotonic_ns());
+        refilled_at_ = now_ns;
+        last_batch_short_ = got < static_cast<int>(batch);
+        for (int i = 0; i < got; ++i) take(in_[i], raw_[i], offset);
+        if (filled_ == 0 && now_ns != unclocked && last_batch_short_) drained_at_ = now_ns;
+        return filled_ != 0;
+    }
+
+    void take(const mmsghdr& message, const canfd_frame& raw, std::int64_t offset) noexcept {
+        Frame& f = buffer_[filled_];
+        if (!from_kernel(raw, message.msg_len, f)) return Counting::add(counting_.errors);
+        f.own = (message.msg_hdr.msg_flags & MSG_CONFIRM) != 0;
+        f.time_ns = 0;
+        auto* header = const_cast<msghdr*>(&message.msg_hdr);
+        for (cmsghdr* c = CMSG_FIRSTHDR(header); c != nullptr; c = CMSG_NXTHDR(header, c)) {
+            if (c->cmsg_level != SOL_SOCKET) continue;
+            if (c->cmsg_type == SCM_TIMESTAMPNS) {
+                timespec t{};
+                std::memcpy(&t, CMSG_DATA(c), sizeof t);
+                f.time_ns = t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
+            } else if (c->cmsg_type == SO_RXQ_OVFL) {
+                std::uint32_t lost = 0;
+                std::memcpy(&lost, CMSG_DATA(c), sizeof lost);
+                Counting::add(counting_.lost, lost - lost_before_);
+                lost_before_ = lost;
+            }
+        }
+        if (f.error) {
+            controller_event(f);
+            if (!options_.error_frames) return;
+        } else {
+            counting_.count_received(f);
+        }
+        ++filled_;
+    }
+
+    void controller_event(const Frame& f) noexcept {
+        Counting::add(counting_.errors);
+        const auto to = [this](State s) { counting_.state.store(s, std::memory_order_relaxed); };
+        if ((f.id & CAN_ERR_CRTL) != 0) {
+            const auto what = f.data[1];
+            if ((what & (CAN_ERR_CRTL_RX_OVERFLOW)) != 0) Counting::add(counting_.lost);
+            if ((what & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) to(State::passive);
+            else if ((what & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) to(State::warning);
+            else if ((what & CAN_ERR_CRTL_ACTIVE) != 0) to(State::active);
+            counting_.send_errors.store(f.data[6], std::memory_order_relaxed);
+            counting_.receive_errors.store(f.data[7], std::memory_order_relaxed);
+        }
+        if ((f.id & CAN_ERR_BUSOFF) != 0) {
+            Counting::add(counting_.bus_offs);
+            to(State::bus_off);
+            keeper_.nudge();
+        }
+        if ((f.id & CAN_ERR_RESTARTED) != 0) {
+            Counting::add(counting_.restarts);
+            to(State::active);
+        }
+    }
+
+    /// The keeper says whether it is down: this may be the late report of what is over already.
+    void lose_interface() noexcept {
+        if (counting_.state.load(std::memory_order_relaxed) != State::down) keeper_.nudge();
+    }
+
+    /// The keeper's thread: a new socket takes the place of the old one under the same number, which the cycle does not notice.
+    bool reopen(int index) {
+        const std::lock_guard lock(mutex_);
+        std::string problem;
+        const Descriptor fresh = make_socket(index, options_, filters_, problem);
+        return fresh && ::dup3(fresh.get(), socket_.get(), O_CLOEXEC) >= 0;
+    }
+
+    const Options options_;
+    const Descriptor socket_;
+    Counting counting_;
+    Ring<Frame> outgoing_;  // written and read by the sending thread
+    Description description_;
+    std::mutex mutex_;  // setup and the keeper: filters_
+    std::vector<can_filter> filters_;
+
+    // The sending thread's.
+    mmsghdr out_[batch]{};
+    iovec out_parts_[batch]{};
+    canfd_frame out_raw_[batch]{};
+    // The receiving thread's.
+    mmsghdr in_[batch]{};
+    iovec parts_[batch]{};
+    canfd_frame raw_[batch]{};
+    alignas(cmsghdr) char control_[batch][CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))]{};
+    Frame buffer_[batch];
+    std::size_t next_ = 0, filled_ = 0;
+    std::int64_t drained_at_ = unclocked, refilled_at_ = unclocked;
+    bool last_batch_short_ = false;
+    std::uint32_t lost_before_ = 0;
+
+    Keeper keeper_;  // last: its thread uses all of the above, and ends first
+};
+
+std::string up_command(const std::string& name, const Interface& i, const Options& o) {
+    const auto rate = o.bit_rate != 0 && o.bit_rate != unlimited ? o.bit_rate : 1'000'000U;
+    return "sudo ip link set " + name + " up" + (i.kind == "can" ? " type can bitrate " + std::to_string(rate) : std::string{});
+}
+
+}  // namespace
+
+Opened open(const std::string& name, const Options& options) {
+    if (name.empty() || name.size() >= IFNAMSIZ) return {nullptr, "this is no name of a network interface; write can:can0"};
+    std::string problem;
+    const Interface interface = ask(name);
+    if (interface.index == 0) {
+        const Descriptor probe = make_socket(0, {}, {}, problem);
+        if (!probe) return {nullptr, problem};
+        return {nullptr, "there is no interface " + name + "; `ip -br link` lists those there are; a virtual one: sudo ip link add " +
+                             name + " type vcan && sudo ip link set " + name + " up"};
+    }
+    if (!interface.is_can) return {nullptr, name + " is not a CAN interface; `ip -br link show type can` lists those"};
+    Descriptor socket = make_socket(interface.index, options, {}, problem);
+    if (!socket) return {nullptr, problem};
+    if (!interface.up) return {nullptr, "the interface is down; type: " + up_command(name, interface, options)};
+    if (options.fd && interface.mtu < CANFD_MTU) {
+        const auto how = interface.kind == "can" ? "type can fd on dbitrate 2000000" : "mtu 72";
+        return {nullptr, "the interface is not set up for CAN FD; type: sudo ip link set " + name + " down && sudo ip link set " +
+                             name + " " + how + " && " + up_command(name, interface, options)};
+    }
+    if (options.bit_rate != 0 && interface.bit_rate != 0 && options.bit_rate != interface.bit_rate)
+        return {nullptr, "the interface runs at " + std::to_string(interface.bit_rate) + " bit/s; type: sudo ip link set " + name +
+                             " down && " + up_command(name, interface, options)};
+    return {std::make_unique<SocketLink>(name, options, interface, std::move(socket)), {}};
+}
+
+}  // namespace hal::can::socketcan

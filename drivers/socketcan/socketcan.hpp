@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "link/can.hpp"
+
+namespace hal::can::socketcan {
+
+/// `can:INTERFACE`: a network interface of the kernel that is a CAN bus. [setup]
+Opened open(const std::string& interface, const Options&);
+
+}  // namespace hal::can::socketcan
