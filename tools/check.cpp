@@ -10,7 +10,7 @@ namespace hal::tools {
 int run_check(const Options& options) {
     Session session(offline());
     ShellOptions how;
-    how.check = how.keep_going = true;
+    how.check = how.keep_going = how.notes = true;
     how.color = colours(STDERR_FILENO);
     Shell shell(session, how);
     ErrorsOnly output;

@@ -18,7 +18,7 @@ namespace hal::tools {
 namespace {
 
 struct Subcommand {
-    const char* name;
+    const char* name;     ///< more than one word in a group: "can dump"
     const char* usage;    ///< what may follow the name
     const char* summary;
     int (*run)(const Options&);
@@ -101,6 +101,21 @@ void declare_doc(CLI::App& app, Options& o) {
     app.add_flag("--markdown", o.markdown, "as Markdown");
     app.add_flag("--json", o.json, "as JSON");
     app.add_flag("--man", o.man, "as a troff page: hal doc pid --man | man -l -");
+    app.add_flag("--html", o.html, "as a web page");
+    app.add_flag("--all", o.all, "all components, into the folder of --output: web pages with an index, or what is chosen above");
+    app.add_option("-o,--output", o.output, "a folder; each component gets a file")->type_name("DIR");
+}
+
+void declare_new(CLI::App& app, Options& o) {
+    words(app, o, "component NAME", "the name loadrt will know; letters, digits, - and _");
+    app.add_option("--folder", o.folder, "made for it (default: NAME, here)")->type_name("DIR");
+}
+
+void declare_compile(CLI::App& app, Options& o) {
+    words(app, o, "FILE", "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or .c (LinuxCNC's hal.h)");
+    app.add_option("-o,--output", o.output, "install here; default: ~/.local/share/halcyon/components")->type_name("DIR");
+    app.add_flag("--check-rt", o.check_rt, "run it 1000 cycles with random and extreme values; name what is not real time");
+    app.add_flag("--keep", o.keep, "of a .comp file: leave the C++ it was translated to in this folder");
 }
 
 void declare_explain(CLI::App& app, Options& o) {
@@ -129,6 +144,66 @@ void declare_doctor(CLI::App& app, Options& o) {
 
 void declare_completion(CLI::App& app, Options& o) { words(app, o, "SHELL", "bash"); }
 
+constexpr const char* address = "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0 or replay:FILE; options follow: ?bitrate=500k&datarate=2M&listen";
+
+void filtered(CLI::App& app, Options& o) {
+    app.add_option("--filter", o.filters, "only frames with this identifier, or ID/MASK: 181, 180/780, 18FF0000/1FFF0000; may be repeated")
+        ->type_name("ID[/MASK]")->allow_extra_args(false);
+    app.add_option("-n,--count", o.count, "end after so many frames")->type_name("N");
+}
+
+void declare_can_dump(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS", address);
+    filtered(app, o);
+    for_how_long(app, o, "end after 2s, 500ms …; without it: until Ctrl-C");
+    app.add_flag("--json", o.json, "a JSON object per line; the last one holds the statistics");
+}
+
+void declare_can_send(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS FRAME", "where to; then frames as candump writes them: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
+    const auto take = [&o](const std::string& text) {
+        const auto ns = parse_duration_ns(text, false);
+        if (!ns || *ns <= 0) throw CLI::ValidationError("--every", fmt::format("'{}' is not a duration; write 10ms, 1s or 500us", text));
+        o.every_ns = *ns;
+    };
+    app.add_option_function<std::string>("--every", take, "send them again and again, this far apart")->type_name("TIME");
+    for_how_long(app, o, "with --every: end after 2s, 500ms …; without it: until Ctrl-C");
+    app.add_option("-n,--count", o.count, "with --every: end after so many rounds")->type_name("N");
+}
+
+void declare_can_record(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS FILE", "what to listen to; a .log file (candump's form) or a .pcapng file (Wireshark)");
+    filtered(app, o);
+    for_how_long(app, o, "end after 2s, 500ms …; without it: until Ctrl-C");
+}
+
+void declare_can_replay(CLI::App& app, Options& o) {
+    words(app, o, "FILE ADDRESS", "a candump log, pcapng or pcap file; the bus its frames are sent to, at their times");
+    app.add_option("--speed", o.speed, "so many times as fast (default 1)")->type_name("FACTOR");
+}
+
+void declare_can_load(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS", address);
+    for_how_long(app, o, "measure for 5s, 500ms … (default 2s)");
+}
+
+void declare_can_nmt(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS COMMAND NODE", "the bus; start, stop, preop, reset or reset-comm; a node 1-127 (or 0x..), or all");
+}
+
+void declare_can_scan(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS", address);
+    for_how_long(app, o, "listen for 2s, 500ms … (default 1s); as long as the slowest heartbeat finds stopped nodes too");
+    app.add_flag("--json", o.json, "as JSON");
+}
+
+void declare_canopen_plan(CLI::App& app, Options& o) {
+    words(app, o, "FILE", "the messages: a line `bitrate 1M`, then lines `ID BYTES PERIOD [DEADLINE [JITTER]] # name`");
+    app.add_flag("--json", o.json, "as JSON");
+}
+
+void declare_can_eds_check(CLI::App& app, Options& o) { words(app, o, "FILE", "device descriptions: EDS, DCF, XDD, XDC"); }
+
 constexpr Subcommand table[] = {
     {"run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads", run_run, declare_run},
     {"sim", "FILE… [--for TIME] [-- ARG…]", "the same on a virtual clock: deterministic, as fast as it goes", run_sim, declare_sim},
@@ -136,23 +211,78 @@ constexpr Subcommand table[] = {
     {"check", "FILE…", "everything wrong with netlists that can be known without running them", run_check, declare_check},
     {"fmt", "FILE…", "format netlists", run_fmt, declare_fmt},
     {"graph", "FILE… [-o OUT]", "draw netlists", run_graph, declare_graph},
-    {"doc", "[COMPONENT]", "the manual page of a component", run_doc, declare_doc},
+    {"doc", "[COMPONENT…] [--all --output DIR]", "the manual page of a component", run_doc, declare_doc},
+    {"new", "component NAME [--folder DIR]", "a component of your own to start from: source, CMakeLists.txt, test", run_new, declare_new},
+    {"compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it", run_compile, declare_compile},
     {"explain", "[CODE]", "what a diagnostic means and what to do", run_explain, declare_explain},
     {"record", "[CHANNEL] [FILE]", "write what a sampler samples", run_record, declare_record},
     {"play", "[CHANNEL] [FILE]", "feed a streamer", run_play, declare_play},
+    {"can dump", "ADDRESS [--filter ID[/MASK]] [--for TIME] [--count N] [--json]", "the frames of a CAN bus, and what they mean", run_can_dump, declare_can_dump},
+    {"can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB", run_can_send, declare_can_send},
+    {"can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "write what is on a bus to a file", run_can_record, declare_can_record},
+    {"can replay", "FILE ADDRESS [--speed FACTOR]", "send what was recorded, at its times", run_can_replay, declare_can_replay},
+    {"can load", "ADDRESS [--for TIME]", "which identifiers fill the bus", run_can_load, declare_can_load},
+    {"can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take", run_can_nmt, declare_can_nmt},
+    {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", run_can_scan, declare_can_scan},
+    {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", run_can_eds_check, declare_can_eds_check},
+    {"canopen plan", "FILE [--json]", "whether every message of a bus arrives in time: worst-case response times", run_canopen_plan, declare_canopen_plan},
     {"doctor", "", "what on this machine spoils real time", run_doctor, declare_doctor},
     {"completion", "SHELL", "print a completion script: source <(hal completion bash)", run_completion, declare_completion},
 };
 
-const Subcommand* find(std::string_view name) {
-    const auto* row = std::find_if(std::begin(table), std::end(table), [&](const Subcommand& s) { return name == s.name; });
-    return row == std::end(table) ? nullptr : row;
+/// Commands of two and more words have a first word in common.
+struct Group {
+    const char* name;
+    const char* summary;
+};
+
+constexpr Group groups[] = {
+    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt; eds check"},
+    {"canopen", "plans a CANopen network"},
+};
+
+const Group* find_group(std::string_view name) {
+    const auto* group = std::find_if(std::begin(groups), std::end(groups), [&](const Group& g) { return name == g.name; });
+    return group == std::end(groups) ? nullptr : group;
+}
+
+bool belongs(const Subcommand& row, const Group& group) { return std::string_view(row.name).starts_with(std::string(group.name) + " "); }
+
+struct Found {
+    const Subcommand* row = nullptr;
+    std::size_t words = 0;  ///< how many of those typed are its name
+};
+
+/// The row with the longest name that is typed.
+Found find(const std::vector<std::string>& typed) {
+    Found found;
+    std::string name;
+    for (std::size_t i = 0; i < typed.size() && i < 4; ++i) {
+        name += (i == 0 ? "" : " ") + typed[i];
+        const auto* row = std::find_if(std::begin(table), std::end(table), [&](const Subcommand& s) { return name == s.name; });
+        if (row != std::end(table)) found = {row, i + 1};
+    }
+    return found;
 }
 
 std::string overview() {
     std::string text = "Halcyon: control components, wired by netlists, run in real-time threads.\n\nusage: hal COMMAND …\n\n";
-    for (const Subcommand& row : table) text += fmt::format("  {:11} {}\n", row.name, row.summary);
+    const Group* last = nullptr;
+    for (const Subcommand& row : table) {
+        const std::string_view name(row.name);
+        const Group* group = find_group(name.substr(0, name.find(' ')));
+        if (group == nullptr) text += fmt::format("  {:11} {}\n", row.name, row.summary);
+        else if (group != last) text += fmt::format("  {:11} {}\n", group->name, group->summary);
+        last = group;
+    }
     return text + "\nhal help COMMAND says more. A first try: hal run halfiles/furuta/hang.hal --for 10s\n";
+}
+
+std::string help_of(const Group& group) {
+    std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name, group.summary, group.name);
+    for (const Subcommand& row : table)
+        if (belongs(row, group)) text += fmt::format("  {:14} {}\n", row.name, row.summary);
+    return text + fmt::format("\nhal help {} COMMAND says more.\n", group.name);
 }
 
 std::unique_ptr<CLI::App> app_of(const Subcommand& row, Options& options) {
@@ -189,21 +319,33 @@ std::vector<std::string> option_names(const CLI::App& app) {
     return names;
 }
 
-int no_such_command(const std::string& word) {
+int no_such_command(const std::vector<std::string>& typed) {
     Options options;
+    std::string word = typed.front();
     if (!word.empty() && word[0] == '-') return fail(options, fmt::format("there is no option '{}'; type: hal help", word));
     const auto ends = [&](std::string_view end) { return word.size() > end.size() && word.ends_with(end); };
     if (ends(".hal") || ends(".ini")) return fail(options, fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
     std::vector<std::string> names = {"help"};
-    for (const Subcommand& row : table) names.emplace_back(row.name);
+    std::string where = "hal help";
+    if (const Group* group = find_group(word)) {
+        if (typed.size() > 1) word += " " + typed[1];
+        where += fmt::format(" {}", group->name);
+        names.clear();
+        for (const Subcommand& row : table)
+            if (belongs(row, *group)) names.emplace_back(row.name);
+    } else {
+        for (const Subcommand& row : table) names.emplace_back(row.name);
+        for (const Group& g : groups) names.emplace_back(g.name);
+    }
     const std::string hint = did_you_mean(word, names);
-    return fail(options, fmt::format("there is no command '{}'; {}", word, hint.empty() ? "type: hal help" : hint));
+    return fail(options, fmt::format("there is no command '{}'; {}", word, hint.empty() ? "type: " + where : hint));
 }
 
 int help(const std::vector<std::string>& about) {
     if (about.empty()) return print(overview()) ? 0 : 1;
-    const Subcommand* row = find(about.front());
-    return row ? (print(help_of(*row)) ? 0 : 1) : no_such_command(about.front());
+    if (const Found found = find(about); found.row) return print(help_of(*found.row)) ? 0 : 1;
+    if (const Group* group = find_group(about.front()); group && about.size() == 1) return print(help_of(*group)) ? 0 : 1;
+    return no_such_command(about);
 }
 
 /// Reads `arguments` into `options`. Returns an exit code when that is the end of it.
@@ -250,11 +392,12 @@ int run_command_line(int argc, char** argv) {
     if (all.empty()) return help({});
     if (all[0] == "help" || all[0] == "--help" || all[0] == "-h") return help({all.begin() + 1, all.end()});
     if (all[0] == "--version" || all[0] == "version") return print(fmt::format("hal {}\n", paths::version)) ? 0 : 1;
-    const Subcommand* row = find(all[0]);
-    if (!row) return no_such_command(all[0]);
+    const auto [row, name_words] = find(all);
+    if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
+    if (!row) return no_such_command(all);
     Options options;
     options.program = fmt::format("hal {}", row->name);
-    if (const auto end = read(*row, {all.begin() + 1, all.end()}, options)) return *end;
+    if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, options)) return *end;
     return row->run(options);
 }
 
@@ -262,7 +405,12 @@ std::vector<Completion> completions() {
     std::vector<Completion> all;
     for (const Subcommand& row : table) {
         Options options;
-        all.push_back({row.name, option_names(*app_of(row, options))});
+        const std::string name = row.name;
+        const auto space = name.find(' ');
+        if (all.empty() || all.back().name != name.substr(0, space)) all.push_back({name.substr(0, space), {}, {}});
+        if (space != name.npos) all.back().words.push_back(name.substr(space + 1, name.find(' ', space + 1) - space - 1));
+        for (std::string& option : option_names(*app_of(row, options)))
+            if (auto& known = all.back().options; std::find(known.begin(), known.end(), option) == known.end()) known.push_back(std::move(option));
     }
     return all;
 }

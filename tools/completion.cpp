@@ -28,8 +28,9 @@ _hal() {
         help) COMPREPLY=($(compgen -W "$commands" -- "$word")) ;;
         doc | explain) COMPREPLY=($(compgen -W "$(hal "${COMP_WORDS[1]}" | cut -d ' ' -f 1)" -- "$word")) ;;
         shell) COMPREPLY=($(COMP_LINE="halcmd ${COMP_WORDS[*]:2:COMP_CWORD-1}" COMP_POINT='' halcmd -C 2>/dev/null)) ;;
+        new) COMPREPLY=($(compgen -W component -- "$word")) ;;
         completion) COMPREPLY=($(compgen -W bash -- "$word")) ;;
-        *) compopt -o default 2>/dev/null ;;
+@GROUPS@        *) compopt -o default 2>/dev/null ;;
     esac
 }
 complete -F _hal hal
@@ -42,16 +43,22 @@ void replace(std::string& text, std::string_view what, std::string_view by) { te
 
 int run_completion(const Options& options) {
     if (options.words != std::vector<std::string>{"bash"}) return fail(options, "only bash is known; type: hal completion bash");
-    std::string commands = "help", cases;
+    std::string commands = "help", cases, groups;
     for (const Completion& completion : completions()) {
         commands += " " + completion.name;
         std::string all;
         for (const std::string& option : completion.options) all += (all.empty() ? "" : " ") + option;
         cases += fmt::format("            {}) options='{}' ;;\n", completion.name, all);
+        if (completion.words.empty()) continue;
+        std::string words;
+        for (const std::string& word : completion.words) words += (words.empty() ? "" : " ") + word;
+        groups += fmt::format("        {}) if [ \"$COMP_CWORD\" -eq 2 ]; then COMPREPLY=($(compgen -W '{}' -- \"$word\")); "
+                              "else compopt -o default 2>/dev/null; fi ;;\n", completion.name, words);
     }
     std::string text(script);
     replace(text, "@COMMANDS@", commands);
     replace(text, "@OPTIONS@", cases);
+    replace(text, "@GROUPS@", groups);
     return print(text) ? 0 : 1;
 }
 

@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: MIT
 // `hal doc [COMPONENT]`: the manual page of a component, made from its declarations; without a name, all components.
+// `hal doc --all --output DIR`: the pages of all of them, with an index.
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <fmt/core.h>
+#include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "options.hpp"
@@ -12,6 +18,8 @@
 namespace hal::tools {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr const char* built_in = "threads";
 
@@ -53,27 +61,107 @@ int list(const Plugins& plugins, const Options& options) {
     return print(text) && good ? 0 : 1;
 }
 
+/// The page of one component. False after saying on stderr why there is none.
+bool page_of(const Plugins& plugins, const std::string& name, const Options& options, Page& page) {
+    if (name == built_in) {
+        page = threads_page();
+        return true;
+    }
+    Diagnostics diagnostics;
+    const auto plugin = plugins.open(name, {}, diagnostics);
+    if (!plugin) {
+        fail(options, reason(diagnostics));
+        return false;
+    }
+    if (std::string problem; !gather(*plugin->component, page, problem)) {
+        fail(options, fmt::format("component '{}' cannot be constructed: {}", name, problem));
+        return false;
+    }
+    return true;
+}
+
+struct Form {
+    bool Options::*chosen;
+    const char* before;      ///< of the file's name
+    const char* after;
+    std::string (*write)(const Page& page, bool alone);
+};
+
+/// Man pages are named hal-NAME, so that they can lie beside LinuxCNC's.
+constexpr Form forms[] = {
+    {&Options::markdown, "", ".md", [](const Page& page, bool) { return as_markdown(page); }},
+    {&Options::json, "", ".json", [](const Page& page, bool) { return as_json(page); }},
+    {&Options::man, "hal-", ".9", [](const Page& page, bool) { return as_man(page); }},
+    {&Options::html, "", ".html", [](const Page& page, bool alone) { return as_html(page, alone ? "" : "index.html"); }},
+};
+
+bool write_page(const fs::path& path, const std::string& text, const Options& options) {
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    if (file.flush()) return true;
+    fail(options, fmt::format("'{}' cannot be written: {}", path.string(), std::strerror(errno)));
+    return false;
+}
+
+/// Which group a component belongs to: the build writes down the folder of its source, beside the plugins.
+std::map<std::string, std::string> groups_of(const Plugins& plugins) {
+    std::map<std::string, std::string> groups;
+    for (const std::string& folder : plugins.path()) {
+        std::ifstream file(folder + "/groups");
+        for (std::string component, group; file >> component >> group;) groups.emplace(component, group);
+    }
+    return groups;
+}
+
+int write_all_pages(const std::vector<Page>& pages, const Plugins& plugins, const Form& form, const Options& options) {
+    const fs::path folder(options.output);
+    std::error_code problem;
+    fs::create_directories(folder, problem);
+    if (problem) return fail(options, fmt::format("'{}' cannot be made: {}", folder.string(), problem.message()));
+    for (const Page& page : pages)
+        if (!write_page(folder / (form.before + page.name + form.after), form.write(page, !options.all), options)) return 1;
+    if (form.chosen != &Options::html || !options.all) return 0;
+    const auto group_of = groups_of(plugins);
+    std::map<std::string, std::vector<const Page*>> by_group;
+    for (const Page& page : pages) {
+        std::string name = page.name;
+        std::replace(name.begin(), name.end(), '-', '_');
+        auto group = group_of.find(page.name);
+        if (group == group_of.end()) group = group_of.find(name);
+        by_group[page.built_in ? "runtime" : group == group_of.end() ? "other" : group->second].push_back(&page);
+    }
+    std::vector<IndexGroup> groups;
+    for (auto& [name, members] : by_group) groups.push_back({name, std::move(members)});
+    return write_page(folder / "index.html", as_html_index(groups), options) ? 0 : 1;
+}
+
 }  // namespace
 
-int run_doc(const Options& options) {
-    if (options.markdown + options.json + options.man > 1)
-        return fail(options, "--markdown, --json and --man exclude each other; give one");
+int run_doc(const Options& given) {
+    Options options = given;
+    if (options.markdown + options.json + options.man + options.html > 1)
+        return fail(options, "--markdown, --json, --man and --html exclude each other; give one");
+    if (options.all && !options.words.empty()) return fail(options, "--all is about all components; leave out their names, or --all");
     const Plugins plugins;
-    if (options.words.empty()) return list(plugins, options);
+    if (options.words.empty() && !options.all) return list(plugins, options);
+    if (options.all) {
+        if (options.output.empty()) return fail(options, "so many pages go into a folder; type: hal doc --all --output DIR");
+        options.words = plugins.available();
+    }
+    if (!options.output.empty() && !(options.markdown || options.json || options.man)) options.html = true;
+    const auto* const form = std::find_if(std::begin(forms), std::end(forms), [&](const Form& one) { return options.*one.chosen; });
+    std::vector<Page> pages;
+    int status = 0;
     for (const std::string& name : options.words) {
         Page page;
-        if (name == built_in) page = threads_page();
-        else {
-            Diagnostics diagnostics;
-            const auto plugin = plugins.open(name, {}, diagnostics);
-            if (!plugin) return fail(options, reason(diagnostics));
-            if (std::string problem; !gather(*plugin->component, page, problem))
-                return fail(options, fmt::format("component '{}' cannot be constructed: {}", name, problem));
-        }
-        if (!print(options.markdown ? as_markdown(page) : options.json ? as_json(page) : options.man ? as_man(page) : as_text(page)))
-            return 1;
+        if (page_of(plugins, name, options, page)) pages.push_back(std::move(page));
+        else if (options.all) status = 1;  // one that cannot be read does not keep the others back
+        else return 1;
     }
-    return 0;
+    if (!options.output.empty()) return write_all_pages(pages, plugins, *form, options) == 0 ? status : 1;
+    for (const Page& page : pages)
+        if (!print(form == std::end(forms) ? as_text(page) : form->write(page, true))) return 1;
+    return status;
 }
 
 }  // namespace hal::tools

@@ -17,6 +17,7 @@ struct Options {
     std::string name;                    ///< --name: of the instance; empty: not given
     std::string ini;
     std::string output;                  ///< -o
+    std::string folder;                  ///< --folder: of the new component
     std::int64_t for_ns = -1;            ///< --for; -1: not given
     std::uint64_t cycles = 0;            ///< --cycles; 0: not given
     std::uint64_t count = 0;             ///< -n; 0: without end
@@ -28,9 +29,13 @@ struct Options {
     bool echo = false, script = false, json = false;
     Loudness loudness = Loudness::errors;
     bool check = false, csv = false, tag = false;
-    bool markdown = false, man = false;
+    bool markdown = false, man = false, html = false, all = false;  ///< of doc
+    bool check_rt = false, keep = false; ///< of compile
     bool classic = false;                ///< under the name halrun or halcmd: as LinuxCNC does it
     double seconds = 2.0;                ///< of each measurement of doctor
+    std::vector<std::string> filters;    ///< --filter ID[/MASK] of the can commands
+    std::int64_t every_ns = 0;           ///< --every; 0: not given
+    double speed = 1.0;                  ///< of can replay
 };
 
 /// Each subcommand, in its own file. Returns the exit code.
@@ -40,11 +45,22 @@ int run_shell(const Options&);
 int run_check(const Options&);
 int run_fmt(const Options&);
 int run_graph(const Options&);
+int run_new(const Options&);
+int run_compile(const Options&);
 int run_doc(const Options&);
 int run_explain(const Options&);
 int run_record(const Options&);
 int run_play(const Options&);
 int run_doctor(const Options&);
+int run_can_dump(const Options&);
+int run_can_send(const Options&);
+int run_can_record(const Options&);
+int run_can_replay(const Options&);
+int run_can_load(const Options&);
+int run_can_nmt(const Options&);
+int run_can_scan(const Options&);
+int run_canopen_plan(const Options&);
 int run_completion(const Options&);
+int run_can_eds_check(const Options&);
 
 }  // namespace hal::tools

@@ -1,45 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What a component declares about itself, gathered by constructing it once with default arguments.
+// A component's page: what it declares about itself, in several forms.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "hal/abi.h"
+#include "session/declared.hpp"
 
 namespace hal::tools {
 
-struct Page {
-    struct Argument {
-        std::string name, doc, fallback;
-        bool per_instance = false;
-    };
-    struct Function {
-        std::string name, doc;  ///< name: below the instance, or the component when shared
-        bool shared = false;
-    };
-    struct Pin {
-        std::string name, doc, unit, function;  ///< function: of the one that uses it; empty: all
-        hal_type type = HAL_TYPE_BIT;
-        hal_dir dir = HAL_DIR_IN;
-        hal_value initial{}, safe{};
-        bool has_safe = false, finite = false;
-    };
-    std::string name, summary, doc;
-    bool singleton = false, built_in = false;
-    unsigned default_count = 1;
-    std::vector<Argument> arguments;
-    std::vector<Function> functions;
-    std::vector<Pin> pins;
-
-    /// Prefix of an instance's names: "pid.N", or the name itself for a component with one instance.
-    std::string instance() const;
-    std::string full_name(const Function& function) const;
-};
-
-/// Hosts the component's constructor. False: `problem` is a sentence that says why. [setup]
-bool gather(const hal_component& component, Page& page, std::string& problem);
+using Page = Declared;
 
 /// The page of `threads`, which the runtime provides itself.
 Page threads_page();
@@ -48,5 +19,13 @@ std::string as_text(const Page& page);
 std::string as_markdown(const Page& page);
 std::string as_json(const Page& page);
 std::string as_man(const Page& page);
+/// A whole page; `home` is the address of the index, or empty.
+std::string as_html(const Page& page, std::string_view home);
+/// The index: each group with its components, and a box to search them by name and summary.
+struct IndexGroup {
+    std::string name;
+    std::vector<const Page*> pages;
+};
+std::string as_html_index(const std::vector<IndexGroup>& groups);
 
 }  // namespace hal::tools

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // `hal shell` and `halcmd`: the client of the control socket. One-shot commands must stay light: no session is made.
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/core.h>
+#include <sys/signalfd.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -28,8 +30,9 @@ int show(const Client::Answer& answer) {
 class RemoteShell final : public Listener {
 public:
     RemoteShell(Client& client, const char* name) : client_(client), name_(name) {}
-    int execute(std::string_view line) override {
-        last_ = client_.run(line, name_);
+    int execute(std::string_view line) override { return execute(line, 1); }
+    int execute(std::string_view line, std::uint32_t number) {
+        last_ = client_.run(line, name_, number);
         return show(last_);
     }
     Completion complete(std::string_view line, std::size_t cursor) override { return client_.complete(line, cursor); }
@@ -67,8 +70,12 @@ int follow_input(Client& client, const Options& options) {
     RemoteShell listener(client, "<stdin>");
     LineReader input(STDIN_FILENO);
     int status = 0;
-    for (std::string line; !listener.over() && (status == 0 || options.keep_going) && input.read(line);)
-        status = std::max(status, listener.execute(line));
+    std::uint32_t number = 1;
+    for (std::string line, more; !listener.over() && (status == 0 || options.keep_going) && input.read(line); ++number) {
+        const std::uint32_t first = number;
+        for (; line.ends_with('\\') && input.read(more); ++number) line += '\n' + more;
+        status = std::max(status, listener.execute(line, first));
+    }
     return status;
 }
 
@@ -95,6 +102,28 @@ bool substitute(const Options& options, const std::string& path, std::string& te
     text += '\n';
     return true;
 }
+
+/// While it lives, Ctrl-C is a message: it ends the command that is waited for, not this program.
+class Interrupts {
+public:
+    Interrupts() {
+        sigset_t interrupt;
+        sigemptyset(&interrupt);
+        sigaddset(&interrupt, SIGINT);
+        ::pthread_sigmask(SIG_BLOCK, &interrupt, &before_);
+        descriptor_ = ::signalfd(-1, &interrupt, SFD_CLOEXEC | SFD_NONBLOCK);
+    }
+    ~Interrupts() {
+        ::close(descriptor_);
+        ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+    }
+    Interrupts(const Interrupts&) = delete;
+    int descriptor() const { return descriptor_; }
+
+private:
+    sigset_t before_;
+    int descriptor_;
+};
 
 int follow_file(Client& client, const Options& options) {
     const std::string& path = options.words.front();
@@ -128,6 +157,8 @@ int run_shell(const Options& options) {
     if (!::isatty(STDIN_FILENO)) return follow_input(*client, options);
     if (!options.classic)
         print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n", client->instance(), client->pid()));
+    const Interrupts interrupts;
+    client->cancel_on(interrupts.descriptor());
     RemoteShell listener(*client, "<shell>");
     const Prompt prompt = options.script    ? Prompt{"%%\n", "%%\n"}
                           : options.classic ? Prompt{"halcmd: ", "halcmd+: "}

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// Documentation strings are written in the macros of manual pages (groff_man); ours is Markdown.
+#include <algorithm>
+
+#include "base/types.hpp"
+#include "syntax.hpp"
+
+namespace hal::comp {
+namespace {
+
+// Escapes within a line: fonts, dashes, bullets.
+std::string inline_text(std::string_view line) {
+    std::string out, open;  // `open`: what ends the font in use
+    const auto font = [&](std::string mark) {
+        out += open;
+        out += mark;
+        open = std::move(mark);
+    };
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        if (line[i] != '\\' || i + 1 == line.size()) {
+            out += line[i];
+            continue;
+        }
+        const char c = line[++i];
+        if (c == 'f' && i + 1 < line.size()) {
+            const char which = line[++i];
+            if (which == '[' || which == '(') {  // a font of a longer name
+                const std::size_t end = which == '[' ? line.find(']', i) : i + 2;
+                font("");
+                i = std::min(end, line.size() - 1);
+            } else font(which == 'B' ? "**" : which == 'I' ? "*" : "");
+        } else if (c == '(' && i + 2 < line.size()) {
+            const std::string_view name = line.substr(i + 1, 2);
+            i += 2;
+            static constexpr std::pair<std::string_view, const char*> characters[] = {
+                {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"}, {"di", "÷"}, {"+-", "±"}, {"<=", "≤"}, {">=", "≥"}, {"!=", "≠"}, {"->", "→"},
+                {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""}, {"lq", "“"}, {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"}, {"sr", "√"}};
+            for (const auto& [key, character] : characters)
+                if (key == name) out += character;
+        } else if (c == 'e' || c == '\\') out += '\\';
+        else if (c == '&' || c == '|' || c == '^' || c == '/' || c == ',' || c == 'c' || c == ':') continue;
+        else if (c == '"') break;  // a comment
+        else if (c == '~' || c == ' ' || c == '0') out += ' ';
+        else out += c;  // \- and the like
+    }
+    return out + open;
+}
+
+std::string_view trimmed(std::string_view text) {
+    const std::size_t begin = text.find_first_not_of(" \t\n");
+    return begin == std::string_view::npos ? std::string_view() : text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
+}
+
+// The arguments of a macro: words, or in quotes.
+std::vector<std::string> arguments(std::string_view line) {
+    std::vector<std::string> all;
+    for (std::size_t i = 0; i < line.size();) {
+        if (line[i] == ' ' || line[i] == '\t') {
+            ++i;
+            continue;
+        }
+        const bool quoted = line[i] == '"';
+        std::size_t end = quoted ? line.find('"', i + 1) : line.find_first_of(" \t", i);
+        end = std::min(end, line.size());
+        all.emplace_back(line.substr(i + quoted, end - i - quoted));
+        i = end + quoted;
+    }
+    return all;
+}
+
+class Converter {
+public:
+    std::string convert(std::string_view text) {
+        for (std::size_t at = 0; at < text.size();) {
+            const std::size_t end = std::min(text.find('\n', at), text.size());
+            line(text.substr(at, end - at));
+            at = end + 1;
+        }
+        if (verbatim_) verbatim(false);
+        return std::string(trimmed(out_));
+    }
+
+private:
+    void paragraph() {
+        while (out_.ends_with(' ')) out_.pop_back();
+        if (!out_.empty() && !out_.ends_with("\n\n")) out_ += out_.ends_with('\n') ? "\n" : "\n\n";
+    }
+    void verbatim(bool on) {
+        if (on == verbatim_) return;
+        if (on) paragraph();
+        out_ += "```\n";
+        verbatim_ = on;
+    }
+    void line(std::string_view line) {
+        if (line.starts_with(".") || line.starts_with("'\\\"")) return macro(line);
+        if (verbatim_) return void((out_ += raw_text(line)) += '\n');
+        if (tag_ && !trimmed(line).empty()) {  // the line behind .TP is what the paragraph explains
+            tag_ = false;
+            return void(out_ += "**" + std::string(trimmed(plain(inline_text(line)))) + "**\n");
+        }
+        (out_ += inline_text(line)) += '\n';
+    }
+    void macro(std::string_view line) {
+        const bool fonts = line.starts_with(".B") || line.starts_with(".I ");
+        if (fonts) tag_ = false;
+        const std::size_t end = std::min(line.find_first_of(" \t", 1), line.size());
+        const std::string_view name = line.substr(1, end - 1);
+        std::vector<std::string> words = arguments(line.substr(end));
+        for (std::string& word : words) word = inline_text(word);
+        std::string all;
+        for (const std::string& word : words) all += (all.empty() ? "" : " ") + word;
+        if (name == "nf" || name == "EX") verbatim(true);
+        else if (name == "fi" || name == "EE") verbatim(false);
+        else if (name == "P" || name == "PP" || name == "LP" || name == "sp" || name == "RS" || name == "RE") paragraph();
+        else if (name == "br") { if (!out_.empty() && !verbatim_) out_ += out_.ends_with('\n') ? (out_.insert(out_.size() - 1, "\\"), "") : "\\\n"; }
+        else if (name == "TP" || name == "TQ") paragraph(), tag_ = true;
+        else if (name == "IP" || name == "HP") {
+            paragraph();
+            const std::string mark = words.empty() ? "" : plain(words[0]);
+            if (mark == "•" || mark == "-" || mark == "*" || mark == "o" || mark == "·") out_ += "- ";
+            else if (!mark.empty()) out_ += "**" + mark + "**\n";
+        } else if (name == "SH" || name == "SS") paragraph(), out_ += (name == "SH" ? "## " : "### ") + all + "\n\n";
+        else if (name == "B" || name == "SB") out_ += "**" + all + "**\n";
+        else if (name == "I") out_ += "*" + all + "*\n";
+        else if (name.size() == 2 && name.find_first_not_of("BIR") == std::string_view::npos) {  // fonts in turn, without blanks
+            for (std::size_t i = 0; i < words.size(); ++i) {
+                const std::string mark = name[i % 2] == 'B' ? "**" : name[i % 2] == 'I' ? "*" : "";
+                out_ += mark + words[i] + mark;
+            }
+            out_ += '\n';
+        } else if (name.empty() || name.starts_with("\\\"") || name == "TH" || name == "ft" || name == "ad" || name == "na" || name == "in" || name == "ti") return;
+        else (out_ += inline_text(line)) += '\n';  // not a macro after all: ".5 is a half"
+    }
+    static std::string plain(std::string text) {
+        std::erase(text, '*');
+        return text;
+    }
+    static std::string raw_text(std::string_view line) { return plain(inline_text(line)); }
+
+    std::string out_;
+    bool verbatim_ = false, tag_ = false;
+};
+
+std::string joined(const std::vector<Text>& texts, const char* between) {
+    std::string all;
+    for (const Text& text : texts) {
+        const std::string converted = markdown_of(text.text);
+        if (!converted.empty()) all += (all.empty() ? "" : between) + converted;
+    }
+    return all;
+}
+
+}  // namespace
+
+std::string markdown_of(std::string_view text) { return Converter().convert(text); }
+
+std::string line_of(std::string_view text) {
+    std::string line;
+    for (const char c : markdown_of(text)) {
+        const bool blank = c == '\n' || c == ' ';
+        if (!blank || !line.ends_with(' ')) line += blank ? ' ' : c;
+    }
+    return std::string(trimmed(line));
+}
+
+std::string manual(const Tree& tree) {
+    std::string all = joined(tree.description, "\n\n");
+    const auto section = [&](const char* title, const std::vector<Text>& texts, const char* between) {
+        if (const std::string text = joined(texts, between); !text.empty()) all += (all.empty() ? "## " : "\n\n## ") + std::string(title) + "\n\n" + text;
+    };
+    // what an instance without load arguments does not show
+    std::vector<Text> personal;
+    for (const Item& item : tree.items) {
+        if (!item.condition.given() && !item.count.given()) continue;
+        static constexpr const char* dirs[] = {"in", "out", "io", "rw"};
+        std::string row = "- " + item.name.hal + " (" + name(item.type) + " " + dirs[static_cast<std::size_t>(item.dir)] + ")";
+        if (item.count.given()) row += ", as many as " + item.count.text + " and at most " + std::to_string(item.size);
+        if (item.condition.given()) row += ", if " + item.condition.text;
+        if (const std::string doc = line_of(item.doc.text); !doc.empty()) row += ": " + doc;
+        personal.push_back({row, item.name.span});
+    }
+    section("Pins that depend on the personality", personal, "\n");
+    section("Examples", tree.examples, "\n\n");
+    section("Notes", tree.notes, "\n\n");
+    section("See also", tree.see_also, ", ");
+    section("Author", tree.author, "\n\n");
+    section("License", tree.license, "\n\n");
+    return all;
+}
+
+}  // namespace hal::comp

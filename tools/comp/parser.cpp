@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: MIT
+#include "scanner.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "base/types.hpp"
+
+namespace hal::comp {
+namespace {
+
+constexpr unsigned largest_array = 1024;
+
+// "no such type 'x'" and the like list what there is.
+const std::vector<std::string>& type_names() {
+    static const std::vector<std::string> names = [] {
+        std::vector<std::string> all;
+        for (const TypeRow& row : types) {
+            all.push_back(row.name);
+            if (*row.newer) all.push_back(row.newer);
+        }
+        all.insert(all.end(), {"signed", "unsigned"});
+        return all;
+    }();
+    return names;
+}
+
+class Parser {
+public:
+    Parser(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) : in_(sources, source, diagnostics) {}
+    Tree parse();
+
+private:
+    using Handler = bool (Parser::*)(const Text& keyword);
+    struct Keyword {
+        const char* name;
+        Handler handler;
+    };
+    static const std::array<Keyword, 15> keywords;
+
+    bool declaration();
+    bool component(const Text& keyword);
+    bool item(const Text& keyword);
+    bool function(const Text& keyword);
+    bool variable(const Text& keyword);
+    bool option(const Text& keyword);
+    bool modparam(const Text& keyword);
+    bool include(const Text& keyword);
+    template <std::vector<Text> Tree::* list>
+    bool prose(const Text& keyword);
+
+    bool type(Item& item);
+    bool array(Item& item);
+    bool name(Name& name, const std::string& of);
+    void doc(Text& doc);
+    bool fail(std::string message, std::string help = "") { return in_.error(in_.here(), std::move(message), "", std::move(help)), false; }
+
+    Scanner in_;
+    Tree tree_;
+};
+
+const std::array<Parser::Keyword, 15> Parser::keywords{{
+    {"component", &Parser::component},
+    {"pin", &Parser::item},
+    {"param", &Parser::item},
+    {"function", &Parser::function},
+    {"variable", &Parser::variable},
+    {"option", &Parser::option},
+    {"modparam", &Parser::modparam},
+    {"include", &Parser::include},
+    {"description", &Parser::prose<&Tree::description>},
+    {"examples", &Parser::prose<&Tree::examples>},
+    {"notes", &Parser::prose<&Tree::notes>},
+    {"see_also", &Parser::prose<&Tree::see_also>},
+    {"author", &Parser::prose<&Tree::author>},
+    {"license", &Parser::prose<&Tree::license>},
+    {"special_format_doc", &Parser::prose<&Tree::notes>},
+}};
+
+Tree Parser::parse() {
+    while (!in_.at_code() && !in_.at_end())
+        if (!declaration()) in_.recover();
+    if (in_.at_code()) tree_.code = in_.take_code();
+    return std::move(tree_);
+}
+
+bool Parser::declaration() {
+    if (in_.take(';')) return true;  // an empty one
+    const Text keyword = in_.word();
+    if (!keyword.given()) return fail("a declaration starts with a word: pin, param, function, …", "put C code behind a line that consists of ;;");
+    const Keyword* found = nullptr;
+    std::vector<std::string> all;
+    for (const Keyword& row : keywords) {
+        if (keyword == row.name) found = &row;
+        all.push_back(row.name);
+    }
+    if (!found) {
+        std::string help = did_you_mean(keyword.text, all);
+        if (help.empty()) help = "declarations: " + listed(all, all.size()) + "; C code stands behind a line that consists of ;;";
+        return in_.error(keyword.span, "no declaration is called '" + keyword.text + "'", "", help), false;
+    }
+    const bool good = (this->*found->handler)(keyword);
+    if (in_.take_broken() || !good) return false;
+    if (!in_.at_code() && in_.take(';')) return true;
+    const Span here = in_.at_code() ? in_.behind() : in_.here();
+    in_.error(here, "the declaration does not end here", here.end - here.begin <= 1 ? "a ';' is missing" : "a ';' is missing before this");
+    return in_.at_code() || std::find(all.begin(), all.end(), in_.peek_word()) != all.end();  // the next one can be read
+}
+
+bool Parser::component(const Text& keyword) {
+    if (tree_.name.given()) return in_.error(keyword.span, "a file describes one component"), false;
+    tree_.name = in_.word();
+    if (!tree_.name.given()) return fail("here the component's name is missing", "component NAME \"what it does\";");
+    doc(tree_.summary);
+    return true;
+}
+
+bool Parser::name(Name& name, const std::string& of) {
+    const Text written = in_.hal_name();
+    if (!written.given()) return fail("here the name of the " + of + " is missing");
+    name = spelled(written);
+    return true;
+}
+
+void Parser::doc(Text& doc) {
+    while (auto text = in_.string()) {  // strings that follow each other are one
+        doc.span = doc.given() ? Span{doc.span.source, doc.span.begin, text->span.end} : text->span;
+        doc.text += text->text;
+    }
+}
+
+bool Parser::type(Item& item) {
+    const Text word = in_.word();
+    std::optional<hal_type> type = type_named(word.text);
+    if (word == "signed") type = HAL_TYPE_S32;
+    if (word == "unsigned") type = HAL_TYPE_U32;
+    if (!word.given() || !type) {
+        if (!word.given()) return fail("here a type is missing", "types: " + listed(type_names(), type_names().size()));
+        std::string help = did_you_mean(word.text, type_names());
+        if (help.empty()) help = "types: " + listed(type_names(), type_names().size());
+        return in_.error(word.span, "there is no type '" + word.text + "'", "", help), false;
+    }
+    item.type = *type;
+    item.settable = word == row(*type).newer;
+    return true;
+}
+
+bool Parser::array(Item& item) {
+    const Text size = in_.expression(":]");
+    const auto end = size.text.data() + size.text.size();
+    const bool hex = size.text.starts_with("0x") || size.text.starts_with("0X");
+    const auto read = std::from_chars(size.text.data() + (hex ? 2 : 0), end, item.size, hex ? 16 : 10);
+    if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 || item.size > largest_array) {
+        item.size = 1;
+        in_.error(size.given() ? size.span : in_.here(), "the size of an array is a whole number from 1 to " + std::to_string(largest_array), "",
+                  "what depends on the personality stands behind it: [16 : personality & 0xff]");
+    }
+    if (in_.take(':')) {
+        item.count = in_.expression("]");
+        if (!item.count.given()) return fail("here the number of elements is missing", "[16 : personality & 0xff]");
+    }
+    return in_.take(']') || fail("a '[' without its ']'");
+}
+
+bool Parser::item(const Text& keyword) {
+    Item item;
+    item.parameter = keyword == "param";
+    struct Direction {
+        const char* name;
+        hal_dir dir;
+        bool writable;
+    };
+    static constexpr Direction of_pins[] = {{"in", HAL_DIR_IN, false}, {"out", HAL_DIR_OUT, true}, {"io", HAL_DIR_IO, true}};
+    static constexpr Direction of_parameters[] = {{"r", HAL_DIR_PARAM, true}, {"rw", HAL_DIR_PARAM, true}};
+    const Text word = in_.word();
+    bool known = false;
+    const auto look = [&](const Direction& row) {
+        if (!(word == row.name)) return;
+        known = true;
+        item.dir = row.dir;
+        item.writable = row.writable;
+        item.read_only = item.parameter && word == "r";
+    };
+    if (item.parameter) for (const Direction& row : of_parameters) look(row);
+    else for (const Direction& row : of_pins) look(row);
+    if (!known) {
+        const Span at = word.given() ? word.span : in_.here();
+        if (item.parameter) in_.error(at, "a parameter is r (the component sets it) or rw", "", "param rw float gain = 1.0 \"what it is\";");
+        else in_.error(at, "a pin is in, out or io", "", "pin in float angle \"what it is\";");
+        return false;
+    }
+    if (!type(item) || !name(item.name, item.parameter ? "parameter" : "pin")) return false;
+    if (in_.take('[') && !array(item)) return false;
+    while (in_.next() == '=' || in_.peek_word() == "if") {
+        const bool start = in_.take('=');
+        Text& part = start ? item.start : item.condition;
+        if (!start) in_.word();
+        if (part.given()) return in_.error(part.span, start ? "a second start value" : "a second condition"), false;
+        part = in_.expression(start ? "" : "=");
+        if (!part.given()) return fail(start ? "here the start value is missing" : "here the condition is missing");
+    }
+    doc(item.doc);
+    tree_.items.push_back(std::move(item));
+    return true;
+}
+
+bool Parser::function(const Text&) {
+    Function function;
+    if (!name(function.name, "function")) return false;
+    if (in_.peek_word() == "fp" || in_.peek_word() == "nofp") in_.word();  // all functions may calculate
+    doc(function.doc);
+    tree_.functions.push_back(std::move(function));
+    return true;
+}
+
+bool Parser::variable(const Text&) {
+    Variable variable;
+    variable.type = in_.word();
+    if (!variable.type.given()) return fail("here the type of the variable is missing", "variable double old;");
+    while (in_.take('*')) variable.stars += '*';
+    const Text written = in_.word();
+    if (!written.given()) return fail("here the name of the variable is missing", "the type is one word: use a typedef for struct, long long, …");
+    variable.name = spelled(written);
+    variable.name.c = written.text;
+    while (in_.take('[')) {  // several make a table
+        const Text size = in_.expression("]");
+        if (!size.given() || !in_.take(']')) return fail("here the size of the array is missing");
+        if (!variable.size.given()) variable.size = size;
+        else variable.size.text += "][" + size.text;
+    }
+    if (in_.take('=')) {
+        if (const auto text = in_.string()) {
+            variable.start = *text;
+            variable.start.text.insert(0, 1, '"').push_back('"');
+        } else variable.start = in_.expression("");
+        if (!variable.start.given()) return fail("here the start value is missing");
+    }
+    Text ignored;
+    doc(ignored);
+    tree_.variables.push_back(std::move(variable));
+    return true;
+}
+
+bool Parser::option(const Text&) {
+    Option option;
+    option.name = in_.word();
+    if (!option.name.given()) return fail("here the name of the option is missing");
+    doc(option.value);
+    if (!option.value.given()) option.value = in_.expression("");
+    tree_.options.push_back(std::move(option));
+    return true;
+}
+
+bool Parser::modparam(const Text&) {
+    Parameter parameter;
+    const Text type = in_.word();
+    if (!(type == "int") && !(type == "dummy"))
+        return in_.error(type.given() ? type.span : in_.here(), "a module parameter is int, or dummy when the C code declares it", "", "modparam int channels = 4 \"what it is\";"), false;
+    parameter.dummy = type == "dummy";
+    parameter.name = in_.word();
+    if (!parameter.name.given()) return fail("here the name of the parameter is missing");
+    if (in_.take('=')) {
+        parameter.start = in_.expression("");
+        if (!parameter.start.given()) return fail("here the default is missing");
+    }
+    doc(parameter.doc);
+    tree_.parameters.push_back(std::move(parameter));
+    return true;
+}
+
+bool Parser::include(const Text&) {
+    const auto header = in_.header();
+    if (!header) return fail("here a file's name is missing", "include <rtapi_math.h>; or include \"mine.h\";");
+    tree_.includes.push_back(*header);
+    return true;
+}
+
+template <std::vector<Text> Tree::* list>
+bool Parser::prose(const Text& keyword) {
+    Text text;
+    doc(text);
+    if (!text.given()) return fail("here a text is missing", keyword.text + " \"a line\"; or " + keyword.text + " \"\"\"several lines\"\"\";");
+    (tree_.*list).push_back(std::move(text));
+    return true;
+}
+
+}  // namespace
+
+bool Option::on() const { return value.text != "no" && value.text != "No" && value.text != "NO" && value.text != "0" && value.text != "false"; }
+
+const Option* Tree::option(std::string_view wanted) const {
+    const Option* found = nullptr;
+    for (const Option& option : options)
+        if (option.name == wanted) found = &option;
+    return found;
+}
+
+bool Tree::has(std::string_view wanted) const {
+    const Option* const found = option(wanted);
+    return found && found->on();
+}
+
+Tree parse(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) { return Parser(sources, source, diagnostics).parse(); }
+
+}  // namespace hal::comp
