@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 # add_hal_component(NAME SOURCE...): a plugin NAME.so that exports `hal_plugin` and nothing else.
 #
-# Works in this tree and, after find_package(Halcyon), in any other. The target is component_NAME.
+# Works in this tree and, after find_package(Halcyon), in any other. The target is component_NAME. Outside of this tree a `test.hal`
+# with its `expected` beside the CMakeLists.txt becomes the test NAME, which ctest runs.
 
 # hal_component_options(TARGET): how the sources of a plugin are compiled.
 function(hal_component_options target)
     target_link_libraries(${target} PRIVATE Halcyon::sdk)
-    target_compile_options(${target} PRIVATE -fno-plt "$<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>")
+    target_compile_options(${target} PRIVATE -fno-plt -ffp-contract=off "$<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>"
+        "$<$<CONFIG:>:-O2>")  # a project that names no build type wants neither an assertion less nor a slow cycle
     set_target_properties(${target} PROPERTIES
         CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON DEFINE_SYMBOL "")
 endfunction()
@@ -28,6 +30,19 @@ function(add_hal_component name)
     endif()
     if(TARGET halcyon_precompiled)  # in this tree: the sdk's header is read once for all components
         target_precompile_headers(${target} REUSE_FROM halcyon_precompiled)
+    endif()
+    if(HALCYON_COMPONENT_FOLDER)  # in this tree: the folder below components/ is its group in the reference
+        list(GET ARGN 0 source)
+        cmake_path(ABSOLUTE_PATH source)
+        cmake_path(RELATIVE_PATH source BASE_DIRECTORY "${HALCYON_COMPONENT_FOLDER}")
+        string(REGEX MATCH "^[^/]+" group "${source}")
+        set_property(GLOBAL APPEND_STRING PROPERTY HALCYON_GROUPS "${name} ${group}\n")
+        set_property(GLOBAL APPEND PROPERTY HALCYON_PLUGINS ${target})
+    endif()
+    set(test "${CMAKE_CURRENT_SOURCE_DIR}")
+    if(HALCYON_PROGRAM AND EXISTS "${test}/test.hal" AND EXISTS "${test}/expected" AND NOT TEST ${name})
+        add_test(NAME ${name} COMMAND "${CMAKE_COMMAND}" "-DHAL=${HALCYON_PROGRAM}" "-DPLUGINS=$<TARGET_FILE_DIR:${target}>" "-DTEST=${test}"
+                 -P "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/HalcyonTest.cmake")
     endif()
     install(TARGETS ${target} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/halcyon/components")
 endfunction()

@@ -57,6 +57,7 @@ void load(const Options&, Report&);
 void shell(const Options&, Report&);
 void edit(const Options&, Report&);
 void coherence(const Options&, Report&);
+void python(const Options&, Report&);
 void size(const Options&, Report&);
 
 }  // namespace hal::bench

@@ -75,10 +75,12 @@ private:
         const std::unordered_map<Pin*, hal_value> pins;
         const std::unordered_map<Signal*, hal_value> signals;
         const std::unordered_map<Signal*, Pin*> inherited;
+        const std::unordered_map<const Pin*, hal_pin*> replaced;
         input.without = &none;
         input.pin_values = &pins;
         input.signal_values = &signals;
         input.inherited = &inherited;
+        input.old_memory = &replaced;
         input.core_of = [&](const Thread&) -> void* { return &core; };
         input.check_finite = check_finite;
         plan_ = std::move(compile(runtime_.session.model(), input).plans.front().second);

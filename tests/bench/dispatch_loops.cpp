@@ -38,7 +38,7 @@ void loop(void* const* instances, std::size_t count, const hal_cycle* cycle) {
 
 Loop loop_over(std::string_view component) {
     if (component == "and2") return loop<and2_source::And2, &and2_source::And2::update>;
-    if (component == "sum2") return loop<sum2_source::Sum2, &sum2_source::Sum2::update>;
+    if (component == "sum2") return loop<sum2_source::Sum2, &sum2_source::Sum2::add>;
     if (component == "mux2") return loop<mux2_source::Mux2, &mux2_source::Mux2::update>;
     if (component == "limit1") return loop<limit1_source::Limit1, &limit1_source::Limit1::update>;
     if (component == "pid") return loop<pid_source::Pid, &pid_source::Pid::calculate>;

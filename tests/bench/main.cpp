@@ -28,6 +28,7 @@ constexpr Section sections[] = {
     {"shell", "one-shot commands, a thousand setp, save, against halcmd", shell, true},
     {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit, true},
     {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
+    {"python", "a component of 100 pins in Python", python, true},
     {"size", "of the program; with --full its build from cold", size},
 };
 

@@ -16,7 +16,7 @@ ROWS = {
     "runtime/execute": ["runtime/plan", "runtime/base"],
     "runtime/session": ["runtime/execute", "runtime/model", "runtime/netlist"],
     "runtime/shell": ["runtime/session"],
-    "tools": ["runtime/shell"],
+    "tools": ["runtime/shell", "components/canopen"],  # hal can: device descriptions
     "drivers/link": [],
     "drivers": ["drivers/link"],
     "components": ["runtime/sdk"],
@@ -40,10 +40,11 @@ LIBRARIES = {
     r"CLI/": ["tools"],
     r"editline/|histedit": ["tools"],
     r"fmt/": ["runtime", "tools"],
+    r"pugixml": ["components/canopen"],
     r"nlohmann/": ["runtime/session", "runtime/shell", "tools"],
 }
 
-INCLUDE_ROOTS = ["runtime", "runtime/abi", "runtime/sdk", "drivers", "tools", "."]  # as the compiler searches
+INCLUDE_ROOTS = ["runtime", "runtime/abi", "runtime/sdk", "drivers", "components", "tools", "."]  # as the compiler searches
 SINGLE = {"paths.hpp": ["runtime/session", "runtime/shell", "tools"]}  # headers that belong to no folder
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 

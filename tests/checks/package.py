@@ -49,6 +49,10 @@ def main(build):
         manual = run(hal, "doc", "mine", env=environment)
         if "twice the input" not in manual:
             sys.exit(f"hal doc mine says:\n{manual}")
+        # What `hal new component` makes passes its test at once.
+        path = dict(environment, PATH=f"{prefix}/bin:{os.environ['PATH']}")
+        run(hal, "new", "component", "fresh", env=path, cwd=folder)
+        run("bash", "-c", "cmake -B build && cmake --build build && ctest --test-dir build", env=path, cwd=Path(folder) / "fresh")
         (source / "mine.hal").write_text(NETLIST + "loadrt not\n")
         run(hal, "check", source / "mine.hal", env=environment)
         for alias in ("halrun", "halcmd"):

@@ -178,7 +178,7 @@ class Doc(Case):
             for pin in page["pins"]:
                 self.assertTrue(pin["doc"], f"{name}.{pin['name']}")
             self.assertTrue(self.good("doc", name, "--markdown").startswith("# "))
-            self.assertTrue(self.good("doc", name, "--man").startswith(".TH "))
+            self.assertRegex(self.good("doc", name, "--man"), r"\A('\\\" t\n)?\.TH ")
 
     def test_unknown_component_gets_a_suggestion(self):
         error = self.bad("doc", "adn2")

@@ -92,7 +92,8 @@ class Live(Case):
         self.assertEqual(("", ""), self.end(recorder, signal.SIGINT))
         self.assertEqual(0, recorder.returncode)
         for line in lines():
-            self.assertEqual(6, len(line.split()))
+            if line != "overrun":  # the machine was faster than this process
+                self.assertEqual(6, len(line.split()))
 
     def test_instance_ends(self):
         machine = self.start("run", self.write("b.hal", NETLIST), "--name", "b", instance="b")

@@ -145,6 +145,11 @@ class Scripts(Case):
         self.assertEqual((1, ""), (done.returncode, done.stdout))
         self.assertIn("<stdin>", done.stderr)
 
+    def test_a_pipes_lines_are_numbered(self):
+        pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input="setp adder.in0 \\\n 10\n\ngetp nothing\n", text=True, capture_output=True)
+        self.assertTrue(pipe.stderr.startswith("<stdin>:4:6: error: "), pipe.stderr)
+        self.assertEqual("10", self.value("adder.in0"))
+
     def test_pipe_answers_each_line_at_once(self):
         client = subprocess.Popen([str(HAL), "shell"], env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
         self.addCleanup(client.wait)

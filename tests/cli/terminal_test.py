@@ -7,6 +7,20 @@ import unittest
 from harness import SERVO, Case, Terminal, wait_until
 
 
+def children(process):
+    """The names of its child processes."""
+    for entry in os.listdir("/proc"):
+        if not entry.isdigit():
+            continue
+        try:
+            with open(f"/proc/{entry}/stat", "rb") as file:
+                stat = file.read()
+        except OSError:
+            continue
+        if int(stat.rsplit(b")", 1)[1].split()[1]) == process:
+            yield stat.split(b"(", 1)[1]
+
+
 class Shell(Case):
     words, prompt = ("shell",), "hal> "
 
@@ -113,6 +127,13 @@ class Shell(Case):
         plain.expect("\n")
         self.assertNotIn("\033[", plain.expect("did you mean"))
 
+    def test_interrupt_ends_a_command_that_waits(self):
+        self.terminal.send("loadusr -w sleep 1000\r")
+        wait_until(lambda: b"sleep" in b"".join(children(self.machine.pid)), "the program runs")
+        self.terminal.send("\x03")
+        self.assertIn("interrupted", self.terminal.expect(self.prompt))
+        self.assertIn("\n2\r\n", self.type("getp adder.in0"))
+
     def test_instance_that_ends(self):
         self.end(self.machine)
         self.terminal.send("getp adder.in0\r")
@@ -144,23 +165,11 @@ class RunInteractively(Case):
 
     def test_interrupt_ends_a_command_that_waits(self):
         self.terminal.send("loadusr -w sleep 1000\r")
-        wait_until(lambda: b"sleep" in b"".join(self.children()), "the program runs")
+        wait_until(lambda: b"sleep" in b"".join(children(self.terminal.process)), "the program runs")
         self.terminal.send("\x03")
         self.terminal.expect("hal> ")
         self.terminal.send("getp adder.in0\r")
         self.assertIn("\n2\r\n", self.terminal.expect("hal> "))
-
-    def children(self):
-        for entry in os.listdir("/proc"):
-            if not entry.isdigit():
-                continue
-            try:
-                with open(f"/proc/{entry}/stat", "rb") as file:
-                    stat = file.read()
-                if int(stat.rsplit(b")", 1)[1].split()[1]) == self.terminal.process:
-                    yield stat.split(b"(", 1)[1]
-            except OSError:
-                pass
 
     def test_terminate_while_a_line_is_edited(self):
         self.terminal.send("setp adder.in0")

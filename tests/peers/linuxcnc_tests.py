@@ -21,7 +21,8 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ.get("HAL_BIN", ROOT / "build/release/bin/hal")).resolve().parent
 SCRIPTS = ("test.hal", "test.sh", "test")
-CLEAN = {"PATH": f"{BIN}:/usr/bin:/bin", "LC_ALL": "C"}
+MODULE = BIN.parent / "python"
+CLEAN = {"PATH": f"{BIN}:/usr/bin:/bin", "LC_ALL": "C", "PYTHONPATH": str(MODULE)}
 
 OF_HAL = re.compile(r"\bhal(run|cmd|compile|sampler|streamer)\b|\bREALTIME\b")  # a test without one of these is not about HAL
 UTILITIES = set("""awk basename bash cat chmod cmp cp cut date diff dirname egrep env expr false fgrep find grep head id kill ln ls mkdir
@@ -30,7 +31,7 @@ UTILITIES = set("""awk basename bash cat chmod cmp cp cut date diff dirname egre
 SHELL = set("""! . : [ [[ alias break case cd command continue declare do done echo elif else esac eval exec exit export fi for function if
     in let local printf pwd read readonly return set shift source test then time trap ulimit umask unset until wait while""".split())
 BEFORE_COMMAND = {"!", "if", "then", "else", "elif", "do", "while", "until", "exec", "time", "env", "$SUDO", "${SUDO}"}
-PYTHON = {"hal", "linuxcnc", "rs274", "gcode", "hal_glib", "_hal", "pyhal"}  # LinuxCNC's modules
+PYTHON = {"linuxcnc", "rs274", "gcode", "hal_glib", "_hal"} | (set() if MODULE.is_dir() else {"hal", "pyhal"})  # LinuxCNC's modules
 
 # What $REALTIME start and stop are upstream: an empty instance, to which halcmd connects.
 REALTIME = """#!/bin/sh
@@ -96,7 +97,9 @@ def run(test, script):
         shutil.copytree(test, here)
         (here / "realtime.sh").write_text(REALTIME)
         (here / "realtime.sh").chmod(0o755)
-        environment = dict(CLEAN, HOME=folder, XDG_RUNTIME_DIR=folder, TOPDIR=str(ROOT), REALTIME=str(here / "realtime.sh"))
+        (here / "bin").mkdir(exist_ok=True)
+        (here / "bin/realtime").symlink_to("../realtime.sh")  # a program in the PATH upstream
+        environment = dict(CLEAN, PATH=f"{here}/bin:{CLEAN['PATH']}", HOME=folder, XDG_RUNTIME_DIR=folder, TOPDIR=str(ROOT), REALTIME=str(here / "realtime.sh"))
         command = {"test.hal": ["halrun", "-f"], "test.sh": ["bash", "-x"], "test": []}[script]
         with open(here / "result", "wb") as out, open(here / "stderr", "wb") as err:
             try:

@@ -120,6 +120,10 @@ TEST_F(Rendering, shows_control_characters_and_broken_bytes_as_escapes) {
               "      |                      ^^^ here\n");
 }
 
+TEST_F(Rendering, does_not_count_a_byte_order_mark) {
+    EXPECT_EQ(at("\xEF\xBB\xBFstart bad\n", "bad"), "test.hal:1:7: error: wrong [two-writers]\n    1 | start bad\n      |       ^^^ here\n");
+}
+
 TEST_F(Rendering, windows_a_huge_line_around_the_place) {
     const std::string text = std::string(1'000'000, 'a') + " bad " + std::string(1'000'000, 'c');
     EXPECT_EQ(at(text, "bad"), "test.hal:1:1000002: error: wrong [two-writers]\n    1 | …" + std::string(39, 'a') + " bad " +

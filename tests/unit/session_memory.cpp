@@ -44,6 +44,14 @@ void* operator new(std::size_t bytes) { return take(bytes, 0); }
 void* operator new[](std::size_t bytes) { return take(bytes, 0); }
 void* operator new(std::size_t bytes, std::align_val_t align) { return take(bytes, static_cast<std::size_t>(align)); }
 void* operator new[](std::size_t bytes, std::align_val_t align) { return take(bytes, static_cast<std::size_t>(align)); }
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
+    try {
+        return take(bytes, 0);
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
+}
+void* operator new[](std::size_t bytes, const std::nothrow_t& none) noexcept { return operator new(bytes, none); }
 void operator delete(void* memory) noexcept { give(memory, 0); }
 void operator delete[](void* memory) noexcept { give(memory, malloc_usable_size(memory)); }
 void operator delete(void* memory, std::size_t) noexcept { give(memory, 0); }
@@ -119,7 +127,8 @@ INSTANTIATE_TEST_SUITE_P(
     Edit, Memory,
     testing::Combine(testing::Values("loadrt test-counter names=new\naddf new t 1\nnet n new.sum => y.float-in", "loadrt test-life names=new", "loadrt test-shared count=2 kind=1,2",
                                      "newthread v 4000000\ndelf a t\naddf a v", "delthread u", "unloadrt a\nunloadrt test-shared", "unloadrt all", "delsig all", "unlinkp a.sum\nsets s 3",
-                                     "net fresh y.u64-out\nnewsig f2 port\nsets f2 8", "setp x.float-in 3\nsetp y.float-in 4\nsets i 5", "alias pin y.u32-in other\nunalias pin speed", "addf --auto u"),
+                                     "net fresh y.u64-out\nnewsig f2 port\nsets f2 8", "setp x.float-in 3\nsetp y.float-in 4\nsets i 5", "alias pin y.u32-in other\nunalias pin speed", "addf --auto u",
+                                     "reload test-counter\nreload test-shared\nunlinkp b.step", "reload test-types\nreload test-port", "reload test-life"),
                      testing::Bool()),
     [](const auto& edit) { return std::to_string(edit.index); });
 

@@ -223,6 +223,20 @@ TEST(Encoder, Velocity_falls_when_edges_stop_coming_and_is_zero_below_the_minimu
     EXPECT_EQ(e.get<double>("position-interpolated"), 40.0);
 }
 
+TEST(Encoder, Velocity_begins_with_the_second_edge_and_falls_as_the_next_edge_would_say) {
+    Encoder e;
+    for (int i = 0; i < 10; ++i) e.show(0);
+    e.turn(0, 1, 4);
+    e.capture();
+    EXPECT_EQ(e.get<double>("velocity"), 0.0) << "one edge tells nothing of the way before it";
+    e.turn(1, 2, 4);
+    e.capture();
+    EXPECT_NEAR(e.get<double>("velocity"), 5000.0, 1e-6) << "the next edge may still come in time, in the next cycle";
+    e.show(2);
+    e.capture();
+    EXPECT_NEAR(e.get<double>("velocity"), 4000.0, 1e-6);
+}
+
 TEST(Encoder, A_shaft_that_trembles_over_one_edge_has_no_velocity) {
     Encoder e;
     e.set("min-speed-estimate", 0.0);
@@ -344,6 +358,18 @@ TEST(Pwmgen, Pdm_is_exact_in_the_average_and_evenly_spread) {
     EXPECT_DOUBLE_EQ(p.average("pwm", 100), 1.0);
     p.set("value", 0.0);
     EXPECT_LE(p.average("pwm", 100), 0.01);
+}
+
+TEST(Pwmgen, Direction_and_level_of_a_tick_belong_together) {
+    for (const char* type : {"1", "2"}) {
+        Pwm p(type);
+        for (const double value : {1.0, -1.0, 1.0}) {
+            p.set("value", value);
+            p.update();
+            p.make();
+            EXPECT_EQ(p.get<bool>(type[0] == '1' ? "dir" : "down"), value < 0.0) << type;
+        }
+    }
 }
 
 TEST(Pwmgen, Limits_and_offset_bound_the_duty) {

@@ -220,6 +220,36 @@ TEST(Pid, A_jump_of_the_coordinates_at_the_index_makes_no_spike) {
     }
 }
 
+TEST(Pid, The_derivative_damps_where_deadband_and_maxerror_take_the_error_away) {
+    Loop loop;
+    loop.set("Dgain", 1.0);
+    loop.set("deadband", 0.5);
+    loop.set("maxerror", 1.0);
+    for (const double offset : {0.0, 50.0}) {
+        loop.step(0.0, offset);
+        loop.step(0.0, offset);
+        EXPECT_NEAR(loop.step(0.0, offset + 1e-3), -1.0, 1e-9) << offset;
+    }
+    loop.set("error-previous-target", true);
+    loop.step(0.0, 0.0);
+    EXPECT_NEAR(loop.step(1e-3, 0.0), 1.0, 1e-9) << "the slope of this cycle";
+}
+
+// The slope is held; what is derived from it goes on from there, so over both cycles the second derivative adds up.
+TEST(Pid, At_the_index_only_the_slope_is_held) {
+    Loop loop;
+    loop.set("index-enable", true);
+    for (const double command : {0.0, 1e-3, 3e-3}) loop.step(command, 0.0);
+    EXPECT_NEAR(loop.real("commandDD"), 1000.0, 1e-6);
+    loop.set("index-enable", false);
+    loop.step(-7.0, 0.0);
+    EXPECT_NEAR(loop.real("commandD"), 2.0, 1e-9);
+    EXPECT_NEAR(loop.real("commandDD"), 0.0, 1e-6);
+    EXPECT_NEAR(loop.real("errorD"), 2.0, 1e-9);
+    loop.step(-7.0 + 4e-3, 0.0);
+    EXPECT_NEAR(loop.real("commandDD"), 2000.0, 1e-6);
+}
+
 TEST(Pid, Linked_derivatives_are_used_instead_of_estimates) {
     Loop loop;
     loop.set("FF1", 1.0);

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+// Needs vcan0, vcan1 and the pair vxcan0/vxcan1: on this machine, or in the kernel that uml/run starts (socketcan_test.py does).
+#include <gtest/gtest.h>
+#include <net/if.h>
+
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "link/can.hpp"
+#include "link/system.hpp"
+
+namespace hal::can {
+namespace {
+
+class Socketcan : public testing::Test {
+protected:
+    void SetUp() override {
+        if (if_nametoindex("vcan0") == 0) GTEST_SKIP() << "no interface vcan0; socketcan_test.py runs this in user-mode-linux";
+    }
+    static std::unique_ptr<Link> link(const std::string& address) {
+        auto opened = open(address);
+        EXPECT_TRUE(opened) << opened.problem;
+        return std::move(opened.link);
+    }
+    static bool next(Link& link, Frame& f) {
+        while (!link.receive(f, unclocked))
+            if (!link.wait(2'000'000'000)) return false;
+        return true;
+    }
+    static void until(Link& link, State wanted) {
+        Frame f;
+        for (int i = 0; i < 500 && link.state() != wanted; ++i) {
+            link.receive(f, unclocked);
+            timespec pause{0, 10'000'000};
+            nanosleep(&pause, nullptr);
+        }
+        EXPECT_STREQ(word(link.state()), word(wanted));
+    }
+    static void run(const std::string& command) { ASSERT_EQ(std::system(command.c_str()), 0) << command; }
+};
+
+TEST_F(Socketcan, frames_of_every_kind_cross_with_the_time_of_arrival) {
+    auto a = link("can:vcan0?fd"), b = link("can:vcan0?fd");
+    Frame fd(0x12345, std::vector<std::uint8_t>(64, 0x5a));
+    fd.bit_rate_switch = true;
+    const Frame frames[] = {{0x7ff, {1, 2, 3, 4, 5, 6, 7, 8}}, Frame::request(0x701, 1), {0x1abcdef0, {}}, fd};
+    const auto before = monotonic_ns();
+    for (const auto& f : frames) EXPECT_EQ(a->send(f, unclocked), Sent::queued);
+    a->flush(unclocked);
+    for (const auto& f : frames) {
+        Frame got;
+        ASSERT_TRUE(next(*b, got));
+        EXPECT_TRUE(got.same(f));
+        EXPECT_GT(got.time_ns, before - 1'000'000);
+        EXPECT_LT(got.time_ns, monotonic_ns() + 1'000'000);
+    }
+    EXPECT_EQ(b->statistics().received, 4U);
+    EXPECT_EQ(a->statistics().sent, 4U);
+}
+
+TEST_F(Socketcan, own_frames_come_back_marked_when_asked_for) {
+    auto a = link("can:vcan0?own"), b = link("can:vcan0");
+    a->send({0x123, {1}}, unclocked), a->flush(unclocked);
+    Frame f;
+    ASSERT_TRUE(next(*a, f));
+    EXPECT_TRUE(f.own);
+    ASSERT_TRUE(next(*b, f));
+    EXPECT_FALSE(f.own);
+    EXPECT_FALSE(b->wait(10'000'000));
+}
+
+TEST_F(Socketcan, filters_are_the_kernels) {
+    auto a = link("can:vcan1"), b = link("can:vcan1");
+    const Filter only[] = {{0x180, 0x780, false}, {0x1000, 0x1fffffff, true}};
+    ASSERT_TRUE(b->set_filters(only));
+    const Frame frames[] = {{0x17f, {1}}, {0x180, {1}}, {0x1ff, {1}}, {0x200, {1}}, {0x1000, {1}}, {0x1001, {1}}};
+    for (const auto& f : frames) a->send(f, unclocked);
+    a->flush(unclocked);
+    std::vector<std::uint32_t> ids;
+    for (Frame f; b->wait(100'000'000);)
+        while (b->receive(f, unclocked)) ids.push_back(f.id);
+    EXPECT_EQ(ids, (std::vector<std::uint32_t>{0x180, 0x1ff, 0x1000}));
+    EXPECT_TRUE(b->set_filters({}));
+    a->send({0x005, {}}, unclocked), a->flush(unclocked);
+    Frame f;
+    EXPECT_TRUE(next(*b, f));
+}
+
+TEST_F(Socketcan, bursts_lose_nothing) {
+    auto a = link("can:vcan0"), b = link("can:vcan0");
+    std::uint32_t sent = 0;
+    for (int burst = 0; burst < 50; ++burst) {  // larger than a batch of system calls, smaller than the kernel's backlog
+        std::uint32_t got = sent;
+        for (int i = 0; i < 400; ++i, ++sent)
+            ASSERT_EQ(a->send({sent & 0x7ffU, {static_cast<std::uint8_t>(sent >> 11)}}, unclocked), Sent::queued);
+        a->flush(unclocked);
+        for (Frame f; got < sent; ++got) {
+            ASSERT_TRUE(next(*b, f));
+            ASSERT_EQ(f.id, got & 0x7ffU);
+        }
+    }
+    EXPECT_EQ(b->statistics().received, sent);
+    EXPECT_EQ(b->statistics().lost, 0U);
+}
+
+TEST_F(Socketcan, a_full_queue_of_the_interface_is_waited_out) {
+    auto a = link("can:vxcan0"), b = link("can:vxcan1");
+    run("ip link set vxcan0 txqueuelen 2");
+    for (int i = 0; i < 100; ++i) a->send({0x10, {static_cast<std::uint8_t>(i)}}, unclocked);
+    a->flush(unclocked);
+    for (int i = 0; i < 100; ++i) {
+        a->flush(unclocked);
+        Frame f;
+        ASSERT_TRUE(next(*b, f));
+        EXPECT_EQ(f.data[0], i);
+    }
+    EXPECT_EQ(a->statistics().dropped, 0U);
+}
+
+TEST_F(Socketcan, an_interface_goes_down_and_comes_up) {
+    auto a = link("can:vcan1"), b = link("can:vcan1");
+    run("ip link set vcan1 down");
+    until(*a, State::down);
+    EXPECT_EQ(a->send({0x1, {}}, unclocked), Sent::down);
+    run("ip link set vcan1 up");
+    until(*a, State::active);
+    until(*b, State::active);
+    a->send({0x1, {}}, unclocked), a->flush(unclocked);
+    Frame f;
+    EXPECT_TRUE(next(*b, f));
+    EXPECT_EQ(a->statistics().restarts, 1U);
+}
+
+TEST_F(Socketcan, an_interface_is_removed_and_comes_back) {
+    run("ip link add vcan7 type vcan && ip link set vcan7 up");
+    auto a = link("can:vcan7"), b = link("can:vcan7");
+    run("ip link del vcan7");
+    until(*a, State::down);
+    until(*b, State::down);
+    run("ip link add vcan8 type vcan && ip link add vcan7 type vcan && ip link set vcan7 up");
+    until(*a, State::active);
+    until(*b, State::active);
+    a->send({0x123, {9}}, unclocked), a->flush(unclocked);
+    Frame f;
+    ASSERT_TRUE(next(*b, f));
+    EXPECT_EQ(f.data[0], 9);
+    run("ip link del vcan7; ip link del vcan8");
+}
+
+TEST_F(Socketcan, what_is_wrong_is_said_with_what_to_type) {
+    EXPECT_EQ(open("can:can9").problem,
+              "can:can9: there is no interface can9; `ip -br link` lists those there are; a virtual one: sudo ip link add can9 type vcan "
+              "&& sudo ip link set can9 up");
+    EXPECT_EQ(open("can:lo").problem, "can:lo: lo is not a CAN interface; `ip -br link show type can` lists those");
+    run("ip link add vcan9 type vcan");
+    EXPECT_EQ(open("can:vcan9").problem, "can:vcan9: the interface is down; type: sudo ip link set vcan9 up");
+    run("ip link set vcan9 mtu 16 up");
+    EXPECT_EQ(open("can:vcan9?fd").problem,
+              "can:vcan9?fd: the interface is not set up for CAN FD; type: sudo ip link set vcan9 down && sudo ip link set vcan9 mtu 72 && "
+              "sudo ip link set vcan9 up");
+    run("ip link del vcan9");
+}
+
+}  // namespace
+}  // namespace hal::can

@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""hal compile of .comp files: the language's features in components of our own, and where the compiler's errors point."""
+import unittest
+
+from harness import Case
+
+EVERYTHING = '''component everything "All that the language has"; // a comment
+/* another */
+pin in bit in-##[8 : personality & 0xf] "the inputs";
+pin out bit all if personality & 0x10 "every input is set";
+pin io s32 edges = 3 "how often it ran";
+pin out float level_ = 1.5;
+pin in u64 big; pin in s64 small_one = -5; pin in unsigned word = 0x10;
+pin out bool fresh; pin out real time-sum; pin out sint doubled-#[2]; pin out ui32 copied;
+param rw float gain = 2.0;
+param r s32 number;
+variable double seconds = 0.25;
+variable int *where; variable int table[3] = 4;
+modparam int step = 1 "added to edges";
+modparam dummy words;
+option extra_setup; option extra_cleanup; option post_export; option data memory;
+option default_count 2;
+function _ "runs"; function other-one nofp;
+include <rtapi_math.h>;
+description """
+Two \\\\fBparagraphs\\\\fR.
+.P
+The second.""";
+notes "a note"; see_also "and2"; author "Somebody"; license "MIT";
+;;
+typedef struct { int calls; } memory;
+char *words[2] = {0, 0};
+RTAPI_MP_ARRAY_STRING(words, 2, "two words");
+
+EXTRA_SETUP() {
+    where = table;
+    number = (rtapi_s32)extra_arg;
+    if (personality == 99) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "%s: not 99\\n", prefix);
+        return -EINVAL;
+    }
+    return 0;
+}
+POST_EXPORT() { (void)prefix, (void)extra_arg; fresh_set(words[0] != 0); return 0; }
+EXTRA_CLEANUP() {}
+FUNCTION(_) {
+    int i, a = 1;
+    for (i = 0; i < (personality & 0xf); i++) a = a && in(i);
+    if (personality & 0x10) all = a;
+    data.calls++;
+    edges += step;
+    seconds += fperiod;
+    time_sum_set(seconds);
+    level_ = fabs(gain * small_one);
+    doubled_set(0, 2 * small_one);
+    doubled_set(1, doubled_set(0, 2 * small_one) + where[2] + (rtapi_sint)big);
+    copied_set(word + period / 1000000);
+}
+FUNCTION(other_one) { hal_set_bool(fresh_ptr, data.calls > 2); (void)period; }
+'''
+
+NETLIST = """loadrt everything names=a,b personality=0x12,0x01 step=2 words=x
+loadrt threads name1=t period1=1000000
+addf a t
+addf a.other-one t
+addf b t
+setp a.in-00 1
+setp a.in-01 1
+setp a.big 100
+start
+advance 3 cycles
+"""
+
+
+class Comp(Case):
+    def setUp(self):
+        super().setUp()
+        self.home = self.folder / "data"
+        self.environment["XDG_DATA_HOME"] = str(self.home)
+        self.plugins = self.environment.pop("HALCYON_PLUGIN_PATH", None)
+
+    def compiled(self, name, text):
+        (self.folder / f"{name}.comp").write_text(text)
+        return self.good("compile", f"{name}.comp")
+
+    def refused(self, name, text):
+        (self.folder / f"{name}.comp").write_text(text)
+        said = self.bad("compile", f"{name}.comp")
+        self.assertFalse((self.home / "halcyon" / "components" / f"{name}.so").exists())
+        return said
+
+    def values(self, netlist, *names):
+        (self.folder / "test.hal").write_text(netlist + "".join(f"getp {name}\n" for name in names))
+        return self.good("sim", "test.hal").split()
+
+    def test_every_feature_works(self):
+        said = self.compiled("everything", EVERYTHING)
+        self.assertIn("everything: ", said)
+        self.assertIn("addf everything.0 THREAD", said)
+        names = ("a.all", "a.edges", "a.level", "a.time-sum", "a.doubled-0", "a.doubled-1", "a.copied", "a.fresh", "a.number", "b.number", "b.fresh")
+        self.assertEqual(["TRUE", "9", "10", "0.253", "-10", "94", "17", "TRUE", "0", "1", "TRUE"], self.values(NETLIST, *names))
+
+    def test_instances_are_counted_and_pins_are_the_personality_s(self):
+        self.compiled("everything", EVERYTHING)
+        (self.folder / "test.hal").write_text("loadrt everything personality=3\nlist pin everything.0.in everything.1.in\n")
+        self.assertEqual("everything.0.in-00 everything.0.in-01 everything.0.in-02 everything.1.in-00 everything.1.in-01 everything.1.in-02".split(),
+                         self.good("sim", "test.hal").split())
+
+    def test_the_manual_page_is_in_the_plugin(self):
+        self.compiled("everything", EVERYTHING)
+        page = self.good("doc", "everything")
+        for line in ("everything: All that the language has", "step=", "added to edges", "everything.N.other-one", "how often it ran (initial 3)",
+                     "Two **paragraphs**.", "in-## (bit in), as many as personality & 0xf and at most 8: the inputs", "Somebody"):
+            self.assertIn(line, page)
+
+    def test_what_EXTRA_SETUP_refuses_is_not_made(self):
+        self.compiled("everything", EVERYTHING)
+        (self.folder / "test.hal").write_text("loadrt everything names=x personality=99\n")
+        self.assertIn("cannot make 'x': x: not 99 (EXTRA_SETUP: Invalid argument)", self.bad("check", "test.hal"))
+
+    def test_more_pins_than_there_is_room_for_are_refused(self):
+        self.compiled("everything", EVERYTHING)
+        (self.folder / "test.hal").write_text("loadrt everything names=x personality=9\n")
+        self.assertIn("personality asks for 9 pins in-##, there are at most 8", self.bad("check", "test.hal"))
+
+    def test_the_code_alone_is_the_body_of_the_only_function(self):
+        self.compiled("half", 'component half;\npin in float in;\npin out float out;\nfunction _;\nlicense "MIT";\n;;\nout = in / 2;\n')
+        self.assertEqual(["3.5"], self.values("loadrt half\nloadrt threads name1=t period1=1000000\naddf half.0 t\nsetp half.0.in 7\nstart\nadvance 1 cycles\n", "half.0.out"))
+
+    def test_parameters_by_pointer_of_EXTRA_SETUP_are_kept_in_step(self):
+        self.compiled("own", 'component own;\npin out float out;\nvariable hal_float_t gain;\nvariable hal_u32_t runs;\noption extra_setup;\nfunction _;\nlicense "MIT";\n;;\n'
+                      'EXTRA_SETUP() {\n    gain = 2;\n    (void)extra_arg;\n'
+                      '    return hal_param_float_newf(HAL_RW, &gain, comp_id, "%s.gain", prefix) || hal_param_u32_newf(HAL_RO, &runs, comp_id, "%s.runs", prefix);\n}\n'
+                      'FUNCTION(_) { out = gain; runs++; }\n')
+        netlist = ("loadrt own names=a,b\nloadrt threads name1=t period1=1000000\naddf a t\naddf b t\nsetp b.gain 5\nstart\nadvance 3 cycles\n"
+                   "getp a.out\ngetp b.out\nsetp a.gain 7\nadvance 1 cycles\n")
+        self.assertEqual(["2", "5", "7", "4"], self.values(netlist, "a.out", "a.runs"))
+
+    def test_a_port_is_given_by_handle_or_by_pointer(self):
+        self.compiled("mouth", 'component mouth;\npin in port bytes;\npin out u32 waiting;\npin out bit same;\nfunction _;\nlicense "MIT";\n;;\n'
+                      'static unsigned held(const hal_port_t *port) { return hal_port_readable(port); }\n'
+                      'FUNCTION(_) { char byte; waiting = held(bytes_ptr); same = waiting == hal_port_readable(bytes); if (hal_port_peek(bytes_ptr, &byte, 1)) hal_port_clear(bytes); }\n')
+        self.assertEqual(["TRUE"], self.values("loadrt mouth\nloadrt threads name1=t period1=1000000\naddf mouth.0 t\nstart\nadvance 1 cycles\n", "mouth.0.same"))
+
+    def test_names_as_LinuxCNC_makes_them(self):
+        self.compiled("hal_loop", 'component hal_loop;\npin out bit x_y_;\nparam r s32 two_words.##.z[2];\noption singleton no;\nfunction _ nofp;\nlicense "MIT";\n;;\nx_y_ = 1;\n')
+        (self.folder / "test.hal").write_text("loadrt hal_loop\nlist pin loop.0\nlist param loop.0.two\n")
+        self.assertEqual("loop.0.time loop.0.x-y loop.0.two-words.00.z loop.0.two-words.01.z".split(), self.good("sim", "test.hal").split())
+
+    def test_errors_of_the_compiler_point_into_the_file(self):
+        text = 'component wrong;\npin in bit in;\npin out bool out;\nvariable no_type v;\nfunction _;\nlicense "MIT";\n;;\nFUNCTION(_) {\n    in = 1;\n    out = in;\n    nothing();\n}\n'
+        said = self.refused("wrong", text)
+        for place in ("wrong.comp:4:", "wrong.comp:9:", "wrong.comp:10:"):
+            self.assertIn(place, said)
+        self.assertIn("assignment of read-only location", said)
+        self.assertIn("'wrong.comp' does not compile; nothing was installed", said)
+
+    def test_mistakes_in_declarations_are_all_reported(self):
+        said = self.refused("wrong", 'component wrong;\npin inn bit a;\npin in bti b;\nfunction _;\nlicense "MIT";\n;;\n')
+        self.assertIn("wrong.comp:2:5: error: a pin is in, out or io [bad-component-source]", said)
+        self.assertIn("did you mean 'bit'?", said)
+        self.assertIn("'wrong.comp' has 2 errors; nothing was installed", said)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""`hal compile`: one source file becomes a plugin; what is wrong with it is said at the user's line."""
+import unittest
+from pathlib import Path
+
+import harness
+
+LAG = """#include "hal/component.hpp"
+#include <vector>
+
+struct Lag : hal::Component {
+    using Component::Component;
+    hal::In<double>    in{*this, "in", "the input"};
+    hal::Out<double>   out{*this, "out", "follows the input"};
+    hal::Function      run{*this, "", &Lag::update, "one step"};
+    void update(hal::Cycle) noexcept { BODY }
+    std::vector<double> row;
+};
+HAL_COMPONENT(Lag, "lag", "First-order lag")
+"""
+EDGES = Path(__file__).parent / "sources/edges.c"
+TWO = """loadrt threads name1=t period1=1000000
+loadrt edges num_chan=2
+net up edges.0.out
+setp edges.0.in 1
+setp edges.1.scale 3
+addf edges.0 t
+addf edges.1 t
+start
+advance 3 cycles
+getp edges.0.out
+getp edges.1.out
+setp edges.0.scale 4
+advance 1 cycles
+gets up
+"""
+
+
+class Compile(harness.Case):
+    def compile(self, *words, **environment):
+        return self.run_program("compile", *words, environment=environment)
+
+    def test_a_cpp_file_is_installed_for_the_user(self):
+        self.write("lag.cpp", LAG.replace("BODY", "out = in;"))
+        done = self.compile("lag.cpp")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, r"^lag: 2 pins, 1 function; installed as .*halcyon/components/lag\.so\nnext: hal doc lag, or in a netlist: loadrt lag, then addf lag\.0 THREAD\n$")
+        self.assertIn("First-order lag", self.run_program("doc", "lag").stdout)
+
+    def test_a_compiler_error_names_the_users_line_and_column(self):
+        self.write("lag.cpp", LAG.replace("BODY", "in = 1;"))
+        done = self.compile("lag.cpp")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"lag\.cpp:9:4\d: error: ")
+        self.assertTrue(done.stderr.endswith("hal compile: 'lag.cpp' does not compile; nothing was installed\n"), done.stderr)
+
+    def test_what_is_no_component_is_not_installed(self):
+        self.write("none.cpp", "int x;\n")
+        done = self.compile("none.cpp")
+        self.assertEqual(done.stderr, "hal compile: 'none.cpp' compiles, but is no component: it exports no symbol hal_plugin; nothing was installed\n")
+
+    def test_a_missing_compiler_is_said_in_one_sentence(self):
+        self.write("lag.cpp", LAG)
+        done = self.compile("lag.cpp", PATH="/nowhere")
+        self.assertEqual(done.stderr, "hal compile: there is no C++ compiler; install it: sudo apt install g++\n")
+
+    def test_check_rt_names_the_call(self):
+        self.write("lag.cpp", LAG.replace("BODY", "row.push_back(in); out = row.back();"))
+        done = self.compile("lag.cpp", "--check-rt")
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stderr, "hal compile: lag: function 'lag' calls malloc in a cycle\nhal compile: 'lag.cpp' was not installed\n")
+        self.assertEqual(done.stdout, "")
+
+    def test_check_rt_of_a_good_one(self):
+        done = self.compile(str(EDGES), "--check-rt", "--", "num_chan=2")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("real time: 2 functions ran 1000 cycles each", done.stdout)
+
+    def test_a_linuxcnc_component_in_c_runs(self):
+        done = self.compile("--output", "plugins", str(EDGES))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.write("two.hal", TWO)
+        done = self.run_program("sim", "two.hal", environment={"HALCYON_PLUGIN_PATH": "plugins"})
+        self.assertEqual((done.stdout, done.stderr), ("10.5\n0.5\n4.5\n", ""))
+
+    def test_its_refusal_is_a_diagnostic(self):
+        self.compile("--output", "plugins", str(EDGES))
+        self.write("many.hal", "loadrt edges num_chan=5\n")
+        done = self.run_program("sim", "many.hal", environment={"HALCYON_PLUGIN_PATH": "plugins"})
+        self.assertIn("component 'edges' cannot make 'edges': edges: 5 channels are too many (rtapi_app_main: Invalid argument) [construct-failed]", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

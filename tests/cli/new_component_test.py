@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""hal new component: what it makes compiles and passes its test at once, from the build tree and from an installation."""
+import os
+import shutil
+import subprocess
+import unittest
+
+from harness import HAL, PATIENCE, Case
+
+BUILD = HAL.parent.parent  # the build tree, or an installation
+PACKAGE = BUILD / "lib" / "cmake" / "Halcyon"
+
+
+class NewComponent(Case):
+    def setUp(self):
+        super().setUp()
+        del self.environment["HALCYON_PLUGIN_PATH"]
+
+    def shell_line(self, line, folder, status=0, path=None):
+        environment = {**self.environment, "PATH": path or self.environment["PATH"]}
+        done = subprocess.run(["bash", "-c", line], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              text=True, timeout=4 * PATIENCE)
+        self.assertEqual(status, done.returncode, done.stdout)
+        return done.stdout
+
+    def follow_the_hint(self, name, path=None):
+        """Types what the program printed; the two lines under the list of files."""
+        lines = self.shell_line(f"{HAL} new component {name}", self.folder, path=path).splitlines()
+        self.assertTrue(lines[1].startswith("  cd ") and "ctest" in lines[2], lines)
+        printed = self.shell_line(f"{lines[1]} && {lines[2]}", self.folder, path=path)
+        self.assertIn("100% tests passed, 0 tests failed out of 1", printed)
+        return self.folder / name
+
+    @unittest.skipUnless(PACKAGE.exists(), "no package beside the program")
+    def test_what_is_printed_works_straight_from_the_build_tree(self):
+        folder = self.follow_the_hint("my-ramp")
+        self.assertEqual({"my-ramp.cpp", "CMakeLists.txt", "test.hal", "expected", "build"}, set(os.listdir(folder)))
+        self.assertIn(f'HINTS "{BUILD}"', (folder / "CMakeLists.txt").read_text())
+        # a test that fails says what is printed and what was expected
+        (folder / "expected").write_text("7\n")
+        said = self.shell_line("ctest --test-dir build --output-on-failure", folder, status=8)
+        self.assertIn("      it prints\n      0.2\n      FALSE\n", said)
+        self.assertIn("      and 'expected' has\n      7\n", said)
+        self.environment["HALCYON_PLUGIN_PATH"] = str(folder / "build")
+        self.assertIn("my-ramp: Follows its input at a limited speed", self.good("doc", "my-ramp"))
+        self.assertEqual("", self.good("fmt", "--check", folder / "test.hal"))
+        self.assertIn("no errors", self.run_program("check", folder / "test.hal").stderr)
+
+    @unittest.skipUnless((BUILD / "cmake_install.cmake").exists(), "not a build tree")
+    def test_an_installed_halcyon_in_the_path_needs_no_hint(self):
+        prefix = self.folder / "installed"
+        # tests/checks/package.py makes a true installation; this is about where CMake looks
+        shutil.copytree(PACKAGE, prefix / "lib" / "cmake" / "Halcyon")
+        (prefix / "bin").mkdir()
+        (prefix / "bin" / "hal").symlink_to(HAL)
+        folder = self.follow_the_hint("ramp2", path=f"{prefix}/bin:{os.environ['PATH']}")
+        self.assertNotIn("HINTS", (folder / "CMakeLists.txt").read_text())
+
+    def test_bad_names_and_places_are_refused(self):
+        (self.folder / "there").mkdir()
+        (self.folder / "there" / "file").touch()
+        for words, why in {
+            ("my part",): "'my part' cannot be a component's name: it begins with a letter, and letters, digits, - and _ follow; try: hal new component my-part",
+            ("my", "part"): "one name is expected, not 2; blanks cannot be part of it: hal new component my-part",
+            ("9x",): "'9x' cannot be",
+            ("../x",): "'../x' cannot be",
+            ("class",): "'class' is a word of C++; try: hal new component my-class",
+            ("not_eq",): "'not_eq' is a word of C++",
+            ("threads",): "there is a component 'threads' already (see: hal doc threads); choose another name",
+            ("n" * 41,): "the name has 41 characters; 40 are enough for a component",
+            ("there",): "'there' exists already; give the new component another folder: hal new component there --folder DIR",
+            ("ok", "--folder", "there"): "'there' exists already",
+            ("ok", "--folder", "there/file/x"): "'there/file/x' cannot be made: Not a directory",
+            (): "the component needs a name: hal new component NAME",
+        }.items():
+            with self.subTest(words):
+                self.assertIn(why, self.bad("new", "component", *words))
+        self.assertEqual("hal new: what is to be new? Components can be; type: hal new component thing\n", self.bad("new", "thing"))
+        self.assertEqual({"there"}, set(os.listdir(self.folder)) - {".ccache"})
+
+    def test_a_folder_of_another_name(self):
+        self.assertTrue(self.good("new", "component", "part", "--folder", "a b/c").startswith("'a b/c': part.cpp, CMakeLists.txt"))
+        self.assertEqual({"part.cpp", "CMakeLists.txt", "test.hal", "expected"}, set(os.listdir(self.folder / "a b" / "c")))
+
+
+if __name__ == "__main__":
+    unittest.main()

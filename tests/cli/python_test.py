@@ -1,0 +1,172 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Python's module hal: components, their death and their return, functions of the module, streams."""
+import os
+import signal
+import subprocess
+import sys
+import unittest
+
+from harness import HAL, SERVO, Case, wait_until
+
+MODULE = HAL.parent.parent / "python"
+
+ECHO = """import hal, time
+c = hal.component("echo")
+c.newpin("in", hal.HAL_FLOAT, hal.HAL_IN)
+c.newpin("out", hal.HAL_FLOAT, hal.HAL_OUT, safe=-1.0)
+c.newpin("kept", hal.HAL_S32, hal.HAL_OUT)
+c.newparam("gain", hal.HAL_FLOAT, hal.HAL_RW)
+c.ready()
+c["kept"] = 7
+try:
+    while True:
+        c["out"] = c["in"] * c["gain"]
+        time.sleep(0.002)
+except KeyboardInterrupt:
+    pass
+"""
+
+
+@unittest.skipUnless(list(MODULE.glob("hal/_core*.so")), "the module is not built")
+class PythonTest(Case):
+    def setUp(self):
+        super().setUp()
+        self.environment["PYTHONPATH"] = str(MODULE)
+        self.environment["PATH"] = f"{HAL.parent}:{self.environment['PATH']}"
+
+    def machine(self, netlist=SERVO + "start\n", *words):
+        return self.start("run", "--no-picture", *words, self.write("machine.hal", netlist))
+
+    def python(self, text):
+        """Runs a program to its end; what it prints."""
+        done = subprocess.run([sys.executable, "-c", text], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, timeout=60)
+        self.assertEqual(0, done.returncode, done.stderr)
+        return done.stdout
+
+    def background(self, text):
+        program = subprocess.Popen([sys.executable, "-c", text], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, program)
+        return program
+
+    def state(self, name="echo"):
+        line = next((line for line in self.shell("show", "comp", name).stdout.splitlines() if f" {name} " in line), "")
+        return line.split(None, 4)[-1] if line else ""
+
+    def pid(self, name="echo"):
+        return int(next(line for line in self.shell("show", "comp", name).stdout.splitlines() if f" {name} " in line).split()[3])
+
+    def test_a_component_from_loadusr_is_linked_like_any_other(self):
+        self.write("echo.py", ECHO)
+        self.machine(f"loadusr -W {sys.executable} echo.py\n{SERVO}setp echo.gain 2\nnet doubled echo.out => adder.in1\n".replace("setp adder.in1 3\n", "")
+                     .replace("net total adder.out", "net total adder.out => echo.in") + "setp adder.gain1 0.25\nstart\n")
+        # total = 2 + 0.25 * 2 * total has its rest at 4
+        wait_until(lambda: self.value("adder.out") == "4", "the loop settles")
+        self.assertEqual("ready", self.state())
+        self.assertIn("echo.in", self.shell("list", "pin", "echo").stdout)
+        self.assertIn("linkps echo.out  doubled", self.shell("save", "link").stdout)
+        self.shell("unlinkp", "echo.out")
+        self.assertIn("two-writers", self.shell("net", "total", "echo.out").stderr)
+        self.assertEqual(0, self.shell("unloadusr", "echo").returncode)
+        wait_until(lambda: self.state() == "", "it leaves")
+        self.assertIn("no-such-pin", self.shell("getp", "echo.out").stderr)
+
+    def test_a_dead_one_goes_to_declared_values_and_is_taken_over(self):
+        self.machine()
+        program = self.background(ECHO)
+        wait_until(lambda: self.state() == "ready", "it is ready")
+        self.assertEqual(0, self.shell("setp", "echo.gain", "3").returncode)
+        self.assertEqual(0, self.shell("setp", "echo.in", "2").returncode)
+        self.assertEqual(0, self.shell("net", "result", "echo.out", "adder.in1").returncode)
+        wait_until(lambda: self.value("adder.in1") == "6", "it works")
+        program.kill()
+        wait_until(lambda: self.state().startswith("dead since "), "its death is seen")
+        wait_until(lambda: self.value("adder.in1") == "-1", "the declared value")
+        self.assertEqual("7", self.value("echo.kept"))
+        second = self.background(ECHO)
+        wait_until(lambda: self.state() == "ready" and self.value("adder.in1") == "6", "another takes its pins over, links and parameters")
+        second.send_signal(signal.SIGTERM)
+        wait_until(lambda: self.state() == "", "SIGTERM is an end in good order")
+
+    def test_an_exception_is_a_death_and_exit_is_not(self):
+        self.machine()
+        text = "import hal\nc = hal.component('echo')\nc.newpin('out', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
+        crashed = subprocess.run([sys.executable, "-c", text + "c['nothing']"], env=self.environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.assertIn("AttributeError: component 'echo' has no pin or parameter 'nothing'", crashed.stderr)
+        wait_until(lambda: self.state().startswith("dead since "), "its death is seen")
+        self.python(text)
+        wait_until(lambda: self.state() == "", "it leaves at its end")
+
+    def test_restart_on_failure(self):
+        self.write("echo.py", ECHO)
+        self.machine(SERVO + f"start\nloadusr -W --restart=on-failure --restart-delay=50ms {sys.executable} echo.py\n")
+        wait_until(lambda: self.state() == "ready", "it is ready")
+        first = self.pid()
+        os.kill(first, signal.SIGKILL)
+        wait_until(lambda: self.state() == "ready" and self.pid() != first, "it is started again")
+        self.assertEqual(0, self.shell("unloadusr", "echo").returncode)
+        wait_until(lambda: self.state() == "", "unloadusr ends it for good")
+        self.assertIn("--restart is no, on-failure or always", self.shell("loadusr", "--restart=sometimes", "true").stderr)
+
+    def test_a_program_that_always_fails_is_given_up(self):
+        self.machine(SERVO + "start\nloadusr --restart=on-failure --restart-delay=10ms false\n")
+        wait_until(lambda: "given up" in self.state("false"), "it is given up")
+        self.assertEqual(0, self.shell("unloadusr", "false").returncode)
+        self.assertEqual("", self.state("false"))
+
+    def test_the_end_of_the_instance_is_survived(self):
+        machine = self.machine()
+        self.background(ECHO)
+        wait_until(lambda: self.state() == "ready", "it is ready")
+        wait_until(lambda: self.value("echo.kept") == "7", "it has written")
+        self.end(machine)
+        self.machine()
+        wait_until(lambda: self.state() == "ready", "it finds the new instance")
+        wait_until(lambda: self.value("echo.kept") == "7", "with its values")
+
+    def test_values_keep_their_range(self):
+        self.machine()
+        self.assertEqual("-1 4294967295 inf True OverflowError\n", self.python(
+            "import hal\nc = hal.component('x')\n"
+            "for name, kind in (('s', hal.HAL_S32), ('u', hal.HAL_U32), ('f', hal.HAL_FLOAT), ('b', hal.HAL_BIT)): c.newpin(name, kind, hal.HAL_OUT)\n"
+            "c.ready()\nc['s'] = -1; c['u'] = 0xffffffff; c['f'] = float('inf'); c.b = 1\n"
+            "try: c['u'] = -1\nexcept OverflowError as e: print(c['s'], c['u'], c['f'], c.b, type(e).__name__)\n"))
+
+    def test_functions_of_the_module(self):
+        self.machine()
+        self.assertEqual("True False True\n2.0 2.0\nTrue False\nerror 9.0\n", self.python(
+            "import hal\nprint(hal.component_exists('sum2'), hal.component_exists('nobody'), hal.component_is_ready('sum2'))\n"
+            "hal.new_sig('level', hal.HAL_FLOAT); hal.set_s('level', 5.5);\n"
+            "hal.connect('adder.in0', 'level')\nprint(hal.get_value('level'), hal.get_value('adder.in0'))\n"
+            "print(hal.pin_has_writer('adder.out'), hal.pin_has_writer('adder.in0'))\n"
+            "try: hal.set_p('adder.nothing', 1)\nexcept hal.error: hal.set_p('adder.in1', 9); print('error', hal.get_value('adder.in1'))\n"))
+
+    def test_several_processes_talk_through_signals(self):
+        self.machine()
+        self.background("import hal, time\nc = hal.component('there')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"
+                        "while True:\n c['out'] = c['in'] + 1\n time.sleep(0.001)\n")
+        self.assertEqual("done\n", self.python(
+            "import hal, time\nc = hal.component('here')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"
+            "while not hal.component_exists('there') or not hal.component_is_ready('there'): time.sleep(0.01)\n"
+            "for name, pins in (('go', ('here.out', 'there.in')), ('come', ('there.out', 'here.in'))):\n"
+            " hal.new_sig(name, hal.HAL_S32)\n for pin in pins: hal.connect(pin, name)\n"
+            "while c['in'] < 100:\n c['out'] = c['in']\n time.sleep(0.001)\nprint('done')\n"))
+
+    def test_a_stream_between_programs(self):
+        self.machine()
+        self.assertEqual("(True, 1.5, -3, 7) 1 None 1\nerror\n", self.python(
+            "import hal\nc = hal.component('s')\nw = hal.stream(c, hal.streamer_base + 5, 3, 'bfsu')\nr = hal.stream(c, hal.streamer_base + 5, 'bfsu')\nc.ready()\n"
+            "w.write((1, 1.5, -3, 7))\nprint(r.read(), r.sampleno, r.read(), r.num_underruns)\nw.write((0,0,0,0)); w.write((0,0,0,0)); assert not w.writable\n"
+            "try: w.write((0,0,0,0))\nexcept hal.error: print('error')\n"))
+
+    def test_a_child_process_does_not_use_its_parents_component(self):
+        self.machine()
+        self.assertEqual("refused\n", self.python(
+            "import hal, os\nc = hal.component('x')\nc.newpin('a', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
+            "if os.fork() == 0:\n try: c['a'] = 1\n except hal.error: print('refused', flush=True)\n os._exit(0)\nos.wait()\nassert c['a'] is False\n"))
+
+
+if __name__ == "__main__":
+    unittest.main()

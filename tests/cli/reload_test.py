@@ -1,0 +1,248 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""hal shell reload: a new version of a plugin in a running machine. The versions are compiled here."""
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+from harness import HAL, PLUGINS, ROOT, Case, wait_until
+
+COMPILER = os.environ.get("CXX", "c++")
+
+# `count` counts in the pin itself, which a reload keeps: a cycle that is lost or done twice shows.
+COUNTER = """#include "hal/component.hpp"
+struct Part : hal::Component {
+    using Component::Component;
+    hal::Argument offset{*this, "offset", 0, "added"};
+    hal::In<double> in{*this, "in", "the input"};
+    hal::Out<double> out{*this, "out", "the output", {.safe = -1.0}};
+    hal::Io<std::int32_t> count{*this, "count", "cycles"};
+    hal::Param<double> gain{*this, "gain", "the factor", {.initial = 1.0}};
+    MEMBERS
+    hal::Function run{*this, "FUNCTION", &Part::update, "one step"};
+    void update(hal::Cycle) noexcept {
+        out = FORMULA;
+        count = count + 1;
+    }
+};
+HAL_COMPONENT(Part, "part", "A part")
+"""
+
+# Something only one instance can have: a file.
+OWNER = """#include <fcntl.h>
+#include <unistd.h>
+#include "hal/component.hpp"
+struct Part : hal::Component {
+    using Component::Component;
+    hal::TextArgument file{*this, "file", "", "what it owns"};
+    hal::Out<std::int32_t> version{*this, "version", "which it is", {.safe = -1}};
+    hal::Function run{*this, "", &Part::update, "one step"};
+    void start() {
+        const int made = ::open(file.get().c_str(), O_CREAT | O_EXCL | O_WRONLY, 0600);
+        if (made < 0) throw std::runtime_error("the file belongs to another");
+        ::close(made);
+        if (REFUSE) {
+            ::unlink(file.get().c_str());
+            throw std::runtime_error("it does not like it");
+        }
+    }
+    void stop() noexcept { ::unlink(file.get().c_str()); }
+    void update(hal::Cycle) noexcept { version = VERSION; }
+};
+HAL_COMPONENT(Part, "part", "Owns a file")
+"""
+
+OTHER_INTERFACE = """#include "hal/abi.h"
+HAL_EXPORT const hal_component hal_plugin = {.size = sizeof(hal_component), .abi_major = HAL_ABI_MAJOR + 1};
+"""
+
+NETLIST = """newthread servo 1000000
+loadrt part names=p offset=5
+loadrt sum2 names=adder
+setp p.gain 3
+setp p.in 2
+net result p.out => adder.in0
+addf p servo
+addf adder servo
+start
+"""
+
+
+def compiled(folder, name, text, language="c++"):
+    source = folder / f"{name}.{'c' if language == 'c' else 'cpp'}"
+    source.write_text(text)
+    library = folder / f"{name}.so"
+    standard = ["-x", "c", "-std=c11"] if language == "c" else ["-std=c++20"]
+    subprocess.run([COMPILER, *standard, "-O1", "-fPIC", "-shared", "-fvisibility=hidden", *([] if "clang" in COMPILER else ["-fno-gnu-unique"]), f"-I{ROOT}/runtime/abi", f"-I{ROOT}/runtime/sdk",
+                    f"-Wl,--version-script={ROOT}/cmake/plugin.map", str(source), "-o", str(library)], check=True)
+    return library
+
+
+def counter(formula="in * gain", members="", function="", **replace):
+    text = COUNTER.replace("FORMULA", formula).replace("MEMBERS", members).replace("FUNCTION", function)
+    for old, new in replace.values():
+        text = text.replace(old, new)
+    return text
+
+
+class Reload(Case):
+    versions = {}
+
+    @classmethod
+    def setUpClass(cls):
+        cls.built = Path(tempfile.mkdtemp(prefix="hal-"))
+        cls.addClassCleanup(shutil.rmtree, cls.built, True)
+        texts = {
+            "first": counter(members='hal::Param<double> old{*this, "old", "goes"};'),
+            "second": counter("in * gain * 10 + offset", 'hal::In<double> extra{*this, "extra", "new", {.initial = 7.0}};'),
+            "retyped": counter("in", t=("hal::Out<double> out", "hal::Out<std::int32_t> out"), f=("out = in", "out = 1")),
+            "turned": counter("in", t=("hal::Out<double> out{*this, \"out\", \"the output\", {.safe = -1.0}}", "hal::In<double> out{*this, \"out\", \"the output\"}"), f=("out = in;", "")),
+            "renamed": counter(function="step"),
+            "stubborn": counter(members='int no = [] { throw std::runtime_error("not today"); return 0; }();'),
+            "unasked": counter(t=('hal::Argument offset{*this, "offset", 0, "added"};', "")),
+            "owner1": OWNER.replace("VERSION", "1").replace("REFUSE", "false"),
+            "owner2": OWNER.replace("VERSION", "2").replace("REFUSE", "false"),
+            "refusing": OWNER.replace("VERSION", "3").replace("REFUSE", "true"),
+        }
+        cls.versions = {name: compiled(cls.built, name, text) for name, text in texts.items()}
+        cls.versions["other"] = compiled(cls.built, "other", OTHER_INTERFACE, "c")
+
+    def setUp(self):
+        super().setUp()
+        self.plugins = self.folder / "plugins"
+        self.plugins.mkdir()
+        self.environment["HALCYON_PLUGIN_PATH"] = f"{self.plugins}:{PLUGINS}"
+
+    def install(self, version):
+        # written over, not renamed: the machine must not mind
+        shutil.copyfile(self.versions[version], self.plugins / "part.so")
+
+    def machine(self, version="first", netlist=NETLIST):
+        self.install(version)
+        return self.start("run", self.write("m.hal", netlist))
+
+    def say(self, *words):
+        done = self.shell(*words)
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+        return done.stdout
+
+    def refused(self, *words):
+        before = self.saved("allu")
+        done = self.shell(*words)
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertEqual(before, self.saved("allu"))
+        return done.stderr
+
+    def saved(self, what):
+        """What save says, but for what changes by itself."""
+        return re.sub(r"setp \S+\.(tmax|count) .*\n", "", self.say("save", what))
+
+    def mapped(self, machine):
+        """Which copies of the plugin the process has mapped."""
+        with open(f"/proc/{machine.pid}/maps") as maps:
+            return {line.split()[4] for line in maps if "part.so" in line}
+
+    def test_links_values_and_places_are_kept(self):
+        machine = self.machine()
+        wait_until(lambda: self.value("p.out") == "6", "it runs")
+        saved = self.saved("all")
+        first = self.mapped(machine)
+        self.assertEqual(1, len(first))
+        self.install("second")
+        self.assertEqual("6", self.value("p.out"), "a file that was written over changes nothing by itself")
+        self.say("reload", "part")
+        wait_until(lambda: self.value("adder.out") == "65", "the new version runs, with its load argument, in its old place")
+        self.assertEqual(["3", "2", "7"], [self.value(name) for name in ("p.gain", "p.in", "p.extra")])
+        self.assertEqual(re.sub("setp p.old .*\n", "", saved), self.saved("all"))
+        second = self.mapped(machine)
+        self.assertEqual(1, len(second), "the old version is unloaded")
+        self.assertNotEqual(first, second)
+        self.say("unload", "part")
+        self.assertEqual(set(), self.mapped(machine))
+        self.say("loadrt", "part", "names=p")
+        self.assertEqual("7", self.value("p.extra"))
+
+    def test_no_cycle_is_lost_and_none_is_done_twice(self):
+        self.machine("first", "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=100000\naddf p servo\naddf sampler.0 servo\n"
+                              "net c p.count => sampler.0.pin.0\nstart\n")
+        for i in range(20):
+            self.install("second" if i % 2 == 0 else "first")
+            self.say("reload", "part")
+        count = int(self.value("p.count"))
+        wait_until(lambda: int(self.value("p.count")) > count + 20, "it counts on")
+        rows = [int(row) for row in self.good("record", "-n", count).split()]
+        self.assertEqual(list(range(rows[0], rows[0] + count)), rows)
+        self.assertGreater(count, 20)
+
+    def test_what_is_linked_or_in_a_thread_must_stay(self):
+        self.machine()
+        for version, words in {"retyped": "pin 'p.out' has type s32 in the new version, and it is on signal 'result'",
+                               "turned": "pin 'p.out' has direction IN in the new version, not OUT",
+                               "renamed": "function 'p' is no more in the new version, and it is in thread 'servo'",
+                               "stubborn": "cannot make 'p': not today",
+                               "unasked": "component 'part' has no argument 'offset'",
+                               "other": "it was built for version 2 of the component interface, this runtime has 1"}.items():
+            with self.subTest(version):
+                self.install(version)
+                self.assertIn(words, self.refused("reload", "part"))
+        wait_until(lambda: self.value("p.out") == "6", "the first version runs on")
+        self.install("retyped")
+        self.say("-e", "begin", "-e", "unlinkp p.out", "-e", "reload part", "-e", "commit")
+        wait_until(lambda: self.value("p.out") == "1", "with the pin off its signal it can be replaced")
+
+    def test_a_value_that_is_lost_is_named(self):
+        self.machine()
+        self.say("setp", "p.old", "4")
+        self.install("second")
+        done = self.shell("reload", "part")
+        self.assertEqual(0, done.returncode)
+        self.assertIn("warning: parameter 'p.old' is no more in the new version: the value it was set to is lost [reload-dropped]", done.stderr)
+
+    def test_who_owns_something_gives_it_back_first(self):
+        owned = self.folder / "owned"
+        self.machine("owner1", f"newthread servo 1000000\nloadrt part names=p file={owned}\naddf p servo\nloadrt sum2\naddf sum2.0 servo\nstart\n")
+        wait_until(lambda: self.value("p.version") == "1", "it runs")
+        self.install("owner2")
+        self.say("reload", "part")
+        wait_until(lambda: self.value("p.version") == "2", "the second has it")
+        self.install("refusing")
+        self.assertIn("'p' (part) cannot start in its new version: it does not like it", self.refused("reload", "part"))
+        self.assertTrue(owned.exists())
+        wait_until(lambda: self.value("p.version") == "2", "the second runs again")
+
+    def test_names_that_are_not_components(self):
+        self.machine()
+        self.assertIn("an instance; a component is reloaded with all its instances", self.refused("reload", "p"))
+        self.assertIn("there is no component 'prat' here; did you mean 'part'?".split(";")[0], self.refused("reload", "prat"))
+        self.assertIn("belongs to the runtime" if "threads" in self.say("list", "comp") else "there is no component", self.refused("reload", "threads"))
+
+    def test_completion_knows_what_can_be_reloaded_and_which_arguments_there_are(self):
+        self.machine()
+        complete = lambda line: self.good("-C", name="halcmd", environment={"COMP_LINE": "halcmd " + line, "COMP_POINT": ""}).split()
+        self.assertEqual(["part", "sum2"], complete("reload "))
+        self.assertEqual(["count=", "names=", "num_chan=", "offset=", "personality="], complete("loadrt part "))
+
+    def test_streams_and_statistics_survive(self):
+        self.install("first")
+        self.machine("first", "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=4000\naddf p servo\naddf sampler.0 servo\nnet c p.count => sampler.0.pin.0\nstart\n")
+        wait_until(lambda: int(self.value("p.count")) > 10, "it counts")
+        self.install("second")
+        self.say("reload", "part")
+        self.say("reload", "sampler")
+        rows = self.good("record", "-n", "5").split()
+        self.assertEqual([str(int(rows[0]) + i) for i in range(5)], rows)
+        self.assertNotEqual("0", self.value("p.tmax"))
+
+    def test_a_machine_that_reloads_itself_under_the_virtual_clock(self):
+        self.install("first")
+        path = self.write("m.hal", NETLIST + f"advance 10 cycles\ngetp p.out\nloadusr -w cp {self.versions['second']} {self.plugins}/part.so\n"
+                          "reload part\ngetp p.out\nadvance 1 cycles\ngetp p.out\ngetp p.count\n")
+        self.assertEqual("6\n6\n65\n11\n", self.good("sim", path))
+
+
+if __name__ == "__main__":
+    unittest.main()

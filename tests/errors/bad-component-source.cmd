@@ -1,0 +1,1 @@
+hal compile bad-component-source.comp

@@ -1,0 +1,1 @@
+hal can eds check eds-unreadable.eds

@@ -1,0 +1,1 @@
+hal sim is-a-program.hal

@@ -1,0 +1,1 @@
+hal compile unsupported-component.comp

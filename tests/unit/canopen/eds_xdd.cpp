@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// Device descriptions in XML, read into the same structures.
+#include "components/canopen/311/xdd.hpp"
+#include "eds_text.hpp"
+
+namespace hal::canopen::eds::test {
+namespace {
+
+std::string xdd(const std::string& objects, const std::string& more = "") {
+    return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<ISO15745ProfileContainer "
+           "xmlns=\"http://www.canopen.org/xml/1.0\">\n<ISO15745Profile>\n"
+           "<ProfileBody fileName=\"motor.xdd\" fileCreator=\"us\" fileCreationDate=\"2024-03-14\" fileVersion=\"2\">\n"
+           "<DeviceIdentity><vendorName>Halcyon</vendorName><vendorID>0x360</vendorID><productName>Motor</productName><productID>0x7</"
+           "productID></DeviceIdentity>\n"
+           "<ApplicationProcess><parameterList><parameter uniqueID=\"P1\" access=\"readWrite\"><label lang=\"en\">Target "
+           "speed</label><INT/>"
+           "<defaultValue value=\"-3\"/><allowedValues><range><minValue value=\"-10\"/><maxValue "
+           "value=\"10\"/></range></allowedValues></parameter></parameterList></ApplicationProcess>\n"
+           "</ProfileBody></ISO15745Profile>\n<ISO15745Profile><ProfileBody>\n<ApplicationLayers><CANopenObjectList>\n"
+           "<CANopenObject index=\"1000\" name=\"Device type\" objectType=\"7\" dataType=\"0007\" accessType=\"const\" "
+           "defaultValue=\"0x20192\" PDOmapping=\"no\"/>\n" +
+           objects +
+           "</CANopenObjectList><dummyUsage><dummy entry=\"Dummy0005=1\"/></dummyUsage></ApplicationLayers>\n"
+           "<TransportLayers><PhysicalLayer><baudRate><supportedBaudRate value=\"125 Kbps\"/><supportedBaudRate value=\"1000 "
+           "Kbps\"/></baudRate></PhysicalLayer></TransportLayers>\n"
+           "<NetworkManagement><CANopenGeneralFeatures granularity=\"8\" nrOfRxPDO=\"0\" nrOfTxPDO=\"0\" bootUpSlave=\"true\" "
+           "layerSettingServiceSlave=\"true\"/>" +
+           more + "</NetworkManagement>\n</ProfileBody></ISO15745Profile>\n</ISO15745ProfileContainer>\n";
+}
+
+class Xdd : public testing::Test {
+protected:
+    void SetUp() override {
+        if (complaints(read_xdd("<a/>"), Severity::error).find("not read by this build") != std::string::npos)
+            GTEST_SKIP() << "built without pugixml";
+    }
+};
+
+TEST_F(Xdd, Is_read_into_the_same_structures_as_an_eds) {
+    const Reading reading = read_description(
+        xdd("<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\" PDOmapping=\"optional\"/>\n"
+            "<CANopenObject index=\"1018\" name=\"Identity\" objectType=\"9\" subNumber=\"2\">"
+            "<CANopenSubObject subIndex=\"00\" name=\"n\" objectType=\"7\" dataType=\"0005\" accessType=\"ro\" defaultValue=\"1\"/>"
+            "<CANopenSubObject subIndex=\"01\" name=\"Vendor\" objectType=\"7\" dataType=\"0007\" accessType=\"ro\" "
+            "defaultValue=\"0x360\"/></CANopenObject>\n"));
+    ASSERT_TRUE(reading.description) << complaints(reading);
+    EXPECT_EQ(complaints(reading, Severity::note), "");
+    const DeviceDescription& d = *reading.description;
+    EXPECT_EQ(d.device.vendor_number, 0x360u);
+    EXPECT_EQ(d.device.product_name, "Motor");
+    EXPECT_EQ(d.file.creation_date, "03-14-2024");
+    EXPECT_TRUE(d.device.supports[4] && d.device.supports[8] && d.device.lss && d.device.boot_up_slave);
+    EXPECT_EQ(d.dummies.size(), 1u);
+    ASSERT_EQ(d.objects.size(), 3u);
+    EXPECT_EQ(d.find(0x1018, 1)->default_value, "0x360");
+    const Entry& speed = *d.find(0x2000, 0);
+    EXPECT_EQ(speed.name, "Target speed");
+    EXPECT_EQ(speed.data_type, 0x03);
+    EXPECT_EQ(speed.access, Access::rw);
+    EXPECT_EQ(speed.default_value, "-3");
+    EXPECT_EQ(speed.high_limit, "10");
+    EXPECT_TRUE(speed.pdo_mapping);
+    EXPECT_EQ(*read_eds(write_eds(d)).description, d);  // becomes an EDS
+}
+
+TEST_F(Xdd, A_configuration_has_node_id_and_values) {
+    const Reading reading =
+        read_xdd(xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0006\" accessType=\"rw\" defaultValue=\"1\" "
+                     "actualValue=\"2\"/>\n",
+                     "<deviceCommissioning nodeID=\"5\" nodeName=\"left\" actualBaudRate=\"500 Kbps\" networkNumber=\"1\" "
+                     "networkName=\"n\" CANopenManager=\"false\"/>"));
+    ASSERT_TRUE(reading.description && reading.description->commissioning);
+    EXPECT_EQ(reading.description->node_id(), 5u);
+    EXPECT_EQ(reading.description->commissioning->baud_rate, 500);
+    EXPECT_EQ(reading.description->find(0x2000, 0)->parameter_value, "2");
+}
+
+TEST_F(Xdd, Defects_are_named_with_their_line) {
+    const std::string text =
+        xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0005\" accessType=\"rw\" defaultValue=\"300\"/>\n"
+            "<CANopenObject index=\"2001\" name=\"y\" objectType=\"7\" dataType=\"0005\" accessType=\"readable\"/>\n"
+            "<CANopenObject index=\"2001\" name=\"z\" objectType=\"7\" dataType=\"0005\" accessType=\"rw\"/>\n<CANopenObject name=\"q\"/>\n"
+            "<CANopenObject index=\"2002\" name=\"r\" objectType=\"7\" uniqueIDRef=\"P9\" dataType=\"0005\" accessType=\"rw\"/>\n");
+    const Reading reading = read_xdd(text);
+    const std::string all = complaints(reading);
+    for (const auto& [at, message] : {std::pair{"index=\"2000\"", "'300' does not fit into UNSIGNED8"},
+                                      {"readable", "there is no access type 'readable'"},
+                                      {"name=\"z\"", "object 2001 is described twice"},
+                                      {"name=\"q\"", "without an index"},
+                                      {"P9", "parameter 'P9', which is not described"}}) {
+        const std::size_t found = all.find(message);
+        ASSERT_NE(found, std::string::npos) << message << "\n" << all;
+        const std::size_t start = all.rfind('\n', found) + 1;
+        EXPECT_EQ(all.substr(start, line_of(text, at).size()), line_of(text, at)) << all;
+    }
+}
+
+TEST_F(Xdd, Broken_xml_and_other_xml_are_refused_with_the_reason) {
+    const Reading broken = read_description(xdd("<CANopenObject index=\"2000\">\n"));
+    EXPECT_FALSE(broken.description);
+    EXPECT_NE(complaints(broken, Severity::error).find("the XML is broken"), std::string::npos);
+    const Reading other = read_description("<?xml version=\"1.0\"?>\n<html><body/></html>\n");
+    EXPECT_FALSE(other.description);
+    EXPECT_NE(complaints(other, Severity::error).find("no CANopenObjectList"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace hal::canopen::eds::test

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+// SDO transfers of all sizes between our client and our server, on a wire that loses, doubles and delays frames.
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <tuple>
+
+#include "bus.hpp"
+
+namespace hal::canopen::test {
+namespace {
+
+std::vector<std::uint8_t> bytes(std::size_t size, unsigned seed) {
+    std::vector<std::uint8_t> data(size);
+    unsigned x = seed * 2654435761U + 1;
+    for (auto& b : data) x = x * 1664525U + 1013904223U, b = static_cast<std::uint8_t>(x >> 24);
+    return data;
+}
+
+struct Pair {
+    Recorder events;
+    Bus bus;
+    Device device;
+    FrameQueue out{1024};
+    SdoClient client;
+    Time now = 0;
+
+    explicit Pair(bool tolerant = false, const SdoClientSettings& settings = {.timeout = 50 * millisecond, .resends = 5, .restarts = 20})
+        : device(example(),
+                 {.node_id = 5, .sdo = {.timeout = 1 * second, .acknowledge_after = 10 * millisecond, .tolerate_repeats = tolerant}},
+                 events),
+          client(out, settings) {
+        bus.logging = false;
+        bus.attach(device);
+        bus.attach(out, [this](const Frame& f, Time t) {
+            if (client.listens_to(f)) client.handle(f, t);
+        });
+        client.configure(5);
+        device.start(now);
+        bus.exchange(now);
+    }
+    bool run(SdoRequest& r, int steps = 400'000) {
+        client.submit(r);
+        for (int n = 0; n < steps && !r.done(); ++n) {
+            client.poll(now);
+            device.poll(now);
+            if (!bus.exchange(now)) now += millisecond;
+        }
+        return r.done();
+    }
+};
+
+constexpr std::size_t sizes[] = {1, 4, 5, 7, 8, 14, 21, 889, 890, 1000, 10'000, 1 << 20};
+
+class Sizes : public testing::TestWithParam<std::tuple<std::size_t, SdoMode>> {};
+
+TEST_P(Sizes, Transfer_goes_both_ways_on_a_good_wire) {
+    const auto [size, mode] = GetParam();
+    Pair p;
+    const auto data = bytes(size, 1);
+    std::vector<std::uint8_t> room(size + 3);
+    SdoRequest down{.index = 0x2006, .mode = mode, .data = data}, up{.index = 0x2006, .upload = true, .mode = mode, .room = room};
+    ASSERT_TRUE(p.run(down));
+    EXPECT_TRUE(down.ok()) << word(down.abort);
+    ASSERT_TRUE(p.run(up));
+    EXPECT_TRUE(up.ok()) << word(up.abort);
+    EXPECT_EQ(up.size, size);
+    EXPECT_TRUE(std::equal(data.begin(), data.end(), room.begin()));
+    EXPECT_EQ(down.retries + up.retries, 0U);
+    EXPECT_EQ(p.client.strangers(), 0U);
+}
+
+std::string size_name(const testing::TestParamInfo<Sizes::ParamType>& info) {
+    return std::to_string(std::get<0>(info.param)) + (std::get<1>(info.param) == SdoMode::block ? "_block" : "_segmented");
+}
+INSTANTIATE_TEST_SUITE_P(All, Sizes, testing::Combine(testing::ValuesIn(sizes), testing::Values(SdoMode::segmented, SdoMode::block)),
+                         size_name);
+
+enum class Fault { lose, repeat, delay };
+
+class Disturbed : public testing::TestWithParam<std::tuple<Fault, unsigned, SdoMode, bool>> {};
+
+/// Whatever the wire does: a transfer that says it worked carried the right bytes, and every transfer ends.
+TEST_P(Disturbed, Transfer_is_right_or_says_that_it_failed) {
+    const auto [fault, n, mode, tolerant] = GetParam();
+    for (const auto size : sizes) {
+        if (size > 1000 && n <= 3) continue;
+        if (size > 10'000 && !(mode == SdoMode::block && n >= 97)) continue;  // what cannot get through only costs time
+        Pair p(tolerant);
+        p.bus.faults = {
+            .lose = fault == Fault::lose ? n : 0, .repeat = fault == Fault::repeat ? n : 0, .delay = fault == Fault::delay ? n : 0};
+        const auto data = bytes(size, n);
+        std::vector<std::uint8_t> room(size);
+        SdoRequest down{.index = 0x2006, .mode = mode, .data = data}, up{.index = 0x2006, .upload = true, .mode = mode, .room = room};
+        ASSERT_TRUE(p.run(down)) << size;
+        const auto& e = *p.device.dictionary().find(0x2006, 0);
+        if (down.ok()) {
+            ASSERT_EQ(e.size, size);
+            ASSERT_TRUE(std::equal(data.begin(), data.end(), e.data)) << size;
+        } else {
+            for (int wait = 0; wait < 2000; ++wait) p.device.poll(p.now += millisecond);  // until the server has given up, too
+            std::copy(data.begin(), data.end(), e.data);
+            const_cast<Entry&>(e).size = static_cast<std::uint32_t>(size);
+        }
+        ASSERT_TRUE(p.run(up)) << size;
+        if (up.ok()) {
+            ASSERT_EQ(up.size, size);
+            ASSERT_EQ(room, data) << size;
+        }
+        // What the protocol can mend is mended: blocks, and segments when the server bears repeats.
+        const bool mendable = n >= 5 && (fault != Fault::delay) && ((mode == SdoMode::block && size > 21) || tolerant);
+        if (mendable) {
+            EXPECT_TRUE(down.ok()) << size << ": " << word(down.abort);
+            EXPECT_TRUE(up.ok()) << size << ": " << word(up.abort);
+        }
+    }
+}
+
+std::string name_of(const testing::TestParamInfo<Disturbed::ParamType>& info) {
+    const auto [fault, n, mode, tolerant] = info.param;
+    return std::string(fault == Fault::lose ? "lose_" : fault == Fault::repeat ? "repeat_" : "delay_") + std::to_string(n) +
+           (mode == SdoMode::block ? "_block" : "_segmented") + (tolerant ? "_tolerant" : "");
+}
+INSTANTIATE_TEST_SUITE_P(All, Disturbed,
+                         testing::Combine(testing::Values(Fault::lose, Fault::repeat, Fault::delay),
+                                          testing::Values(2U, 3U, 5U, 7U, 13U, 50U, 97U, 1009U),
+                                          testing::Values(SdoMode::segmented, SdoMode::block), testing::Bool()),
+                         name_of);
+
+TEST(SdoClient, Drops_a_stale_abort_and_asks_again_on_silence) {
+    Pair p;
+    std::uint8_t room[4];
+    SdoRequest r{.index = 0x2000, .sub = 0, .upload = true, .room = room};
+    p.client.submit(r);
+    p.client.poll(p.now);
+    Frame asked;
+    ASSERT_TRUE(p.out.pop(asked));  // never reaches the server: it answers with the abort of an earlier transfer instead
+    p.client.handle({0x585, {0x80, 0x06, 0x20, 0, 0x01, 0, 0x04, 0x05}}, p.now);
+    EXPECT_FALSE(r.done());
+    EXPECT_EQ(p.client.strangers(), 1U);
+    for (int n = 0; n < 200 && !r.done(); ++n) {
+        p.now += millisecond;
+        p.client.poll(p.now);
+        p.bus.exchange(p.now);
+    }
+    EXPECT_TRUE(r.ok());
+    EXPECT_EQ(r.retries, 1U);
+    EXPECT_EQ(load<std::uint32_t>(room), 0x12345678U);
+}
+
+TEST(SdoClient, Falls_back_to_segments_when_the_server_has_no_block_transfer) {
+    FrameQueue out(64);
+    SdoClient client(out);
+    client.configure(9);
+    const auto data = bytes(20, 1);
+    SdoRequest r{.index = 0x2006, .mode = SdoMode::block, .data = data};
+    client.submit(r);
+    client.poll(0);
+    Frame f;
+    ASSERT_TRUE(out.pop(f));
+    EXPECT_EQ(f.data[0], 0xc6);
+    client.handle({0x589, {0x80, 0x06, 0x20, 0, 0x01, 0, 0x04, 0x05}}, 0);
+    ASSERT_TRUE(out.pop(f));
+    EXPECT_EQ(f.data[0], 0x21);
+    EXPECT_EQ(load<std::uint32_t>(f.data.data() + 4), 20U);
+}
+
+TEST(SdoClient, Gives_up_on_a_silent_node_and_says_so_to_it) {
+    FrameQueue out(64);
+    SdoClient client(out, {.timeout = 10 * millisecond, .resends = 2, .restarts = 0});
+    client.configure(9);
+    std::uint8_t room[4];
+    SdoRequest r{.index = 0x1000, .upload = true, .room = room};
+    client.submit(r);
+    for (Time t = 0; t < 100 * millisecond && !r.done(); t += millisecond) client.poll(t);
+    EXPECT_TRUE(r.done());
+    EXPECT_EQ(r.abort, Abort::timeout);
+    std::vector<std::uint8_t> commands;
+    for (Frame f; out.pop(f);) commands.push_back(f.data[0]);
+    EXPECT_EQ(commands, (std::vector<std::uint8_t>{0x40, 0x40, 0x40, 0x80}));
+}
+
+TEST(SdoClient, Serves_requests_in_line_and_cancels_one_of_them) {
+    Pair p;
+    std::uint8_t a[4], b[4], c[4];
+    SdoRequest first{.index = 0x1000, .upload = true, .room = a}, second{.index = 0x1018, .sub = 1, .upload = true, .room = b},
+        third{.index = 0x1018, .sub = 2, .upload = true, .room = c};
+    EXPECT_TRUE(p.client.submit(first));
+    EXPECT_TRUE(p.client.submit(second));
+    EXPECT_FALSE(p.client.submit(second));
+    p.client.cancel(second);
+    EXPECT_TRUE(second.done());
+    EXPECT_EQ(second.abort, Abort::general);
+    ASSERT_TRUE(p.run(third));
+    EXPECT_TRUE(first.ok());
+    EXPECT_TRUE(third.ok());
+    EXPECT_EQ(load<std::uint32_t>(c), 2U);
+}
+
+TEST(SdoClient, Does_not_write_beyond_its_room) {
+    Pair p;
+    const auto data = bytes(1000, 3);
+    SdoRequest down{.index = 0x2006, .data = data};
+    ASSERT_TRUE(p.run(down));
+    for (const auto mode : {SdoMode::segmented, SdoMode::block}) {
+        std::vector<std::uint8_t> room(999);
+        SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .room = room};
+        ASSERT_TRUE(p.run(up));
+        EXPECT_EQ(up.abort, Abort::memory);
+        EXPECT_FALSE(up.aborted_there);
+    }
+}
+
+TEST(SdoClient, Serves_many_nodes_at_once) {
+    Bus bus;
+    Recorder events;
+    FrameQueue out(4096);
+    Network network(out, events, {.timeout = 100 * millisecond});
+    std::vector<std::unique_ptr<Device>> devices;
+    for (std::uint8_t id = 1; id <= 127; ++id) {
+        devices.push_back(
+            std::make_unique<Device>(basic_device({.vendor = 1000U + id}), DeviceSettings{.node_id = id, .queue = 64}, events));
+        bus.attach(*devices.back());
+        network.add(id);
+        devices.back()->start(0);
+    }
+    bus.attach(out, [&](const Frame& f, Time t) { network.handle(f, t); });
+    bus.logging = false;
+    std::vector<std::array<std::uint8_t, 4>> rooms(128);
+    std::vector<SdoRequest> requests(128);
+    for (std::uint8_t id = 1; id <= 127; ++id) {
+        requests[id].index = 0x1018, requests[id].sub = 1, requests[id].upload = true, requests[id].room = rooms[id];
+        network.node(id)->sdo().submit(requests[id]);
+    }
+    bus.exchange(0);
+    network.poll(0);
+    bus.exchange(0);
+    for (std::uint8_t id = 1; id <= 127; ++id) {
+        EXPECT_TRUE(requests[id].ok());
+        EXPECT_EQ(load<std::uint32_t>(rooms[id].data()), 1000U + id);
+        EXPECT_EQ(network.node(id)->boot_ups(), 1U);
+    }
+}
+
+}  // namespace
+}  // namespace hal::canopen::test
