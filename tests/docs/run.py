@@ -47,8 +47,11 @@ def run(command, folder, environment):
         command, folder = str(HAL) + command[len("./hal"):], ROOT
     if command.startswith("cmake --install build/release"):
         command, folder = command.replace("build/release", str(HAL.parents[1])), ROOT
-    done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, timeout=120, text=True, errors="replace")
+    try:
+        done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, timeout=120, text=True, errors="replace")
+    except subprocess.TimeoutExpired:
+        return False, "none: it still ran after 120 s", []
     return done.returncode == status, done.returncode, done.stdout.splitlines()
 
 
