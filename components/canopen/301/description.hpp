@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,6 +41,7 @@ struct EntryDescription {
 /// All of a device. The order does not matter; of two entries with one address the first counts. [setup]
 struct Description {
     std::vector<EntryDescription> entries;
+    std::map<std::uint16_t, std::string> objects;  ///< names of whole objects, for those with sub-indices
 
     EntryDescription& add(std::uint16_t index, std::uint8_t sub, Type, Access, std::uint64_t value = 0, std::string name = {});
     EntryDescription& add_real(std::uint16_t index, std::uint8_t sub, Type, Access, double value = 0, std::string name = {});
