@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// Between the drive's units and the user's.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace hal::canopen::cia402 {
+
+/// Drive units per user unit, as two numbers, because a gear of 7:3 is no decimal. Negative: the other direction.
+struct Factor {
+    double numerator = 1.0, denominator = 1.0;
+
+    bool sound() const noexcept { return std::isfinite(ratio()) && ratio() != 0.0; }
+    double ratio() const noexcept { return numerator / denominator; }
+    double to_user(double drive) const noexcept { return drive / ratio(); }
+    /// Rounded, and limited to what an integer of type T holds; what is not a number is 0. [any]
+    template <class T>
+    T to_drive(double user) const noexcept {
+        using Limits = std::numeric_limits<T>;
+        constexpr double low = static_cast<double>(Limits::min()), high = static_cast<double>(Limits::max());
+        const double exact = std::nearbyint(user * ratio());
+        if (std::isnan(exact)) return T{};
+        return exact >= high ? Limits::max() : exact > low ? static_cast<T>(exact) : Limits::min();
+    }
+    /// As to_drive, without direction. [any]
+    std::uint32_t amount(double user) const noexcept { return Factor{std::fabs(ratio()), 1.0}.to_drive<std::uint32_t>(std::fabs(user)); }
+};
+
+/// A position counter of the drive that wraps, continued without end.
+class Counter {
+public:
+    /// The counter says `raw`, of which `bits` count (1–32). It went less than half its range since the last call. [realtime]
+    void follow(std::int32_t raw, unsigned bits) noexcept {
+        if (!known_) return put(raw);
+        count_ += low_bits(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(count_), bits);
+    }
+    /// From now on it is what the drive says. [realtime]
+    void put(std::int32_t raw) noexcept { count_ = raw, known_ = true; }
+    std::int64_t count() const noexcept { return count_; }
+    bool known() const noexcept { return known_; }
+
+    /// An endless count as the drive's counter would show it. [any]
+    static std::int32_t low_bits(std::uint32_t count, unsigned bits) noexcept {
+        const unsigned unused = bits == 0 || bits > 32 ? 0 : 32 - bits;
+        return static_cast<std::int32_t>(count << unused) >> unused;
+    }
+
+private:
+    std::int64_t count_ = 0;
+    bool known_ = false;
+};
+
+}  // namespace hal::canopen::cia402

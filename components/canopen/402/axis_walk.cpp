@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include "axis_walk.hpp"
+
+#include <iterator>
+
+namespace hal::canopen::cia402 {
+
+namespace {
+
+/// The wanted states, in the order of the columns below.
+constexpr State columns[] = {State::switch_on_disabled, State::ready_to_switch_on, State::switched_on, State::operation_enabled,
+                             State::quick_stop_active};
+constexpr unsigned column_of(State wanted) noexcept {
+    for (unsigned i = 0; i < std::size(columns); ++i)
+        if (columns[i] == wanted) return i;
+    return 0;
+}
+
+struct Way {
+    Step step;
+    bool there = false;
+};
+constexpr Way there(Step held) { return {held, true}; }
+
+/// What to command in a state (row, as they are numbered) to come to the wanted one (column). From operation enabled the way off is
+/// the gentle one, by the ramps of the drive; the way through fault is none: only a reset leads out.
+constexpr Way ways[9][5] = {
+    // off                          ready to switch on         switched on                operation enabled          quick stop
+    {there(Step::disable_voltage), {Step::wait}, {Step::wait}, {Step::wait}, there(Step::quick_stop)},
+    {there(Step::disable_voltage), {Step::shutdown}, {Step::shutdown}, {Step::shutdown}, there(Step::quick_stop)},
+    {{Step::disable_voltage}, there(Step::shutdown), {Step::switch_on}, {Step::switch_on}, there(Step::quick_stop)},
+    {{Step::shutdown}, {Step::shutdown}, there(Step::switch_on), {Step::enable_operation}, there(Step::quick_stop)},
+    {{Step::disable_operation}, {Step::disable_operation}, {Step::disable_operation}, there(Step::enable_operation), {Step::quick_stop}},
+    {{Step::quick_stop}, {Step::quick_stop}, {Step::quick_stop}, {Step::enable_operation}, there(Step::quick_stop)},
+    {{Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}},
+    {there(Step::disable_voltage), {Step::wait}, {Step::wait}, {Step::wait}, there(Step::disable_voltage)},
+    {{Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}},
+};
+
+constexpr std::uint16_t controlword(Step step) noexcept {
+    switch (step) {
+    case Step::shutdown: return command::shutdown;
+    case Step::switch_on: return command::switch_on;
+    case Step::enable_operation: return command::enable_operation;
+    case Step::disable_operation: return command::disable_operation;
+    case Step::quick_stop: return command::quick_stop;
+    case Step::fault_reset: return command::fault_reset;
+    case Step::wait:
+    case Step::disable_voltage: break;
+    }
+    return command::disable_voltage;
+}
+
+}  // namespace
+
+void Walk::want(State wanted, Request request) noexcept {
+    if (wanted == wanted_ && request == request_) return;
+    wanted_ = wanted, request_ = request;
+    failure_ = {};
+    step_ = led_ = Step::wait;
+    fresh_ = true, forced_ = false, reached_ = false;
+}
+
+void Walk::reset_fault() noexcept {
+    resetting_ = edge_low_ = true;
+    failure_ = {};
+    fresh_ = true;
+}
+
+void Walk::fail(Cause cause, std::uint16_t statusword, std::uint16_t error_code, Time waited) noexcept {
+    failure_ = {};
+    failure_.cause = cause, failure_.request = resetting_ ? Request::reset : request_,
+    failure_.step = cause == Cause::drive_fault ? led_ : step_, failure_.state = state_;
+    failure_.statusword = statusword, failure_.error_code = error_code, failure_.after = waited;
+}
+
+std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Time now, const Limits& limits) noexcept {
+    const State before = state_;
+    state_ = state_of(statusword);
+    if (resetting_ && state_ != State::fault && state_ != State::fault_reaction_active) resetting_ = false, fresh_ = true;
+    if (state_ != before) forced_ = false;
+    const bool off = wanted_ == State::switch_on_disabled, in_fault = state_ == State::fault;
+
+    Way way = ways[static_cast<unsigned>(state_)][column_of(wanted_)];
+    if (resetting_ && in_fault) way = {edge_low_ ? Step::wait : Step::fault_reset};
+    else if (in_fault && !way.there && !failure_) fail(Cause::drive_fault, statusword, error_code, 0);
+    if (forced_ && !way.there) way.step = Step::disable_voltage;
+    edge_low_ = false;  // a cycle with bit 7 low makes the edge
+    reached_ = way.there && !resetting_;
+    if (failure_ && !off) return command::disable_voltage;  // gave up; whoever asked decides
+
+    if (fresh_ || state_ != before || way.step != step_) {
+        since_ = now, fresh_ = false;
+        step_ = way.step;
+        if (step_ != Step::wait) led_ = step_;
+        return controlword(step_);
+    }
+    if (reached_) return controlword(step_);
+    const bool brakes = step_ == Step::disable_operation || state_ == State::quick_stop_active || state_ == State::fault_reaction_active;
+    const Time waited = now - since_;
+    if (waited < (brakes ? limits.stop : limits.step)) return controlword(step_);
+    const bool optional = state_ == State::quick_stop_active;  // 605Ah can make the drive stay there, and transition 16 need not exist
+    if (!optional && !failure_) fail(Cause::stays, statusword, error_code, waited);
+    if (resetting_) resetting_ = false, fresh_ = true;
+    if (off || optional) forced_ = true, fresh_ = true;
+    return controlword(step_);
+}
+
+}  // namespace hal::canopen::cia402
