@@ -73,15 +73,35 @@ public:
 
 private:
     class Node;
+    struct Command {
+        NmtCommand command;
+        std::uint8_t id;
+    };
     void on_node(std::uint8_t, NodeEvent, NmtState, Time) noexcept override;
     void on_emergency(std::uint8_t, const Emergency&) noexcept override;
+    void boot_all(bool reset) noexcept;
+    void halt(NetworkState, std::uint8_t because_of) noexcept;
+    void reset_all(std::uint8_t because_of) noexcept;
+    void schedule() noexcept;
+    void update() noexcept;
+    void set_state(NetworkState, std::uint8_t node) noexcept;
+    void own_state(NmtState) noexcept;
+    bool send(NmtCommand, std::uint8_t id) noexcept;
+    void send_commands() noexcept;
 
     const MasterSetup setup_;
     FrameQueue& out_;
     MasterEvents& events_;
     Network network_;
     std::vector<std::unique_ptr<Node>> nodes_;
+    std::array<Node*, 128> by_id_{};
     NetworkStatus status_{};
+    std::vector<Command> commands_;  // that the inhibit time or a full queue holds back
+    std::size_t commands_waiting_ = 0;
+    NmtState own_state_ = NmtState::initialising;
+    unsigned booting_ = 0, ready_ = 0;
+    bool keeps_some_ = false, halted_ = false, started_together_ = false, was_operational_ = false, commanded_ = false, dirty_ = false;
+    Time now_ = 0, last_command_ = 0;
 };
 
 }  // namespace hal::canopen

@@ -75,6 +75,10 @@ struct MasterSetup {
     SdoClientSettings sdo{};
 };
 
+/// What object 1F80h and, for one node, 1F81h of a master's DCF say. The nodes are there already. [setup]
+void take_startup(MasterSetup&, std::uint32_t object_1f80);
+void take_assignment(NodeSetup&, std::uint32_t object_1f81);
+
 /// A sentence for each thing that cannot be: ids twice or out of range, our own id, writes without data …. [setup]
 std::vector<std::string> problems_of(const MasterSetup&);
 
