@@ -55,14 +55,14 @@ void Emcy::update_register() noexcept {
     dictionary_.set<std::uint8_t>(0x1001, 0, bits);
 }
 
-bool Emcy::active(std::uint16_t code) const noexcept {
+bool Emcy::active(std::uint16_t code, std::uint8_t source) const noexcept {
     return std::any_of(errors_.begin(), errors_.begin() + static_cast<std::ptrdiff_t>(errors_count_),
-                       [&](const Active& a) { return a.code == code; });
+                       [&](const Active& a) { return a.code == code && a.source == source; });
 }
 
-void Emcy::raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer) noexcept {
-    if (active(code) || errors_count_ == errors_.size()) return;
-    errors_[errors_count_++] = {code, register_bits};
+void Emcy::raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer, std::uint8_t source) noexcept {
+    if (active(code, source) || errors_count_ == errors_.size()) return;
+    errors_[errors_count_++] = {code, register_bits, source};
     update_register();
     if (history_.size() > 1) {  // the newest is at sub-index 1
         std::uint8_t& used = *history_[0].data;
@@ -75,9 +75,9 @@ void Emcy::raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& ma
     queue(code, manufacturer);
 }
 
-void Emcy::clear(std::uint16_t code) noexcept {
+void Emcy::clear(std::uint16_t code, std::uint8_t source) noexcept {
     for (std::size_t n = 0; n < errors_count_; ++n) {
-        if (errors_[n].code != code) continue;
+        if (errors_[n].code != code || errors_[n].source != source) continue;
         std::copy(errors_.begin() + static_cast<std::ptrdiff_t>(n) + 1, errors_.begin() + static_cast<std::ptrdiff_t>(errors_count_),
                   errors_.begin() + static_cast<std::ptrdiff_t>(n));
         --errors_count_;

@@ -28,11 +28,12 @@ public:
     void reset(bool all) noexcept;
     /// Pre-operational and operational nodes may send.
     void set_active(bool active) noexcept { active_ = active; }
-    /// An error is there; as long as it is, saying so again does nothing. [realtime]
-    void raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer = {}) noexcept;
+    /// An error is there; as long as it is, saying so again does nothing. `source`: which of several parts that can have it, such as
+    /// the axes of a drive. [realtime]
+    void raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer = {}, std::uint8_t source = 0) noexcept;
     /// It is gone. [realtime]
-    void clear(std::uint16_t code) noexcept;
-    bool active(std::uint16_t code) const noexcept;
+    void clear(std::uint16_t code, std::uint8_t source = 0) noexcept;
+    bool active(std::uint16_t code, std::uint8_t source = 0) const noexcept;
     std::uint8_t error_register() const noexcept { return dictionary_.get<std::uint8_t>(0x1001, 0); }
     void poll(Time now) noexcept;
     std::uint64_t lost() const noexcept { return lost_; }  ///< found no room while the inhibit time ran
@@ -43,7 +44,7 @@ public:
 private:
     struct Active {
         std::uint16_t code = 0;
-        std::uint8_t bits = 0;
+        std::uint8_t bits = 0, source = 0;
     };
     void queue(std::uint16_t code, const Bytes&) noexcept;
     void update_register() noexcept;
@@ -52,7 +53,7 @@ private:
     Dictionary& dictionary_;
     FrameQueue& out_;
     std::span<Entry> history_;
-    std::array<Active, 32> errors_{};
+    std::array<Active, 64> errors_{};
     std::size_t errors_count_ = 0;
     std::array<Emergency, 16> waiting_{};
     std::size_t head_ = 0, count_ = 0;

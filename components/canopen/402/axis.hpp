@@ -78,7 +78,13 @@ struct AxisRules {
 class Axis {
 public:
     /// One cycle. The answer stays good until the next. [realtime]
-    const AxisOrders& step(const AxisFeedback&, const AxisCommand&, const AxisRules&, Time now) noexcept;
+    const AxisOrders& step(const AxisFeedback& feedback, const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
+        observe(feedback, rules, now);
+        return act(command, rules, now);
+    }
+    /// Its two halves, for whoever makes the command from the feedback in between. [realtime]
+    void observe(const AxisFeedback&, const AxisRules&, Time now) noexcept;
+    const AxisOrders& act(const AxisCommand&, const AxisRules&, Time now) noexcept;
 
     State state() const noexcept { return walk_.state(); }
     bool enabled() const noexcept { return enabled_; }
@@ -104,21 +110,21 @@ public:
 private:
     enum class Home : std::uint8_t { no, entering, running, leaving };
 
-    void measure(const AxisFeedback&, const AxisRules&, Time now) noexcept;
-    void decide(const AxisFeedback&, const AxisCommand&, const AxisRules&) noexcept;
-    void walk(const AxisFeedback&, const AxisCommand&, const AxisRules&, Time now) noexcept;
-    void select_mode(const AxisFeedback&, const AxisCommand&, const AxisRules&, Time now) noexcept;
-    void home(const AxisFeedback&, const AxisCommand&, const AxisRules&, Time now) noexcept;
-    void follow_position(const AxisFeedback&, const AxisCommand&, const AxisRules&, Time now) noexcept;
-    void move(const AxisFeedback&, const AxisCommand&, const AxisRules&, Time now) noexcept;
-    void fail(Cause, Request, const AxisFeedback&) noexcept;
-    void fail(Cause, double value, double limit, const AxisFeedback&) noexcept;
+    void decide(const AxisCommand&, const AxisRules&) noexcept;
+    void walk(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void select_mode(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void home(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void follow_position(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void move(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void fail(Cause, Request) noexcept;
+    void fail(Cause, double value, double limit) noexcept;
 
     Walk walk_;
     SetPoints set_points_;
     HomingRun homing_run_;
     Counter counter_;
     Failure failure_;
+    AxisFeedback in_;
     AxisOrders orders_;
 
     double position_ = 0.0, velocity_ = 0.0, torque_ = 0.0, commanded_ = 0.0, last_position_ = 0.0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "axis_failure.hpp"
 
+#include <algorithm>
 #include <cstdarg>
 #include <cstdio>
 
@@ -95,6 +96,105 @@ std::string text(const Failure& f) {
     if (f.cause == Cause::bad_command || f.cause == Cause::bad_factor) return all + print(" (%g)", f.value);
     if (f.cause == Cause::none || f.cause == Cause::lost || f.cause == Cause::not_enabled) return all;
     return all + print(" (statusword 0x%04X", f.statusword) + error_words(f.error_code) + ")" + hint(f);
+}
+
+namespace {
+
+/// All that changes the sentence, as one number.
+std::uint32_t key_of(const Failure& f) noexcept {
+    unsigned a = 0, b = 0;
+    switch (f.cause) {
+    case Cause::stays: a = static_cast<unsigned>(f.step), b = static_cast<unsigned>(f.state); break;
+    case Cause::drive_fault: a = static_cast<unsigned>(f.step); break;
+    case Cause::left: a = static_cast<unsigned>(f.before), b = static_cast<unsigned>(f.state); break;
+    case Cause::mode_refused: a = static_cast<std::uint8_t>(f.mode), b = static_cast<std::uint8_t>(f.shown); break;
+    case Cause::homing_error: a = static_cast<unsigned>(homing_of(f.statusword)); break;
+    case Cause::set_point: a = f.statusword >> 12 & 1; break;
+    case Cause::step_refused: a = f.step != Step::wait; break;
+    default: break;
+    }
+    return static_cast<std::uint32_t>(f.cause) << 24 | static_cast<std::uint32_t>(f.request) << 16 | a << 8 | b;
+}
+
+/// Where the number stands, and what was done.
+std::string reason(const Failure& f) {
+    const char* number = " (statusword {})";
+    switch (f.cause) {
+    case Cause::stays:
+    case Cause::mode_refused:
+    case Cause::homing_late:
+    case Cause::set_point: number = " for {} s"; break;
+    case Cause::drive_fault: number = " (error code {})"; break;
+    case Cause::following_error:
+    case Cause::step_refused:
+    case Cause::bad_command:
+    case Cause::bad_factor: number = ": {}"; break;
+    default: break;
+    }
+    return sentence(f) + number + (f.request == Request::run ? "; it was stopped" : "; it is off");
+}
+
+}  // namespace
+
+Sentences::Sentences() {
+    std::vector<Failure> all;
+    const auto add = [&](Cause cause, Request request) -> Failure& {
+        Failure f;
+        f.cause = cause, f.request = request;
+        return all.emplace_back(f);
+    };
+    constexpr unsigned states_and_none = static_cast<unsigned>(State::unknown) + 1, steps = static_cast<unsigned>(Step::fault_reset) + 1;
+    for (unsigned r = 0; r <= static_cast<unsigned>(Request::go); ++r) {
+        const auto request = static_cast<Request>(r);
+        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor, Cause::homing_late,
+                                  Cause::not_enabled})
+            add(cause, request);
+        for (unsigned step = 0; step < steps; ++step) {
+            add(Cause::drive_fault, request).step = static_cast<Step>(step);
+            for (unsigned state = 0; state < states_and_none; ++state) {
+                Failure& f = add(Cause::stays, request);
+                f.step = static_cast<Step>(step), f.state = static_cast<State>(state);
+            }
+        }
+    }
+    for (const Step step : {Step::wait, Step::enable_operation})
+        add(Cause::step_refused, step == Step::wait ? Request::run : Request::enable).step = step;
+    for (unsigned state = 0; state < states_and_none; ++state) {
+        Failure& f = add(Cause::left, Request::run);
+        f.before = State::operation_enabled, f.state = static_cast<State>(state);
+    }
+    for (int mode = -128; mode <= 127; ++mode)  // a display may show anything
+        for (const ModeRow& asked : modes) {
+            Failure& f = add(Cause::mode_refused, Request::mode);
+            f.mode = asked.mode, f.shown = static_cast<Mode>(mode);
+        }
+    for (unsigned bits = 0; bits < 2; ++bits) {
+        add(Cause::set_point, Request::go).statusword = bits != 0 ? status::set_point_acknowledge : std::uint16_t{0};
+        add(Cause::homing_error, Request::home).statusword =
+            static_cast<std::uint16_t>(status::homing_error | (bits != 0 ? status::target_reached : 0));
+    }
+    std::sort(all.begin(), all.end(), [](const Failure& x, const Failure& y) { return key_of(x) < key_of(y); });
+    for (const Failure& f : all) keys_.push_back(key_of(f)), texts_.push_back(reason(f));
+}
+
+const char* Sentences::find(const Failure& f) const noexcept {
+    const auto at = std::lower_bound(keys_.begin(), keys_.end(), key_of(f));
+    return at != keys_.end() && *at == key_of(f) ? texts_[static_cast<std::size_t>(at - keys_.begin())].c_str() : "the axis failed";
+}
+
+double Sentences::number(const Failure& f) noexcept {
+    switch (f.cause) {
+    case Cause::stays:
+    case Cause::mode_refused:
+    case Cause::homing_late:
+    case Cause::set_point: return seconds(f.after);
+    case Cause::drive_fault: return f.error_code;
+    case Cause::following_error:
+    case Cause::step_refused:
+    case Cause::bad_command:
+    case Cause::bad_factor: return f.value;
+    default: return f.statusword;
+    }
 }
 
 }  // namespace hal::canopen::cia402

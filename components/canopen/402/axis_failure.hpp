@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "canopen/301/protocol.hpp"
 #include "objects.hpp"
@@ -59,5 +60,18 @@ struct Failure {
 std::string sentence(const Failure&);
 /// With all numbers and what they hint at. [setup]
 std::string text(const Failure&);
+
+/// Every sentence there is, made beforehand, for a cycle that reports failures to hal.faults/1: {} in it is where the number goes.
+class Sentences {
+public:
+    Sentences();  // [setup]
+    /// Good as long as this. [realtime]
+    const char* find(const Failure&) const noexcept;
+    static double number(const Failure&) noexcept;
+
+private:
+    std::vector<std::uint32_t> keys_;  // sorted, in the order of texts_
+    std::vector<std::string> texts_;
+};
 
 }  // namespace hal::canopen::cia402

@@ -42,8 +42,9 @@ inline constexpr std::uint16_t
     position_offset = 0x60b0, velocity_offset = 0x60b1, torque_offset = 0x60b2, touch_probe_function = 0x60b8, touch_probe_status = 0x60b9,
     touch_probe_1_positive = 0x60ba, touch_probe_1_negative = 0x60bb, touch_probe_2_positive = 0x60bc, touch_probe_2_negative = 0x60bd,
     interpolation_submode = 0x60c0, interpolation_data = 0x60c1, interpolation_period = 0x60c2, interpolation_configuration = 0x60c4,
-    max_acceleration = 0x60c5, max_deceleration = 0x60c6, supported_homing_methods = 0x60e3, positive_torque_limit = 0x60e0,
-    negative_torque_limit = 0x60e1, following_error_actual = 0x60f4, control_effort = 0x60fa, position_demand_internal = 0x60fc,
+    max_acceleration = 0x60c5, max_deceleration = 0x60c6, positive_torque_limit = 0x60e0, negative_torque_limit = 0x60e1,
+    supported_homing_methods = 0x60e3, additional_position = 0x60e4, positioning_option = 0x60f2, following_error_actual = 0x60f4,
+    max_slippage = 0x60f8, control_effort = 0x60fa, position_demand_internal = 0x60fc,
     digital_inputs = 0x60fd, digital_outputs = 0x60fe, target_velocity = 0x60ff, motor_type = 0x6402, supported_modes = 0x6502,
     drive_type = 0x67ff;
 }  // namespace object
@@ -225,6 +226,7 @@ constexpr const char* error_word(std::uint16_t code) noexcept {
 /// Bits of 60FDh, and of 60FEh:1.
 namespace input {
 inline constexpr std::uint32_t negative_limit = 0x1, positive_limit = 0x2, home = 0x4, interlock = 0x8;
+inline constexpr std::uint32_t probe_1 = 0x10000, probe_2 = 0x20000;  // of ours
 }
 namespace output {
 inline constexpr std::uint32_t set_brake = 0x1;
@@ -233,7 +235,7 @@ inline constexpr std::uint32_t set_brake = 0x1;
 /// Bits of 60B8h and 60B9h of probe 1; those of probe 2 are 8 places further up.
 namespace probe {
 inline constexpr std::uint16_t enable = 0x0001, continuous = 0x0002, index_pulse = 0x0004, positive_edge = 0x0010, negative_edge = 0x0020;
-inline constexpr std::uint16_t enabled = 0x0001, positive_stored = 0x0002, negative_stored = 0x0004;
+inline constexpr std::uint16_t enabled = 0x0001, positive_stored = 0x0002, negative_stored = 0x0004, updated = 0x0040;  // it toggles
 }  // namespace probe
 
 }  // namespace hal::canopen::cia402

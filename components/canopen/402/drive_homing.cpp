@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+#include "drive_homing.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drive_objects.hpp"
+
+namespace hal::canopen::cia402 {
+
+const HomingSearch::Rule HomingSearch::rules[15] = {
+    {},
+    {Switch::negative, Edge::right, 1, 0},  // 1, 17
+    {Switch::positive, Edge::left, -1, 0},
+    {Switch::home, Edge::left, -1, 0},      // 3, 4: active from its edge to the positive end
+    {Switch::home, Edge::left, 1, 0},
+    {Switch::home, Edge::right, 1, 0},      // 5, 6: active from the negative end to its edge
+    {Switch::home, Edge::right, -1, 0},
+    {Switch::home, Edge::left, -1, 1},      // 7–10: start in the positive direction
+    {Switch::home, Edge::left, 1, 1},
+    {Switch::home, Edge::right, -1, 1},
+    {Switch::home, Edge::right, 1, 1},
+    {Switch::home, Edge::right, 1, -1},     // 11–14: start in the negative direction
+    {Switch::home, Edge::right, -1, -1},
+    {Switch::home, Edge::left, 1, -1},
+    {Switch::home, Edge::left, -1, -1},
+};
+
+bool HomingSearch::supports(int method) noexcept {
+    return std::find(homing_methods.begin(), homing_methods.end(), method) != homing_methods.end();
+}
+
+Range HomingSearch::range(const Plant& plant, Switch which) noexcept {
+    return which == Switch::negative ? plant.negative_limit() : which == Switch::positive ? plant.positive_limit() : plant.home();
+}
+
+HomingSearch::Region HomingSearch::before_edge() const noexcept {
+    return rule_.edge == Edge::left ? (rule_.last > 0 ? left : inside) : (rule_.last > 0 ? inside : right);
+}
+
+bool HomingSearch::begin(int method, const Plant& plant) noexcept {
+    *this = {};
+    if (!supports(method)) return false;
+    if (method >= 35) {
+        found_ = true;
+        home_ = plant.place();
+        return true;
+    }
+    if (method >= 33) {
+        searching_index_ = index_ = true;
+        direction_ = method == 33 ? -1 : 1;
+        edge_ = plant.place();
+        return true;
+    }
+    index_ = method <= 14;
+    rule_ = rules[index_ ? method : method - 16];
+    const auto r = range(plant, rule_.which);
+    if (r.holds(plant.place())) region_ = inside;
+    else if (rule_.first == 0) region_ = rule_.edge == Edge::left ? left : right;
+    return true;
+}
+
+void HomingSearch::pass(double place, Region to, bool wanted, double speed, double slow, int direction) noexcept {
+    // The last passage: from the right side and slow enough. Else it only tells where the edge is.
+    if (wanted && direction == rule_.last && edge_found_ && std::abs(speed) <= slow * 1.001) {
+        edge_ = place;
+        if (index_) searching_index_ = true, direction_ = direction;
+        else found_ = true, home_ = place;
+    }
+    if (wanted) edge_found_ = true;
+    region_ = to;
+}
+
+void HomingSearch::track(const Plant& plant, double speed, double slow) noexcept {
+    const auto r = range(plant, rule_.which);
+    const int direction = plant.place() > plant.before() ? 1 : -1;
+    // In the order in which they are passed: in at one edge, out at the other.
+    const Edge first = direction > 0 ? Edge::left : Edge::right;
+    for (const auto edge : {first, first == Edge::left ? Edge::right : Edge::left}) {
+        const bool rising = edge == first;
+        const auto place = r.edge(plant.before(), plant.place(), rising);
+        if (!place || found_ || searching_index_) continue;
+        pass(*place, rising ? inside : direction > 0 ? right : left, edge == rule_.edge, speed, slow, direction);
+    }
+}
+
+HomingSearch::Order HomingSearch::step(const Plant& plant, double speed, double slow) noexcept {
+    if (!found_ && !searching_index_) track(plant, speed, slow);
+    if (!found_ && searching_index_)
+        if (const auto pulse = plant.index_pulse(edge_, direction_)) found_ = true, home_ = *pulse;
+    return order(plant);
+}
+
+HomingSearch::Order HomingSearch::order(const Plant& plant) noexcept {
+    if (found_) return {Act::stop_at_home, 0};
+    const bool negative = plant.negative_limit().holds(plant.place()), positive = plant.positive_limit().holds(plant.place());
+    const auto blocked = [&](int direction) { return direction < 0 ? negative : positive; };
+    if (searching_index_) {
+        const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;  // a whole turn without a pulse
+        return gone || blocked(direction_) ? Order{Act::failed, 0} : Order{Act::slow, direction_};
+    }
+    if (region_ == unknown && blocked(rule_.first)) {
+        if (blocked(-rule_.first)) return {Act::failed, 0};
+        region_ = rule_.first > 0 ? right : left;
+    }
+    const auto start = before_edge();
+    const int direction = region_ == unknown ? rule_.first : region_ == start ? rule_.last : region_ < start ? 1 : -1;
+    // A limit switch in the way is an error, unless it is the one that is looked for.
+    const bool own = rule_.which == (direction < 0 ? Switch::negative : Switch::positive);
+    if (blocked(direction) && !own) return {Act::failed, 0};
+    return {edge_found_ && region_ != unknown && std::abs(region_ - start) <= 1 ? Act::slow : Act::fast, direction};
+}
+
+}  // namespace hal::canopen::cia402

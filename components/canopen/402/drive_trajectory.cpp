@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include "drive_trajectory.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hal::canopen::cia402 {
+
+namespace {
+void move(Motion& m, double acceleration, double dt) noexcept {
+    m.position += (m.velocity + 0.5 * acceleration * dt) * dt;
+    m.velocity += acceleration * dt;
+    m.acceleration = acceleration;
+}
+}  // namespace
+
+void ramp(Motion& m, double target, double acceleration, double deceleration, double dt) noexcept {
+    m.acceleration = 0;
+    // At most three parts: down to 0, up on the other side, constant.
+    for (int part = 0; part < 3 && dt > 0; ++part) {
+        if (m.velocity == target) {
+            m.position += m.velocity * dt;
+            return;
+        }
+        const bool through_zero = m.velocity * target < 0;
+        const double goal = through_zero ? 0 : target;
+        const double rate = std::abs(goal) > std::abs(m.velocity) ? acceleration : deceleration;
+        if (!(rate > 0)) {
+            m.position += m.velocity * dt;
+            return;
+        }
+        const double needed = std::abs(goal - m.velocity) / rate, time = std::min(dt, needed);
+        move(m, goal > m.velocity ? rate : -rate, time);
+        if (time == needed) m.velocity = goal;
+        dt -= time;
+    }
+}
+
+void Profile::add(double time, double acceleration) noexcept {
+    if (time > 0 && count_ < segments_.size()) segments_[count_++] = {time, acceleration};
+}
+
+void Profile::plan(const Motion& from, double target, const Limits& limits) noexcept {
+    clear();
+    elapsed_ = 0;
+    target_ = target;
+    const double highest = std::max(limits.velocity, 1e-6), up = std::max(limits.acceleration, 1e-6),
+                 down = std::max(limits.deceleration, 1e-6);
+    double end = std::min(std::abs(limits.end_velocity), highest);
+    double way = target - from.position, v = from.velocity;
+    const auto ahead = [&] { return v * way > 0; };
+    // Away from the target, or too fast to be at the end velocity there: stop first.
+    if (v != 0 && (!ahead() || v * v - end * end > 2 * down * std::abs(way) * (1 + 1e-12))) {
+        const double time = std::abs(v) / down;
+        add(time, v > 0 ? -down : down);
+        way -= 0.5 * v * time;
+        v = 0;
+    }
+    const double sign = way < 0 ? -1 : 1;
+    double u = std::abs(v);
+    way = std::abs(way);
+    if (way == 0 && u == 0) end = 0;
+    if (u > highest) {
+        const double time = (u - highest) / down;
+        add(time, -sign * down);
+        way -= 0.5 * (u + highest) * time;
+        u = highest;
+    }
+    // The highest velocity between u and end when nothing limits it.
+    const double peak_squared = (2 * way + u * u / up + end * end / down) / (1 / up + 1 / down);
+    double peak = std::sqrt(std::max(peak_squared, u * u));
+    if (peak < end) end = peak = std::sqrt(u * u + 2 * up * way);
+    peak = std::min(peak, highest);
+    const double rise = (peak - u) / up, fall = (peak - end) / down;
+    const double cruise = way - 0.5 * (u + peak) * rise - 0.5 * (peak + end) * fall;
+    add(rise, sign * up);
+    if (peak > 0) add(cruise / peak, 0);
+    add(fall, -sign * down);
+    end_velocity_ = sign * end;
+}
+
+double Profile::step(Motion& m, double dt) noexcept {
+    while (dt > 0 && !done()) {
+        const auto& s = segments_[next_];
+        const double time = std::min(dt, s.time - elapsed_);
+        move(m, s.acceleration, time);
+        dt -= time, elapsed_ += time;
+        if (elapsed_ < s.time) return 0;
+        elapsed_ = 0;
+        if (++next_ == count_) m = {target_, end_velocity_, 0};
+    }
+    if (done()) m.acceleration = 0;
+    return dt;
+}
+
+double Interpolator::step(Motion& m, double dt) noexcept {
+    const double before = m.position, time = std::min(dt, left_);
+    left_ -= time;
+    m.position = left_ > 0 && period_ > 0 ? to_ - (to_ - from_) * left_ / period_ : to_;
+    m.velocity = dt > 0 ? (m.position - before) / dt : 0;
+    m.acceleration = 0;
+    return dt - time;
+}
+
+}  // namespace hal::canopen::cia402
