@@ -5,16 +5,16 @@ namespace {
 
 struct Bitslice : hal::Component {
     using Component::Component;
-    hal::Argument          count{*this, "personality", 32, "how many bits, from the lowest", {.min = 1, .max = 32}};
+    hal::Argument          personality{*this, "personality", 32, "how many bits, from the lowest", {.min = 1, .max = 32}};
     hal::In<std::uint32_t> in{*this, "in", "the word"};
-    hal::Outs<bool>        out{*this, "out-##", count, "bit # of in"};
+    hal::Outs<bool>        out{*this, "out-##", personality, "bit # of in"};
     hal::Function          run{*this, "", &Bitslice::update, "takes the word apart"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t rest = in;
         for (auto& bit : out) {
-            bit = rest % 2 != 0;
-            rest /= 2;
+            bit = (rest & 1u) != 0;
+            rest >>= 1;
         }
     }
 };
