@@ -11,8 +11,7 @@ struct TristateBit : hal::Component {
     hal::Function run{*this, "", &TristateBit::update, "places the value"};
 
     void update(hal::Cycle) noexcept {
-        if (!enable) return;
-        out = in.get();
+        if (enable) out = in.get();
     }
 };
 
