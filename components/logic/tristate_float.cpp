@@ -11,8 +11,7 @@ struct TristateFloat : hal::Component {
     hal::Function   run{*this, "", &TristateFloat::update, "places the value"};
 
     void update(hal::Cycle) noexcept {
-        if (!enable) return;
-        out = in.get();
+        if (enable) out = in.get();
     }
 };
 
@@ -25,9 +24,9 @@ its value.
     loadrt tristate_float names=from-pendant,from-panel
     addf from-pendant servo
     addf from-panel servo
-    net pendant-speed => from-pendant.in
-    net pendant-active  => from-pendant.enable
-    net panel-speed   => from-panel.in
-    net panel-active    => from-panel.enable
+    net pendant-speed  => from-pendant.in
+    net pendant-active => from-pendant.enable
+    net panel-speed    => from-panel.in
+    net panel-active   => from-panel.enable
     net speed <=> from-pendant.out <=> from-panel.out
 )")
