@@ -10,21 +10,23 @@ struct Timedelay : hal::Component {
     hal::In<double>  on_delay{*this, "on-delay", "how long in must be TRUE before out is", {.initial = 0.5, .unit = "s"}};
     hal::In<double>  off_delay{*this, "off-delay", "how long in must be FALSE before out is", {.initial = 0.5, .unit = "s"}};
     hal::Out<double> elapsed{*this, "elapsed", "how long in has been other than out", {.unit = "s"}};
-    hal::Function    run{*this, "", &Timedelay::measure, "measures the time"};
+    hal::Function    run{*this, "", &Timedelay::update, "measures the time"};
 
-    void measure(hal::Cycle cycle) noexcept {
-        if (in == out) waited_ns_ = 0;
-        else if (waited_ns_ < (std::int64_t{1} << 62)) waited_ns_ += cycle.period_ns();  // whole numbers: nothing adds up
-        const double waited = static_cast<double>(waited_ns_) / 1e9;
-        if (in != out && !(waited < (in ? on_delay : off_delay))) {
-            out = in.get();
-            waited_ns_ = 0;
+    void update(hal::Cycle cycle) noexcept {
+        const bool now = in;
+        waited_ns_ = now == state_ ? 0 : waited_ns_ + cycle.period_ns();
+        const double waited_s = static_cast<double>(waited_ns_) / 1e9;  // whole ns, divided: 20 cycles of 1 ms are 0.02 to the last bit
+        elapsed = waited_s;
+        if (!(waited_s < (now ? on_delay : off_delay))) {
+            state_ = now;
+            waited_ns_ = 0;  // a change back in the next cycle has its own delay before it
         }
-        elapsed = waited;
+        out = state_;
     }
 
 private:
-    std::int64_t waited_ns_ = 0;
+    bool state_ = false;
+    std::int64_t waited_ns_ = 0;  // how long in has been other than state_
 };
 
 }  // namespace
