@@ -9,21 +9,21 @@ struct Toggle : hal::Component {
     hal::Io<bool>             out{*this, "out", "turns over with each press; others may write it, too"};
     hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles the button must hold its new state; 0 and 1: it counts at once",
                                        {.initial = 2}};
-    hal::Function             run{*this, "", &Toggle::read, "reads the button"};
+    hal::Function             run{*this, "", &Toggle::update, "reads the button"};
 
-    void read(hal::Cycle) noexcept {
-        const std::uint32_t enough = std::max<std::uint32_t>(debounce, 1);
-        if (in) count_ += count_ < enough ? 1 : 0;
-        else count_ -= count_ > 0 ? 1 : 0;
-        if (count_ >= enough && !pressed_) {
-            pressed_ = true;
-            out = !out;
-        } else if (count_ == 0) pressed_ = false;
+    void update(hal::Cycle) noexcept {
+        if (in == pressed_) {
+            held_ = 0;
+        } else if (++held_ >= debounce) {
+            held_ = 0;
+            pressed_ = !pressed_;
+            if (pressed_) out = !out;
+        }
     }
 
 private:
-    std::uint32_t count_ = 0;  // up to debounce while the button is down, down to 0 while it is up
-    bool pressed_ = false;
+    bool pressed_ = false;    // the button without its bouncing
+    std::uint32_t held_ = 0;  // cycles it has been other than that
 };
 
 }  // namespace
