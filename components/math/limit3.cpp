@@ -1,133 +1,153 @@
 // SPDX-License-Identifier: MIT
+// In one cycle `out` moves by its speed, and its speed changes by a = maxa * T^2 at most. So before it can stand on the goal
+// its moves must shrink to 0. Counted backwards from the stop, in units of a, they are
+//     p(0) = 0,  p(k) = p(k-1) + min(1, k/m),  and  q(k) = p(1) + ... + p(k)  is the way they cover,
+// with m = 1 for the fastest stop; with a larger m braking fades out over the last m moves. If q(k-1) + t p(k) is left,
+// 0 <= t <= 1, the move p(k-1) + t (p(k) - p(k-1)) leaves q(k-2) + t p(k-1): the same t and one move fewer, down to
+// exactly 0. So the line through the points (q, p) is the largest speed that still stops on the goal, and braking along it
+// never takes more than a. Below the line `out` speeds up. Where a whole `a` more would lead above it, it brakes by a
+// whole `a`; what this leaves over is made up by the last moves, which lie on the line.
+// With an input that moves at w the same holds for speed and way relative to it: `out` meets it at w.
 #include "hal/component.hpp"
 
 namespace {
 
-// How far may the output move in one cycle and still be able to stop at a point `distance` ahead?
-//
-// In units of one cycle let A be the largest change of the displacement per cycle (maxa * period^2), and let the last
-// m cycles before the stop change it by A/m, 2A/m, ... A only (m = smooth-steps - 1, at least 1). Counted back from the
-// stop, the displacements of a braking output are then
-//     v(j) = A j (j+1) / (2m)             for j <= m
-//     v(j) = v(m) + (j - m) A             for j >= m
-// and the ways they add up to are
-//     p(j) = A j (j+1) (j+2) / (6m)       for j <= m
-//     p(j) = p(m) + q v(m) + A q (q+1)/2  for j >= m, with q = j - m
-// A distance between p(j) and p(j+1) takes the displacement at the same share between v(j) and v(j+1); what remains
-// then lies at that share between p(j-1) and p(j), so the output arrives exactly, in j+1 cycles, and no change is
-// larger than A. With m = 1 this is the fastest way there is.
-class Approach {
-public:
-    Approach(double a, double m) noexcept : a_(a), m_(m), pm_(a * (m + 1.0) * (m + 2.0) / 6.0), vm_(a * (m + 1.0) / 2.0) {}
+constexpr double largest = 1e150;    // what is larger counts as this: its square is finite
+constexpr double rounding = 16e-16;  // of a few additions, relative
 
-    double operator()(double distance) const noexcept { return std::copysign(magnitude(std::fabs(distance)), distance); }
+double bounded(double value) { return std::clamp(value, -largest, largest); }
 
-    /// p(m + 1): the way of the last m + 1 cycles.
-    double last_cycles() const noexcept { return pm_ + vm_ + a_; }
+// q(m), the way over which braking fades out.
+double fading_way(double m) { return (m + 1.0) * (m + 2.0) / 6.0; }
 
-private:
-    double magnitude(double distance) const noexcept {
-        if (distance <= a_ / m_) return distance;
-        double v, p, next;
-        if (distance < pm_) {
-            double j = 1.0, above = m_;  // p(j) <= distance < p(above)
-            while (above - j > 1.0) {
-                const double middle = std::floor((j + above) / 2.0);
-                (start_of(middle) <= distance ? j : above) = middle;
-            }
-            p = start_of(j);
-            v = a_ * j * (j + 1.0) / (2.0 * m_);
-            next = a_ * (j + 1.0) * (j + 2.0) / (2.0 * m_);
-        } else {
-            const double b = 0.5 + vm_ / a_;
-            const double q = std::floor(std::sqrt(b * b + 2.0 * (distance - pm_) / a_) - b);
-            p = pm_ + q * vm_ + a_ * q * (q + 1.0) / 2.0;
-            v = vm_ + q * a_;
-            next = v + a_;
-        }
-        return v + (next - v) * std::clamp((distance - p) / next, 0.0, 1.0);
+// p at the way q on the line through the points (q(k), p(k)): k moves go there.
+double speed_for(double q, double m) {
+    if (q <= fading_way(m)) {  // q(k) = k (k+1) (k+2) / 6m
+        const double y = 6.0 * m * q * (1.0 - rounding);
+        double k = std::floor(std::cbrt(y));
+        if (k * (k + 1.0) * (k + 2.0) < y) k += 1.0;
+        return 2.0 * q / (k + 1.0) + k * (k - 1.0) / (6.0 * m);
     }
-    double start_of(double j) const noexcept { return a_ * j * (j + 1.0) * (j + 2.0) / (6.0 * m_); }
+    const double p = (m + 1.0) / 2.0, way = q - fading_way(m), b = m + 2.0;  // q(m+j) = q(m) + j p(m) + j (j+1) / 2
+    const double j = std::max(1.0, std::ceil(4.0 * way / (b + std::sqrt(b * b + 8.0 * way)) * (1.0 - rounding)));
+    return p + (j - 1.0) + (way - (j - 1.0) * (p + j / 2.0)) / (p + j);
+}
 
-    double a_, m_, pm_, vm_;
-};
+// The largest speed that stops at the end of `way`, which may be negative. The last move is all of the way.
+double stopping_speed(double way, double a, double m) {
+    return std::abs(way) * m <= a ? way : std::copysign(a * speed_for(std::abs(way) / a, m), way);
+}
+
+// False when a stop from `speed` surely fits into `way`: it takes (speed + a/2)^2 / 2a at most. Saves the root.
+bool too_fast(double speed, double way, double a) {
+    const double s = speed + a / 2.0;
+    return speed > way || (speed > 0.0 && s * s > 2.0 * a * way);
+}
+
+// The speed after `before`, to go `way` by at most `most` in a cycle.
+double next_speed(double way, double before, double most, double a, double m) {
+    const double side = std::copysign(1.0, way), limit = side * stopping_speed(way, a, m), on_line = std::min(limit, most);
+    const double faster = side * before + a, slower = side * before - a, fastest = std::min(faster, most);
+    const double last_moves = a * (fading_way(m) + m + 4.0);  // q(m+2)
+    if (side * way - std::clamp(on_line, slower, faster) <= last_moves) return side * on_line;
+    return side * (fastest <= limit * (1.0 + rounding) ? fastest : slower);
+}
 
 struct Limit3 : hal::Component {
     using Component::Component;
-    hal::In<double>        in{*this, "in", "the value to follow"};
-    hal::Out<double>       out{*this, "out", "follows in within the limits"};
-    hal::In<bool>          enable{*this, "enable", "TRUE: out follows in; FALSE: out returns to 0 within the limits", {.initial = true}};
-    hal::In<bool>          load{*this, "load", "while TRUE out is in at once, whatever maxv and maxa are"};
-    hal::In<double>        min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::In<double>        max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::In<double>        max_velocity{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
-    hal::In<double>        max_acceleration{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
+    hal::In<double>  in{*this, "in", "the value to follow"};
+    hal::Out<double> out{*this, "out", "follows in within the limits"};
+    hal::In<bool>    enable{*this, "enable", "TRUE: out follows in; FALSE: out returns to 0 within the limits", {.initial = true}};
+    hal::In<bool>    load{*this, "load", "while TRUE out is in at once, whatever maxv and maxa are"};
+    hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::In<double>  maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
+    hal::In<double>  maxa{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
     hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop in which acceleration fades out; 2: the fastest stop",
                                         {.initial = 2}};
-    hal::Function          run{*this, "", &Limit3::update, "follows in"};
+    hal::Function    run{*this, "", &Limit3::update, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
-        const double dt = cycle.seconds();
-        const double goal = std::min(std::max(enable ? in.get() : 0.0, min.get()), max.get());
-        const double target = std::isfinite(goal) ? goal : started_ ? target_ : position_;
-        const double stride = started_ ? target - target_ : 0.0;  // of the target, since the cycle before
-        if (load) put(target, dt);
-        else follow(target, stride, dt);
-        loading_ = load;
-        target_ = target;
-        last_stride_ = stride;
-        started_ = true;
+        const double period = cycle.seconds();
+        const double a = std::min(maxa * period * period, largest), v = maxv > 0.0 ? std::min(maxv * period, largest) : 0.0;
+        const double w = look_at_input(v);
+        if (load) carry();
+        else if (a > 1.0 / largest) approach(a, v, w);
+        else stand();
+        carried_ = load;
         out = position_;
     }
 
 private:
-    static constexpr double full = 1.0 - 1e-9;  // this much of A is A, but for rounding
-
-    void put(double target, double dt) {
-        velocity_ = loading_ ? (target - position_) / dt : 0.0;  // how it really moves while it is carried along
-        position_ = target;
+    // Reads in, min and max; what is not a number keeps its last value. Returns the speed to meet the input at: of its last
+    // two the smaller one, because a step or a jitter has a speed in one cycle and none or the opposite in the next. An
+    // input that is faster than maxv cannot be met and counts as standing.
+    double look_at_input(double v) noexcept {
+        const double input = in, low = min, high = max, before = speed_in_;
+        if (!std::isnan(low)) low_ = bounded(low);
+        if (!std::isnan(high)) high_ = bounded(high);
+        low_now_ = std::min(low_, high_);
+        speed_in_ = std::isnan(input) ? 0.0 : bounded(input) - input_;
+        if (!std::isnan(input)) input_ = bounded(input);
+        const double w = speed_in_ > 0.0 ? std::max(0.0, std::min(speed_in_, before)) : std::min(0.0, std::max(speed_in_, before));
+        return std::abs(w) <= v * (1.0 + 1e-9) + 8.0 * rounding * std::abs(input_) ? std::clamp(w, -v, v) : 0.0;
     }
 
-    void follow(double target, double stride, double dt) {
-        const double a = max_acceleration * dt * dt, v = max_velocity > 0.0 ? max_velocity * dt : 0.0;
-        if (!(a > 0.0)) {
-            velocity_ = 0.0;
-            return;
-        }
-        // A moving target is met at its own speed. Only what two cycles agree on counts as speed, so a step or noise
-        // on the input is no motion; and never more than the output could do.
-        const bool steady = stride * last_stride_ > 0.0;
-        const double common = steady ? std::copysign(std::min(std::fabs(stride), std::fabs(last_stride_)), stride) : 0.0;
-        const double drift = std::clamp(common, -v, v);
-
-        const Approach approach(a, static_cast<double>(std::max<std::uint32_t>(smooth_steps, 2) - 1));
-        const double before = velocity_ * dt;
-        // The displacement towards a point that is `distance` away and moves by `own` per cycle. It changes by all of A or
-        // is all of maxv; only the last cycles may take less. Where the fastest way would, the output brakes, and gets what
-        // is missing in a later cycle.
-        const auto towards = [&](double distance, double own) {
-            const double left = distance - own, fastest = own + approach(left);
-            if (std::fabs(fastest) >= v || std::fabs(fastest - before) >= a * full) return fastest;
-            const double braking = before - std::copysign(a, left);
-            const double slower = std::copysign(1.0, left) * (braking - own);
-            const bool as_soon = std::fabs(left) - slower <= std::min(a, slower) / full;  // there in the next cycle
-            return std::fabs(left) > approach.last_cycles() || as_soon ? braking : fastest;
-        };
-        double step = towards(target - position_, drift);
-        if (std::fabs(step - before) > a * full) step = before + std::copysign(a, step - before);
-        step = std::max(step, towards(min - position_, 0.0));
-        step = std::min(step, towards(max - position_, 0.0));
-        step = std::clamp(step, -v, v);
-        step = std::clamp(step, before - a, before + a);
-        velocity_ = step / dt;
-        // Without this the last bit of rounding would keep it from ever being exactly there.
-        const double rounding = 1e-15 * (std::fabs(target) + std::fabs(position_));
-        position_ = std::fabs(target - position_ - step) <= rounding ? target : position_ + step;
+    void carry() noexcept {
+        const double before = position_;
+        position_ = std::clamp(input_, low_now_, high_);
+        rest_ = 0.0;
+        speed_ = carried_ ? position_ - before : 0.0;  // the jump at its beginning is no speed
+        arrived_ = true;
     }
 
-    double position_ = 0.0, velocity_ = 0.0;
-    double target_ = 0.0, last_stride_ = 0.0;  // of the cycle before
-    bool started_ = false, loading_ = false;
+    void stand() noexcept {
+        speed_ = 0.0;
+        arrived_ = false;
+    }
+
+    void approach(double a, double v, double input_speed) noexcept {
+        const double goal = std::clamp(enable ? input_ : 0.0, low_now_, high_);
+        const double w = enable && goal == input_ ? input_speed : 0.0;
+        const double left = way_to(goal), down = way_to(low_now_), up = way_to(high_);
+        // Once on the input it need not be gentle to what the input does within the limits.
+        const double m = arrived_ && std::abs(left - w) <= a ? 1.0 : std::max<double>(smooth_steps, 2.0) - 1.0;
+
+        double wanted = w + next_speed(left - w, speed_ - w, left < w ? v + w : v - w, a, m);
+        if (too_fast(-wanted, -down, a)) wanted = std::max(wanted, stopping_speed(down, a, 1.0));
+        if (too_fast(wanted, up, a)) wanted = std::min(wanted, stopping_speed(up, a, 1.0));
+        wanted = std::clamp(wanted, -v, v);
+        const double possible = std::clamp(wanted, speed_ - a, speed_ + a);
+        const double slack = 1e-12 * a + rounding * (std::abs(speed_) + std::abs(w));
+        speed_ = std::abs(wanted - possible) <= slack ? wanted : possible;
+        move(speed_);
+
+        const double tiny = rounding * (std::abs(goal) + std::abs(speed_));
+        arrived_ = std::abs(left - speed_) <= tiny && std::abs(speed_ - w) <= a + tiny;
+        if (arrived_) stand_at(goal);
+        else if (up >= 0.0 && up < speed_ && speed_ - up <= slack) stand_at(high_);
+        else if (down <= 0.0 && down > speed_ && down - speed_ <= slack) stand_at(low_now_);
+    }
+
+    double way_to(double place) const noexcept { return (place - position_) - rest_; }
+    void stand_at(double place) noexcept {
+        position_ = place;
+        rest_ = 0.0;
+    }
+    // Adds to the position and keeps what the sum rounds off: with it the stops of a long way are exact.
+    void move(double by) noexcept {
+        by += rest_;
+        const double sum = position_ + by, part = sum - position_;
+        rest_ = (position_ - (sum - part)) + (by - part);
+        position_ = sum;
+    }
+
+    double position_ = 0.0, rest_ = 0.0;             // out, and what is rounded off it
+    double speed_ = 0.0;                             // of out, per cycle like all speeds here
+    double input_ = 0.0, speed_in_ = 0.0;            // in as last seen, and its speed
+    double low_ = 0.0, high_ = 0.0, low_now_ = 0.0;  // min and max as last seen; the lower of them
+    bool arrived_ = true;                            // out is on its goal
+    bool carried_ = false;                           // by load, in the last cycle
 };
 
 }  // namespace
@@ -140,10 +160,10 @@ kept and the output comes back. It moves with all of `maxa` or all of `maxv` unt
 `smooth-steps` above 2 the acceleration fades out over that many cycles: it takes a little longer and is gentle to a
 jittering input.
 
-`out` starts at 0; `load` puts it on the input. While the input is not a number its last value counts. With `maxa` not
+`out` starts at 0; `load` puts it on the input. While the input, `min` or `max` is not a number its last value counts. With `maxa` not
 positive `out` stands still. When `min` is above `max`, `max` wins.
 
-**Otherwise than LinuxCNC's**, which accelerates and cruises the same to the last bits: it stops with `maxa` and is then exactly
+**Otherwise than LinuxCNC's**, which accelerates and cruises the same: it stops with `maxa` and is then exactly
 there (there each of the last cycles goes half of what is left, for some 30 cycles). It keeps `min` and `max` also with `maxv` and
 `maxa` as they are by default (there `out` goes beyond). It leaves `min` and `max` with the input (there some cycles before the
 input is back, to have its speed by then). An input that comes nearer faster than `maxv` it brakes towards (there it turns round).
