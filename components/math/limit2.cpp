@@ -11,20 +11,26 @@ struct Limit2 : hal::Component {
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>  maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
-    hal::Function    run{*this, "", &Limit2::follow, "follows in"};
+    hal::Function    run{*this, "", &Limit2::update, "follows in"};
 
-    void follow(hal::Cycle cycle) noexcept {
-        const double goal = std::fmin(std::fmax(in, min), max);
-        if (std::isfinite(goal) && !std::isnan(in.get())) {
-            const double way = goal - position_;
-            const double reach = load ? HUGE_VAL : std::fmax(maxv, 0.0) * cycle.seconds();
-            position_ = std::fabs(way) <= reach ? goal : position_ + std::copysign(reach, way);
+    void update(hal::Cycle cycle) noexcept {
+        const double goal = limited(in);
+        if (std::isfinite(goal)) {
+            const double way = goal - state_, step = maxv * cycle.seconds();
+            if (load || std::abs(way) <= step) state_ = goal;
+            else if (step > 0.0) state_ += std::copysign(step, way);
         }
-        out = position_;
+        out = state_;
     }
 
 private:
-    double position_ = 0.0;
+    // `value` between the limits, max last. NaN when one of the three is, or the value is infinite.
+    double limited(double value) const noexcept {
+        const double low = min, high = max;
+        if (!std::isfinite(value) || std::isnan(low) || std::isnan(high)) return NAN;
+        return std::min(std::max(value, low), high);
+    }
+    double state_ = 0.0;
 };
 
 }  // namespace
