@@ -310,7 +310,7 @@ void Master::Node::identified() noexcept {
 
 /// Two devices with one id answer both: what differs tells.
 void Master::Node::on_sdo_frame(const Frame& f) noexcept {
-    if (status.step != Step::identifying || f.remote || f.length != 8 || (f.data[0] & 0xee) != 0x42) return;
+    if (status.step < Step::identifying || !booting() || f.remote || f.length != 8 || (f.data[0] & 0xee) != 0x42) return;
     for (std::size_t n = 0; n < identity_objects.size(); ++n) {
         const auto& o = identity_objects[n];
         if (load<std::uint16_t>(f.data.data() + 1) != o.index || f.data[3] != o.sub) continue;

@@ -159,7 +159,9 @@ void Master::Node::written() noexcept {
         if (lacks() && o.optional) {
             o.absent = true;
         } else {
-            if (remote_.state() == NmtState::operational && tries_ < most_state_changes) {  // it left pre-operational meanwhile
+            const bool wrong_state = remote_.state() == NmtState::operational || request_.abort == Abort::device_state ||
+                                     request_.abort == Abort::local_control;
+            if (wrong_state && tries_ < most_state_changes) {  // it started itself
                 ++tries_;
                 master_.send(NmtCommand::enter_pre_operational, setup.id);
                 return write(Task::write, o.index, o.sub, o.value());

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// A master and devices on the wire of bus.hpp, for the tests of booting. Time is a number; devices have a plug and can be spoilt.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "bus.hpp"
+#include "canopen/302/master.hpp"
+
+namespace hal::canopen::test {
+
+/// A device with a plug: without power it neither hears nor sends. What it sends can be changed, dropped or delayed.
+struct Station : Recorder {
+    Station(std::uint8_t id, const Description& d, bool start_by_itself = false)
+        : device(d, {.node_id = id, .queue = 256, .start_by_itself = start_by_itself}, *this) {}
+
+    void plug(bool in, Time now) {
+        if (in == powered) return;
+        powered = in;
+        device.out().clear();
+        late.clear();
+        if (in) booted ? device.command(NmtCommand::reset_node, now) : device.start(now);
+        booted = true;
+        send(now);
+    }
+    void take(const Frame& f, Time now) {
+        if (!powered) return;
+        ++heard;
+        device.handle(f, now);
+        send(now);
+    }
+    void poll(Time now) {
+        if (!powered) return;
+        device.poll(now);
+        send(now);
+    }
+    void send(Time now) {
+        for (Frame f; device.out().pop(f);) {
+            if (tamper && !tamper(f)) continue;
+            late.push_back({now + delay, f});
+        }
+        while (!late.empty() && late.front().first <= now) {
+            wire.push(late.front().second);
+            late.pop_front();
+        }
+    }
+
+    Device device;
+    FrameQueue wire{256};
+    bool powered = false, booted = false;
+    Time delay = 0;
+    std::function<bool(Frame&)> tamper;
+    std::deque<std::pair<Time, Frame>> late;
+    std::size_t heard = 0;
+};
+
+/// Refuses or changes what an object does.
+struct Spoil : Handler {
+    std::function<Abort(Entry&)> read;
+    std::function<Abort(Entry&, std::span<const std::uint8_t>)> write;
+    std::function<void(Entry&)> after;
+    Abort reading(Entry& e) noexcept override { return read ? read(e) : Abort::none; }
+    Abort writing(Entry& e, std::span<const std::uint8_t> value) noexcept override { return write ? write(e, value) : Abort::none; }
+    void written(Entry& e) noexcept override {
+        if (after) after(e);
+    }
+};
+
+struct Bed : MasterEvents {
+    explicit Bed(MasterSetup s) : setup(std::move(s)) {
+        own = std::make_unique<Device>(basic_device({.vendor = 1, .heartbeat_ms = 50}),
+                                       DeviceSettings{.node_id = setup.id, .obeys_nmt = false}, own_events);
+        master = std::make_unique<Master>(setup, own->out(), *this);
+        bus.attach(own->out(), [this](const Frame& f, Time t) {
+            if (!alive) return;
+            own->handle(f, t);
+            master->handle(f, t);
+        });
+        bus.logging = false;
+    }
+    Station& add(std::uint8_t id, const Description& d, bool start_by_itself = false) {
+        stations.push_back(std::make_unique<Station>(id, d, start_by_itself));
+        auto& s = *stations.back();
+        bus.attach(s.wire, [&s](const Frame& f, Time t) { s.take(f, t); });
+        return s;
+    }
+    void power() {
+        for (auto& s : stations) s->plug(true, now);
+    }
+    /// All on, the master started.
+    void start() {
+        own->start(now);
+        master->start(now);
+    }
+    void step() {
+        now += dt;
+        if (alive) own->poll(now), master->poll(now);
+        for (auto& s : stations) s->poll(now);
+        bus.exchange(now);
+    }
+    void run(Time time) {
+        for (const Time end = now + time; now < end;) step();
+    }
+    template <class Condition>
+    bool until(Condition condition, Time at_most = 60 * second) {
+        for (const Time end = now + at_most; now < end;) {
+            if (condition()) return true;
+            step();
+        }
+        return condition();
+    }
+    bool operational(Time at_most = 60 * second) {
+        return until([&] { return master->status().state == NetworkState::operational; }, at_most);
+    }
+    bool ended(std::uint8_t id, Time at_most = 60 * second) {
+        return until([&] { return status(id).result != BootResult::none && status(id).step >= Step::ready; }, at_most);
+    }
+    const NodeStatus& status(std::uint8_t id) const { return master->status(id); }
+    NmtState state(std::size_t station) { return stations[station]->device.state(); }
+    std::uint32_t value(std::size_t station, std::uint16_t index, std::uint8_t sub) {
+        return stations[station]->device.dictionary().get<std::uint32_t>(index, sub);
+    }
+    /// The steps a node went through, as words.
+    std::string way(std::uint8_t id) const {
+        std::string result;
+        for (const auto& [node, step] : steps)
+            if (node == id) result += (result.empty() ? "" : ", ") + std::string(word(step));
+        return result;
+    }
+
+    void on_step(const NodeStatus& s) noexcept override {
+        if (steps.empty() || steps.back() != std::pair{s.id, s.step}) steps.emplace_back(s.id, s.step);
+    }
+    void on_network(const NetworkStatus& s) noexcept override { networks.push_back(s.state); }
+    void on_own_state(NmtState s) noexcept override {
+        own->command(s == NmtState::operational ? NmtCommand::start : NmtCommand::enter_pre_operational, now);
+    }
+    void on_emergency(std::uint8_t id, const Emergency& e) noexcept override { emergencies.emplace_back(id, e); }
+
+    MasterSetup setup;
+    Time now = 1 * second, dt = 1 * millisecond;
+    bool alive = true;
+    Bus bus;
+    Recorder own_events;
+    std::unique_ptr<Device> own;
+    std::unique_ptr<Master> master;
+    std::vector<std::unique_ptr<Station>> stations;
+    std::vector<std::pair<std::uint8_t, Step>> steps;
+    std::vector<NetworkState> networks;
+    std::vector<std::pair<std::uint8_t, Emergency>> emergencies;
+};
+
+/// Node 5 as example() is.
+inline NodeSetup example_node(std::uint8_t id = 5) {
+    NodeSetup n;
+    n.id = id;
+    n.device_type = 0x191, n.vendor = 1, n.product = 2, n.revision = 3, n.serial = 4;
+    n.heartbeat_ms = 50;
+    n.retry = 200 * millisecond, n.retry_most = 2 * second, n.boot_limit = 3 * second;
+    return n;
+}
+inline MasterSetup network_of(std::vector<NodeSetup> nodes) {
+    MasterSetup s;
+    s.nodes = std::move(nodes);
+    s.sdo = {.timeout = 50 * millisecond};
+    return s;
+}
+
+}  // namespace hal::canopen::test
