@@ -41,8 +41,9 @@ std::string error_words(std::uint16_t code) {
 /// What the other bits of the statusword say about it.
 std::string hint(const Failure& f) {
     if (f.statusword == 0) return "; was a statusword received at all?";
-    if ((f.statusword & status::remote) == 0 && f.cause == Cause::stays) return "; remote is 0: the drive obeys its own panel";
-    if ((f.statusword & status::voltage_enabled) == 0 && f.cause == Cause::stays && f.request == Request::enable)
+    if (f.cause != Cause::stays || f.state == State::unknown) return "";
+    if ((f.statusword & status::remote) == 0) return "; remote is 0: the drive obeys its own panel";
+    if ((f.statusword & status::voltage_enabled) == 0 && f.request == Request::enable)
         return "; voltage-enabled is 0: has its power stage supply?";
     return "";
 }
