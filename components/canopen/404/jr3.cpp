@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+#include "jr3.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace hal::canopen {
+
+namespace {
+constexpr std::uint32_t zero_command = 0x6f72657a, tare_command = 0x65726174;  // "zero", "tare"
+constexpr Time silence = 10 * millisecond;             // no packet for that long: no sensor
+constexpr Time most_at_once = 100 * millisecond;       // of a line that was not looked at, the rest is gone
+constexpr double overload_over_below = 0.95;           // of the limit
+constexpr std::int16_t supply_low = 22937, supply_high = 26214;  // 70 % and 80 %; 75 % is right
+
+template <class T>
+T rounded(double value) noexcept {
+    constexpr double low = std::numeric_limits<T>::min(), high = std::numeric_limits<T>::max();
+    return std::isnan(value) ? T{0} : static_cast<T>(std::llround(std::clamp(value, low, high)));
+}
+constexpr double powers[] = {1, 10, 100, 1e3, 1e4, 1e5, 1e6};
+}  // namespace
+
+Jr3::Jr3(Jr3Settings settings) : settings_(std::move(settings)), calibration_(settings_.calibration) {
+    if (!settings_.calibration.invert(inverse_)) throw std::invalid_argument("the decoupling matrix has no inverse");
+    settings_.calibration.write(sensor_memory_);
+    sensor_.set_memory(sensor_memory_);
+}
+
+void Jr3::attach(Device& device) {
+    Program::attach(device);
+    auto& dictionary = device.dictionary();
+    for (std::uint8_t sub = 1; sub <= 6; ++sub) {
+        const auto n = sub - 1U;
+        auto& c = channels_[n];
+        dictionary.bind(0x7100, sub, raw_[n]), dictionary.bind(0x7130, sub, values_[n]), dictionary.bind(0x7140, sub, nets_[n]);
+        dictionary.bind(0x7133, sub, delta_[n]), dictionary.bind(0x2103, sub, limits_[n]);
+        dictionary.bind(0x6124, sub, c.offset), dictionary.bind(0x6126, sub, c.factor), dictionary.bind(0x6127, sub, c.scaling_offset);
+        dictionary.bind(0x6138, sub, c.tare), dictionary.bind(0x6132, sub, c.digits), dictionary.bind(0x6130, sub, c.process);
+    }
+    dictionary.bind(0x2200, 0, supply_raw_), dictionary.bind(0x2201, 0, status_), dictionary.bind(0x2202, 0, counter_);
+    dictionary.stream(0x2104, 0, memory_stream_);
+    for (const int index : {0x2203, 0x2204, 0x6100, 0x6125, 0x6139, 0x6140, 0x9130}) watch(static_cast<std::uint16_t>(index));
+}
+
+void Jr3::on_reset(bool application) noexcept {
+    if (!application) return;
+    decoder_.reset();
+    status_ = jr3_status::no_signal | jr3_status::not_calibrated;
+    calibrated_ = false;
+    heard_ = last_;
+    said_.fill(0);
+}
+
+// The sensor.
+
+void Jr3::drive_sensor() noexcept {
+    const auto raw = settings_.calibration.raw(applied_, inverse_);
+    for (unsigned n = 0; n < 6; ++n) {
+        int off = 0;
+        if (noise_ != 0) {  // xorshift
+            random_ ^= random_ << 13, random_ ^= random_ >> 17, random_ ^= random_ << 5;
+            off = static_cast<int>(random_ % (2 * noise_ + 1)) - static_cast<int>(noise_);
+        }
+        sensor_.set(jr3::first_force + n, static_cast<std::int16_t>(std::clamp(raw[n] + off, -32768, 32767)));
+    }
+    sensor_.set(jr3::supply_address, rounded<std::int16_t>(supply_ * 32768.0));
+}
+
+void Jr3::sample(Time now) noexcept {
+    if (!started_) started_ = true, last_ = heard_ = began_ = now;
+    const Time passed = std::clamp<Time>(now - last_, 0, most_at_once);
+    last_ = now;
+    clocks_ += static_cast<double>(passed) * 1e-9 * jr3::clock_hz;
+    const auto due = static_cast<unsigned>(clocks_);
+    clocks_ -= due;
+    const std::size_t recorded = settings_.recording.size() * 8;
+    if (recorded == 0) drive_sensor();
+    for (unsigned n = 0; n < due; ++n) {
+        bool line;
+        if (recorded == 0) {
+            line = sensor_.next();
+        } else {
+            line = (settings_.recording[recorded_bit_ / 8] >> (7 - recorded_bit_ % 8) & 1) != 0;
+            if (++recorded_bit_ == recorded) recorded_bit_ = 0;
+        }
+        if (decoder_.take(line && cable_)) take(decoder_.packet());
+    }
+}
+
+void Jr3::take(const jr3::Packet& p) noexcept {
+    heard_ = last_;
+    if (p.address == jr3::supply_address) supply_raw_ = p.value;
+    else if (p.address < jr3::calibration_address) raw_[p.address - jr3::first_force] = p.value;
+    else if (p.address == jr3::calibration_address && memory_reader_.take(static_cast<std::uint16_t>(p.value))) {
+        calibrated_ = calibration_.read(memory_reader_.memory());
+        alarm(jr3_status::not_calibrated, !calibrated_, jr3_error::calibration, 0);
+        if (calibrated_) show_calibration();
+    }
+}
+
+// The node.
+
+void Jr3::show_calibration() noexcept {
+    auto& dictionary = device_->dictionary();
+    for (unsigned n = 0; n < 36; ++n)
+        dictionary.set(0x2100, static_cast<std::uint8_t>(n + 1), static_cast<float>(calibration_.matrix[n / 6][n % 6]));
+    for (unsigned n = 0; n < 6; ++n) {
+        dictionary.set(0x2101, static_cast<std::uint8_t>(n + 1), static_cast<float>(calibration_.full_scale[n]));
+        dictionary.set(0x2102, static_cast<std::uint8_t>(n + 1), static_cast<float>(calibration_.overload[n]));
+    }
+    dictionary.set(0x2105, 0, calibration_.serial);
+}
+
+void Jr3::alarm(std::uint8_t bit, bool on, std::uint16_t code, std::uint8_t about) noexcept {
+    const bool was = device_->emcy().active(code);
+    status_ = static_cast<std::uint8_t>(on ? status_ | bit : status_ & ~bit);
+    if (on && !was) device_->emcy().raise(code, bit == jr3_status::supply ? error_voltage : error_profile, {about});
+    else if (!on && was) device_->emcy().clear(code);
+}
+
+void Jr3::supervise(Time now) noexcept {
+    const bool silent = now - heard_ >= silence;
+    alarm(jr3_status::no_signal, silent, jr3_error::no_signal, 0);
+    if (silent || decoder_.packets() < 2 * jr3::addresses) return;
+    alarm(jr3_status::supply, supply_raw_ < supply_low || supply_raw_ > supply_high, jr3_error::supply, 0);
+    std::uint8_t over = 0;
+    bool saturated = false;
+    const double until = (status_ & jr3_status::overload) != 0 ? overload_over_below : 1.0;
+    for (unsigned n = 0; n < 6; ++n) {
+        const bool full = raw_[n] == 32767 || raw_[n] == -32768;
+        saturated = saturated || full;
+        if (full || std::abs(field_[n]) > static_cast<double>(limits_[n]) * until) over = static_cast<std::uint8_t>(over | 1U << n);
+    }
+    status_ = static_cast<std::uint8_t>(saturated ? status_ | jr3_status::saturated : status_ & ~jr3_status::saturated);
+    alarm(jr3_status::overload, over != 0, jr3_error::overload, over);
+}
+
+double Jr3::process(unsigned n) const noexcept {
+    const auto& c = channels_[n];
+    return field_[n] * double{c.factor} + double{c.scaling_offset} + double{c.offset};
+}
+
+void Jr3::publish() noexcept {
+    field_ = calibration_.wrench(raw_);
+    for (unsigned n = 0; n < 6; ++n) {
+        auto& c = channels_[n];
+        const double value = process(n), scale = powers[std::min<unsigned>(c.digits, 6)];
+        c.process = static_cast<float>(value);
+        values_[n] = rounded<std::int16_t>(value * scale);
+        nets_[n] = rounded<std::int16_t>((value - double{c.tare}) * scale);
+    }
+    ++counter_;
+}
+
+/// The PDOs of forces and of torques, each when one of its three values is further off than its delta.
+void Jr3::trigger_changes() noexcept {
+    for (unsigned group = 0; group < 2; ++group) {
+        bool changed = status_ != said_status_;
+        for (unsigned n = group * 3; n < group * 3 + 3; ++n) changed = changed || std::abs(values_[n] - said_[n]) > delta_[n];
+        if (!changed) continue;
+        std::copy_n(values_.begin() + group * 3, 3, said_.begin() + group * 3);
+        device_->pdos().trigger(group * 2 + 1);
+        device_->pdos().trigger(group * 2 + 2);
+    }
+    said_status_ = status_;
+}
+
+void Jr3::step(Time now) noexcept {
+    sample(now);
+    publish();
+    supervise(now);
+    trigger_changes();
+    const auto state = device_->state();
+    led_ = state == NmtState::operational || (state == NmtState::pre_operational && (now - began_) / (200 * millisecond) % 2 == 0);
+}
+
+Abort Jr3::reading(Entry& e) noexcept {
+    const unsigned n = e.sub == 0 ? 0 : e.sub - 1U;
+    if (e.sub == 0 && e.index >= 0x6000) return Abort::none;
+    switch (e.index) {
+    case 0x2203: store(e.data, decoder_.packets()); break;
+    case 0x2204: store(e.data, decoder_.errors()); break;
+    case 0x6100: store(e.data, static_cast<float>(field_[n])); break;
+    case 0x6140: store(e.data, static_cast<float>(process(n) - double{channels_[n].tare})); break;
+    case 0x9130: store(e.data, rounded<std::int32_t>(process(n) * powers[std::min<unsigned>(channels_[n].digits, 6)])); break;
+    default: break;
+    }
+    return Abort::none;
+}
+
+Abort Jr3::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
+    if (e.sub == 0 || (e.index != 0x6125 && e.index != 0x6139)) return Abort::none;
+    return load<std::uint32_t>(value.data()) == (e.index == 0x6125 ? zero_command : tare_command) ? Abort::none : Abort::cannot_store;
+}
+
+void Jr3::written(Entry& e) noexcept {
+    if (e.sub == 0) return;
+    const unsigned n = e.sub - 1U;
+    if (e.index == 0x6125) channels_[n].offset -= static_cast<float>(process(n));
+    else if (e.index == 0x6139) channels_[n].tare = static_cast<float>(process(n));
+}
+
+Abort Jr3::Memory::open_read(Entry&, std::uint32_t& size) noexcept {
+    if (!node_.calibrated_) return Abort::no_data;
+    return size = jr3::memory_size, Abort::none;
+}
+
+Abort Jr3::Memory::read(Entry&, std::uint32_t offset, std::span<std::uint8_t> room) noexcept {
+    const auto memory = node_.memory_reader_.memory();
+    if (offset > memory.size() || room.size() > memory.size() - offset) return Abort::local_control;
+    std::copy_n(memory.begin() + offset, room.size(), room.begin());
+    return Abort::none;
+}
+
+// The world, by name.
+
+bool Jr3::set(std::string_view name, double value) {
+    constexpr std::string_view names[] = {"fx", "fy", "fz", "mx", "my", "mz"};
+    for (unsigned n = 0; n < 6; ++n)
+        if (name == names[n]) return applied_[n] = value, true;
+    if (name == "supply") return set_supply(value), true;
+    if (name == "noise") return set_noise(value >= 0 && value < 10000 ? static_cast<unsigned>(value) : 0), true;
+    if (name == "cable") return set_cable(value != 0.0), true;
+    return false;
+}
+
+std::vector<std::string> Jr3::settable() const { return {"fx", "fy", "fz", "mx", "my", "mz", "supply", "noise", "cable"}; }
+
+std::string Jr3::news() const {
+    constexpr std::pair<std::uint8_t, const char*> words[] = {
+        {jr3_status::no_signal, "no signal"}, {jr3_status::supply, "supply voltage wrong"}, {jr3_status::overload, "overload"}};
+    std::string text = calibrated_ ? "calibrated" : "not calibrated yet";
+    for (const auto& [bit, word] : words)
+        if ((status_ & bit) != 0) text += std::string(", ") + word;
+    return text;
+}
+
+std::string Jr3::summary() const {
+    char text[160];
+    std::snprintf(text, sizeof text, ", F %.2f %.2f %.2f N, M %.3f %.3f %.3f N*m, %u packets, %u errors", field_[0], field_[1], field_[2],
+                  field_[3], field_[4], field_[5], static_cast<unsigned>(decoder_.packets()), static_cast<unsigned>(decoder_.errors()));
+    return news() + text;
+}
+
+}  // namespace hal::canopen

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include "jr3.hpp"
+
+namespace hal::canopen {
+
+namespace {
+
+constexpr const char* channel[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+
+struct Row {
+    std::uint16_t index;
+    const char* object;
+    Type type;
+    Access access;
+    bool sent = false;
+    double real = 0.0;
+    std::uint64_t value = 0;
+};
+
+void add(Description& d, const Row& row) {
+    d.objects[row.index] = row.object;
+    d.add(row.index, 0, Type::unsigned8, Access::constant, 6, "Highest sub-index");
+    for (std::uint8_t n = 1; n <= 6; ++n) {
+        auto& e = is_real(row.type) ? d.add_real(row.index, n, row.type, row.access, row.real, channel[n - 1])
+                                    : d.add(row.index, n, row.type, row.access, row.value, channel[n - 1]);
+        e.tpdo = row.sent;
+    }
+}
+
+void add_own(Description& d, const jr3::Calibration& c) {
+    d.objects[0x2100] = "Decoupling matrix";
+    d.add(0x2100, 0, Type::unsigned8, Access::constant, 36, "Highest sub-index");
+    for (unsigned n = 0; n < 36; ++n)
+        d.add_real(0x2100, static_cast<std::uint8_t>(n + 1), Type::real32, Access::read_only, c.matrix[n / 6][n % 6],
+                   std::string(channel[n / 6]) + " of " + channel[n % 6]);
+    add(d, {0x2101, "Full scale", Type::real32, Access::read_only});
+    add(d, {0x2102, "Overload of the sensor", Type::real32, Access::read_only});
+    add(d, {0x2103, "Overload limit", Type::real32, Access::read_write});
+    for (std::uint8_t n = 1; n <= 6; ++n) {
+        const auto put = [&](std::uint16_t index, double value) { store(d.find(index, n)->value.data(), static_cast<float>(value)); };
+        put(0x2101, c.full_scale[n - 1U]), put(0x2102, c.overload[n - 1U]), put(0x2103, c.full_scale[n - 1U]);
+    }
+    d.add_domain(0x2104, 0, Access::read_only, jr3::memory_size, "Calibration memory");
+    d.add(0x2105, 0, Type::unsigned32, Access::read_only, c.serial, "Serial number of the sensor");
+    d.add(0x2200, 0, Type::integer16, Access::read_only, 0, "Supply voltage feedback").sent();
+    d.add(0x2201, 0, Type::unsigned8, Access::read_only, 0, "Sensor status").sent();
+    d.add(0x2202, 0, Type::unsigned8, Access::read_only, 0, "Sample counter").sent();
+    d.add(0x2203, 0, Type::unsigned32, Access::read_only, 0, "Packets received");
+    d.add(0x2204, 0, Type::unsigned32, Access::read_only, 0, "Packets with errors");
+}
+
+void add_profile(Description& d) {
+    using enum Access;
+    const Row rows[] = {
+        {0x6100, "AI field value float", Type::real32, read_only, true},
+        {0x6124, "AI offset float", Type::real32, read_write},
+        {0x6125, "AI autozero", Type::unsigned32, write_only},
+        {0x6126, "AI scaling factor", Type::real32, read_write, false, 1.0},
+        {0x6127, "AI scaling offset", Type::real32, read_write},
+        {0x6130, "AI process value float", Type::real32, read_only, true},
+        {0x6132, "AI decimal digits", Type::unsigned8, read_write},
+        {0x6138, "AI tare zero float", Type::real32, read_write},
+        {0x6139, "AI autotare", Type::unsigned32, write_only},
+        {0x6140, "AI net value float", Type::real32, read_only, true},
+        {0x7100, "AI field value 16-bit", Type::integer16, read_only, true},
+        {0x7130, "AI process value 16-bit", Type::integer16, read_only, true},
+        {0x7133, "AI interrupt delta 16-bit", Type::integer16, read_write},
+        {0x7140, "AI net value 16-bit", Type::integer16, read_only, true},
+        {0x9130, "AI process value 32-bit", Type::integer32, read_only, true},
+    };
+    for (const auto& row : rows) add(d, row);
+    for (std::uint8_t n = 1; n <= 6; ++n) {
+        d.find(0x6132, n)->limited(0, 6).value[0] = n <= 3 ? 2 : 3;
+        d.find(0x7133, n)->limited(0, 32767);
+    }
+}
+
+}  // namespace
+
+Description jr3_description(const Jr3Settings& s) {
+    Description d = basic_device({.device_type = 0x00040194, .vendor = example_vendor, .product = 0x404, .revision = 0x00010000,
+                                  .serial = s.serial, .name = "Halcyon JR3", .heartbeat_ms = s.heartbeat_ms});
+    add_storage(d);
+    add_own(d, s.calibration);
+    add_profile(d);
+    for (unsigned pdo = 1; pdo <= 4; ++pdo) {
+        PdoDescription p;
+        const bool by_change = pdo % 2 == 1;
+        p.cob = 0x180 + (pdo - 1) * 0x100 + (by_change ? cob_invalid : 0);
+        p.plus_node_id = true;
+        p.transmission = by_change ? 255 : 1;
+        p.inhibit_100us = by_change ? 10 : 0;
+        for (unsigned n = 0; n < 3; ++n) p.mapping.push_back(map_entry(0x7130, static_cast<std::uint8_t>((pdo <= 2 ? 1 : 4) + n), 16));
+        p.mapping.push_back(map_entry(0x2201, 0, 8));
+        p.mapping.push_back(map_entry(0x2202, 0, 8));
+        add_tpdo(d, pdo, p);
+    }
+    return d;
+}
+
+}  // namespace hal::canopen

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: MIT
+#include "faults.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <vector>
+
+namespace hal::canopen {
+
+namespace {
+
+constexpr FaultRow rows[] = {
+    {Fault::mute, "mute", "frame it sends is lost", 0},
+    {Fault::deaf, "deaf", "frame that comes is not heard", 0},
+    {Fault::twice, "twice", "frame it sends comes twice", 0},
+    {Fault::late_sdo, "late-sdo", "SDO answer leaves late, by `time`", 700 * millisecond},
+    {Fault::late_pdo, "late-pdo", "PDO leaves late, by `time`", 2 * millisecond},
+    {Fault::no_boot_up, "no-boot-up", "boot-up message is not sent", 0},
+    {Fault::boot_storm, "boot-storm", "`time` it says that it booted, and did not", 100 * millisecond},
+    {Fault::reboot, "reboot", "`time` it loses its power for a moment", 2 * second},
+    {Fault::no_heartbeat, "no-heartbeat", "heartbeat or guarding answer is not sent", 0},
+    {Fault::wrong_state, "wrong-state", "heartbeat says stopped", 0},
+    {Fault::guard_toggle, "guard-toggle", "guarding answer has a wrong toggle bit", 0},
+    {Fault::no_sdo, "no-sdo", "SDO answer is not sent", 0},
+    {Fault::abort, "abort", "SDO request is aborted: general error", 0},
+    {Fault::stale_abort, "stale-abort", "SDO answer comes behind an abort of the request before", 0},
+    {Fault::toggle, "toggle", "SDO segment has a wrong toggle bit", 0},
+    {Fault::block_gap, "block-gap", "segment of a block upload is lost", 0},
+    {Fault::block_crc, "block-crc", "block transfer ends with a wrong CRC", 0},
+    {Fault::short_pdo, "short-pdo", "PDO has a byte less", 0},
+    {Fault::long_pdo, "long-pdo", "PDO has a byte more", 0},
+    {Fault::wrong_type, "wrong-type", "reading of the device type (1000h) is wrong", 0},
+    {Fault::wrong_vendor, "wrong-vendor", "reading of the vendor-ID (1018h:1) is wrong", 0},
+    {Fault::wrong_product, "wrong-product", "reading of the product code (1018h:2) is wrong", 0},
+    {Fault::wrong_revision, "wrong-revision", "reading of the revision number (1018h:3) is wrong", 0},
+    {Fault::wrong_serial, "wrong-serial", "reading of the serial number (1018h:4) is wrong", 0},
+    {Fault::wrong_software, "wrong-software", "reading of the software identification (1F56h:1) is wrong", 0},
+    {Fault::babble, "babble", "`time` it sends a frame of the highest priority", 200 * microsecond},
+    {Fault::emcy_storm, "emcy-storm", "`time` it sends an emergency", 10 * millisecond},
+};
+static_assert([] {
+    for (std::size_t n = 0; n < std::size(rows); ++n)
+        if (rows[n].fault != static_cast<Fault>(n)) return false;
+    return true;
+}(), "the table is in the order of the enumeration");
+
+/// "20ms", "1.5s", "200us".
+bool parse_time(std::string_view text, Time& time) {
+    double value = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto unit = text.substr(static_cast<std::size_t>(end - text.data()));
+    const double factor = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 0.0;
+    if (wrong != std::errc{} || factor == 0.0 || !(value >= 0.0 && value * factor <= 1e15)) return false;
+    return time = static_cast<Time>(value * factor), true;
+}
+
+std::string names() {
+    std::string all;
+    for (const auto& row : rows) all += (all.empty() ? "" : ", ") + std::string(row.name);
+    return all;
+}
+
+constexpr bool is_pdo(const Frame& f, std::uint8_t node) noexcept {
+    if (f.extended || f.remote) return f.extended;
+    return f.id > 0x180 && f.id < 0x700 && f.id != 0x580U + node && f.id != 0x600U + node;
+}
+
+}  // namespace
+
+std::span<const FaultRow> fault_rows() noexcept { return rows; }
+
+const FaultRow* find_fault(std::string_view name) noexcept {
+    const auto* found = std::find_if(std::begin(rows), std::end(rows), [&](const FaultRow& row) { return name == row.name; });
+    return found == std::end(rows) ? nullptr : found;
+}
+
+bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std::string& problem) {
+    const auto next_part = [&] {
+        const auto part = text.substr(0, text.find(':'));
+        text.remove_prefix(std::min(part.size() + 1, text.size()));
+        return part;
+    };
+    const auto name = next_part();
+    const auto* row = find_fault(name);
+    if (row == nullptr) return problem = "there is no fault '" + std::string(name) + "'; there are " + names(), false;
+    fault = row->fault;
+    setting = {.every = 1};
+    Time lasting = 0;
+    while (!text.empty()) {
+        const auto part = next_part();
+        const auto equals = std::min(part.find('='), part.size());
+        const auto key = part.substr(0, equals), value = part.substr(std::min(equals + 1, part.size()));
+        bool good = false;
+        if (key == "every") {
+            const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), setting.every);
+            good = wrong == std::errc{} && end == value.data() + value.size() && setting.every != 0;
+        } else if (key == "time" && row->time != 0) {
+            good = parse_time(value, setting.time) && setting.time != 0;
+        } else if (key == "from") {
+            good = parse_time(value, setting.from);
+        } else if (key == "for") {
+            good = parse_time(value, lasting) && lasting != 0;
+        }
+        if (good) continue;
+        problem = "'" + std::string(part) + "' is no property of the fault " + row->name + "; write every=3, " +
+                  (row->time != 0 ? "time=20ms, " : "") + "from=5s or for=1s";
+        return false;
+    }
+    if (lasting != 0) setting.until = setting.from + lasting;
+    return true;
+}
+
+Faults::Faults(std::size_t held) : held_(std::make_unique<Held[]>(held)), held_room_(held) {}
+
+void Faults::find_any() noexcept {
+    any_ = std::any_of(settings_.begin(), settings_.end(), [](const FaultSetting& s) { return s.every != 0; });
+    for (std::size_t n = 0; n < kinds; ++n)
+        if (settings_[n].every == 0) next_[n] = 0;
+}
+
+void Faults::start(Time now) noexcept {
+    if (!started_) started_ = true, began_ = now;
+    now_ = now;
+}
+
+bool Faults::active(Fault fault) const noexcept {
+    const auto& s = settings_[index(fault)];
+    return s.every != 0 && now_ - began_ >= s.from && now_ - began_ < s.until;
+}
+
+bool Faults::hit(Fault fault) noexcept {
+    if (!active(fault)) return false;
+    if (++seen_[index(fault)] % settings_[index(fault)].every != 0) return false;
+    return ++hits_[index(fault)], true;
+}
+
+Time Faults::time(Fault fault) const noexcept {
+    const auto own = settings_[index(fault)].time;
+    return std::max<Time>(own != 0 ? own : rows[index(fault)].time, microsecond);
+}
+
+bool Faults::periodic(Fault fault) noexcept {
+    if (!active(fault)) return false;
+    auto& next = next_[index(fault)];
+    if (next == 0) next = now_ + time(fault) * settings_[index(fault)].every;
+    if (now_ < next) return false;
+    next += time(fault) * settings_[index(fault)].every;
+    if (next <= now_ - 32 * time(fault)) next = now_ + time(fault);  // a turn that comes late does not make up for all
+    return ++hits_[index(fault)], true;
+}
+
+bool Faults::swallows(const Frame& f, std::uint8_t node, Time now) noexcept {
+    start(now);
+    if (hit(Fault::deaf)) return true;
+    if (f.id != 0x600U + node || f.extended || f.length != 8) return false;
+    const auto command = f.data[0], kind = static_cast<std::uint8_t>(command >> 5);
+    if (command == 0x80) return block_ = Block::none, false;
+    if (block_ == Block::receiving) return false;  // these bytes are data, until the device says that it has all
+    if (command == 0xa3) return block_ = Block::sending, last_sequence_ = 0, false;
+    if (command == 0xa2) {
+        if (block_ == Block::sending && last_sequence_ != 0 && f.data[1] == last_sequence_) block_ = Block::ending;
+        return last_sequence_ = 0, false;
+    }
+    block_ = Block::none;
+    if (kind == 1 || kind == 2 || (kind == 5 && (command & 3) == 0) || kind == 6) {
+        previous_ = request_;
+        std::copy_n(f.data.begin() + 1, 3, request_.begin());
+    }
+    return false;
+}
+
+void Faults::identity(Frame& f) noexcept {
+    if ((f.data[0] >> 5) != 2 || (f.data[0] & 2) == 0) return;
+    const auto object = load<std::uint16_t>(f.data.data() + 1);
+    const auto sub = f.data[3];
+    const auto wrong = object == 0x1000   ? hit(Fault::wrong_type)
+                       : object == 0x1f56 ? sub == 1 && hit(Fault::wrong_software)
+                       : object != 0x1018 ? false
+                       : sub == 1         ? hit(Fault::wrong_vendor)
+                       : sub == 2         ? hit(Fault::wrong_product)
+                       : sub == 3         ? hit(Fault::wrong_revision)
+                                          : sub == 4 && hit(Fault::wrong_serial);
+    if (wrong) f.data[4] ^= 0xff;
+}
+
+/// What becomes of an answer of the SDO server. False: it is not sent.
+bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
+    const auto tell_abort = [&](Frame& to, const std::array<std::uint8_t, 3>& about, Abort why) {
+        to.data[0] = 0x80;
+        std::copy(about.begin(), about.end(), to.data.begin() + 1);
+        store(to.data.data() + 4, static_cast<std::uint32_t>(why));
+    };
+    if (hit(Fault::no_sdo)) return false;
+    if (block_ == Block::sending) {  // all that comes now are segments
+        if ((f.data[0] & 0x80) != 0) last_sequence_ = f.data[0] & 0x7f;
+        return !hit(Fault::block_gap);
+    }
+    const auto kind = f.data[0] >> 5;
+    if (block_ == Block::ending) {
+        block_ = Block::none;
+        if (kind == 6 && hit(Fault::block_crc)) f.data[1] ^= 0xff;
+        return true;
+    }
+    if (block_ == Block::receiving) {
+        if (f.data[0] == 0xa2) return true;
+        block_ = Block::none;
+        if (f.data[0] == 0xa1 && hit(Fault::block_crc)) tell_abort(f, request_, Abort::crc);
+        return true;
+    }
+    if (kind <= 1) {
+        if (hit(Fault::toggle)) f.data[0] ^= 0x10;
+        return true;
+    }
+    if (hit(Fault::stale_abort)) {
+        Frame stale = f;
+        tell_abort(stale, previous_, Abort::command);
+        bus.push(stale);
+    }
+    if (f.data[0] == 0x80) return true;
+    if (hit(Fault::abort)) return tell_abort(f, request_, Abort::general), true;
+    if (kind == 5) block_ = Block::receiving;
+    identity(f);
+    return true;
+}
+
+void Faults::hold(const Frame& f, Time due, FrameQueue& bus) noexcept {
+    if (held_count_ == held_room_) return void(bus.push(f));
+    held_[held_count_++] = {f, due};
+}
+
+void Faults::send(Frame f, std::uint8_t node, FrameQueue& bus, Time now) noexcept {
+    start(now);
+    if (hit(Fault::mute)) return;
+    Time late = 0;
+    if (!f.extended && f.id == 0x580U + node && f.length == 8) {
+        if (!answer(f, bus)) return;
+        if (hit(Fault::late_sdo)) late = time(Fault::late_sdo);
+    } else if (!f.extended && f.id == 0x700U + node && f.length == 1) {
+        const bool boot_up = f.data[0] == 0;
+        if (boot_up ? hit(Fault::no_boot_up) : hit(Fault::no_heartbeat)) return;
+        if (!boot_up && hit(Fault::wrong_state)) f.data[0] = static_cast<std::uint8_t>((f.data[0] & 0x80) | 0x04);
+        if (!boot_up && hit(Fault::guard_toggle)) f.data[0] ^= 0x80;
+    } else if (is_pdo(f, node)) {
+        if (f.length > 0 && hit(Fault::short_pdo)) --f.length;
+        else if (f.length < 8 && hit(Fault::long_pdo)) f.data[f.length++] = 0;
+        if (hit(Fault::late_pdo)) late = time(Fault::late_pdo);
+    }
+    if (late != 0) return hold(f, now + late, bus);
+    bus.push(f);
+    if (hit(Fault::twice)) bus.push(f);
+}
+
+bool Faults::poll(std::uint8_t node, FrameQueue& bus, Time now) noexcept {
+    start(now);
+    std::size_t kept = 0;
+    for (std::size_t n = 0; n < held_count_; ++n) {
+        if (now >= held_[n].due && bus.push(held_[n].frame)) continue;
+        if (kept != n) held_[kept] = held_[n];
+        ++kept;
+    }
+    held_count_ = kept;
+    if (!any_) return false;
+    if (periodic(Fault::boot_storm)) bus.push(make_frame(0x700U + node, 1));
+    if (periodic(Fault::emcy_storm)) {
+        Frame f = make_frame(0x80U + node, 8);
+        store(f.data.data(), std::uint16_t{0xff00});
+        f.data[2] = 0x81;
+        bus.push(f);
+    }
+    for (unsigned n = 0; n < 32 && periodic(Fault::babble); ++n) bus.push(make_frame(0x001, 8));
+    return periodic(Fault::reboot);
+}
+
+}  // namespace hal::canopen

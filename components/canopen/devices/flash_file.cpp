@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#include "flash_file.hpp"
+
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+namespace hal::canopen {
+
+namespace {
+struct Close {
+    void operator()(std::FILE* f) const noexcept { std::fclose(f); }
+};
+using File = std::unique_ptr<std::FILE, Close>;
+std::string problem(const char* what, const std::string& path) { return std::string(what) + " '" + path + "': " + std::strerror(errno); }
+}  // namespace
+
+std::string read_flash(const std::string& path, std::size_t most, std::optional<std::vector<std::uint8_t>>& image) {
+    image.reset();
+    errno = 0;
+    const File file(std::fopen(path.c_str(), "rbe"));
+    if (!file) return errno == ENOENT ? std::string() : problem("cannot read", path);
+    std::vector<std::uint8_t> room(most + 1);
+    const auto size = std::fread(room.data(), 1, room.size(), file.get());
+    if (std::ferror(file.get()) != 0) return problem("cannot read", path);
+    if (size > most) return "'" + path + "' is longer than the flash, which has " + std::to_string(most) + " bytes";
+    room.resize(size);
+    image = std::move(room);
+    return {};
+}
+
+std::string write_flash(const std::string& path, std::span<const std::uint8_t> image) {
+    const auto fresh = path + ".new";
+    File file(std::fopen(fresh.c_str(), "wbe"));
+    bool good = file != nullptr && std::fwrite(image.data(), 1, image.size(), file.get()) == image.size();
+    if (file != nullptr) good = std::fclose(file.release()) == 0 && good;
+    if (!good) return problem("cannot write", fresh);
+    if (std::rename(fresh.c_str(), path.c_str()) != 0) return problem("cannot write", path);
+    return {};
+}
+
+}  // namespace hal::canopen

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// `hal node KIND`: the device of each kind, made from the options.
+#include <charconv>
+#include <fmt/core.h>
+#include <stdexcept>
+
+#include "canopen/401/io.hpp"
+#include "canopen/404/jr3.hpp"
+#include "canopen/devices/bootloader.hpp"
+#include "canopen/devices/drive.hpp"
+#include "canopen/devices/flash_file.hpp"
+#include "node/run.hpp"
+#include "say.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+std::string counted(unsigned n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
+
+/// "2.1" to 0x00020001. False when it is no version.
+bool parse_version(const std::string& text, std::uint32_t& version) {
+    unsigned major = 0, minor = 0;
+    const char* end = text.data() + text.size();
+    const auto first = std::from_chars(text.data(), end, major);
+    if (first.ec != std::errc() || first.ptr == end || *first.ptr != '.') return false;
+    const auto second = std::from_chars(first.ptr + 1, end, minor);
+    if (second.ec != std::errc() || second.ptr != end || major > 0xffff || minor > 0xffff) return false;
+    return version = major << 16 | minor, true;
+}
+
+/// What the sensor's line is for that long, into a file.
+int record_line(const Options& options) {
+    if (options.for_ns < 0) return fail(options, "for how long? add --for 2s; the calibration comes through in 1.02 s");
+    if (options.for_ns > 600'000'000'000) return fail(options, "more than 10min would be a file of hundreds of megabytes");
+    canopen::jr3::Calibration calibration;
+    calibration.serial = options.node.serial;
+    std::array<std::uint8_t, canopen::jr3::memory_size> memory{};
+    calibration.write(memory);
+    canopen::jr3::Generator line;
+    line.set_memory(memory);
+    line.set(canopen::jr3::supply_address, 24576);
+    std::string bytes(static_cast<std::size_t>(static_cast<double>(options.for_ns) * 1e-9 * canopen::jr3::clock_hz / 8), '\0');
+    line.fill({reinterpret_cast<std::uint8_t*>(bytes.data()), bytes.size()});
+    const std::string problem =
+        canopen::write_flash(options.node.record, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+    return problem.empty() ? 0 : fail(options, problem);
+}
+
+}  // namespace
+
+int run_node_drive(const Options& options) {
+    canopen::cia402::DriveSettings settings;
+    settings.axes = options.node.axes;
+    settings.serial = options.node.serial, settings.heartbeat_ms = options.node.heartbeat_ms;
+    for (const std::string& text : options.node.motor)
+        for (auto& axis : settings.axis)
+            if (const std::string problem = canopen::parse_motor(text, axis.motor); !problem.empty()) return fail(options, problem);
+    canopen::DriveProgram program(settings);
+    return run_node(options, {"drive", "CiA 402, " + fmt::format("{} ax{}s", settings.axes, settings.axes == 1 ? 'i' : 'e')}, program);
+}
+
+int run_node_io(const Options& options) {
+    const NodeOptions& o = options.node;
+    canopen::Io program({o.inputs, o.outputs, o.analog_inputs, o.analog_outputs, o.serial, o.heartbeat_ms});
+    return run_node(options, {"io", fmt::format("CiA 401, {}, {}, {} and {}", counted(o.inputs, "digital input"), counted(o.outputs, "output"),
+                                                counted(o.analog_inputs, "analogue input"), counted(o.analog_outputs, "output"))},
+                    program);
+}
+
+int run_node_jr3(const Options& options) {
+    if (!options.node.record.empty()) return record_line(options);
+    canopen::Jr3Settings settings;
+    settings.serial = settings.calibration.serial = options.node.serial;
+    settings.heartbeat_ms = options.node.heartbeat_ms;
+    if (!options.node.stream.empty()) {
+        std::string bytes;
+        if (!read_file(options.node.stream, bytes)) return fail(options, fmt::format("cannot read '{}': {}", options.node.stream, bytes));
+        if (bytes.empty()) return fail(options, fmt::format("'{}' is empty; it should hold the sensor's line, eight clocks to a byte", options.node.stream));
+        settings.recording.assign(bytes.begin(), bytes.end());
+    }
+    const std::string source = options.node.stream.empty() ? "a simulated sensor" : "the sensor's line in " + options.node.stream;
+    canopen::Jr3 program(std::move(settings));
+    return run_node(options, {"jr3", "CiA 404, six-axis force/torque sensor, " + source, 0x50}, program);
+}
+
+int run_node_bootloader(const Options& options) {
+    canopen::BootloaderSettings settings;
+    settings.serial = options.node.serial, settings.heartbeat_ms = options.node.heartbeat_ms;
+    const auto version = [&](const std::string& text, std::uint32_t& to) {
+        return parse_version(text, to) || (fail(options, fmt::format("'{}' is no version; write 2.1", text)), false);
+    };
+    if (!options.node.image.empty()) {
+        std::uint32_t wanted = 0;
+        if (!version(options.node.image, wanted)) return 1;
+        const auto image = canopen::program_image(settings.product, wanted, 20000);
+        return print({reinterpret_cast<const char*>(image.data()), image.size()}) ? 0 : 1;
+    }
+    if (options.node.version == "none") settings.version = 0;
+    else if (!version(options.node.version, settings.version)) return 1;
+    if (!options.node.flash.empty())
+        if (const std::string problem = canopen::read_flash(options.node.flash, settings.flash, settings.image); !problem.empty())
+            return fail(options, problem);
+    try {
+        canopen::Bootloader program(std::move(settings));
+        const int status = run_node(options, {"bootloader", "program download after CiA 302"}, program);
+        if (!options.node.flash.empty() && program.changes() != 0)
+            if (const std::string problem = canopen::write_flash(options.node.flash, program.flash()); !problem.empty())
+                return fail(options, problem);
+        return status;
+    } catch (const std::invalid_argument& e) {
+        return fail(options, e.what());
+    }
+}
+
+}  // namespace hal::tools
