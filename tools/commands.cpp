@@ -204,6 +204,53 @@ void declare_canopen_plan(CLI::App& app, Options& o) {
 
 void declare_can_eds_check(CLI::App& app, Options& o) { words(app, o, "FILE", "device descriptions: EDS, DCF, XDD, XDC"); }
 
+/// What every kind of simulated device takes.
+void declare_node(CLI::App& app, Options& o) {
+    NodeOptions& n = o.node;
+    app.add_option("--link", n.link, "the bus: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0; options follow: ?bitrate=500k")->type_name("ADDRESS");
+    app.add_option("--id", n.id, "its node-id, 1-127 or 0x..; none: an LSS master gives it one")->type_name("N");
+    app.add_flag("--eds", n.eds, "print its EDS and end");
+    app.add_option("--fault", n.faults, "what it does wrong: late-sdo, mute:from=5s:for=1s, twice:every=3 …; list: hal node faults; may be repeated")
+        ->type_name("FAULT")->allow_extra_args(false);
+    app.add_option("--set", n.settings, "the world around it: NAME=VALUE, or NAME=VALUE@2s for later; may be repeated")
+        ->type_name("NAME=VALUE")->allow_extra_args(false);
+    app.add_option("--heartbeat", n.heartbeat_ms, "ms between heartbeats until a master says otherwise (default 0: none)")->type_name("MS");
+    app.add_option("--serial", n.serial, "its serial number (default 1)")->type_name("N");
+    app.add_flag("--start", n.starts_itself, "operational after boot-up without a master");
+    for_how_long(app, o, "end after 10s, 2min …; without it: until Ctrl-C");
+}
+
+void declare_node_drive(CLI::App& app, Options& o) {
+    declare_node(app, o);
+    app.add_option("--axes", o.node.axes, "1-8 (default 1)")->check(CLI::Range(1, 8))->type_name("N");
+    app.add_option("--motor", o.node.motor, "of all axes: NAME:VALUE, as in inertia:1e-4,resolution:8192,endless:1; may be repeated")
+        ->type_name("NAME:VALUE")->allow_extra_args(false);
+}
+
+void declare_node_io(CLI::App& app, Options& o) {
+    declare_node(app, o);
+    NodeOptions& n = o.node;
+    app.add_option("--inputs", n.inputs, "digital inputs, 0-64 (default 64)")->check(CLI::Range(0, 64))->type_name("N");
+    app.add_option("--outputs", n.outputs, "digital outputs, 0-64 (default 64)")->check(CLI::Range(0, 64))->type_name("N");
+    app.add_option("--analog-inputs", n.analog_inputs, "0-12 (default 12)")->check(CLI::Range(0, 12))->type_name("N");
+    app.add_option("--analog-outputs", n.analog_outputs, "0-12 (default 12)")->check(CLI::Range(0, 12))->type_name("N");
+}
+
+void declare_node_jr3(CLI::App& app, Options& o) {
+    declare_node(app, o);
+    app.add_option("--stream", o.node.stream, "the sensor's line from this file, eight clocks to a byte, over and over")->type_name("FILE");
+    app.add_option("--record", o.node.record, "write the line of a simulated sensor for the time of --for into this file, and end")->type_name("FILE");
+}
+
+void declare_node_bootloader(CLI::App& app, Options& o) {
+    declare_node(app, o);
+    app.add_option("--program", o.node.version, "version of the program it comes with (default 1.0); none: its flash is empty")->type_name("VERSION");
+    app.add_option("--flash", o.node.flash, "keeps the flash from run to run")->type_name("FILE");
+    app.add_option("--make-image", o.node.image, "print a program of this version, to be downloaded, and end")->type_name("VERSION");
+}
+
+void declare_node_faults(CLI::App&, Options&) {}
+
 constexpr Subcommand table[] = {
     {"run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads", run_run, declare_run},
     {"sim", "FILE… [--for TIME] [-- ARG…]", "the same on a virtual clock: deterministic, as fast as it goes", run_sim, declare_sim},
@@ -226,6 +273,11 @@ constexpr Subcommand table[] = {
     {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", run_can_scan, declare_can_scan},
     {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", run_can_eds_check, declare_can_eds_check},
     {"canopen plan", "FILE [--json]", "whether every message of a bus arrives in time: worst-case response times", run_canopen_plan, declare_canopen_plan},
+    {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", run_node_drive, declare_node_drive},
+    {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", run_node_io, declare_node_io},
+    {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", run_node_jr3, declare_node_jr3},
+    {"node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus", run_node_bootloader, declare_node_bootloader},
+    {"node faults", "", "what simulated devices can do wrong on purpose", run_node_faults, declare_node_faults},
     {"doctor", "", "what on this machine spoils real time", run_doctor, declare_doctor},
     {"completion", "SHELL", "print a completion script: source <(hal completion bash)", run_completion, declare_completion},
 };
@@ -239,6 +291,7 @@ struct Group {
 constexpr Group groups[] = {
     {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt; eds check"},
     {"canopen", "plans a CANopen network"},
+    {"node", "simulated CANopen devices as processes: drive, io, jr3, bootloader; what they can do wrong: faults"},
 };
 
 const Group* find_group(std::string_view name) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "node/node_options.hpp"
+
 namespace hal::tools {
 
 enum class Loudness { nothing, errors, results };  ///< halcmd's -Q, -q (the default) and -v
@@ -36,6 +38,7 @@ struct Options {
     std::vector<std::string> filters;    ///< --filter ID[/MASK] of the can commands
     std::int64_t every_ns = 0;           ///< --every; 0: not given
     double speed = 1.0;                  ///< of can replay
+    NodeOptions node;                    ///< of hal node
 };
 
 /// Each subcommand, in its own file. Returns the exit code.
@@ -61,6 +64,11 @@ int run_can_nmt(const Options&);
 int run_can_scan(const Options&);
 int run_canopen_plan(const Options&);
 int run_completion(const Options&);
+int run_node_drive(const Options&);
+int run_node_io(const Options&);
+int run_node_jr3(const Options&);
+int run_node_bootloader(const Options&);
+int run_node_faults(const Options&);
 int run_can_eds_check(const Options&);
 
 }  // namespace hal::tools
