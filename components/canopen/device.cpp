@@ -201,6 +201,9 @@ Abort Device::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (e.sub > 2) return Abort::none;
     const auto cob = load<std::uint32_t>(value.data()), was = load<std::uint32_t>(e.data);
     if ((cob & cob_invalid) != 0) return Abort::none;
+    const auto id = cob_id(cob);
+    const bool of_sdo = (id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f);
+    if ((cob & cob_extended) == 0 && restricted(id) && !of_sdo) return Abort::value;
     return (was & cob_invalid) == 0 && cob != was ? Abort::value : Abort::none;
 }
 

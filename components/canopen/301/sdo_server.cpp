@@ -330,6 +330,7 @@ void SdoServer::block_upload_command(const Frame& f) noexcept {
         if (state_ != State::block_upload) break;
         const std::uint8_t good = f.data[1], next = f.data[2];
         if (next < 1 || next > 127) return abort(Abort::block_size);
+        if (good > 127) return abort(Abort::sequence);  // no segment has such a number
         const auto said = static_cast<std::uint16_t>(good << 8 | next);
         if (good > sequence_ || !block_sent_) return;  // of an earlier block
         // A client that varies the size never says the same of two blocks: this one came twice, or it still waits for our block.
