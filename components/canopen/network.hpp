@@ -29,6 +29,8 @@ public:
     /// Asks it every `period`; it is lost after `factor` periods without a good answer. 0: no guarding. [realtime]
     void guard(Time period, std::uint8_t factor, Time now) noexcept;
 
+    bool guarded() const noexcept { return guard_period_ != 0; }
+
     bool heard() const noexcept { return heard_; }
     bool lost() const noexcept { return lost_; }
     NmtState state() const noexcept { return state_; }

@@ -25,6 +25,7 @@ public:
     };
     explicit LssMaster(FrameQueue& out, const LssMasterSettings& settings = {}) : out_(out), settings_(settings) {}
 
+    LssMasterSettings& settings() noexcept { return settings_; }
     bool busy() const noexcept { return job_ != Job::none; }
     const Result& result() const noexcept { return result_; }
     bool listens_to(const Frame& f) const noexcept { return f.id == lss_slave_to_master && !f.extended && !f.remote; }
