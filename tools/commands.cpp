@@ -197,10 +197,96 @@ void declare_can_scan(CLI::App& app, Options& o) {
     app.add_flag("--json", o.json, "as JSON");
 }
 
+/// An option that takes a duration.
+void duration(CLI::App& app, const char* name, std::int64_t& to, const char* what) {
+    const auto take = [name, &to](const std::string& text) {
+        const auto ns = parse_duration_ns(text, false);
+        if (!ns || *ns < 0) throw CLI::ValidationError(name, fmt::format("'{}' is not a duration; write 10ms, 1s or 500us", text));
+        to = *ns;
+    };
+    app.add_option_function<std::string>(name, take, what)->type_name("TIME");
+}
+
+void described(CLI::App& app, Options& o, const char* what = "names and types of the node's objects: an EDS, DCF or XDD file") {
+    app.add_option("--eds", o.eds, what)->type_name("FILE");
+}
+
+void answered(CLI::App& app, Options& o) { duration(app, "--timeout", o.timeout_ns, "an answer comes within 1s, 200ms … (default 500ms); then it is asked again"); }
+
+void transferred(CLI::App& app, Options& o) {
+    described(app, o);
+    app.add_option("--type", o.type, "of the value: u8 … u64, i8 … i64, r32, r64, bool, visible_string, octet_string, domain")->type_name("TYPE");
+    app.add_flag("--block", o.block, "by block transfer, where the node knows it");
+    app.add_flag("--segmented", o.segmented, "never by block transfer");
+    answered(app, o);
+}
+
+void declare_can_sdo_read(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE OBJECT", "the bus; a node 1-127; objects: INDEX:SUB in hex (6041, 1018:1) or names of the EDS");
+    transferred(app, o);
+    app.add_option("-o,--output", o.output, "the bytes as they are into this file")->type_name("FILE");
+    app.add_flag("--json", o.json, "as JSON, a line per object");
+}
+
+void declare_can_sdo_write(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE OBJECT VALUE", "the bus; a node 1-127; INDEX:SUB in hex or a name of the EDS; a number, 0x…, text, or hex bytes");
+    transferred(app, o);
+    app.add_option("--from", o.input, "the bytes of this file instead of a value")->type_name("FILE");
+}
+
+void declare_can_pdo(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE", "the bus; a node 1-127");
+    described(app, o);
+    answered(app, o);
+}
+
+void declare_can_pdo_show(CLI::App& app, Options& o) {
+    declare_can_pdo(app, o);
+    app.add_flag("--json", o.json, "as JSON, a line per PDO");
+}
+
+void declare_can_pdo_switch(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE PDO", "the bus; a node 1-127; rpdo1 … or tpdo1 …");
+    answered(app, o);
+}
+
+void declare_can_pdo_map(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE PDO OBJECT", "the bus; a node 1-127; rpdo1 … or tpdo1 …; what it carries: INDEX:SUB or a name, with /BITS where the length is not known");
+    described(app, o);
+    answered(app, o);
+    app.add_option("--transmission", o.transmission, "type: 0 SYNC after an event, 1-240 every n-th SYNC, 252, 253 on request, 254, 255 on event")
+        ->check(CLI::Range(0, 255))->type_name("N");
+    app.add_option("--id", o.id, "identifier in hex; without it, as it is")->type_name("ID");
+    duration(app, "--inhibit", o.inhibit_ns, "of a TPDO: at least so long between two");
+    duration(app, "--event", o.event_ns, "event timer: a TPDO is sent, an RPDO expected that often");
+}
+
+void declare_can_pdo_watch(CLI::App& app, Options& o) {
+    declare_can_pdo_show(app, o);
+    for_how_long(app, o, "end after 2s, 500ms …; without it: until Ctrl-C");
+    app.add_option("-n,--count", o.count, "end after so many PDOs")->type_name("N");
+}
+
+void declare_can_lss(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS COMMAND", "the bus; scan, switch configuration|waiting, select VENDOR PRODUCT REVISION SERIAL, inquire, node-id N|none, "
+                                     "bit-rate RATE, activate DELAY, store, identify [VENDOR PRODUCT REVISION SERIAL]");
+    duration(app, "--timeout", o.timeout_ns, "an answer comes within 1s, 200ms … (default 100ms; of each step of a scan 20ms)");
+}
+
+void declare_can_gateway(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS", "the buses, as nets 1, 2 …");
+    app.add_option("--socket", o.socket, "a local socket made for it (default: halcyon-canopen-gateway in $XDG_RUNTIME_DIR)")->type_name("PATH");
+    app.add_option("--listen", o.listen, "a TCP port of this machine instead: 127.0.0.1:6000")->type_name("ADDRESS:PORT");
+    app.add_option("--state", o.state, "what `store` keeps, read at the start")->type_name("FILE");
+}
+
 void declare_canopen_plan(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "the messages: a line `bitrate 1M`, then lines `ID BYTES PERIOD [DEADLINE [JITTER]] # name`");
+    words(app, o, "FILE", "the configuration of the network, NAME.canopen");
+    app.add_option("--cycle", o.cycle, "the period of the master's thread, where the SYNC comes with every cycle (default 1ms)")->type_name("TIME");
     app.add_flag("--json", o.json, "as JSON");
 }
+
+void declare_canopen_check(CLI::App& app, Options& o) { words(app, o, "FILE", "configurations, NAME.canopen"); }
 
 void declare_can_eds_check(CLI::App& app, Options& o) { words(app, o, "FILE", "device descriptions: EDS, DCF, XDD, XDC"); }
 
@@ -271,8 +357,18 @@ constexpr Subcommand table[] = {
     {"can load", "ADDRESS [--for TIME]", "which identifiers fill the bus", run_can_load, declare_can_load},
     {"can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take", run_can_nmt, declare_can_nmt},
     {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", run_can_scan, declare_can_scan},
+    {"can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node", run_can_sdo_read, declare_can_sdo_read},
+    {"can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node", run_can_sdo_write, declare_can_sdo_write},
+    {"can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry", run_can_pdo_show, declare_can_pdo_show},
+    {"can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301", run_can_pdo_map, declare_can_pdo_map},
+    {"can pdo enable", "ADDRESS NODE PDO", "switch a PDO on", run_can_pdo_enable, declare_can_pdo_switch},
+    {"can pdo disable", "ADDRESS NODE PDO", "switch a PDO off", run_can_pdo_disable, declare_can_pdo_switch},
+    {"can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass", run_can_pdo_watch, declare_can_pdo_watch},
+    {"can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify", run_can_lss, declare_can_lss},
+    {"can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE]", "a CiA 309-3 gateway: programs command the network by lines of text", run_can_gateway, declare_can_gateway},
     {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", run_can_eds_check, declare_can_eds_check},
-    {"canopen plan", "FILE [--json]", "whether every message of a bus arrives in time: worst-case response times", run_canopen_plan, declare_canopen_plan},
+    {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", run_canopen_check, declare_canopen_check},
+    {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", run_canopen_plan, declare_canopen_plan},
     {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", run_node_drive, declare_node_drive},
     {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", run_node_io, declare_node_io},
     {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", run_node_jr3, declare_node_jr3},
@@ -289,8 +385,8 @@ struct Group {
 };
 
 constexpr Group groups[] = {
-    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt; eds check"},
-    {"canopen", "plans a CANopen network"},
+    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, pdo, lss, gateway; eds check"},
+    {"canopen", "checks and plans a CANopen network"},
     {"node", "simulated CANopen devices as processes: drive, io, jr3, bootloader; what they can do wrong: faults"},
 };
 

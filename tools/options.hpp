@@ -29,6 +29,7 @@ struct Options {
     bool from_file = false;              ///< -f: the first word is a file of commands; without one, standard input
     std::vector<std::string> execute;    ///< -e COMMAND
     bool echo = false, script = false, json = false;
+    std::string cycle = "1ms";  ///< hal canopen plan
     Loudness loudness = Loudness::errors;
     bool check = false, csv = false, tag = false;
     bool markdown = false, man = false, html = false, all = false;  ///< of doc
@@ -39,6 +40,14 @@ struct Options {
     std::int64_t every_ns = 0;           ///< --every; 0: not given
     double speed = 1.0;                  ///< of can replay
     NodeOptions node;                    ///< of hal node
+    std::string eds;                     ///< --eds: names and types of the objects of a node
+    std::string type, input;             ///< of can sdo: --type, --from FILE
+    std::int64_t timeout_ns = 0;         ///< --timeout: of one answer; 0: not given
+    bool block = false, segmented = false;
+    std::string id;                      ///< of can pdo map
+    int transmission = -1;               ///< of can pdo map; -1: as it is
+    std::int64_t inhibit_ns = -1, event_ns = -1;
+    std::string socket, listen, state;   ///< of can gateway
 };
 
 /// Each subcommand, in its own file. Returns the exit code.
@@ -62,6 +71,16 @@ int run_can_replay(const Options&);
 int run_can_load(const Options&);
 int run_can_nmt(const Options&);
 int run_can_scan(const Options&);
+int run_can_sdo_read(const Options&);
+int run_can_sdo_write(const Options&);
+int run_can_pdo_show(const Options&);
+int run_can_pdo_map(const Options&);
+int run_can_pdo_enable(const Options&);
+int run_can_pdo_disable(const Options&);
+int run_can_pdo_watch(const Options&);
+int run_can_lss(const Options&);
+int run_can_gateway(const Options&);
+int run_canopen_check(const Options&);
 int run_canopen_plan(const Options&);
 int run_completion(const Options&);
 int run_node_drive(const Options&);
