@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string_view>
 
 #include "base/code_pages.hpp"
@@ -13,11 +14,18 @@ namespace hal {
 class Code {
 public:
     consteval Code(const char* name) : index_(find(name)) {}
+    /// A code that is known only when the program runs.
+    static std::optional<Code> named(std::string_view name) {
+        for (std::size_t i = 0; i < std::size(code_pages); ++i)
+            if (name == code_pages[i].name) return Code(i);
+        return std::nullopt;
+    }
     constexpr std::string_view name() const { return code_pages[index_].name; }
     constexpr std::string_view page() const { return code_pages[index_].page; }
     constexpr bool operator==(const Code&) const = default;
 
 private:
+    constexpr explicit Code(std::size_t index) : index_(index) {}
     static consteval std::size_t find(std::string_view name) {
         for (std::size_t i = 0; i < std::size(code_pages); ++i)
             if (name == code_pages[i].name) return i;

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cstring>
+#include <deque>
+#include <filesystem>
 #include <set>
 
 #include "hal/naming.h"
+#include "hal/texts.h"
 
 namespace hal {
 namespace {
@@ -47,6 +50,12 @@ struct Construction {
     bool no_memory = false;
     std::string serial = {};             // of an instance that is named after its component
     bool whole_function_names = false;
+    Sources* sources = nullptr;
+    Diagnostics* diagnostics = nullptr;
+    std::string text_name = {}, text = {};  // what it reads
+    std::uint32_t text_source = 0;          // 0: nothing was said of it yet
+    bool said_why = false;                  // an error was
+    std::deque<std::string> found = {};     // what find_text() gave
 };
 
 bool whole_names(const Instance& instance) { return instance.component->plugin->flags & HAL_COMPONENT_WHOLE_NAMES; }
@@ -177,14 +186,62 @@ constexpr hal_naming naming{sizeof naming, name_instance, [](const hal_host* hos
                             },
                             [](const hal_host* host) { return of(host).instance.name.c_str(); }};
 
-const void* extension_of(const hal_host*, const char* id) { return std::strcmp(id, HAL_NAMING) == 0 ? &naming : nullptr; }
+// Files a component reads.
+const char* find_text(const hal_host* host, const char* file) {
+    Construction& c = of(host);
+    return guarded(c, file, [&] {
+        const std::string& netlist = c.request.at.known() ? c.sources->get(c.request.at.source).name : "";
+        const auto slash = netlist.rfind('/');
+        if (*file == '/' || slash == std::string::npos) return file;
+        std::error_code none;
+        const std::string beside = netlist.substr(0, slash + 1) + file;
+        if (!std::filesystem::exists(beside, none) && std::filesystem::exists(file, none)) return file;
+        c.found.push_back(beside);
+        return c.found.back().c_str();
+    });
+}
+
+void begin_text(const hal_host* host, const char* name, const char* text, std::size_t bytes) {
+    Construction& c = of(host);
+    guarded(c, false, [&] {
+        c.text_name = name;
+        c.text.assign(text, bytes);
+        c.text_source = 0;
+        return true;
+    });
+}
+
+void say_of_text(const hal_host* host, const hal_text_message* message) {
+    Construction& c = of(host);
+    guarded(c, false, [&] {
+        if (message->size < sizeof *message) return refuse(c, "it says something in a form that is not known here");
+        if (c.text_source == 0) c.text_source = c.sources->add(c.text_name, c.text);
+        const auto size = static_cast<std::uint32_t>(c.text.size());
+        const std::uint32_t begin = std::min(message->begin, size), end = std::clamp(message->end, begin, size);
+        const Severity severity = message->severity == HAL_SEVERITY_ERROR ? Severity::error : message->severity == HAL_SEVERITY_WARNING ? Severity::warning : Severity::note;
+        Diagnostic d{severity, Code::named(message->code).value_or(Code("construct-failed")), message->sentence, {{{c.text_source, begin, end}, message->label}}};
+        if (*message->help) d.help.emplace_back(message->help);
+        c.diagnostics->add(std::move(d));
+        c.said_why = c.said_why || severity == Severity::error;
+        return true;
+    });
+}
+constexpr hal_texts texts{sizeof texts, find_text, begin_text, say_of_text};
+
+const void* extension_of(const hal_host*, const char* id) {
+    if (std::strcmp(id, HAL_NAMING) == 0) return &naming;
+    return std::strcmp(id, HAL_TEXTS) == 0 ? &texts : nullptr;
+}
 
 // One instance: memory, constructor, declarations into the model.
-bool construct_one(Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics, std::unique_ptr<Instance> instance, Construction& c) {
+bool construct_one(Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics, std::unique_ptr<Instance> instance, Construction& c) {
+    c.sources = &sources;
+    c.diagnostics = &diagnostics;
     const hal_host host{sizeof host, &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of};
     c.texts.reserve(request.arguments.size());  // pointers into it are handed out
     if (!component.plugin->create(&host, instance->memory)) {
         if (c.no_memory) throw std::bad_alloc();
+        if (c.said_why && c.failure.empty()) return false;
         const std::string why = c.failure.empty() ? "it gave no reason" : c.failure;
         for (const auto& [name, given] : request.arguments)
             if (why.starts_with(name + "=")) {
@@ -273,7 +330,7 @@ bool all_known(const Component& component, const LoadRequest& request, const std
 
 }  // namespace
 
-bool construct_again(Model& beside, Edit& edit, const Component& old, Component& fresh, Span at, Diagnostics& diagnostics) {
+bool construct_again(Model& beside, Edit& edit, const Component& old, Component& fresh, Span at, Sources& sources, Diagnostics& diagnostics) {
     edit.diagnostics = &diagnostics;
     const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
     for (std::size_t i = 0; i < old.instances.size(); ++i) {
@@ -292,13 +349,13 @@ bool construct_again(Model& beside, Edit& edit, const Component& old, Component&
         instance->storage = storage;
         const std::string personality = load.personalities.empty() ? "" : load.personalities[before.number % load.personalities.size()];
         Construction c{beside, request, *instance, before.number, personality, {}, {}, {}, {}, 0, {}, {}};
-        if (!construct_one(edit, fresh, request, diagnostics, std::move(instance), c)) return false;
+        if (!construct_one(edit, fresh, request, sources, diagnostics, std::move(instance), c)) return false;
         if (!all_known(fresh, request, c.asked, diagnostics)) return false;
     }
     return true;
 }
 
-bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Diagnostics& diagnostics) {
+bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics) {
     const hal_component& plugin = *component.plugin;
     const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
     const std::size_t stride = stride_of(plugin);
@@ -324,7 +381,7 @@ bool construct(Model& model, Edit& edit, Component& component, const LoadRequest
         instance->number = i;
         Construction c{model, request, *instance, i, request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()], {}, {}, {}, {}, 0, {}, {}};
         c.serial = serial;
-        if (!construct_one(edit, component, request, diagnostics, std::move(instance), c)) return false;
+        if (!construct_one(edit, component, request, sources, diagnostics, std::move(instance), c)) return false;
         asked.insert(c.asked.begin(), c.asked.end());
         if (i == 0) {
             if (!all_known(component, request, c.asked, diagnostics)) return false;

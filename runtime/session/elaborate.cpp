@@ -117,7 +117,7 @@ void loadrt(Elaboration& on, const Command& command, Args args) {
     for (const auto& [key, given] : request.arguments) load.arguments.emplace(key, given.value);
     load.personalities = request.personalities;
     on.edit.note_arguments(*component, written, std::move(load));
-    construct(on.model, on.edit, *component, request, on.diagnostics);
+    construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
     (void)command;
 }
 
@@ -194,7 +194,7 @@ void reload(Elaboration& on, const Command&, Args args) {
             for (auto it = component.instances.rbegin(); it != component.instances.rend(); ++it) destroy_instance(**it);
         }
     } undo{fresh};
-    const bool made = construct_again(beside, making, *component, fresh, name.span, on.diagnostics);
+    const bool made = construct_again(beside, making, *component, fresh, name.span, on.sources, on.diagnostics);
     on.model.next_id = beside.next_id;
     if (made) undo.taken = on.edit.replace(*component, beside.components.front(), name.span);
 }

@@ -23,6 +23,7 @@ struct Elaboration {
     Model& model;
     Edit& edit;
     const Plugins& plugins;
+    Sources& sources;
     Diagnostics& diagnostics;
     std::vector<AutoOrder>& auto_orders;
 };

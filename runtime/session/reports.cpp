@@ -69,8 +69,13 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
         return {"budget", thread.name + ": the cycle took " + format_duration(event.value) + " (budget " + format_duration(static_cast<double>(thread.options.budget_ns)) + ")" + at + "; see: show thread " + thread.name};
     case HAL_FAULT_COMPONENT: {
         const Instance* const instance = instance_at(model, event.self);
-        return {"component", (instance ? instance->name + ": " : thread.name + ": ") + (event.reason ? event.reason : "a fault") + " (" + format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value}) + ")" + at +
-                                 (instance ? "; see: show pin " + instance->name : "")};
+        // "what happened {}; what was done": the number where the braces are, the cycle before the semicolon
+        std::string what = event.reason ? event.reason : "a fault", done;
+        const std::string number = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
+        if (const auto semicolon = what.find(';'); semicolon != std::string::npos) done = what.substr(semicolon), what.resize(semicolon);
+        if (const auto braces = what.find("{}"); braces != std::string::npos) what.replace(braces, 2, number);
+        else what += " (" + number + ")";
+        return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at + done + (instance ? "; see: show pin " + instance->name : "")};
     }
     case HAL_FAULT_SILENT_THREAD:
     case HAL_FAULT_NONE: break;

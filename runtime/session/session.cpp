@@ -41,7 +41,7 @@ void Session::apply(const Command& command, Diagnostics& diagnostics) {
         }
         for (const auto& thread : s.model.threads)
             if (const Core* const core = s.core(thread.get())) thread->init_done = core->passed();
-        Elaboration on{s.model, *s.edit, s.plugins, diagnostics, s.auto_orders};
+        Elaboration on{s.model, *s.edit, s.plugins, sources, diagnostics, s.auto_orders};
         for (const Command& plain : expand(command, diagnostics)) {
             ++s.commands;
             elaborate(on, plain);

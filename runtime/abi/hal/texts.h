@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Extension "hal.texts/1", offered while an instance is created: a file that the component reads, with what is wrong in it said as
+ * the netlist's own errors are.
+ */
+#ifndef HAL_TEXTS_H
+#define HAL_TEXTS_H
+
+#include "hal/abi.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define HAL_TEXTS "hal.texts/1"
+
+typedef enum hal_severity { HAL_SEVERITY_NOTE, HAL_SEVERITY_WARNING, HAL_SEVERITY_ERROR } hal_severity;
+
+typedef struct hal_text_message {
+    uint32_t size;
+    hal_severity severity;
+    const char *code;      /* one of `hal explain` */
+    uint32_t begin, end;   /* bytes of the text */
+    const char *sentence;  /* no final stop */
+    const char *label;     /* a word under the place, or "" */
+    const char *help;      /* what to type, or "" */
+} hal_text_message;
+
+typedef struct hal_texts {
+    uint32_t size;
+    /* Where the file is that the user calls so: beside the netlist that loads the component, or else as it is written. Valid until
+     * create returns. [setup] */
+    const char *(*find)(const hal_host *, const char *file);
+    /* The text that the messages after it are about, and the name they print. [setup] */
+    void (*begin)(const hal_host *, const char *name, const char *text, size_t bytes);
+    /* After an error create must fail, and needs no other reason. [setup] */
+    void (*say)(const hal_host *, const hal_text_message *);
+} hal_texts;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// For components that read a file of the user's: where it is, and what is wrong in it, said as the netlist's own errors are.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "hal/component.hpp"
+#include "hal/texts.h"
+
+namespace hal {
+
+/// In a component's constructor only. A host without the extension (`hal doc`) hears nothing.
+class Texts {
+public:
+    explicit Texts(Component&) : texts_(extension<hal_texts>(HAL_TEXTS)) {}
+    /// False: nobody loads this instance, its declarations are looked at.
+    bool offered() const { return texts_ != nullptr; }
+    /// Beside the netlist, or else as it is written. [setup]
+    std::string find(const std::string& file) const { return texts_ ? texts_->find(detail::creating, file.c_str()) : file; }
+    /// The text the next messages are about. [setup]
+    void begin(const std::string& name, std::string_view text) const {
+        if (texts_) texts_->begin(detail::creating, name.c_str(), text.data(), text.size());
+    }
+    /// [setup]
+    void say(hal_severity severity, const char* code, std::uint32_t begin, std::uint32_t end, const std::string& sentence,
+             const std::string& label, const std::string& help) const {
+        const hal_text_message message{sizeof message, severity, code, begin, end, sentence.c_str(), label.c_str(), help.c_str()};
+        if (texts_) texts_->say(detail::creating, &message);
+    }
+    /// Ends the constructor after an error was said. [setup]
+    [[noreturn]] static void refuse() { detail::refused(); }
+
+private:
+    const hal_texts* texts_;
+};
+
+}  // namespace hal
