@@ -61,6 +61,25 @@ inline constexpr CodePage code_pages[] = {
     {"cannot-write",
      "`save` could not write the file; nothing else was changed. The reason is the system's.\n\n"
      "Without a file name `save` prints to the terminal."},
+    {"canopen-line",
+     "A line of a CANopen configuration (`NAME.canopen`) that means nothing where it stands: neither a [section] nor KEY = VALUE, a section "
+     "or key that does not exist or comes twice.\n\n"
+     "Sections are [bus], [defaults], [type NAME], [node ID NAME], [messages]. docs/canopen-configuration.md lists their keys."},
+    {"canopen-load",
+     "The messages of a CANopen configuration cannot all arrive in time on this bus: computed from the longest possible frames, all of them "
+     "due at once. The network runs all the same, and frames come late.\n\n"
+     "`hal canopen plan FILE` shows the arithmetic and what would help: a higher bit rate, a longer SYNC period, fewer PDOs, a second bus."},
+    {"canopen-node",
+     "Nodes or messages of a CANopen configuration are in each other's way: a node-id, a name or an identifier twice; or a node is told "
+     "something that needs what is not there, such as a SYNC."},
+    {"canopen-object",
+     "An object that the node does not have by its description, that a PDO cannot carry, or that does not fit beside others: a PDO holds "
+     "64 bits.\n\n"
+     "Objects are written by name, in lower case with dashes, or as 0x6064 or 0x6099:1; `hal canopen check FILE` lists those in use. "
+     "Without a description an object needs its type: `0x2000:1 u16`."},
+    {"canopen-value",
+     "A value of a CANopen configuration that its key does not take. The help says what it takes.\n\n"
+     "Times have a unit (us, ms, s, min), numbers are decimal or hexadecimal with 0x."},
     {"construct-failed",
      "The component refused to be made: its constructor gave the reason that is printed. Nothing of it is left behind.\n\n"
      "`hal doc COMPONENT` shows its arguments."},

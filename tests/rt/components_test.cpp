@@ -14,7 +14,7 @@ namespace hal::test {
 namespace {
 
 // Load arguments of components that cannot be made without.
-const std::map<std::string, std::string> arguments{};
+const std::map<std::string, std::string> arguments{{"canopen", "inputs=24831 outputs=24675 slavenodeid=2"}};
 
 std::vector<std::string> all_components() {
     std::vector<std::string> names;

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// A node's keys to a Node: its description, its settings, its PDOs, its writes.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "../306/eds.hpp"
+#include "catalog.hpp"
+#include "keys.hpp"
+
+namespace hal::canopen::config {
+
+/// Device descriptions by their path, each read once.
+class Descriptions {
+public:
+    Descriptions(const ReadFile& read, std::string folder) : read_(read), folder_(std::move(folder)) {}
+    /// nullptr after saying why, at the value that names the file.
+    const eds::DeviceDescription* get(const Word& file, Report& report);
+    /// The bytes of a file named beside the configuration; false after saying why.
+    bool bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report);
+
+private:
+    bool read(const Word& file, std::string& bytes, Report& report);
+
+    const ReadFile&                                                read_;
+    std::string                                                    folder_;
+    std::map<std::string, std::unique_ptr<eds::DeviceDescription>> known_;
+};
+
+class NodeReader {
+public:
+    NodeReader(Keys& keys, Descriptions& descriptions, const MasterConfig& bus, Node& node)
+        : keys_(keys), report_(keys.report()), descriptions_(descriptions), bus_(bus), node_(node) {}
+    void read();
+
+private:
+    struct PdoWish {
+        unsigned                           number = 0;
+        bool                               to_node = false;
+        const Line*                        objects = nullptr;
+        std::map<std::string, const Line*> options{};
+    };
+    void                                         describe();
+    void                                         identity(const char* key, std::uint32_t& to, std::uint64_t described);
+    void                                         settings();
+    void                                         firmware();
+    void                                         writes();
+    void                                         write_one(const Line& line);
+    void                                         pdos();
+    std::map<std::pair<bool, unsigned>, PdoWish> wishes();
+    void                                         pdo(const PdoWish& wish);
+    void                                         pdo_options(const PdoWish& wish, Pdo& pdo);
+    void                                         objects_of(const Word& list, Pdo& pdo);
+    bool                                         default_objects(const PdoWish& wish, Pdo& pdo);
+    bool                                         object(const Word& word, Pdo& pdo, Object& out);
+    Object                                       known_object(const Known& known, unsigned bits) const;
+    void                                         configure(Pdo& pdo);
+    void                                         object_options();
+    void                                         option(Object& object, const std::string& property, const Line& line);
+    bool                                         set_safe(Object& object, const Line& line);
+    void                                         finish_objects();
+    void                                         leftover();
+
+    Keys&                         keys_;
+    Report&                       report_;
+    Descriptions&                 descriptions_;
+    const MasterConfig&           bus_;
+    Node&                         node_;
+    const eds::DeviceDescription* eds_ = nullptr;
+    std::unique_ptr<Catalog>      catalog_;
+};
+
+/// The object's bits for a value of its pin. The value is cut off at the object's limits.
+std::uint64_t raw_of(const Object&, double pin_value);
+
+}  // namespace hal::canopen::config

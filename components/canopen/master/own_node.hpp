@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// The master's own object dictionary: what a node sends is received here and the other way round, an object each.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "../301/description.hpp"
+#include "../config/config.hpp"
+
+namespace hal::canopen {
+
+/// An object of a node and the one of ours that stands for it: a signed or unsigned number of 64 bits, or a real.
+struct Placed {
+    std::size_t           node = 0;                    ///< in MasterConfig::nodes
+    bool                  to_node = false;
+    const config::Object* object = nullptr;  ///< of the configuration, which outlives this
+    std::uint16_t         index = 0;
+    std::uint8_t          sub = 0;
+};
+
+/// Which RPDO of ours takes which PDO of a node.
+struct Received {
+    std::size_t        node = 0;
+    const config::Pdo* pdo = nullptr;
+    unsigned           number = 0;
+};
+
+/// A TPDO of ours. Several nodes may take their parts of it: then it stands for an RPDO of each, all with the same identifier.
+struct Sent {
+    struct Part {
+        std::size_t  placed = 0;
+        std::uint8_t first = 0, bits = 0;
+    };
+    const config::Pdo* pdo = nullptr;  ///< of the first of them
+    unsigned           number = 0;
+    std::vector<Part>  parts{};         ///< by their first bit; what lies between them is zero
+};
+
+struct OwnNode {
+    Description           description;
+    std::vector<Placed>   placed;   ///< one for each object and node, however many PDOs carry it; fillers are not among them
+    std::vector<Received> received;
+    std::vector<Sent>     sent;
+};
+
+/// [setup]
+OwnNode own_node(const config::MasterConfig&);
+
+}  // namespace hal::canopen

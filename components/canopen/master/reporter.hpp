@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// What happened on the network, in sentences on standard error: numbers out of the cycle, words in a thread of their own.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "../301/emcy.hpp"
+#include "../302/status.hpp"
+#include "../config/schedule.hpp"
+#include "hal/queue.hpp"
+#include "link/can.hpp"
+
+namespace hal::canopen {
+
+class Reporter {
+public:
+    /// All outlive it. [setup]
+    Reporter(std::string instance, const config::MasterConfig& config, const std::string& file)
+        : instance_(std::move(instance)), config_(config), setup_(config.setup()), file_(file) {}
+    ~Reporter() { stop(); }
+
+    void start() {  // [setup]
+        ended_.store(false);
+        thread_ = std::thread([this] { run(); });
+    }
+    void stop() noexcept {  // [setup]
+        ended_.store(true);
+        if (thread_.joinable()) thread_.join();
+    }
+
+    // By the cycle. What finds no room is not said. [realtime]
+    void node(const NodeStatus& s) noexcept { events_.push({Event::node, s, {}, {}, {}, 0}); }
+    void network(const NetworkStatus& n, const NodeStatus& s) noexcept { events_.push({Event::network, s, n, {}, {}, 0}); }
+    void emergency(const NodeStatus& s, const Emergency& e) noexcept { events_.push({Event::emergency, s, {}, e, {}, 0}); }
+    void bus(can::State state) noexcept { events_.push({Event::bus, {}, {}, {}, state, 0}); }
+    void cycle(Time period) noexcept { events_.push({Event::cycle, {}, {}, {}, {}, period}); }
+
+private:
+    struct Event {
+        enum Kind : std::uint8_t { node, network, emergency, bus, cycle } kind = node;
+        NodeStatus    of_node{};
+        NetworkStatus of_network{};
+        Emergency     of_emergency{};
+        can::State    of_bus{};
+        Time          period = 0;
+    };
+
+    void run() {
+        for (bool last = false; !last;) {
+            last = ended_.load();  // looked at before the queue, so that what came before the end is still said
+            for (Event e; events_.pop(e);) say(words(e));
+            if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
+    }
+    void say(const std::string& sentence) const {
+        if (!sentence.empty()) std::fputs((instance_ + ": " + sentence + "\n").c_str(), stderr);
+    }
+    std::string called(std::uint8_t id) const {
+        for (const config::Node& n : config_.nodes)
+            if (n.setup.id == id) return "node " + std::to_string(id) + (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
+        return "node " + std::to_string(id);
+    }
+    std::string words(const Event& e) const {
+        switch (e.kind) {
+        case Event::node:
+            for (const NodeSetup& n : setup_.nodes)
+                if (n.id == e.of_node.id) return sentence(n, e.of_node);
+            break;
+        case Event::network: return sentence(setup_, e.of_network, e.of_node);
+        case Event::emergency: {
+            char text[120];
+            std::snprintf(text, sizeof text, "%s: emergency 0x%04X (%s), error register 0x%02X", called(e.of_node.id).c_str(),
+                          e.of_emergency.code, emergency_word(e.of_emergency.code), e.of_emergency.error_register);
+            return text;
+        }
+        case Event::bus:
+            return std::string("the bus is ") + can::word(e.of_bus) +
+                   (e.of_bus == can::State::bus_off ? "; it is tried again by itself" : "");
+        case Event::cycle:
+            for (const config::Message& m : config::load_messages(config_, e.period, file_)) return m.sentence + "; " + m.help;
+            break;
+        }
+        return {};
+    }
+
+    const std::string           instance_;
+    const config::MasterConfig& config_;
+    const MasterSetup           setup_;
+    const std::string           file_;
+    hal::Queue<Event>           events_{512};      // cycle to thread
+    std::atomic<bool>           ended_{false};
+    std::thread                 thread_;
+};
+
+}  // namespace hal::canopen

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// A master on a link, a cycle at a time:
+//
+//     Runner runner(config);                  // [setup]
+//     runner.open(*link);
+//     each cycle:
+//         runner.receive(now);                // what came is in the objects
+//         for (auto& slot : runner.slots()) … // objects to pins, pins to slot.wish
+//         runner.transmit(now, period);       // SYNC and PDOs are on their way
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "../302/master.hpp"
+#include "../device.hpp"
+#include "link/can.hpp"
+#include "own_node.hpp"
+
+namespace hal::canopen {
+
+/// An object at work. The value is the object's: of a real its bits, of a number all 64.
+struct Slot {
+    Entry*                entry = nullptr;
+    std::uint16_t         node = 0;
+    bool                  to_node = false, has_safe = false;
+    std::uint64_t         safe = 0;
+    std::uint64_t         wish = 0;           ///< to_node: what is to be sent while the node is operational
+    const config::Object* object = nullptr;
+};
+
+/// What the runner noticed. [realtime]
+class RunnerEvents {
+public:
+    virtual ~RunnerEvents() = default;
+    virtual void on_step(std::size_t node, const NodeStatus&) noexcept { (void)node; }
+    virtual void on_network(const NetworkStatus&) noexcept {}
+    virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
+    /// It did not come for its time-out.
+    virtual void on_late(const Received& pdo) noexcept { (void)pdo; }
+    virtual void on_bus_state(can::State) noexcept {}
+    /// What belongs to one SYNC was not all sent when the next was due.
+    virtual void on_sync_overrun() noexcept {}
+};
+
+class Runner final : private MasterEvents {
+public:
+    Runner(const config::MasterConfig&, RunnerEvents&);  // [setup] the configuration outlives it
+
+    /// The next receive() boots the network. [setup]
+    void open(can::Link& link) noexcept;
+    /// Nothing is received or sent any more. [setup]
+    void close() noexcept { link_ = nullptr; }
+
+    /// [realtime]
+    void receive(Time now) noexcept;
+    /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them otherwise. [realtime]
+    void transmit(Time now, Time period, bool leads = true) noexcept;
+    /// All outputs to their safe values, nodes out of the operational state as configured. The network boots anew when cycles go on.
+    /// Async-signal-safe.
+    void make_safe() noexcept;
+
+    std::span<Slot>             slots() noexcept { return slots_; }
+    bool                        operational(std::size_t node) const noexcept { return statuses_[node]->operational; }
+    const NodeStatus&           status(std::size_t node) const noexcept { return *statuses_[node]; }
+    const NetworkStatus&        network() const noexcept { return master_.status(); }
+    const can::Statistics&      link_statistics() const noexcept { return statistics_; }
+    std::uint64_t               syncs() const noexcept { return syncs_; }
+    std::uint64_t               sync_overruns() const noexcept { return overruns_; }
+    const OwnNode&              own() const noexcept { return own_; }
+    Master&                     master() noexcept { return master_; }
+    Device&                     device() noexcept { return device_; }
+    const config::MasterConfig& config() const noexcept { return config_; }
+    /// [realtime]
+    void restart_node(std::size_t node, Time now) noexcept { master_.restart(config_.nodes[node].setup.id, now); }
+    void restart(Time now) noexcept { boot(now); }
+
+private:
+    /// A PDO for when things go wrong.
+    struct Output {
+        const Sent* sent;
+        can::Frame  frame;
+    };
+    void boot(Time now) noexcept;
+    void send(Time now) noexcept;
+    void produce_sync(Time now, Time period) noexcept;
+    void produce_time(Time now) noexcept;
+    void take_wishes() noexcept;
+
+    void on_step(const NodeStatus&) noexcept override;
+    void on_network(const NetworkStatus&) noexcept override;
+    void on_own_state(NmtState) noexcept override;
+    void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
+    void on_rpdo_late(unsigned number, Time) noexcept override;
+
+    const config::MasterConfig&    config_;
+    RunnerEvents&                  events_;
+    const OwnNode                  own_;
+    Device                         device_;
+    Master                         master_;
+    can::Link*                     link_ = nullptr;
+    std::vector<Slot>              slots_;
+    std::vector<const NodeStatus*> statuses_;
+    std::array<std::uint8_t, 128>  place_{};     // node-id to place in the configuration; 255: none
+    std::vector<Output>            outputs_;
+    std::vector<can::Frame>        farewell_;          // NMT commands for make_safe()
+    can::Frame                     sync_frame_;
+    can::Statistics                statistics_{};
+    can::State                     bus_state_ = can::State::active;
+    Time                           now_ = 0, next_sync_ = 0, next_time_ = 0;
+    std::uint64_t                  syncs_ = 0, overruns_ = 0;
+    bool                           sync_begun_ = false, time_begun_ = false, produces_ = false;
+    std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
+};
+
+}  // namespace hal::canopen

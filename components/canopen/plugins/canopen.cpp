@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <atomic>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "canopen/config/config.hpp"
+#include "canopen/config/schedule.hpp"
+#include "canopen/master/pins.hpp"
+#include "canopen/master/reporter.hpp"
+#include "canopen/master/runner.hpp"
+#include "hal/component.hpp"
+#include "hal/naming.hpp"
+#include "hal/texts.hpp"
+
+namespace {
+
+using namespace hal::canopen;
+
+std::string ms_text(Time t) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.2f", static_cast<double>(t) * 1e-9);
+    return text;
+}
+
+/// Instances on one bus: one of them makes the SYNC and the heartbeat; when it goes, another takes over in its next cycle.
+struct Shared {
+    std::atomic<const void*> leader{nullptr};
+};
+std::shared_ptr<Shared> shared_bus(const std::string& link) {
+    static std::mutex                                   mutex;
+    static std::map<std::string, std::weak_ptr<Shared>> all;
+    const std::lock_guard                               lock(mutex);
+    auto                                                found = all[link].lock();
+    if (!found) all[link] = found = std::make_shared<Shared>();
+    return found;
+}
+
+/// A node's faults in words, made before the first cycle.
+struct FaultWords {
+    std::string                 silent, guarding, rebooted, left, not_started, doubled;
+    std::array<std::string, 16> boot;  // by the letter of CiA 302
+
+    FaultWords(const config::Node& n) {
+        const std::string who = "node " + std::to_string(n.setup.id) + (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
+        const std::string safe = "; its outputs were set to their safe values";
+        const Time        limit = n.setup.heartbeat_limit > 0 ? n.setup.heartbeat_limit : n.setup.heartbeat_ms * millisecond * 5 / 2;
+        silent = who + " silent for {} s (limit " + ms_text(limit) + " s)" + safe;
+        guarding = who + " did not answer its guarding for {} s" + safe;
+        rebooted = who + " restarted by itself" + safe;
+        left = who + " left the operational state by itself" + safe;
+        not_started = who + " was started and did not become operational" + safe;
+        doubled = who + " is there twice: two devices have this node-id" + safe;
+        for (char letter = 'A'; letter <= 'O'; ++letter)
+            boot[static_cast<std::size_t>(letter - 'A')] =
+                who + " cannot be booted: " + word(static_cast<BootResult>(letter)) + " (result " + letter + ")";
+    }
+};
+
+class Canopen : public hal::Component, private RunnerEvents {
+public:
+    explicit Canopen(const hal_host* host) : Component(host), name_(name_of(host)) {
+        load();
+        if (by_index()) {
+            update_.emplace(*this, "update", &Canopen::update, "receives, copies received objects to pins and pins to objects, and sends");
+        } else {
+            receive_.emplace(*this, "receive", &Canopen::receive,
+                             "takes what came, boots and watches nodes, copies received objects to pins");
+            transmit_.emplace(*this, "transmit", &Canopen::transmit, "copies pins to objects, sends the SYNC and the PDOs of this cycle");
+        }
+        runner_ = std::make_unique<Runner>(config_, static_cast<RunnerEvents&>(*this));
+        bus_.emplace(*this);
+        for (const config::Node& n : config_.nodes) nodes_.emplace_back(*this, n.name), words_.emplace_back(n);
+        for (std::size_t i = 0; i < runner_->slots().size(); ++i) {
+            const Slot& s = runner_->slots()[i];
+            objects_.declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
+        }
+        reporter_ = std::make_unique<Reporter>(name_, config_, file_);
+    }
+
+    void start() {
+        faults_ = hal::extension<hal_faults>("hal.faults/1");
+        hal::can::Options options;
+        options.bit_rate = config_.link.starts_with("sim:") ? config_.bit_rate : 0;
+        options.send_capacity = 4096;
+        auto opened = hal::can::open(config_.link, options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        const auto& description = opened.link->description();
+        if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate && description.bit_rate != hal::can::unlimited)
+            throw std::runtime_error(config_.link + " runs at " + std::to_string(description.bit_rate) + " bit/s, the configuration says " +
+                                     std::to_string(config_.bit_rate) +
+                                     "; change one of them: bitrate = " + std::to_string(description.bit_rate) +
+                                     ", or ip link set … type can bitrate " + std::to_string(config_.bit_rate));
+        link_ = std::move(opened.link);
+        shared_ = shared_bus(config_.link);
+        period_ = 0;
+        reporter_->start();
+        runner_->open(*link_);
+    }
+
+    void stop() noexcept {
+        runner_->close();
+        reporter_->stop();
+        if (shared_) {
+            const void* self = this;
+            shared_->leader.compare_exchange_strong(self, nullptr);
+        }
+        shared_.reset();
+        link_.reset();
+    }
+
+    void receive(hal::Cycle cycle) noexcept {
+        const Time now = cycle.start_ns();
+        if (period_ != cycle.period_ns()) {
+            period_ = cycle.period_ns();
+            if (config_.sync == config::SyncMode::cycle) reporter_->cycle(period_);
+            if (config_.sync == config::SyncMode::timed && config_.sync_period % period_ != 0)
+                raise("the SYNC period is no multiple of the thread's period; SYNCs come up to half a period early or late", not_a_number);
+        }
+        now_ = now;
+        runner_->receive(now);
+        bus_->show(*runner_, now);
+        for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n].show(*runner_, n, now);
+        objects_.show(*runner_);
+    }
+
+    void transmit(hal::Cycle cycle) noexcept {
+        objects_.take(*runner_);
+        const void* leader = shared_ ? shared_->leader.load(std::memory_order_relaxed) : this;
+        if (leader == nullptr && shared_->leader.compare_exchange_strong(leader, this)) leader = this;
+        runner_->transmit(cycle.start_ns(), cycle.period_ns(), leader == this);
+    }
+
+    void update(hal::Cycle cycle) noexcept {
+        receive(cycle);
+        transmit(cycle);
+    }
+
+    void make_safe(hal::Cycle) noexcept { runner_->make_safe(); }
+
+private:
+    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+    static std::string name_of(const hal_host* host) {
+        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
+        return naming != nullptr ? naming->name(host) : "canopen.0";
+    }
+    bool by_index() const { return slave_ != 0; }
+
+    void load() {
+        const hal::Texts texts(*this);
+        config::Reading  reading;
+        if (by_index() && file_argument_.get().empty()) {
+            reading = config::read(config::ByIndex{inputs_.get(), outputs_.get(), eds_.get().empty() ? "" : texts.find(eds_.get()),
+                                                   static_cast<unsigned>(slave_), static_cast<unsigned>(own_id_)});
+            if (!reading.good()) throw std::invalid_argument(first_error(reading));
+            if (reading.config.nodes.size() == 1 && reading.config.nodes[0].pdos.empty())
+                throw std::invalid_argument("no object is named: inputs=24831 outputs=24675");
+            if (!bit_rate_.get().empty())
+                reading.config.bit_rate = static_cast<std::uint32_t>(std::strtoul(bit_rate_.get().c_str(), nullptr, 0));
+        } else if (!file_argument_.get().empty()) {
+            if (by_index())
+                throw std::invalid_argument("slavenodeid= and config= are both given; the configuration says which nodes there are");
+            file_ = texts.find(file_argument_.get());
+            std::string text;
+            if (!config::read_from_disk(file_, text))
+                throw std::invalid_argument("config=" + file_argument_.get() + ": the file '" + file_ + "' cannot be read: " + text);
+            reading = config::read(text, file_);
+            if (reading.good() && reading.config.sync != config::SyncMode::cycle) {
+                auto more = config::load_messages(reading.config,
+                                                  reading.config.sync_period != 0 ? reading.config.sync_period : millisecond, file_);
+                std::move(more.begin(), more.end(), std::back_inserter(reading.messages));
+            }
+            if (!texts.offered() && !reading.good()) throw std::invalid_argument(config::to_string(reading, file_));
+            texts.begin(file_, text);
+            for (const config::Message& m : reading.messages)
+                texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
+                          m.sentence, m.label, m.help);
+            if (!reading.good()) hal::Texts::refuse();
+        } else if (texts.offered()) {
+            throw std::invalid_argument(
+                "it needs a configuration: loadrt canopen config=FILE.canopen; or a single node: loadrt canopen inputs=24831 outputs=24675 "
+                "slavenodeid=2");
+        }
+        config_ = std::move(reading.config);
+        if (!link_argument_.get().empty()) config_.link = link_argument_.get();
+    }
+    static std::string first_error(const config::Reading& reading) {
+        for (const config::Message& m : reading.messages)
+            if (m.severity == config::Severity::error) return m.sentence + (m.help.empty() ? "" : "; " + m.help);
+        return {};
+    }
+
+    void raise(const char* reason, double detail) noexcept {
+        if (faults_ != nullptr) faults_->raise(faults_, this, reason, detail);
+    }
+
+    // What the runner noticed. [realtime]
+    void on_step(std::size_t place, const NodeStatus& s) noexcept override {
+        NodePins&         pins = nodes_[place];
+        const FaultWords& w = words_[place];
+        const double      silence = s.last_heard == 0 ? not_a_number : static_cast<double>(now_ - s.last_heard) * 1e-9;
+        if (s.losses != pins.losses) {
+            pins.losses = s.losses;
+            pins.is_faulty = true;
+            switch (s.cause) {
+            case Cause::guarding: raise(w.guarding.c_str(), silence); break;
+            case Cause::boot_up: raise(w.rebooted.c_str(), not_a_number); break;
+            case Cause::left_operational: raise(w.left.c_str(), not_a_number); break;
+            case Cause::not_started: raise(w.not_started.c_str(), not_a_number); break;
+            case Cause::doubled: raise(w.doubled.c_str(), not_a_number); break;
+            default: raise(w.silent.c_str(), silence); break;
+            }
+            reporter_->node(s);
+            return;
+        }
+        const bool failed = (s.step == Step::waiting || s.step == Step::failed) && s.result != BootResult::none && !booted(s.result);
+        if (failed && !pins.is_faulty) {
+            const NodeSetup& setup = config_.nodes[place].setup;
+            // One that is not there yet may still be powered up.
+            const bool absent = s.result == BootResult::no_answer && s.cause == Cause::silent;
+            if (absent && (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) return;
+            pins.is_faulty = true;
+            raise(w.boot[static_cast<std::size_t>((static_cast<unsigned>(s.result) - 'A') & 15)].c_str(), not_a_number);
+            reporter_->node(s);
+        } else if (s.step == Step::running && pins.is_faulty) {
+            reporter_->node(s);
+        }
+    }
+    void on_network(const NetworkStatus& n) noexcept override {
+        static constexpr NodeStatus nobody{};
+        const NodeStatus*           about = &nobody;
+        for (std::size_t i = 0; i < config_.nodes.size(); ++i)
+            if (config_.nodes[i].setup.id == n.node) about = &runner_->status(i);
+        reporter_->network(n, *about);
+    }
+    void on_emergency(std::size_t place, const Emergency& e) noexcept override { reporter_->emergency(runner_->status(place), e); }
+    void on_late(const Received& late) noexcept override {
+        raise("a PDO of a node did not come for {} s", static_cast<double>(late.pdo->limit) * 1e-9);
+    }
+    void on_bus_state(hal::can::State state) noexcept override {
+        if (state == hal::can::State::bus_off)
+            raise("the controller is off the bus: too many errors; it is tried again by itself", not_a_number);
+        if (state == hal::can::State::down)
+            raise("the bus is down: the interface is off or was taken away; it is tried again by itself", not_a_number);
+        reporter_->bus(state);
+    }
+    void on_sync_overrun() noexcept override {
+        if (runner_->network().state == NetworkState::operational && !overran_) {
+            overran_ = true;
+            raise("the frames of a SYNC were not all sent when the next was due; hal canopen plan says what fits", not_a_number);
+        }
+    }
+
+    const std::string name_;
+    hal::TextArgument file_argument_{
+        *this, "config", "", "the configuration file, NAME.canopen; several make an instance each", {.per_instance = true}};
+    hal::TextArgument link_argument_{
+        *this, "link", "", "the bus, instead of the configuration's: can:can0, sim:NAME, …", {.per_instance = true}};
+    hal::TextArgument inputs_{*this, "inputs", "",
+                              "without a configuration: objects the node receives, by index, decimal or 0x…, INDEX:SUB, INDEX/BITS"};
+    hal::TextArgument outputs_{*this, "outputs", "", "objects the node sends"};
+    hal::Argument     slave_{*this, "slavenodeid", 0, "the node's id", {.per_instance = true, .min = 0, .max = 127}};
+    hal::Argument     own_id_{*this, "masternodeid", 127, "the master's id", {.min = 1, .max = 127}};
+    hal::TextArgument bit_rate_{*this, "bitrate", "", "of a bus in memory, bit/s; 1000000 if not given"};
+    hal::TextArgument eds_{*this, "eds", "", "the node's device description"};
+
+    std::string                  file_;
+    config::MasterConfig         config_;
+    std::optional<hal::Function> receive_, transmit_, update_;
+    hal::Emergency               emergency_{*this, &Canopen::make_safe, "outputs to their safe values, nodes out of the operational state"};
+    std::unique_ptr<Runner>      runner_;
+    std::optional<BusPins>       bus_;
+    std::deque<NodePins>         nodes_;
+    std::deque<FaultWords>       words_;
+    ObjectPins                   objects_;
+    std::unique_ptr<Reporter>    reporter_;
+    std::unique_ptr<hal::can::Link> link_;
+    std::shared_ptr<Shared>         shared_;
+    const hal_faults*               faults_ = nullptr;
+    Time                            period_ = 0, now_ = 0;
+    bool                            overran_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Canopen, "canopen", "CANopen master: nodes of a CAN bus as pins", R"(
+Boots the nodes of a network, watches them, and exchanges process data with them in every cycle. What there is on the bus, which objects
+become pins and by which PDO is said in a configuration file beside the netlist, `axis.canopen`:
+
+```
+[bus]
+link    = sim:axis        # can:can0 on a machine
+bitrate = 1M
+sync    = cycle
+[node 1 x]
+device  = cia402
+tpdo1   = statusword, position-actual-value
+rpdo1   = controlword, target-position
+position-actual-value.scale = 10000
+target-position.scale       = 10000
+```
+
+and in the netlist:
+
+```
+loadrt canopen config=axis.canopen
+addf canopen.0.receive  servo-thread 1
+addf canopen.0.transmit servo-thread -1
+net x-status canopen.0.x.statusword => …
+```
+
+Every object that a PDO carries is a pin below the node's name, called as the device description calls it: what the node sends is an
+output, what it receives an input. `receive` at the beginning of the cycle shows what came since the last; `transmit` at its end sends
+the SYNC and all outputs of this cycle. While a node is not operational its outputs are held at their safe values: controlwords at quick
+stop, speeds, torques and digital outputs at 0, others at their last value. On `stop`, `unload`, a fault of the thread or the end of the
+process the safe values are sent at once and the nodes are told to leave the operational state.
+
+A node that is lost is a fault (`show fault`), sets its pin `fault`, and is booted again when it comes back, while the others run on.
+
+Without a file, a single node by the indices of its objects:
+
+    loadrt canopen inputs=24831 outputs=24675,25600 slavenodeid=2 masternodeid=1
+    addf canopen.0.update servo-thread
+
+The pins are called as the indices are written, inputs are sent to the node, outputs come from it, and there is one function. Several
+such instances share a bus when they are given the same `link=`.
+)")

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: MIT
+// The configuration of a network: what it makes, and what is said of a wrong one.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "canopen/config/node_reader.hpp"
+#include "canopen/config/schedule.hpp"
+
+namespace hal::canopen::config {
+namespace {
+
+constexpr const char* eds_text = R"([DeviceInfo]
+VendorName=Maker
+VendorNumber=0x1234
+ProductNumber=0x10
+[MandatoryObjects]
+SupportedObjects=3
+1=0x1000
+2=0x1001
+3=0x1018
+[1000]
+ParameterName=Device type
+DataType=0x0007
+AccessType=ro
+DefaultValue=0x00020192
+[1001]
+ParameterName=Error register
+DataType=0x0005
+AccessType=ro
+[1018]
+ParameterName=Identity
+ObjectType=0x9
+SubNumber=2
+[1018sub0]
+ParameterName=Highest sub-index
+DataType=0x0005
+AccessType=const
+DefaultValue=1
+[1018sub1]
+ParameterName=Vendor
+DataType=0x0007
+AccessType=ro
+DefaultValue=0x1234
+[OptionalObjects]
+SupportedObjects=2
+1=0x1800
+2=0x1A00
+[1800]
+ParameterName=TPDO 1
+ObjectType=0x9
+SubNumber=3
+[1800sub0]
+ParameterName=Highest sub-index
+DataType=0x0005
+AccessType=const
+DefaultValue=2
+[1800sub1]
+ParameterName=COB-ID
+DataType=0x0007
+AccessType=rw
+DefaultValue=$NODEID+0x180
+[1800sub2]
+ParameterName=Transmission type
+DataType=0x0005
+AccessType=rw
+DefaultValue=254
+[1A00]
+ParameterName=TPDO 1 mapping
+ObjectType=0x9
+SubNumber=2
+[1A00sub0]
+ParameterName=Number
+DataType=0x0005
+AccessType=rw
+DefaultValue=1
+[1A00sub1]
+ParameterName=Entry
+DataType=0x0007
+AccessType=rw
+DefaultValue=0x20000010
+[ManufacturerObjects]
+SupportedObjects=2
+1=0x2000
+2=0x2001
+[2000]
+ParameterName=Motor Temperature
+DataType=0x0003
+AccessType=ro
+PDOMapping=1
+[2001]
+ParameterName=Fan (speed)
+DataType=0x0006
+AccessType=rww
+PDOMapping=1
+)";
+
+bool files(const std::string& path, std::string& bytes) {
+    if (path == "machine/drive.eds") return bytes = eds_text, true;
+    return bytes = "No such file or directory", false;
+}
+
+Reading read_text(const std::string& text) { return read(text, "machine/arm.canopen", files); }
+MasterConfig good(const std::string& text) {
+    Reading r = read_text(text);
+    EXPECT_EQ(to_string(r, "arm"), "");
+    return r.config;
+}
+std::string said(const std::string& text) { return to_string(read_text(text), "arm"); }
+const Pdo* find(const Node& n, bool to_node, unsigned number) {
+    for (const Pdo& p : n.pdos)
+        if (p.to_node == to_node && p.number == number) return &p;
+    return nullptr;
+}
+
+TEST(CanopenConfig, a_profile_gives_objects_names_types_and_safe_values) {
+    const auto c = good(
+        "[bus]\nlink = sim:arm\nbitrate = 500k\nsync = 2ms\n[node 5 elbow]\ndevice = cia402\n"
+        "rpdo1 = controlword, target-position\ntpdo1 = statusword, position-actual-value\n"
+        "target-position.scale = 65536/360\ntarget-position.unit = deg\nstatusword.name = status\n");
+    EXPECT_EQ(c.link, "sim:arm");
+    EXPECT_EQ(c.bit_rate, 500'000U);
+    EXPECT_EQ(c.sync_period, 2 * millisecond);
+    ASSERT_EQ(c.nodes.size(), 1U);
+    const Node& n = c.nodes[0];
+    EXPECT_EQ(n.name, "elbow");
+    const Pdo* out = find(n, true, 1);
+    ASSERT_NE(out, nullptr);
+    EXPECT_EQ(out->cob, 0x205U);
+    EXPECT_EQ(out->transmission, 1);
+    ASSERT_EQ(out->objects.size(), 2U);
+    EXPECT_EQ(out->objects[0].pin, "controlword");
+    EXPECT_EQ(out->objects[0].as, PinType::u32);
+    EXPECT_EQ(out->objects[0].safe, 2U) << "quick stop";
+    EXPECT_EQ(out->objects[1].as, PinType::real);
+    EXPECT_DOUBLE_EQ(out->objects[1].scale, 65536.0 / 360);
+    EXPECT_EQ(out->objects[1].unit, "deg");
+    EXPECT_EQ(out->objects[1].safe, std::nullopt) << "a position is held";
+    const Pdo* in = find(n, false, 1);
+    ASSERT_NE(in, nullptr);
+    EXPECT_EQ(in->cob, 0x185U);
+    EXPECT_EQ(in->objects[0].pin, "status");
+    EXPECT_EQ(in->objects[0].safe, 0U) << "nobody may believe in it";
+    EXPECT_EQ(in->objects[1].as, PinType::s32);
+}
+
+TEST(CanopenConfig, a_node_without_PDOs_has_those_its_description_has_switched_on) {
+    const auto c = good("[bus]\n[node 5]\neds = drive.eds\n");
+    const Node& n = c.nodes[0];
+    EXPECT_EQ(n.name, "node-5");
+    EXPECT_EQ(n.setup.device_type, 0x20192U);
+    EXPECT_EQ(n.setup.vendor, 0x1234U);
+    EXPECT_EQ(n.setup.product, 0x10U);
+    ASSERT_EQ(n.pdos.size(), 1U);
+    EXPECT_EQ(n.pdos[0].cob, 0x185U);
+    EXPECT_EQ(n.pdos[0].transmission, 254);
+    EXPECT_EQ(n.pdos[0].objects[0].pin, "motor-temperature");
+    EXPECT_EQ(n.pdos[0].objects[0].type, Type::integer16);
+}
+
+TEST(CanopenConfig, naming_a_PDO_switches_the_others_off) {
+    const auto c = good("[bus]\n[node 5]\neds = drive.eds\nvendor = any\nrpdo2 = fan-speed\n");
+    const Node& n = c.nodes[0];
+    EXPECT_EQ(n.setup.vendor, 0U);
+    ASSERT_EQ(n.pdos.size(), 1U);
+    EXPECT_EQ(n.pdos[0].cob, 0x305U);
+    bool off = false;
+    for (const auto& w : n.setup.writes)
+        off = off || (w.index == 0x1800 && w.sub == 1 && (load<std::uint32_t>(w.data.data()) & cob_invalid) != 0);
+    EXPECT_TRUE(off);
+}
+
+TEST(CanopenConfig, a_type_is_what_its_nodes_have_in_common_and_a_node_has_the_last_word) {
+    const auto c = good(
+        "[bus]\n[defaults]\nheartbeat = 20ms\nmandatory = no\n[type drive]\ndevice = cia402\ntpdo1 = statusword\nmandatory = yes\n"
+        "[node 1 a]\ntype = drive\n[node 2 b]\ntype = drive\nheartbeat = 40ms\ntpdo1 = statusword, modes-of-operation-display\n");
+    EXPECT_EQ(c.nodes[0].setup.heartbeat_ms, 20);
+    EXPECT_TRUE(c.nodes[0].setup.mandatory);
+    EXPECT_EQ(c.nodes[1].setup.heartbeat_ms, 40);
+    EXPECT_EQ(c.nodes[0].pdos[0].objects.size(), 1U);
+    EXPECT_EQ(c.nodes[1].pdos[0].objects.size(), 2U);
+}
+
+TEST(CanopenConfig, inputs_and_outputs_are_a_pin_a_bit) {
+    const auto c = good(
+        "[bus]\n[node 3 io]\ndevice = cia401\ntpdo1 = read-inputs-1, read-inputs-2\nread-inputs-2.bits = home, -, limit-max\nrpdo1 = "
+        "write-outputs-1\n"
+        "write-outputs-1.name = out-##\n");
+    const auto& in = find(c.nodes[0], false, 1)->objects;
+    ASSERT_EQ(in[0].bit_pins.size(), 8U);
+    EXPECT_EQ(in[0].bit_pins[7].name, "read-inputs-1-7");
+    ASSERT_EQ(in[1].bit_pins.size(), 2U);
+    EXPECT_EQ(in[1].bit_pins[1].name, "limit-max");
+    EXPECT_EQ(in[1].bit_pins[1].bit, 2U);
+    EXPECT_EQ(find(c.nodes[0], true, 1)->objects[0].bit_pins[3].name, "out-03");
+    EXPECT_EQ(find(c.nodes[0], true, 1)->objects[0].safe, 0U);
+}
+
+TEST(CanopenConfig, axes_of_one_node_have_names_of_their_own) {
+    const auto c = good(
+        "[bus]\n[node 8 base]\ndevice = cia402\naxes = 2\nrpdo1 = axis-1.controlword, axis-1.target-velocity\nrpdo65 = axis-2.controlword, "
+        "axis-2.target-velocity\n");
+    EXPECT_EQ(find(c.nodes[0], true, 65)->objects[0].index, 0x6840);
+    EXPECT_EQ(find(c.nodes[0], true, 65)->objects[0].pin, "axis-2.controlword");
+    const auto cob = find(c.nodes[0], true, 65)->cob;
+    EXPECT_GT(cob, 0x200U) << "a free one";
+    EXPECT_NE(cob, 0x208U);
+    EXPECT_EQ(c.nodes[0].pdos.size(), 2U);
+}
+
+TEST(CanopenConfig, writes_are_made_of_the_object_s_type) {
+    const auto c = good(
+        "[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\nwrite modes-of-operation = 8\nwrite 0x6099:1 = 1000\nwrite 0x2001:3 i16 = "
+        "-2\n");
+    std::vector<std::pair<std::uint16_t, std::size_t>> seen;
+    for (const auto& w : c.nodes[0].setup.writes)
+        if (w.index >= 0x2000) seen.emplace_back(w.index, w.data.size());
+    EXPECT_EQ(seen, (std::vector<std::pair<std::uint16_t, std::size_t>>{{0x6060, 1}, {0x6099, 4}, {0x2001, 2}}));
+}
+
+TEST(CanopenConfig, a_safe_value_is_in_the_pin_s_unit) {
+    const auto c = good(
+        "[bus]\n[node 1]\ndevice = cia402\nrpdo1 = controlword, target-velocity\ntarget-velocity.scale = 100\ntarget-velocity.safe = "
+        "-2.5\ncontrolword.safe = hold\n");
+    const auto& o = c.nodes[0].pdos[0].objects;
+    EXPECT_EQ(o[0].safe, std::nullopt);
+    EXPECT_EQ(static_cast<std::int32_t>(*o[1].safe), -250);
+}
+
+TEST(CanopenConfig, values_beyond_an_object_are_cut_off) {
+    Object o;
+    o.type = Type::integer16, o.bits = 16;
+    EXPECT_EQ(static_cast<std::int16_t>(raw_of(o, 1e9)), 32767);
+    EXPECT_EQ(static_cast<std::int16_t>(raw_of(o, -1e9)), -32768);
+    o.type = Type::unsigned8, o.bits = 8;
+    EXPECT_EQ(raw_of(o, -1), 0U);
+    EXPECT_EQ(raw_of(o, 256), 255U);
+    EXPECT_EQ(raw_of(o, std::numeric_limits<double>::quiet_NaN()), 0U);
+}
+
+TEST(CanopenConfig, what_is_wrong_is_said_with_its_place_and_what_to_type) {
+    EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statuswort\n"),
+              "arm:4:9: the node has no object 'statuswort'; did you mean 'statusword'?");
+    EXPECT_EQ(said("[bus]\n[node 5]\neds = motor.eds\n"),
+              "arm:3:7: the file 'motor.eds' cannot be read: No such file or directory; a name without / at its beginning is looked for "
+              "beside this file");
+    EXPECT_EQ(said("[bus]\n[node 128]\n"),
+              "arm:2:7: a node section is named by the node's id, 1 to 127, and a name of your own; write [node 5 NAME]");
+    EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statusword, position-actual-value, velocity-actual-value\n"),
+              "arm:4:9: these objects are 80 bits together; a PDO carries 64; move some to another PDO");
+    EXPECT_EQ(said("link = can:can0\n"),
+              "arm:1:1: this line stands before the first section; begin the file with [bus]\n"
+              "arm:1:1: there is no section [bus]; write [bus] and below it link = can:can0 and bitrate = 1M");
+}
+
+TEST(CanopenConfig, by_index_inputs_go_to_the_node_and_outputs_come_from_it) {
+    const Reading r = read(ByIndex{"24831", "24675,25600/16", "", 2, 1}, files);
+    ASSERT_TRUE(r.good()) << to_string(r, "");
+    const Node& n = r.config.nodes[0];
+    EXPECT_EQ(r.config.node_id, 1);
+    EXPECT_EQ(n.setup.id, 2);
+    ASSERT_NE(find(n, true, 1), nullptr);
+    EXPECT_EQ(find(n, true, 1)->objects[0].index, 0x60ff);
+    EXPECT_EQ(find(n, true, 1)->objects[0].pin, "24831");
+    EXPECT_EQ(find(n, true, 1)->transmission, 255);
+    ASSERT_NE(find(n, false, 2), nullptr);
+    EXPECT_EQ(find(n, false, 1)->objects[0].index, 0x6063);
+    EXPECT_EQ(find(n, false, 2)->objects[0].bits, 16);
+    EXPECT_FALSE(read(ByIndex{"speed", "", "", 2, 1}, files).good());
+}
+
+/// Axes with a statusword and a position each way.
+std::string axes(unsigned count, const std::string& bus) {
+    std::string text = "[bus]\n" + bus +
+                       "[type drive]\ndevice = cia402\nheartbeat = 100ms\ntpdo1 = statusword, position-actual-value\nrpdo1 = controlword, "
+                       "target-position\n";
+    for (unsigned n = 1; n <= count; ++n) text += "[node " + std::to_string(n) + " axis-" + std::to_string(n) + "]\ntype = drive\n";
+    return text;
+}
+
+TEST(CanopenSchedule, says_how_many_axes_fit_into_a_millisecond) {
+    // A frame of 6 bytes has at most 117 bits with its intermission, two for each axis, and the SYNC 55.
+    const auto share = [](unsigned n) { return schedule_of(good(axes(n, "sync = 1ms\n")), millisecond).sync_share; };
+    EXPECT_NEAR(share(4), 0.055e-3 / 1e-3 + 4 * 2 * 0.000115 / 1e-3, 1e-9);
+    EXPECT_TRUE(load_messages(good(axes(3, "sync = 1ms\n")), millisecond, "arm").empty());
+    EXPECT_FALSE(load_messages(good(axes(8, "sync = 1ms\n")), millisecond, "arm").empty());
+    EXPECT_TRUE(load_messages(good(axes(8, "sync = 2500us\n")), millisecond, "arm").empty());
+}
+
+}  // namespace
+}  // namespace hal::canopen::config
