@@ -93,6 +93,7 @@ private:
     void go_back_home() noexcept;
     void guard_limits(const Motion& before, double dt) noexcept;
     bool blocked(int direction) const noexcept;
+    Range software_limits() const noexcept;  // encoder
     double within_limits(double target) noexcept;
     double absolute(std::int32_t target, double near) const noexcept;
     double nearest(std::int32_t target, double near) const noexcept;

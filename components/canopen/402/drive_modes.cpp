@@ -77,11 +77,18 @@ double DriveAxis::nearest(std::int32_t target, double near) const noexcept {
     return encoder(target + round * std::round((user(near) - target) / round));
 }
 
+Range DriveAxis::software_limits() const noexcept {
+    using Limits = std::numeric_limits<std::int32_t>;
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    const auto low = objects_.software_min, high = objects_.software_max;
+    if (low >= high) return {-infinity, infinity};
+    const double from = low == Limits::min() ? -infinity : low, to = high == Limits::max() ? infinity : high;
+    return units_.position > 0 ? Range{encoder(from), encoder(to)} : Range{encoder(to), encoder(from)};
+}
+
 double DriveAxis::within_limits(double target) noexcept {
-    double low = encoder(objects_.software_min), high = encoder(objects_.software_max);
-    if (objects_.software_min >= objects_.software_max) return target;
-    if (low > high) std::swap(low, high);
-    const double result = std::clamp(target, low, high);
+    const auto limits = software_limits();
+    const double result = std::clamp(target, limits.from, limits.to);
     if (result != target) limited_ = true;
     return result;
 }
@@ -223,14 +230,12 @@ void DriveAxis::guard_limits(const Motion& before, double dt) noexcept {
     const double rate = stop_rate(Stop::quick_stop);
     if (loop_ == Control::position) wanted_ = ref_.position - (guard_ != 0 ? guarded_.position : before.position);
     if (guard_ == 0) {
-        double low = encoder(objects_.software_min), high = encoder(objects_.software_max);
-        if (low > high) std::swap(low, high);
         // A set-point that is a position is within the software limits already; the others stop in time.
-        const bool limits = objects_.software_min < objects_.software_max && loop_ != Control::position;
+        const auto limits = loop_ == Control::position ? Range{-HUGE_VAL, HUGE_VAL} : software_limits();
         const double speed = now_speed(), way = 0.5 * speed * speed / rate;
         for (const int direction : {1, -1}) {
-            const bool beyond = limits && (direction > 0 ? measured_ + (speed > 0 ? way : 0) >= high
-                                                         : measured_ - (speed < 0 ? way : 0) <= low);
+            const bool beyond = direction > 0 ? measured_ + (speed > 0 ? way : 0) >= limits.to
+                                              : measured_ - (speed < 0 ? way : 0) <= limits.from;
             const bool heads = wanted_ * direction > 0 || (loop_ == Control::velocity && ref_.velocity * direction > 0);
             if (!heads || !(blocked(direction) || beyond)) continue;
             guard_ = direction;
@@ -308,13 +313,16 @@ void DriveAxis::profile_position(double dt) noexcept {
         ramp(ref_, 0, stop_rate(stop), stop_rate(stop), dt);
         return;
     }
-    double left = profile_.step(ref_, dt);
-    while (profile_.done() && active_set_point_.limits.end_velocity > 0 && set_points_.count != 0) {
+    const auto start_next = [&] {
         const SetPoint next = set_points_.front();
         set_points_.pop();
         start_set_point(next);
+    };
+    if (reached_ && set_points_.count != 0) start_next();
+    double left = profile_.step(ref_, dt);
+    while (profile_.done() && active_set_point_.limits.end_velocity > 0 && set_points_.count != 0 && left > 0) {
+        start_next();
         left = profile_.step(ref_, left);
-        if (left <= 0) break;
     }
     if (!profile_.done()) return;
     ref_.position += ref_.velocity * left;  // with an end velocity and nothing after it, it goes on
@@ -323,11 +331,6 @@ void DriveAxis::profile_position(double dt) noexcept {
     if (ref_.velocity == 0 && !there) reached_time_ = 0;
     else reached_time_ += dt;
     reached_ = reached_time_ * 1000 >= objects_.position_window_time || ref_.velocity != 0;
-    if (reached_ && set_points_.count != 0) {
-        const SetPoint next = set_points_.front();
-        set_points_.pop();
-        start_set_point(next);
-    }
 }
 
 // Profile velocity, vl, profile torque.

@@ -2,14 +2,18 @@
 // The loops:
 //     v* = v_ref + k_p (x_ref − x)                              position, P with feed-forward
 //     a  = k_v (v* − v) + ∫ k_i k_v (v* − v) dt                 velocity, PI
-//     T  = J (a + a_ref) + b v_ref + T_c sgn v_ref + offset     within the torque limits; the integral waits while they act
-// x_ref is the demand at the beginning of the step, v_ref and a_ref those of the step.
+//     T  = J (a + a_ref) + b v_ref + T_c sgn v* + offset        within the torque limits; the integral waits while they act
+// x_ref is the demand at the beginning of the step, v_ref and a_ref those of the step. Around 0 sgn is a slope, or it would chatter.
 #include <algorithm>
 #include <cmath>
 
 #include "drive_axis.hpp"
 
 namespace hal::canopen::cia402 {
+
+namespace {
+constexpr double slow = 0.5;  // rad/s
+}
 
 double DriveAxis::servo(double dt) noexcept {
     const auto& motor = settings_.motor;
@@ -30,6 +34,7 @@ double DriveAxis::servo(double dt) noexcept {
         // At the highest speed no torque drives it faster.
         const double room = gain.velocity * motor.inertia;
         torque = std::clamp(torque, std::min(0.0, (-most - speed) * room), std::max(0.0, (most - speed) * room));
+        if (torque != torque_ref_) limited_ = true;
     } else {
         double wanted = ref_.velocity / increments;
         if (loop_ == Control::position) wanted += gain.position * (demand_before_ - measured_) / increments;
@@ -37,7 +42,7 @@ double DriveAxis::servo(double dt) noexcept {
         if (limited != wanted) limited_ = true;
         velocity_wanted_ = limited * increments;
         const double error = limited - speed, ahead = ref_.velocity / increments;
-        const double friction = motor.viscous_friction * ahead + (ahead != 0 ? std::copysign(motor.coulomb_friction, ahead) : 0);
+        const double friction = motor.viscous_friction * ahead + motor.coulomb_friction * std::clamp(limited / slow, -1.0, 1.0);
         const double offset = mode_ == Mode::cyclic_position || mode_ == Mode::cyclic_velocity ? torque_of(objects_.torque_offset) : 0;
         torque = motor.inertia * (gain.velocity * error + integral_ + gain.feed_forward * ref_.acceleration / increments) +
                  gain.feed_forward * friction + offset;

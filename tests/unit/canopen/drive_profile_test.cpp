@@ -1,0 +1,460 @@
+// SPDX-License-Identifier: MIT
+// Modes in which the drive makes its own set-points: pp with its handshake, pv, vl, tq.
+#include "drive_bench.hpp"
+
+namespace hal::canopen::test {
+namespace {
+
+struct DriveProfile : DriveBench {
+    void ready(Mode mode) {
+        settings.axis[0].motor.endless();
+        make();
+        set(object::profile_velocity, 40000);
+        set(object::profile_acceleration, 100000);
+        set(object::profile_deceleration, 200000);
+        enable(mode);
+    }
+    bool reached() { return bit(status::target_reached); }
+    bool acknowledged() { return bit(status::set_point_acknowledge); }
+    void go(std::int32_t target, std::uint16_t bits = 0) {
+        set(object::target_position, target);
+        control(static_cast<std::uint16_t>(0x1f | bits));
+        EXPECT_TRUE(acknowledged());
+        control(static_cast<std::uint16_t>(0x0f | bits));
+    }
+    std::int32_t demand() { return get<std::int32_t>(object::position_demand); }
+    std::int32_t demanded_velocity() { return get<std::int32_t>(object::velocity_demand); }
+};
+
+// Up in 0.4 s over 8000, down in 0.2 s over 4000, at 40 000 per s in between.
+
+TEST_F(DriveProfile, Position_takes_the_time_of_its_trapezoid) {
+    ready(Mode::profile_position);
+    go(32000);
+    EXPECT_FALSE(reached());
+    run(398);
+    EXPECT_NEAR(demand(), 8000, 100);
+    EXPECT_NEAR(demanded_velocity(), 40000, 200);
+    EXPECT_NEAR(velocity(), 40000, 400);
+    run(500);
+    EXPECT_NEAR(demand(), 28000, 100);
+    run(198);
+    EXPECT_NEAR(demand(), 32000, 5);
+    EXPECT_TRUE(until([&] { return reached(); }, 40));
+    EXPECT_NEAR(position(), 32000, 10);
+    EXPECT_EQ(demand(), 32000);
+}
+TEST_F(DriveProfile, Position_without_cruising_peaks_where_the_ramps_meet) {
+    ready(Mode::profile_position);
+    go(-3000);  // the peak is sqrt(2·3000 / (1/1e5 + 1/2e5)) = 20 000
+    std::int32_t peak = 0;
+    ASSERT_TRUE(until([&] { return peak = std::min(peak, demanded_velocity()), reached(); }, 1000));
+    EXPECT_NEAR(peak, -20000, 300);
+    EXPECT_NEAR(position(), -3000, 10);
+}
+TEST_F(DriveProfile, Handshake_answers_each_edge_of_bit_4_once) {
+    ready(Mode::profile_position);
+    EXPECT_FALSE(acknowledged());
+    set(object::target_position, 10000);
+    control(0x1f);
+    EXPECT_TRUE(acknowledged());
+    set(object::target_position, 20000);  // without an edge it is nothing
+    run(5);
+    EXPECT_TRUE(acknowledged());
+    control(0x0f);
+    EXPECT_FALSE(acknowledged());
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 10000, 10);
+    control(0x1f);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 20000, 10);
+}
+TEST_F(DriveProfile, Set_of_set_points_goes_to_one_after_the_other_and_stops_at_each) {
+    ready(Mode::profile_position);
+    const std::int32_t targets[] = {8000, 2000, 12000};
+    for (const auto t : targets) go(t);
+    for (const auto t : targets) {
+        ASSERT_TRUE(until([&] { return reached(); }));
+        EXPECT_NEAR(position(), t, 10);
+        EXPECT_NEAR(velocity(), 0, 300);
+        until([&] { return !reached(); }, 3);
+    }
+    run(500);
+    EXPECT_NEAR(position(), 12000, 10);
+}
+TEST_F(DriveProfile, Full_buffer_keeps_the_acknowledge_until_there_is_room) {
+    ready(Mode::profile_position);
+    for (int n = 1; n <= 4; ++n) go(1000 * n);
+    set(object::target_position, 5000);
+    control(0x1f);
+    control(0x0f);  // one under way, four behind it
+    EXPECT_TRUE(acknowledged());
+    set(object::target_position, 99000);
+    control(0x1f);  // not taken
+    control(0x0f);
+    ASSERT_TRUE(until([&] { return !acknowledged(); }));
+    EXPECT_NEAR(position(), 1000, 20);
+    ASSERT_TRUE(until([&] { return position() > 4990; }));
+    run(500);
+    EXPECT_NEAR(position(), 5000, 10);
+    EXPECT_TRUE(reached());
+}
+TEST_F(DriveProfile, Change_immediately_turns_round_at_once) {
+    ready(Mode::profile_position);
+    go(32000);
+    go(20000);  // would come after it
+    run(600);
+    const auto was = position();
+    go(0, control::change_immediately);
+    run(150);
+    EXPECT_LT(velocity(), 20000);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 0, 10);
+    EXPECT_GT(was, 10000);
+    run(100);
+    EXPECT_NEAR(position(), 0, 10);  // what waited is dropped
+}
+TEST_F(DriveProfile, Change_on_set_point_passes_it_without_a_stop) {
+    ready(Mode::profile_position);
+    go(16000);
+    go(40000, control::change_on_set_point);
+    ASSERT_TRUE(until([&] { return demand() >= 15990; }));
+    EXPECT_NEAR(demanded_velocity(), 40000, 200);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 40000, 10);
+    // 0.4 s up, 0.2 s down, the rest at full speed
+    go(0, control::change_on_set_point);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 0, 10);
+}
+TEST_F(DriveProfile, Change_on_set_point_slows_down_for_a_near_next_one) {
+    ready(Mode::profile_position);
+    go(16000);
+    go(17000, control::change_on_set_point);  // 1000 at 200 000 per s²: at most 20 000 per s at the first
+    ASSERT_TRUE(until([&] { return demand() >= 16000; }));
+    EXPECT_NEAR(demanded_velocity(), 20000, 600);
+    std::int32_t highest = 0;
+    ASSERT_TRUE(until([&] { return highest = std::max(highest, demand()), reached(); }));
+    EXPECT_EQ(highest, 17000);
+}
+TEST_F(DriveProfile, End_velocity_is_kept_beyond_the_target) {
+    ready(Mode::profile_position);
+    set(object::end_velocity, 5000);
+    go(10000);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    run(1000);
+    EXPECT_NEAR(velocity(), 5000, 200);
+    EXPECT_NEAR(position(), 15000, 100);
+}
+TEST_F(DriveProfile, Relative_counts_from_target_demand_or_actual_position) {
+    ready(Mode::profile_position);
+    go(10000);
+    go(5000, control::relative);
+    ASSERT_TRUE(until([&] { return position() > 14990 && reached(); }));
+    EXPECT_NEAR(position(), 15000, 10);
+    go(-5000, control::relative | control::change_immediately);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 10000, 10);
+    for (const int option : {1, 2}) {
+        set(object::positioning_option, option);
+        go(20000, control::relative | control::change_immediately);
+        run(400);
+        const auto here = demand();
+        go(1000, control::relative | control::change_immediately);
+        ASSERT_TRUE(until([&] { return reached(); }));
+        EXPECT_NEAR(position(), here + 1000, 100);
+    }
+}
+TEST_F(DriveProfile, Halt_stops_and_lets_it_go_on) {
+    ready(Mode::profile_position);
+    go(32000);
+    run(600);
+    control(0x10f);
+    ASSERT_TRUE(until([&] { return reached(); }, 300));
+    EXPECT_NEAR(velocity(), 0, 300);
+    const auto here = position();
+    run(200);
+    EXPECT_NEAR(position(), here, 30);
+    control(0x0f);
+    EXPECT_FALSE(reached());
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 32000, 10);
+}
+TEST_F(DriveProfile, Limits_of_velocity_and_acceleration_hold) {
+    ready(Mode::profile_position);
+    set(object::max_profile_velocity, 20000);
+    set(object::max_acceleration, 50000);
+    set(object::max_deceleration, 50000);
+    go(40000);
+    run(395);
+    EXPECT_NEAR(demanded_velocity(), 20000, 300);
+    run(400);
+    EXPECT_NEAR(velocity(), 20000, 200);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    set(object::max_profile_velocity, 0);
+    set(object::max_motor_speed, 60);  // r/min: 4096 per s
+    go(0);
+    run(1000);
+    EXPECT_NEAR(velocity(), -4096, 100);
+}
+TEST_F(DriveProfile, Software_limit_cuts_the_target) {
+    ready(Mode::profile_position);
+    set(object::software_position_limit, -5000, 0, 1);
+    set(object::software_position_limit, 5000, 0, 2);
+    set(object::target_position, 20000);
+    control(0x1f);
+    EXPECT_TRUE(bit(status::internal_limit));
+    control(0x0f);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 5000, 10);
+}
+TEST_F(DriveProfile, Limit_switch_stops_it_and_lets_it_back) {
+    settings.axis[0].motor.positive_limit = 20000;
+    settings.axis[0].motor.positive_stop = 30000;
+    make();
+    set(object::quick_stop_deceleration, 400000);
+    enable(Mode::profile_position);
+    set(object::target_position, 40000);
+    control(0x1f);
+    control(0x0f);
+    ASSERT_TRUE(until([&] { return (get<std::uint32_t>(object::digital_inputs) & input::positive_limit) != 0; }));
+    run(300);
+    EXPECT_NEAR(velocity(), 0, 10);
+    EXPECT_LT(position(), 23000);
+    EXPECT_EQ(state(), State::operation_enabled);
+    EXPECT_TRUE(bit(status::warning));
+    const auto here = position();
+    go(41000);
+    run(300);
+    EXPECT_NEAR(position(), here, 30);
+    go(10000);
+    ASSERT_TRUE(until([&] { return position() < 10010; }));
+    EXPECT_FALSE(bit(status::warning));
+}
+TEST_F(DriveProfile, Gear_feed_and_polarity_make_the_unit) {
+    settings.axis[0].motor.endless();
+    make();
+    set(object::gear_ratio, 5, 0, 1);
+    set(object::feed_constant, 1000, 0, 1);  // 5 turns are 1000 units: 20.48 increments each
+    set(object::polarity, 0x80);
+    set(object::profile_velocity, 2000);
+    set(object::profile_acceleration, 10000);
+    set(object::profile_deceleration, 10000);
+    set(object::max_acceleration, 0);
+    set(object::max_deceleration, 0);
+    enable(Mode::profile_position);
+    go(1000);
+    run(450);
+    EXPECT_NEAR(drive->status(0).speed, -600, 10);
+    EXPECT_NEAR(velocity(), -2000, 40);  // of bit 6, not of bit 7
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(drive->status(0).place, -20480, 220);
+    run(100);
+    EXPECT_NEAR(position(), 1000, 1);
+    EXPECT_NEAR(get<std::int32_t>(object::position_actual_internal), -20480, 3);
+}
+TEST_F(DriveProfile, Units_cannot_change_while_it_follows_them) {
+    ready(Mode::profile_position);
+    EXPECT_EQ(write(object::gear_ratio, 1, 2), Abort::device_state);
+    EXPECT_EQ(write(object::polarity, 0, 0x80), Abort::device_state);
+    control(0x06);
+    EXPECT_EQ(write(object::gear_ratio, 1, 2), Abort::none);
+}
+TEST_F(DriveProfile, Rotary_axis_goes_round) {
+    ready(Mode::profile_position);
+    set(object::position_range_limit, 0, 0, 1);
+    set(object::position_range_limit, 4095, 0, 2);
+    const auto turns = [&] { return std::lround((drive->status(0).place - position()) / 4096); };
+    go(4000);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 4000, 10);
+    EXPECT_EQ(turns(), 0);
+    set(object::positioning_option, 3 << 6);  // the shortest way
+    go(100);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 100, 10);
+    EXPECT_EQ(turns(), 1);
+    set(object::positioning_option, 2 << 6);  // forwards only
+    go(50);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 50, 10);
+    EXPECT_EQ(turns(), 2);
+    set(object::positioning_option, 1 << 6);  // backwards only
+    go(3000);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 3000, 10);
+    EXPECT_EQ(turns(), 1);
+    set(object::positioning_option, 0);
+    go(5000, control::relative);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_NEAR(position(), 8000 - 4096, 10);
+}
+TEST_F(DriveProfile, Endless_axis_passes_the_end_of_32_bits) {
+    settings.axis[0].motor.endless();
+    settings.axis[0].motor.resolution = 1 << 24;
+    make();
+    enable(Mode::profile_velocity);
+    set(object::profile_acceleration, 0xffffffff);
+    set(object::max_acceleration, 0);
+    set(object::target_velocity, 1 << 30);
+    run(2300);
+    EXPECT_LT(position(), 0);  // 2.4e9 − 2³²
+    EXPECT_EQ(state(), State::operation_enabled);
+}
+TEST_F(DriveProfile, Position_window_off_means_reached_with_the_trajectory) {
+    ready(Mode::profile_position);
+    set(object::position_window, 0xffffffff);
+    set(object::position_window_time, 0);
+    go(3000);
+    ASSERT_TRUE(until([&] { return reached(); }));
+    EXPECT_EQ(demand(), 3000);
+}
+
+// pv.
+
+TEST_F(DriveProfile, Velocity_ramps_reaches_and_says_when_it_stands) {
+    ready(Mode::profile_velocity);
+    run(10);
+    EXPECT_TRUE(reached());
+    EXPECT_TRUE(bit(status::speed_is_zero));
+    set(object::target_velocity, 30000);
+    run(150);
+    EXPECT_NEAR(demanded_velocity(), 15000, 200);
+    EXPECT_FALSE(reached());
+    EXPECT_FALSE(bit(status::speed_is_zero));
+    run(170);
+    EXPECT_TRUE(reached());
+    EXPECT_NEAR(velocity(), 30000, 300);
+    set(object::target_velocity, -30000);
+    run(150);  // down by 200 000 per s²
+    EXPECT_NEAR(demanded_velocity(), 0, 250);
+    run(300);  // up by 100 000
+    EXPECT_NEAR(demanded_velocity(), -30000, 250);
+    EXPECT_TRUE(until([&] { return reached(); }, 50));
+    control(0x10f);
+    run(200);
+    EXPECT_TRUE(bit(status::speed_is_zero));
+    control(0x0f);
+    run(400);
+    EXPECT_NEAR(velocity(), -30000, 300);
+}
+TEST_F(DriveProfile, Velocity_polarity_turns_it_round) {
+    settings.axis[0].motor.endless();
+    make();
+    set(object::polarity, 0x40);
+    enable(Mode::profile_velocity);
+    set(object::target_velocity, 10000);
+    run(300);
+    EXPECT_NEAR(velocity(), 10000, 100);
+    EXPECT_NEAR(drive->status(0).speed, -146.5, 2);
+}
+TEST_F(DriveProfile, Velocity_stops_at_the_software_limit) {
+    ready(Mode::profile_velocity);
+    set(object::software_position_limit, 20000, 0, 2);
+    set(object::software_position_limit, -20000, 0, 1);
+    for (const int sign : {1, -1, 1}) {
+        set(object::target_velocity, sign * 40000);
+        run(3000);
+        EXPECT_NEAR(position(), sign * 20000, 100);
+        EXPECT_NEAR(velocity(), 0, 10);
+        EXPECT_TRUE(bit(status::internal_limit));
+    }
+}
+TEST_F(DriveProfile, Velocity_slippage_is_seen_when_the_motor_cannot_follow) {
+    ready(Mode::profile_velocity);
+    set(object::max_slippage, 1000);
+    set(object::max_torque, 100);
+    drive->set_load_torque(0, -0.2);
+    set(object::target_velocity, 20000);
+    run(100);
+    EXPECT_TRUE(bit(status::max_slippage));
+    EXPECT_TRUE(bit(status::internal_limit));
+    EXPECT_LT(velocity(), 0);
+}
+
+// vl, in r/min.
+
+TEST_F(DriveProfile, Vl_follows_its_ramp_bits) {
+    ready(Mode::velocity);
+    set(object::vl_velocity_acceleration, 1000, 0, 1);
+    set(object::vl_velocity_acceleration, 1, 0, 2);
+    set(object::vl_target_velocity, 600);
+    const auto actual = [&] { return get<std::int16_t>(object::vl_control_effort); };
+    run(100);
+    EXPECT_EQ(actual(), 0);
+    control(0x7f);
+    run(300);
+    EXPECT_NEAR(actual(), 300, 10);
+    control(0x5f);  // the ramp is locked
+    run(300);
+    EXPECT_NEAR(actual(), 300, 10);
+    control(0x7f);
+    run(400);
+    EXPECT_NEAR(actual(), 600, 5);
+    EXPECT_NEAR(drive->status(0).speed, 600, 5);
+    control(0x3f);  // the ramp's input is 0
+    run(300);
+    EXPECT_NEAR(actual(), 300, 10);
+    control(0x7f);
+    run(1000);
+    control(0x6f);  // the ramp is off: quick stop ramp, 5000 r/min per s
+    run(150);
+    EXPECT_NEAR(actual(), 0, 5);
+}
+TEST_F(DriveProfile, Vl_keeps_to_its_amounts_and_factors) {
+    ready(Mode::velocity);
+    set(object::vl_velocity_min_max, 100, 0, 1);
+    set(object::vl_velocity_min_max, 400, 0, 2);
+    control(0x7f);
+    const auto settle = [&](int target) {
+        set(object::vl_target_velocity, target);
+        run(1200);
+        return drive->status(0).speed;
+    };
+    EXPECT_NEAR(settle(50), 100, 2);
+    EXPECT_NEAR(settle(-1000), -400, 2);
+    EXPECT_NEAR(settle(0), 0, 2);
+    set(object::vl_dimension_factor, 3, 0, 1);
+    EXPECT_NEAR(settle(100), 300, 2);
+    EXPECT_NEAR(get<std::int16_t>(object::vl_control_effort), 100, 1);
+    set(object::vl_set_point_factor, 2, 0, 2);
+    EXPECT_NEAR(settle(-200), -300, 2);
+}
+
+// tq.
+
+TEST_F(DriveProfile, Torque_rises_by_its_slope_and_accelerates_by_inertia) {
+    settings.axis[0].motor.coulomb_friction = 0;
+    settings.axis[0].motor.viscous_friction = 0;
+    ready(Mode::profile_torque);
+    set(object::torque_slope, 1000);
+    set(object::target_torque, 100);  // 0.03 N·m
+    run(50);
+    EXPECT_NEAR(get<std::int16_t>(object::torque_demand), 50, 2);
+    EXPECT_FALSE(reached());
+    run(60);
+    EXPECT_EQ(get<std::int16_t>(object::torque_demand), 100);
+    EXPECT_TRUE(reached());
+    const double before = drive->status(0).speed;
+    run(100);  // 0.03 / 5e-5 = 600 rad/s²
+    EXPECT_NEAR((drive->status(0).speed - before) * std::acos(-1.0) / 30, 60, 0.6);
+}
+TEST_F(DriveProfile, Torque_keeps_to_the_highest_speed_and_the_torque_limits) {
+    ready(Mode::profile_torque);
+    set(object::max_motor_speed, 1000);
+    set(object::target_torque, 500);
+    run(1000);
+    EXPECT_NEAR(drive->status(0).speed, 1000, 20);
+    EXPECT_TRUE(bit(status::internal_limit));
+    set(object::max_motor_speed, 6000);
+    set(object::positive_torque_limit, 100);
+    run(50);
+    EXPECT_EQ(get<std::int16_t>(object::torque_actual), 100);
+    set(object::target_torque, -500);
+    set(object::negative_torque_limit, 50);
+    run(100);
+    EXPECT_EQ(get<std::int16_t>(object::torque_actual), -50);
+}
+
+}  // namespace
+}  // namespace hal::canopen::test
