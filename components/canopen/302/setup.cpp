@@ -46,8 +46,7 @@ void take_assignment(NodeSetup& node, std::uint32_t object_1f81) {
 std::vector<std::string> problems_of(const MasterSetup& setup) {
     std::vector<std::string> problems;
     const auto say = [&](const NodeSetup& n, const std::string& what) { problems.push_back("node " + std::to_string(n.id) + ' ' + what); };
-    if (setup.id < 1 || setup.id > 127)
-        problems.push_back("the master's node id is " + std::to_string(setup.id) + "; it has to be 1 to 127");
+    if (setup.id > 127) problems.push_back("the master's node id is " + std::to_string(setup.id) + "; it has to be 1 to 127");
     std::array<bool, 256> seen{};
     for (const auto& n : setup.nodes) {
         if (n.id < 1 || n.id > 127) say(n, "cannot be: node ids are 1 to 127");
@@ -61,6 +60,7 @@ std::vector<std::string> problems_of(const MasterSetup& setup) {
             say(n, "gets no value for object " + std::string(object.data()) + "; give it one or take the object out");
         }
         if (n.writes.size() > 60000) say(n, "gets " + std::to_string(n.writes.size()) + " objects; 60000 are the most");
+        if (n.master_limit_ms != 0 && setup.id == 0) say(n, "is to watch the master, which has no node id; give the master one");
         if (n.guard_ms != 0 && n.guard_factor == 0) say(n, "is guarded with the factor 0; 3 is usual");
         if (n.heartbeat_limit > 0 && n.heartbeat_limit <= n.heartbeat_ms * millisecond)
             say(n, "is lost after " + std::to_string(n.heartbeat_limit / millisecond) + " ms of silence but sends its heartbeat every " +

@@ -64,7 +64,7 @@ struct NodeSetup {
 };
 
 struct MasterSetup {
-    std::uint8_t id = 127;              ///< our own node id: whose heartbeat the nodes watch
+    std::uint8_t id = 127;              ///< our own node id: whose heartbeat the nodes watch; 0: we have none
     std::vector<NodeSetup> nodes{};
     bool start_all_at_once = false;     ///< one command to all, when all mandatory nodes are ready (1F80h bit 1)
     bool start_self = true;             ///< we become operational with the network; false: the application says when (1F80h bit 2)

@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "canopen/302/master.hpp"
 #include "canopen/device.hpp"
-#include "canopen/network.hpp"
 
 namespace {
 bool counting = false;
@@ -96,6 +96,76 @@ TEST(Memory, Is_not_taken_after_setup) {
     EXPECT_EQ(taken, 0);
     EXPECT_EQ(node.emergency(0).code, 0x5000);
     EXPECT_EQ(device.pdos().tpdo(1).count, 1U);
+}
+
+TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
+    const auto with_program = [] {
+        Description d = basic_device({.vendor = 1});
+        d.add(0x1010, 1, Type::unsigned32, Access::read_write, 1);
+        d.add(0x1011, 1, Type::unsigned32, Access::read_write, 1);
+        d.add_domain(0x1f50, 1, Access::read_write, 5000);
+        d.add(0x1f51, 1, Type::unsigned8, Access::read_write, 1);
+        d.add(0x1f56, 1, Type::unsigned32, Access::read_only, 6);
+        d.add(0x2000, 0, Type::unsigned32, Access::read_write).mappable();
+        add_tpdo(d, 1, {.mapping = {map_entry(0x2000, 0, 32)}});
+        return d;
+    };
+    Events events;
+    Device good(with_program(), {.node_id = 5}, events), wrong(with_program(), {.node_id = 6}, events);
+    NodeSetup n;
+    n.id = 5;
+    n.vendor = 1;
+    n.writes = tpdo_writes(1, {.transmission = 1, .mapping = {map_entry(0x2000, 0, 32)}}, 5);
+    n.restore = n.save = true;
+    n.heartbeat_ms = 20;
+    n.master_limit_ms = 500;
+    n.retry = 50 * millisecond, n.retry_most = 100 * millisecond;
+    MasterSetup setup;
+    setup.sdo.timeout = 20 * millisecond;
+    setup.nodes = {n, n, n};
+    setup.nodes[1].id = 6, setup.nodes[2].id = 7;
+    setup.nodes[1].program = {.id = 7, .update = true, .image = std::vector<std::uint8_t>(3000), .limit = 100 * millisecond};
+    setup.nodes[2].mandatory = false;
+    FrameQueue out(1024);
+    MasterEvents told;
+    Master master(setup, out, told);
+    Time now = 0;
+    bool plugged = true;
+    const auto run = [&](Time time) {
+        for (const Time end = now + time; now < end; now += millisecond) {
+            for (int turn = 0; turn < 20; ++turn) {
+                for (Frame f; out.pop(f);)
+                    for (auto* d : {&good, &wrong})
+                        if (plugged || d == &wrong) d->handle(f, now);
+                for (auto* d : {&good, &wrong})
+                    for (Frame f; d->out().pop(f);)
+                        if (plugged || d == &wrong) master.handle(f, now);
+            }
+            good.poll(now), wrong.poll(now), master.poll(now);
+        }
+    };
+
+    taken = 0;
+    counting = true;
+    good.start(now), wrong.start(now), master.start(now);
+    run(3 * second);
+    const bool was_operational = master.status(5).operational;
+    plugged = false;
+    run(second);
+    const bool was_lost = master.status(5).losses == 1;
+    plugged = true;
+    run(2 * second);
+    const bool came_back = master.status(5).operational;
+    master.command(NmtCommand::reset_node, 5, now);
+    run(second);
+    master.remove(7, now);
+    master.stop(now);
+    run(second);
+    counting = false;
+    EXPECT_EQ(taken, 0);
+    EXPECT_TRUE(was_operational && was_lost && came_back);
+    EXPECT_EQ(master.status(6).result, BootResult::update);
+    EXPECT_EQ(master.status().state, NetworkState::stopped);
 }
 
 }  // namespace
