@@ -63,9 +63,18 @@ void Bus::add(Node& node) {
     nodes.insert(std::upper_bound(nodes.begin(), nodes.end(), &node, [](auto* a, auto* b) { return a->number < b->number; }), &node);
 }
 
-void Bus::remove(Node& node) {
+void Bus::remove(std::unique_ptr<Node> node) {
+    std::vector<std::unique_ptr<Node>> gone;  // freed after the bus is let go
     const Hold hold(*this);
-    std::erase(nodes, &node);
+    node->leaving = true;
+    node->babble_period = 0;
+    leaving_.push_back(std::move(node));
+    std::erase_if(leaving_, [&](std::unique_ptr<Node>& n) {
+        if (n->outgoing.front() != nullptr && bit_rate != 0 && hears(*n)) return false;
+        std::erase(nodes, n.get());
+        gone.push_back(std::move(n));
+        return true;
+    });
 }
 
 void Bus::pump(std::int64_t now) noexcept {
@@ -115,6 +124,7 @@ std::int64_t Bus::earliest() noexcept {
             continue;
         }
         if (const Frame* f = n->outgoing.front()) first = std::min(first, std::max(f->time_ns, n->hold_until));
+        else if (n->leaving) n->cut.store(true, std::memory_order_relaxed);
         if (n->babble_period > 0) first = std::min(first, std::max(n->babble_at, n->hold_until));
     }
     return first;
@@ -294,7 +304,7 @@ void Bus::failed(Node& n, std::int64_t time) noexcept {
 
 void Bus::deliver(Node& from, const Frame& frame, std::int64_t time) noexcept {
     for (Node* n : nodes) {
-        if (n == &from || !hears(*n)) continue;
+        if (n == &from || !hears(*n) || n->leaving) continue;
         if (frame.fd && !n->fd) continue;
         const auto matches = [&](const Filter& f) { return f.matches(frame); };
         if (!n->filters.empty() && std::none_of(n->filters.begin(), n->filters.end(), matches)) continue;

@@ -36,6 +36,7 @@ struct Node {
 
     unsigned tec = 0, rec = 0;
     bool off = false;                     ///< bus off
+    bool leaving = false;                 ///< its link is gone
     std::int64_t back_at = INT64_MAX;     ///< when bus off ends
     std::int64_t hold_until = INT64_MIN;  ///< does not start a frame before
     bool delayed = false, doubled = false, counted = false;  ///< of the frame at the front of `outgoing`
@@ -59,7 +60,8 @@ public:
     static std::shared_ptr<Bus> find(const std::string& name, const Options&, std::string& problem);
 
     void add(Node&);     ///< [setup]
-    void remove(Node&);  ///< [setup]
+    /// What it has queued is still sent, as by a controller whose program ended. [setup]
+    void remove(std::unique_ptr<Node>);
 
     /// Works the bus out up to `now_ns`, unless another thread is doing so. [realtime]
     void pump(std::int64_t now_ns) noexcept;
@@ -116,6 +118,7 @@ private:
     std::uint64_t draw() noexcept;
     std::int64_t bits(unsigned count) const noexcept { return duration_ns({count, 0}, bit_rate); }
 
+    std::vector<std::unique_ptr<Node>> leaving_;  ///< [setup]
     std::atomic_flag pumping_;
     std::atomic<std::int64_t> latest_{INT64_MIN};
     std::atomic<std::uint64_t> calls_{0};  ///< of sent(): a pump that sees it change looks again

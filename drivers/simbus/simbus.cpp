@@ -16,7 +16,8 @@ constexpr std::size_t most_filters = 1024;
 
 class SimulatedLink final : public Link, public Simulation {
 public:
-    SimulatedLink(std::shared_ptr<Bus> bus, const Options& options) : bus_(std::move(bus)), node_(options) {
+    SimulatedLink(std::shared_ptr<Bus> bus, const Options& options)
+        : bus_(std::move(bus)), owned_(std::make_unique<Node>(options)), node_(*owned_) {
         node_.fd = bus_->fd;
         node_.own_frames = options.own_frames;
         node_.error_frames = options.error_frames;
@@ -25,7 +26,7 @@ public:
         description_ = {"sim:" + bus_->name, "bus in memory", bus_->bit_rate, bus_->data_rate, bus_->fd, true};
         bus_->add(node_);
     }
-    ~SimulatedLink() override { bus_->remove(node_); }
+    ~SimulatedLink() override { bus_->remove(std::move(owned_)); }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
         const auto drop = [this](Sent why) {
@@ -146,7 +147,8 @@ public:
 
 private:
     const std::shared_ptr<Bus> bus_;
-    Node node_;
+    std::unique_ptr<Node> owned_;
+    Node& node_;
     Description description_;
 };
 
