@@ -59,5 +59,10 @@ void edit(const Options&, Report&);
 void coherence(const Options&, Report&);
 void python(const Options&, Report&);
 void size(const Options&, Report&);
+void canopen_boot(const Options&, Report&);
+
+/// What `canopen-boot` starts where there is a vcan0: `hal-bench` with this word prints seconds and what went wrong.
+inline constexpr const char* canopen_boot_inside_word = "canopen-boot-inside";
+int canopen_boot_inside();
 
 }  // namespace hal::bench

@@ -212,6 +212,13 @@ std::string sentence(const MasterSetup& setup, const NetworkStatus& s, const Nod
     return result;
 }
 
+std::string progress(const NetworkStatus& s) {
+    std::string result = std::string(word(s.state)) + ": " + std::to_string(s.operational) + " of " + std::to_string(s.nodes) + " nodes operational";
+    if (s.booting != 0) result += ", " + std::to_string(s.booting) + " booting";
+    if (s.failed != 0) result += ", " + std::to_string(s.failed) + " failed or waited for";
+    return result;
+}
+
 std::vector<std::string> note_sentences(const NodeSetup& n, const NodeStatus& s) {
     std::vector<std::string> result;
     const auto say = [&](Note note, const std::string& what) {

@@ -145,6 +145,8 @@ struct NetworkStatus {
 std::string sentence(const NodeSetup&, const NodeStatus&);
 /// The same of the network. [setup]
 std::string sentence(const MasterSetup&, const NetworkStatus&, const NodeStatus& of_node);
+/// How far it is, as one short line that can be printed over and over. [setup]
+std::string progress(const NetworkStatus&);
 /// One line for each bit. [setup]
 std::vector<std::string> note_sentences(const NodeSetup&, const NodeStatus&);
 

@@ -106,6 +106,7 @@ TEST(BootNetwork, Waits_for_a_mandatory_node_and_says_for_which) {
     b.run(30 * second);
     EXPECT_EQ(b.master->status().state, NetworkState::booting);
     EXPECT_EQ(b.master->status().node, 6);
+    EXPECT_EQ(progress(b.master->status()), "booting: 2 of 3 nodes operational, 1 failed or waited for");
     EXPECT_EQ(b.master->sentence(),
               "the network is booting: node 6 does not answer (1000:0): check its power, cable, bit rate and node id; "
               "'hal can scan' shows who is there [result B, no answer]; it is tried again");
