@@ -49,7 +49,7 @@ void Node::turn(Time now, std::int64_t link_now) noexcept {
         count = link_->receive(heard_, link_now);
         if (!runs_) continue;
         for (std::size_t n = 0; n < count; ++n)
-            if (!heard_[n].error && !heard_[n].own && !(!faults_.idle() && faults_.swallows(heard_[n], device_.node_id(), now)))
+            if (!heard_[n].error && !heard_[n].own && !faults_.swallows(heard_[n], device_.node_id(), now))
                 device_.handle(heard_[n], now);
     }
     if (runs_) {
