@@ -237,42 +237,76 @@ class Scan(Can):
 
 
 PLAN = """# three messages of 1 ms
-bitrate 125k
-100 7 2.5ms -      # A
-101 7 3.5ms 3.25ms # B
-102 7 3.5ms 3.25ms # C
+[bus]
+bitrate = 125k
+heartbeat = none
+[messages]
+0x100 A = 7, 2.5ms
+0x101 B = 7, 3.5ms, 3.25ms
+0x102 C = 7, 3.5ms, 3.25ms
+"""
+
+AXES = """[bus]
+link = sim:arm
+sync = 1ms
+[type drive]
+device = cia402
+tpdo1 = statusword, position-actual-value
+rpdo1 = controlword, target-position
 """
 
 
 class Plan(Case):
     def test_refusal_with_the_arithmetic_and_what_to_change(self):
-        done = self.run_program("canopen", "plan", self.write("plan.txt", PLAN) and "plan.txt")
+        done = self.run_program("canopen", "plan", self.write("plan.canopen", PLAN) and "plan.canopen")
         self.assertEqual(1, done.returncode)
         self.assertEqual("      id   bytes   bits   period ms    deadline       worst    used\n"
                          "     100       7    125       2.500       2.500       2.000    80 %  A\n"
                          "     101       7    125       3.500       3.250       3.000    92 %  B\n"
                          "     102       7    125       3.500       3.250       3.500   108 %  LATE C\n"
                          "3 messages at 125000 bit/s: load 97.1 % with all stuff bits\n", done.stdout)
-        self.assertEqual("plan.txt:5: 102 (C) needs 3.500 ms and has 3.250 ms: 1.000 for 1 of its own before it + 3 x 1.000 for 100 + 2 x 1.000 for 101 "
-                         "+ 1.000 for itself - 3.500 since it was due\n"
-                         "  = help: at bitrate 250k everything is in time\n"
+        self.assertEqual("plan.canopen:8: 102 (C) needs 3.500 ms and has 3.250 ms: 1.000 for 1 of its own before it + 3 x 1.000 for 100 "
+                         "+ 2 x 1.000 for 101 + 1.000 for itself - 3.500 since it was due\n"
+                         "  = help: with bitrate = 250k everything is in time\n"
                          "  = help: with every period 10 % longer and the deadlines as they are, everything is in time\n", done.stderr)
 
     def test_good_plan(self):
-        self.write("plan.txt", PLAN.replace("125k", "250k"))
-        self.assertIn("load 48.6 %", self.good("canopen", "plan", "plan.txt"))
-        self.assertTrue(json.loads(self.good("canopen", "plan", "plan.txt", "--json"))["fits"])
+        self.write("plan.canopen", PLAN.replace("125k", "250k"))
+        self.assertIn("load 48.6 %", self.good("canopen", "plan", "plan.canopen"))
+        self.assertTrue(json.loads(self.good("canopen", "plan", "plan.canopen", "--json"))["fits"])
+
+    def test_axes_of_a_millisecond(self):
+        nodes = lambda count: "".join(f"[node {n} axis-{n}]\ntype = drive\n" for n in range(1, count + 1))
+        self.write("arm.canopen", AXES + nodes(4))
+        self.assertIn("9 frames with each SYNC of 1 ms take 0.975 ms at most: 97.5 %\n", self.run_program("canopen", "plan", "arm.canopen").stdout)
+        self.write("arm.canopen", AXES.replace("1ms", "cycle") + nodes(8))
+        self.assertIn("17 frames with each SYNC of 2 ms take 1.895 ms at most: 94.8 %\n",
+                      self.run_program("canopen", "plan", "arm.canopen", "--cycle", "2ms").stdout)
+        done = self.run_program("canopen", "plan", "arm.canopen")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("17 frames with each SYNC of 1 ms take 1.895 ms at most: 189.5 %\n", done.stdout)
 
     def test_all_wrong_lines_are_named(self):
-        self.write("plan.txt", "100 9 1ms\n100 8 soon\nxyz 8 1ms\n101 8\n102 8 1ms\n102 4 2ms\n103 8 5\n")
-        self.assertEqual("plan.txt:1: '9' is no length; write 0 to 8, R for a remote request, or up to 64fd or 64brs for CAN FD\n"
-                         "plan.txt:2: 'soon' is no period; write 10ms, 250us or 1s\n"
-                         "plan.txt:3: 'xyz' is no identifier; write it in hex, eight digits for an extended one\n"
-                         "plan.txt:4: a message is ID BYTES PERIOD [DEADLINE [JITTER]] # name\n"
-                         "plan.txt:6: identifier 102 is used in line 5 too; two senders of one identifier destroy each other's frames\n"
-                         "plan.txt:7: '5' is no period; write 10ms, 250us or 1s\n"
-                         "plan.txt:1: the bit rate is missing; write a line: bitrate 1M\n", self.bad("canopen", "plan", "plan.txt"))
-        self.assertEqual("hal canopen plan: cannot read 'none.txt': No such file or directory\n", self.bad("canopen", "plan", "none.txt"))
+        self.write("plan.canopen", "[bus]\n[messages]\n0x100 = 9, 1ms\n0x100 = 8, soon\nxyz = 8, 1ms\n0x101 = 8\n0x102 = 8, 1ms\n0x102 = 4, 2ms\n0x103 = 8, 5\n")
+        said = self.bad("canopen", "plan", "plan.canopen")
+        for line in ("plan.canopen:3:9: error: '9' is no length [canopen-value]", "plan.canopen:4:12: error: 'soon' is no period [canopen-value]",
+                     "plan.canopen:5:1: error: 'xyz' is no identifier [canopen-value]",
+                     "plan.canopen:6:9: error: a message has BYTES, PERIOD, DEADLINE, JITTER [canopen-value]",
+                     "plan.canopen:8:1: error: this identifier is used in line 7, too [canopen-node]",
+                     "plan.canopen:9:12: error: '5' is no period [canopen-value]"):
+            self.assertIn(line, said.splitlines())
+        self.assertEqual("hal canopen plan: cannot read 'none.canopen': No such file or directory\n", self.bad("canopen", "plan", "none.canopen"))
+
+    def test_check_lists_the_pins(self):
+        self.write("arm.canopen", AXES + "[node 5 elbow]\ntype = drive\ntarget-position.scale = 65536/360\n")
+        self.assertEqual("arm.canopen: sim:arm at 1000000 bit/s, master 127, 1 node\n"
+                         "node 5 elbow, mandatory\n"
+                         "  rpdo1 205, 6 bytes, with every SYNC\n"
+                         "    u32   in  elbow.controlword  6040 Controlword\n"
+                         "    float in  elbow.target-position  607A Target position, 182.044 to one\n"
+                         "  tpdo1 185, 6 bytes, with every SYNC\n"
+                         "    u32   out elbow.statusword  6041 Statusword\n"
+                         "    s32   out elbow.position-actual-value  6064 Position actual value\n", self.good("canopen", "check", "arm.canopen"))
 
 
 if __name__ == "__main__":

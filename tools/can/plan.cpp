@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
-// `hal canopen plan`: a table of messages, and whether each arrives in time.
+// `hal canopen plan`: what a configuration puts on the bus, and whether each message arrives in time. `hal canopen check`: what is wrong
+// in it, and the pins it makes.
 #include <algorithm>
-#include <charconv>
 #include <fmt/core.h>
+#include <numeric>
 #include <unistd.h>
 
+#include "base/diagnostic.hpp"
+#include "base/text.hpp"
 #include "base/types.hpp"
-#include "canopen/plan/response_time.hpp"
+#include "canopen/config/schedule.hpp"
 #include "say.hpp"
 
 namespace hal::tools {
@@ -14,6 +17,7 @@ namespace hal::tools {
 namespace {
 
 namespace plan = canopen::plan;
+namespace config = canopen::config;
 
 struct Row {
     plan::Message message;
@@ -23,108 +27,19 @@ struct Row {
 
 struct Table {
     plan::Bus bus;
-    std::vector<Row> rows;
-    std::vector<std::string> problems;  ///< "3: sentence"
+    std::vector<Row> rows;  ///< the most important first
+    std::string per_sync;   ///< what goes with a SYNC; empty: there is none
 };
 
-std::vector<std::string_view> fields_of(std::string_view text) {
-    std::vector<std::string_view> fields;
-    constexpr std::string_view blanks = " \t\r";
-    for (std::size_t at = text.find_first_not_of(blanks); at != text.npos; at = text.find_first_not_of(blanks, at)) {
-        const std::size_t end = std::min(text.find_first_of(blanks, at), text.size());
-        fields.push_back(text.substr(at, end - at));
-        at = end;
-    }
-    return fields;
-}
-
-bool number(std::string_view text, int base, std::uint32_t& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
-    return !text.empty() && error == std::errc() && end == text.data() + text.size();
-}
-
-/// 500k, 1M, 125000
-bool rate_of(std::string_view text, std::uint32_t& rate) {
-    std::uint32_t unit = 1;
-    if (text.ends_with('k')) unit = 1000;
-    if (text.ends_with('M')) unit = 1'000'000;
-    if (unit > 1) text.remove_suffix(1);
-    if (!number(text, 10, rate) || rate == 0 || rate > 20'000'000 / unit) return false;
-    return rate *= unit, rate >= 1000;
-}
-
-/// Why the fields are no message, or empty.
-std::string message_of(const std::vector<std::string_view>& fields, plan::Message& m) {
-    if (fields.size() < 3 || fields.size() > 5) return "a message is ID BYTES PERIOD [DEADLINE [JITTER]] # name";
-    std::string_view id = fields[0], bytes = fields[1];
-    if (id.starts_with("0x")) id.remove_prefix(2);
-    if (id.size() > 8 || !number(id, 16, m.id) || m.id > 0x1fffffff)
-        return fmt::format("'{}' is no identifier; write it in hex, eight digits for an extended one", fields[0]);
-    m.extended = id.size() == 8 || m.id > 0x7ff;
-    if (bytes.ends_with("brs")) m.fd = m.bit_rate_switch = true, bytes.remove_suffix(3);
-    else if (bytes.ends_with("fd")) m.fd = true, bytes.remove_suffix(2);
-    else if (bytes == "R") m.remote = true, bytes = "0";
-    std::uint32_t length = 0;
-    if (!number(bytes, 10, length) || length > (m.fd ? 64U : 8U))
-        return fmt::format("'{}' is no length; write 0 to 8, R for a remote request, or up to 64fd or 64brs for CAN FD", fields[1]);
-    m.bytes = static_cast<std::uint8_t>(length);
-    std::int64_t* const times[] = {&m.period, &m.deadline, &m.jitter};
-    constexpr const char* names[] = {"period", "deadline", "jitter"};
-    constexpr std::int64_t longest = 3'600'000'000'000;
-    for (std::size_t i = 2; i < fields.size(); ++i) {
-        if (i > 2 && fields[i] == "-") continue;
-        const bool unit = fields[i].find_first_not_of("0123456789.") != fields[i].npos || fields[i] == "0";
-        const auto ns = parse_duration_ns(fields[i], false);
-        if (!unit || !ns || *ns < (i == 4 ? 0 : 1) || *ns > longest)
-            return fmt::format("'{}' is no {}; write 10ms, 250us or 1s", fields[i], names[i - 2]);
-        *times[i - 2] = *ns;
-    }
-    return {};
-}
-
-Table read(std::string_view text) {
-    Table table;
-    std::size_t line = 0;
-    bool has_rate = false;
-    while (!text.empty() && table.problems.size() < 20) {
-        ++line;
-        const std::size_t end = std::min(text.find('\n'), text.size());
-        std::string_view whole = text.substr(0, end);
-        text.remove_prefix(std::min(end + 1, text.size()));
-        const std::size_t hash = std::min(whole.find('#'), whole.size());
-        const auto fields = fields_of(whole.substr(0, hash));
-        if (fields.empty()) continue;
-        const auto problem = [&](const std::string& what) { table.problems.push_back(fmt::format("{}: {}", line, what)); };
-        if (fields[0] == "bitrate" || fields[0] == "datarate") {
-            std::uint32_t& rate = fields[0] == "bitrate" ? table.bus.bit_rate : table.bus.data_rate;
-            has_rate = has_rate || fields[0] == "bitrate";
-            if (fields.size() != 2 || !rate_of(fields[1], rate)) problem(fmt::format("'{}' needs a rate: {} 500k", fields[0], fields[0]));
-            continue;
-        }
-        Row row;
-        row.line = line;
-        if (hash < whole.size()) {
-            const auto words = fields_of(whole.substr(hash + 1));
-            for (const auto word : words) row.name += (row.name.empty() ? "" : " ") + std::string(word);
-        }
-        if (const std::string what = message_of(fields, row.message); !what.empty()) {
-            problem(what);
-            continue;
-        }
-        for (const Row& other : table.rows)
-            if (other.message.id == row.message.id && other.message.extended == row.message.extended &&
-                other.message.remote == row.message.remote)
-                problem(fmt::format("identifier {} is used in line {} too; two senders of one identifier destroy each other's frames",
-                                    fields[0], other.line));
-        if (table.rows.size() == 4096) {
-            problem("more than 4096 messages");
-            break;
-        }
-        table.rows.push_back(std::move(row));
-    }
-    if (!has_rate) table.problems.push_back("1: the bit rate is missing; write a line: bitrate 1M");
-    else if (table.rows.empty() && table.problems.empty())
-        table.problems.push_back("1: there is no message; write lines: ID BYTES PERIOD [DEADLINE [JITTER]] # name");
+Table table_of(const config::Schedule& schedule) {
+    Table table{schedule.bus, {}, {}};
+    for (std::size_t i = 0; i < schedule.messages.size(); ++i)
+        table.rows.push_back({schedule.messages[i], schedule.names[i], schedule.places[i].line});
+    std::stable_sort(table.rows.begin(), table.rows.end(), [](const Row& a, const Row& b) { return plan::before(a.message, b.message); });
+    if (schedule.sync > 0)
+        table.per_sync = fmt::format("{} frames with each SYNC of {:g} ms take {:.3f} ms at most: {:.1f} %\n", schedule.per_sync,
+                                     static_cast<double>(schedule.sync) / 1e6,
+                                     schedule.sync_share * static_cast<double>(schedule.sync) / 1e6, 100 * schedule.sync_share);
     return table;
 }
 
@@ -148,7 +63,7 @@ std::string table_text(const Table& table, const plan::Analysis& a) {
         while (line.back() == ' ') line.pop_back();
         text += line + "\n";
     }
-    return text +
+    return text + table.per_sync +
            fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits\n", table.rows.size(), table.bus.bit_rate, 100 * a.load);
 }
 
@@ -181,7 +96,7 @@ std::string why_late(const Table& table, const std::vector<plan::Message>& messa
 std::string help_text(const Table& table, const std::vector<plan::Message>& messages) {
     std::string text;
     if (const auto rate = plan::sufficient_bit_rate(messages, table.bus))
-        text += fmt::format("  = help: at bitrate {}k everything is in time\n", *rate / 1000);
+        text += fmt::format("  = help: with bitrate = {}k everything is in time\n", *rate / 1000);
     if (const auto order = plan::sufficient_order(messages, table.bus); !order.empty()) {
         text += "  = help: in this order of identifiers, lowest first, everything is in time:";
         for (const std::size_t i : order) text += fmt::format(" {}", id_of(messages[i]));
@@ -210,24 +125,85 @@ std::string json_text(const Table& table, const plan::Analysis& a) {
     return text + "]}\n";
 }
 
+/// The configuration, its errors and warnings said. 0: it can be used.
+int read_configuration(const Options& options, const std::string& file, config::Reading& reading) {
+    std::string text;
+    if (!config::read_from_disk(file, text)) return fail(options, fmt::format("cannot read '{}': {}", file, text));
+    reading = config::read(text, file);
+    Sources sources;
+    const std::uint32_t source = sources.add(file, text);
+    Diagnostics found;
+    for (const config::Message& m : reading.messages) {
+        const Severity severities[] = {Severity::note, Severity::warning, Severity::error};
+        Diagnostic d{severities[static_cast<std::size_t>(m.severity)], Code::named(config::code_of(m.topic)).value_or(Code("canopen-line")),
+                     m.sentence};
+        d.labels.push_back({Span{source, m.at.offset, m.at.offset + m.at.length}, m.label});
+        if (!m.help.empty()) d.help.push_back(m.help);
+        found.add(std::move(d));
+    }
+    write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
+    return found.failed() ? 1 : 0;
+}
+
+const char* word(config::PinType type) {
+    constexpr const char* words[] = {"s32", "bit", "s32", "u32", "s64", "u64", "float"};
+    return words[static_cast<std::size_t>(type)];
+}
+
+std::string pin_text(const config::Node& node, const config::Object& object, bool to_node) {
+    std::string text;
+    const auto line = [&](const std::string& name, const char* type, const std::string& about) {
+        text += fmt::format("    {:<5} {} {}.{}  {}\n", type, to_node ? "in " : "out", node.name, name, about);
+    };
+    std::string about =
+        fmt::format("{:04X}", object.index) + (object.sub != 0 ? fmt::format(":{}", object.sub) : "") + " " + printable(object.about);
+    if (object.scale != 1.0 || object.offset != 0.0)
+        about += fmt::format(", {:g} to one{}{}", object.scale, object.unit.empty() ? "" : " ", object.unit);
+    else if (!object.unit.empty()) about += ", " + object.unit;
+    for (const config::BitPin& b : object.bit_pins) line(b.name, "bit", fmt::format("{}, bit {}", about, b.bit));
+    if (object.bit_pins.empty()) line(object.pin, word(object.as), about);
+    return text;
+}
+
+std::string transmission_text(const config::Pdo& pdo) {
+    if (pdo.transmission == 0) return "with the SYNC when changed";
+    if (pdo.transmission == 1) return "with every SYNC";
+    if (pdo.transmission <= 240) return fmt::format("with every SYNC number {}", pdo.transmission);
+    return pdo.event_ms != 0 ? fmt::format("when changed and every {} ms", pdo.event_ms) : "when changed";
+}
+
+std::string network_text(const std::string& file, const config::MasterConfig& c) {
+    std::string text = fmt::format("{}: {} at {} bit/s, master {}, {} node{}\n", file, c.link, c.bit_rate, c.node_id, c.nodes.size(),
+                                   c.nodes.size() == 1 ? "" : "s");
+    for (const config::Node& n : c.nodes) {
+        text += fmt::format("node {} {}, {}\n", n.setup.id, n.name, n.setup.mandatory ? "mandatory" : "optional");
+        for (const config::Pdo& p : n.pdos) {
+            text += fmt::format("  {}{} {:X}, {} bytes, {}\n", p.to_node ? "rpdo" : "tpdo", p.number, canopen::cob_id(p.cob), p.bytes(),
+                                transmission_text(p));
+            for (const config::Object& o : p.objects)
+                if (!o.filler) text += pin_text(n, o, p.to_node);
+        }
+    }
+    return text;
+}
+
 }  // namespace
 
 int run_canopen_plan(const Options& options) {
     if (options.words.size() != 1)
         return fail(options, fmt::format("nothing is expected at '{}'; see: hal help canopen plan", options.words[1]));
     const std::string& file = options.words[0];
-    std::string text;
-    if (!read_file(file, text)) return fail(options, fmt::format("cannot read '{}': {}", file, text));
-    if (text.size() > 1'000'000) return fail(options, fmt::format("'{}' is larger than 1 MB; it is no plan", file));
-    const Table table = read(text);
-    std::string said;
-    for (const std::string& problem : table.problems) said += fmt::format("{}:{}\n", file, problem);
-    if (!said.empty()) return write_all(STDERR_FILENO, said), 1;
+    config::Reading reading;
+    if (const int status = read_configuration(options, file, reading); status != 0) return status;
+    const auto cycle = parse_duration_ns(options.cycle, false);
+    if (!cycle || *cycle < 1000) return fail(options, fmt::format("'{}' is no period of a thread; write --cycle 1ms", options.cycle));
+    const Table table = table_of(config::schedule_of(reading.config, *cycle));
     std::vector<plan::Message> messages;
     for (const Row& row : table.rows) messages.push_back(row.message);
     const plan::Analysis a = plan::analyse(messages, table.bus);
     if (!print(options.json ? json_text(table, a) : table_text(table, a))) return 1;
     if (a.fits) return 0;
+    std::string said;
     std::size_t late = 0;
     for (std::size_t i = 0; i < messages.size(); ++i)
         if (!a.responses[i].in_time && ++late <= 3)
@@ -235,6 +211,16 @@ int run_canopen_plan(const Options& options) {
     if (late > 3) said += fmt::format("{}: {} more are late\n", file, late - 3);
     write_all(STDERR_FILENO, said + help_text(table, messages));
     return 1;
+}
+
+int run_canopen_check(const Options& options) {
+    int status = 0;
+    for (const std::string& file : options.words) {
+        config::Reading reading;
+        if (const int one = read_configuration(options, file, reading); one != 0) status = one;
+        else if (!print(network_text(file, reading.config))) return 1;
+    }
+    return status;
 }
 
 }  // namespace hal::tools
