@@ -280,6 +280,14 @@ void declare_can_gateway(CLI::App& app, Options& o) {
     app.add_option("--state", o.state, "what `store` keeps, read at the start")->type_name("FILE");
 }
 
+void declare_can_drive(CLI::App& app, Options& o) {
+    app.add_option("--node", o.drive_node, "the drive: 1-127")->type_name("N");
+    app.add_option("--axis", o.drive_axis, "of commands that begin with none: A (the default) to H")->type_name("LETTER");
+    app.add_flag("-k,--keep-going", o.keep_going, "commands from a file or pipe: go on after one that failed");
+    answered(app, o);
+    app.prefix_command();
+}
+
 void declare_canopen_plan(CLI::App& app, Options& o) {
     words(app, o, "FILE", "the configuration of the network, NAME.canopen");
     app.add_option("--cycle", o.cycle, "the period of the master's thread, where the SYNC comes with every cycle (default 1ms)")->type_name("TIME");
@@ -366,6 +374,7 @@ constexpr Subcommand table[] = {
     {"can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass", run_can_pdo_watch, declare_can_pdo_watch},
     {"can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify", run_can_lss, declare_can_lss},
     {"can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE]", "a CiA 309-3 gateway: programs command the network by lines of text", run_can_gateway, declare_can_gateway},
+    {"can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "a drive by hand: on, off, go, speed, stop, home, … or a shell of them", run_can_drive, declare_can_drive, true},
     {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", run_can_eds_check, declare_can_eds_check},
     {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", run_canopen_check, declare_canopen_check},
     {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", run_canopen_plan, declare_canopen_plan},
@@ -385,7 +394,7 @@ struct Group {
 };
 
 constexpr Group groups[] = {
-    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, pdo, lss, gateway; eds check"},
+    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, pdo, lss, drive, gateway; eds check"},
     {"canopen", "checks and plans a CANopen network"},
     {"node", "simulated CANopen devices as processes: drive, io, jr3, bootloader; what they can do wrong: faults"},
 };
@@ -430,7 +439,7 @@ std::string overview() {
 std::string help_of(const Group& group) {
     std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name, group.summary, group.name);
     for (const Subcommand& row : table)
-        if (belongs(row, group)) text += fmt::format("  {:14} {}\n", row.name, row.summary);
+        if (belongs(row, group)) text += fmt::format("  {:16} {}\n", row.name, row.summary);
     return text + fmt::format("\nhal help {} COMMAND says more.\n", group.name);
 }
 

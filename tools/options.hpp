@@ -48,6 +48,7 @@ struct Options {
     int transmission = -1;               ///< of can pdo map; -1: as it is
     std::int64_t inhibit_ns = -1, event_ns = -1;
     std::string socket, listen, state;   ///< of can gateway
+    std::string drive_node, drive_axis;  ///< of can drive
 };
 
 /// Each subcommand, in its own file. Returns the exit code.
@@ -71,6 +72,7 @@ int run_can_replay(const Options&);
 int run_can_load(const Options&);
 int run_can_nmt(const Options&);
 int run_can_scan(const Options&);
+int run_can_drive(const Options&);
 int run_can_sdo_read(const Options&);
 int run_can_sdo_write(const Options&);
 int run_can_pdo_show(const Options&);
