@@ -67,6 +67,8 @@ public:
     const NodeSetup* setup(std::uint8_t id) const noexcept;
     const MasterSetup& setup() const noexcept { return setup_; }
     Network& network() noexcept { return network_; }
+    /// The newest time it was told. [realtime]
+    Time now() const noexcept { return now_; }
     /// The node in words, the network in words; see status.hpp. [setup]
     std::string sentence(std::uint8_t id) const;
     std::string sentence() const;

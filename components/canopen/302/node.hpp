@@ -126,6 +126,8 @@ private:
     void fail_write(Cause) noexcept;
     bool guarding() const noexcept { return setup.guard_ms != 0 || guarded_; }
     void watch() noexcept;
+    void watch_on() noexcept;
+    Time guard_period() const noexcept { return (setup.guard_ms != 0 ? setup.guard_ms : setup.heartbeat_ms) * millisecond; }
     void await_beat() noexcept;
     void watched() noexcept;
     void rebooted_while_booting() noexcept;

@@ -213,7 +213,8 @@ std::string sentence(const MasterSetup& setup, const NetworkStatus& s, const Nod
 }
 
 std::string progress(const NetworkStatus& s) {
-    std::string result = std::string(word(s.state)) + ": " + std::to_string(s.operational) + " of " + std::to_string(s.nodes) + " nodes operational";
+    std::string result = std::string(word(s.state)) + ": " + std::to_string(s.operational) + " of " + std::to_string(s.nodes);
+    result += " nodes operational";
     if (s.booting != 0) result += ", " + std::to_string(s.booting) + " booting";
     if (s.failed != 0) result += ", " + std::to_string(s.failed) + " failed or waited for";
     return result;
