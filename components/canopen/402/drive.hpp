@@ -25,7 +25,8 @@
 namespace hal::canopen::cia402 {
 
 /// The motor, its load, and what is mounted along the travel. Places along the travel are in encoder increments, 0 is index pulse 0.
-/// A switch or mark of which the first place is not below the second does not exist.
+/// A switch or mark of which the first place is not below the second does not exist. Values that cannot be, such as no inertia, become
+/// the smallest that can.
 struct MotorSettings {
     double inertia = 5e-5;               ///< of rotor and load, at the motor shaft, kg·m²
     double viscous_friction = 1e-5;      ///< N·m·s/rad

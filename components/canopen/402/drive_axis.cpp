@@ -12,12 +12,16 @@ namespace {
 constexpr std::uint32_t no_window = 0xffffffff;
 template <class T>
 T limited(double value) noexcept {
-    return static_cast<T>(std::llround(std::clamp<double>(value, std::numeric_limits<T>::min(), std::numeric_limits<T>::max())));
+    return static_cast<T>(std::clamp<std::int64_t>(whole(value), std::numeric_limits<T>::min(), std::numeric_limits<T>::max()));
 }
 }  // namespace
 
 DriveAxis::DriveAxis(unsigned number, const AxisSettings& settings)
-    : number_(number), settings_(settings), objects_(settings), plant_(settings.motor), dc_link_(settings.motor.rated_voltage) {
+    : number_(number),
+      settings_(possible(settings)),
+      objects_(settings_),
+      plant_(settings_.motor),
+      dc_link_(settings_.motor.rated_voltage) {
     power_up();
 }
 
@@ -201,10 +205,10 @@ void DriveAxis::publish() noexcept {
     };
     const double speed = now_speed();
     o.position_actual = shown(measured_);
-    o.position_actual_internal = static_cast<std::int32_t>(static_cast<std::int64_t>(std::floor(measured_)));
-    o.additional_position = static_cast<std::int32_t>(static_cast<std::int64_t>(std::floor(plant_.place())));
+    o.position_actual_internal = static_cast<std::int32_t>(whole(std::floor(measured_)));
+    o.additional_position = static_cast<std::int32_t>(whole(std::floor(plant_.place())));
     o.position_demand = shown(ref_.position);
-    o.position_demand_internal = static_cast<std::int32_t>(std::llround(ref_.position));
+    o.position_demand_internal = static_cast<std::int32_t>(whole(ref_.position));
     o.following_error = loop_ == Control::position ? limited<std::int32_t>((ref_.position - measured_) / units_.position) : 0;
     o.velocity_actual = limited<std::int32_t>(speed / units_.velocity);
     o.velocity_sensor = limited<std::int32_t>(speed);
@@ -214,7 +218,7 @@ void DriveAxis::publish() noexcept {
     o.vl_demand = per_minute(loop_ == Control::off ? 0 : ref_.velocity);
     o.torque_demand = per_mille(torque_demand_);
     o.torque_actual = o.current_actual = per_mille(plant_.torque());
-    o.dc_link = static_cast<std::uint32_t>(std::max(0.0, dc_link_ * 1000));
+    o.dc_link = limited<std::uint32_t>(dc_link_ * 1000);
     o.inputs = inputs_;
     o.buffer_position = static_cast<std::uint16_t>(records_.count);
 }

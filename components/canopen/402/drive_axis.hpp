@@ -5,12 +5,20 @@
 // drive_axis.cpp what is watched and shown.
 #pragma once
 
+#include <cmath>
+
 #include "drive_homing.hpp"
 #include "drive_objects.hpp"
 #include "drive_plant.hpp"
 #include "drive_trajectory.hpp"
 
 namespace hal::canopen::cia402 {
+
+/// The next whole number; what is beyond any counter stays there. [any]
+inline std::int64_t whole(double value) noexcept {
+    constexpr double most = 1LL << 52;
+    return value >= -most && value <= most ? std::llround(value) : value > 0 ? 1LL << 52 : -(1LL << 52);
+}
 
 class DriveAxis final : public Handler {
 public:

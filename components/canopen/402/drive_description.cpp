@@ -18,7 +18,7 @@ constexpr Type type_for() noexcept {
 }
 
 void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
-    Objects objects(settings);
+    Objects objects(possible(settings));
     // A second axis needs names of its own.
     const std::string suffix = axis == 0 ? "" : " " + std::to_string(axis + 1);
     each_object(objects, [&](const ObjectRow& row, const auto& value) {
@@ -56,6 +56,22 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
     }
 }
 }  // namespace
+
+AxisSettings possible(AxisSettings settings) {
+    auto& m = settings.motor;
+    const auto at_least = [](double& value, double least) { value = value >= least && value < 1e12 ? value : least; };
+    at_least(m.inertia, 1e-9);
+    at_least(m.rated_torque, 1e-6);
+    at_least(m.peak_torque, m.rated_torque);
+    at_least(m.rated_current, 1e-6);
+    at_least(m.rated_voltage, 1e-3);
+    at_least(m.highest_speed, 1);
+    for (double* none : {&m.viscous_friction, &m.coulomb_friction, &m.current_loop_time, &m.thermal_time_constant, &m.brake_torque,
+                         &m.brake_release, &m.brake_engage})
+        at_least(*none, 0);
+    m.resolution = std::max(m.resolution, 1U);
+    return settings;
+}
 
 Objects::Objects(const AxisSettings& settings) {
     const auto& m = settings.motor;

@@ -49,7 +49,7 @@ double DriveAxis::period() const noexcept {
 // Positions of the user have 32 bits, or the range of 607Bh, and go round; the axis goes on.
 
 std::int32_t DriveAxis::shown(double encoder) const noexcept {
-    const auto value = std::llround(user(encoder));
+    const auto value = whole(user(encoder));
     const std::int64_t low = objects_.range_min, span = std::int64_t{objects_.range_max} - low + 1;
     if (span <= 1) return static_cast<std::int32_t>(value);
     const auto rest = (value - low) % span;
@@ -150,7 +150,8 @@ bool DriveAxis::stop_step(Stop stop, double dt) noexcept {
 
 void DriveAxis::select_mode() noexcept {
     const auto wanted = static_cast<Mode>(objects_.mode);
-    if (wanted == mode_) return;
+    // An SDO cannot ask for another; of a PDO it is not heard.
+    if (wanted == mode_ || (wanted != Mode::none && (objects_.supported_modes & bit_of(wanted)) == 0)) return;
     mode_ = wanted;
     objects_.mode_display = objects_.mode;
     restart_mode();

@@ -21,6 +21,9 @@ inline constexpr std::array<std::int8_t, 32> homing_methods{1,  2,  3,  4,  5,  
                                                             19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37};
 inline constexpr unsigned interpolation_room = 32;
 
+/// With what a motor cannot be without: inertia, torque, speed, an encoder. [setup]
+AxisSettings possible(AxisSettings);
+
 /// A numerator over a denominator.
 struct Ratio {
     std::uint32_t numerator = 1, denominator = 1;

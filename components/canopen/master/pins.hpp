@@ -48,9 +48,9 @@ struct Bound {
     Range       range;
 
     template <class T>
-    Bound(Component& component, const std::string& name, const std::string& about, hal::PinOptions<T> options, std::size_t at,
-          const config::Object& o, unsigned bit_)
-        : pin(component, name.c_str(), about.c_str(), options),
+    Bound(Component& component, const Function& function, const std::string& name, const std::string& about, hal::PinOptions<T> options,
+          std::size_t at, const config::Object& o, unsigned bit_)
+        : pin(component, function, name.c_str(), about.c_str(), options),
           slot(at),
           type(o.type),
           scale(o.scale),
@@ -61,6 +61,8 @@ struct Bound {
 
 class ObjectPins {
 public:
+    /// Outputs are written by the one function, inputs read by the other. [setup]
+    ObjectPins(const Function& shows, const Function& takes) : shows_(shows), takes_(takes) {}
     /// Declares the pins of a slot. `prefix` ends with a dot or is empty. [setup]
     void declare(Component& component, const std::string& prefix, bool to_node, const config::Object& o, std::size_t slot) {
         if (!o.bit_pins.empty()) {
@@ -131,8 +133,8 @@ private:
              std::size_t slot, unsigned bit, Ins& ins, Outs& outs) {
         hal::PinOptions<T> options;
         options.unit = o.unit.c_str();
-        if (to_node) ins.emplace_back(component, name, about, options, slot, o, bit);
-        else outs.emplace_back(component, name, about, options, slot, o, bit);
+        if (to_node) ins.emplace_back(component, takes_, name, about, options, slot, o, bit);
+        else outs.emplace_back(component, shows_, name, about, options, slot, o, bit);
     }
     template <class T>
     static double cut(double value) noexcept {
@@ -159,6 +161,8 @@ private:
         return raw;
     }
 
+    const Function& shows_;
+    const Function& takes_;
     // Deques: a pin may not move once it is declared.
     std::deque<Bound<hal::In<bool>>>           in_bits_;
     std::deque<Bound<hal::In<double>>>         in_real_;
@@ -180,23 +184,23 @@ struct NodePins {
     hal::Out<bool>          online, operational, fault;
     hal::Out<std::uint32_t> state, step, error_register, emcy, emcy_count, retries, boot_result;
     hal::Out<double>        age;
-    hal::In<bool>           restart;
+    hal::In<bool> restart;  // of both functions, which may therefore not be in two threads
     bool                    was_restart = false, is_faulty = false;
     std::uint32_t           losses = 0;
 
-    NodePins(Component& c, const std::string& n)
-        : online(c, (n + ".online").c_str(), "it is heard"),
-          operational(c, (n + ".operational").c_str(), "it exchanges process data", {.safe = false}),
-          fault(c, (n + ".fault").c_str(), "it was lost or could not be booted, and is not operational again yet"),
-          state(c, (n + ".state").c_str(), "its NMT state: 0 booting, 4 stopped, 5 operational, 127 pre-operational"),
-          step(c, (n + ".step").c_str(), "where the master is with it: 0 off to 13 running, 14 waiting, 15 failed, 16 stopped"),
-          error_register(c, (n + ".error-register").c_str(), "1001h as its newest emergency told it"),
-          emcy(c, (n + ".emcy").c_str(), "code of its newest emergency; 0: none, or the error is gone"),
-          emcy_count(c, (n + ".emcy-count").c_str(), "emergencies heard"),
-          retries(c, (n + ".retries").c_str(), "boots begun again after a failure or loss"),
-          boot_result(c, (n + ".boot-result").c_str(),
+    NodePins(Component& c, const Function& f, const std::string& n)
+        : online(c, f, (n + ".online").c_str(), "it is heard"),
+          operational(c, f, (n + ".operational").c_str(), "it exchanges process data", {.safe = false}),
+          fault(c, f, (n + ".fault").c_str(), "it was lost or could not be booted, and is not operational again yet"),
+          state(c, f, (n + ".state").c_str(), "its NMT state: 0 booting, 4 stopped, 5 operational, 127 pre-operational"),
+          step(c, f, (n + ".step").c_str(), "where the master is with it: 0 off to 13 running, 14 waiting, 15 failed, 16 stopped"),
+          error_register(c, f, (n + ".error-register").c_str(), "1001h as its newest emergency told it"),
+          emcy(c, f, (n + ".emcy").c_str(), "code of its newest emergency; 0: none, or the error is gone"),
+          emcy_count(c, f, (n + ".emcy-count").c_str(), "emergencies heard"),
+          retries(c, f, (n + ".retries").c_str(), "boots begun again after a failure or loss"),
+          boot_result(c, f, (n + ".boot-result").c_str(),
                       "0 not finished, 1 booted, else the character of CiA 302's letter, 65 (A) to 79 (O)"),
-          age(c, (n + ".heartbeat-age-ms").c_str(), "since its last sign of life; -1: none yet", {.unit = "ms"}),
+          age(c, f, (n + ".heartbeat-age-ms").c_str(), "since its last sign of life; -1: none yet", {.unit = "ms"}),
           restart(c, (n + ".restart").c_str(), "rising edge: resets it and boots it anew") {}
 
     /// [realtime]
@@ -224,20 +228,20 @@ struct BusPins {
     hal::Out<bool>          operational, bus_off;
     hal::Out<std::uint32_t> state, nodes_operational, tx_errors, rx_errors, frames_lost, sync_count, sync_overruns;
     hal::Out<double>        load;
-    hal::In<bool>           restart;
+    hal::In<bool> restart;  // of both functions, which may therefore not be in two threads
     bool                    was_restart = false;
 
-    explicit BusPins(Component& c)
-        : operational(c, "operational", "all mandatory nodes are", {.safe = false}),
-          bus_off(c, "bus-off", "the controller is off the bus, or the bus is gone"),
-          state(c, "state", "0 off, 1 booting, 2 operational, 3 degraded, 4 stopped, 5 failed"),
-          nodes_operational(c, "nodes-operational", "how many nodes are"),
-          tx_errors(c, "tx-errors", "the controller's send error counter"),
-          rx_errors(c, "rx-errors", "the controller's receive error counter"),
-          frames_lost(c, "frames-lost", "received ones that found no room, own ones that were not sent"),
-          sync_count(c, "sync-count", "SYNCs sent"),
-          sync_overruns(c, "sync-overruns", "SYNCs that were due before everything of the one before was sent"),
-          load(c, "bus-load", "share of the bus's time in use", {.unit = "%"}),
+    BusPins(Component& c, const Function& f)
+        : operational(c, f, "operational", "all mandatory nodes are", {.safe = false}),
+          bus_off(c, f, "bus-off", "the controller is off the bus, or the bus is gone"),
+          state(c, f, "state", "0 off, 1 booting, 2 operational, 3 degraded, 4 stopped, 5 failed"),
+          nodes_operational(c, f, "nodes-operational", "how many nodes are"),
+          tx_errors(c, f, "tx-errors", "the controller's send error counter"),
+          rx_errors(c, f, "rx-errors", "the controller's receive error counter"),
+          frames_lost(c, f, "frames-lost", "received ones that found no room, own ones that were not sent"),
+          sync_count(c, f, "sync-count", "SYNCs sent"),
+          sync_overruns(c, f, "sync-overruns", "SYNCs that were due before everything of the one before was sent"),
+          load(c, f, "bus-load", "share of the bus's time in use", {.unit = "%"}),
           restart(c, "restart", "rising edge: resets all nodes and boots the network anew") {}
 
     /// [realtime]

@@ -20,9 +20,9 @@ namespace {
 
 using namespace hal::canopen;
 
-std::string ms_text(Time t) {
+std::string seconds_text(Time t) {
     char text[40];
-    std::snprintf(text, sizeof text, "%.2f", static_cast<double>(t) * 1e-9);
+    std::snprintf(text, sizeof text, "%g", static_cast<double>(t) * 1e-9);
     return text;
 }
 
@@ -48,7 +48,7 @@ struct FaultWords {
         const std::string who = "node " + std::to_string(n.setup.id) + (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
         const std::string safe = "; its outputs were set to their safe values";
         const Time        limit = n.setup.heartbeat_limit > 0 ? n.setup.heartbeat_limit : n.setup.heartbeat_ms * millisecond * 5 / 2;
-        silent = who + " silent for {} s (limit " + ms_text(limit) + " s)" + safe;
+        silent = who + " silent for {} s (limit " + seconds_text(limit) + " s)" + safe;
         guarding = who + " did not answer its guarding for {} s" + safe;
         rebooted = who + " restarted by itself" + safe;
         left = who + " left the operational state by itself" + safe;
@@ -72,11 +72,13 @@ public:
             transmit_.emplace(*this, "transmit", &Canopen::transmit, "copies pins to objects, sends the SYNC and the PDOs of this cycle");
         }
         runner_ = std::make_unique<Runner>(config_, static_cast<RunnerEvents&>(*this));
-        bus_.emplace(*this);
-        for (const config::Node& n : config_.nodes) nodes_.emplace_back(*this, n.name), words_.emplace_back(n);
+        const hal::Function& shows = by_index() ? *update_ : *receive_;
+        bus_.emplace(*this, shows);
+        objects_.emplace(shows, by_index() ? *update_ : *transmit_);
+        for (const config::Node& n : config_.nodes) nodes_.emplace_back(*this, shows, n.name), words_.emplace_back(n);
         for (std::size_t i = 0; i < runner_->slots().size(); ++i) {
             const Slot& s = runner_->slots()[i];
-            objects_.declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
+            objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
         }
         reporter_ = std::make_unique<Reporter>(name_, config_, file_);
     }
@@ -124,11 +126,11 @@ public:
         runner_->receive(now);
         bus_->show(*runner_, now);
         for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n].show(*runner_, n, now);
-        objects_.show(*runner_);
+        objects_->show(*runner_);
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        objects_.take(*runner_);
+        objects_->take(*runner_);
         const void* leader = shared_ ? shared_->leader.load(std::memory_order_relaxed) : this;
         if (leader == nullptr && shared_->leader.compare_exchange_strong(leader, this)) leader = this;
         runner_->transmit(cycle.start_ns(), cycle.period_ns(), leader == this);
@@ -276,7 +278,7 @@ private:
     std::optional<BusPins>       bus_;
     std::deque<NodePins>         nodes_;
     std::deque<FaultWords>       words_;
-    ObjectPins                   objects_;
+    std::optional<ObjectPins> objects_;
     std::unique_ptr<Reporter>    reporter_;
     std::unique_ptr<hal::can::Link> link_;
     std::shared_ptr<Shared>         shared_;
