@@ -38,12 +38,17 @@ std::string json_of(const PdoSettings& p) {
                        p.name(), p.on(), canopen::cob_id(p.cob), p.transmission, p.inhibit_100us * 100, p.event_ms, p.sync_start, mapping);
 }
 
-std::string line_of(const PdoSettings& p) {
-    std::string mapping;
-    if (p.count > 64) mapping = p.count == 0xff ? "multiplexed, to an object of another node" : "multiplexed, from an object of its own";
-    else if (p.mapping.empty()) mapping = "nothing";
-    for (const auto& item : p.mapping) mapping += (mapping.empty() ? "" : ", ") + item_text(item);
-    return fmt::format("{:7}  {:>8}  {:28}  {}\n", p.name(), p.identifier(), p.timing(), mapping);
+/// A line, and one below it for each object.
+std::string lines_of(const PdoSettings& p) {
+    std::string text = fmt::format("{:7} {:>8}  {}", p.name(), p.identifier(), p.timing());
+    if (p.count > 64) return text + (p.count == 0xff ? ", multiplexed: to an object of another node\n" : ", multiplexed: from an object of its own\n");
+    if (p.mapping.empty()) return text + ", empty\n";
+    text += '\n';
+    for (const auto& item : p.mapping) {
+        const std::string place = fmt::format("{:04X}:{:X}/{}", item.object.index, item.object.sub, item.bits);
+        text += item.object.name.empty() ? fmt::format("                  {}\n", place) : fmt::format("                  {:10} {}\n", place, item.object.name);
+    }
+    return text;
 }
 
 }  // namespace
@@ -57,7 +62,7 @@ int run_can_pdo_show(const Options& options) {
     std::vector<PdoSettings> pdos;
     if (!read_pdos(station, options, node, names, pdos)) return 1;
     std::string text;
-    for (const PdoSettings& p : pdos) text += options.json ? json_of(p) : line_of(p);
+    for (const PdoSettings& p : pdos) text += options.json ? json_of(p) : lines_of(p);
     return print(text) ? 0 : 1;
 }
 
@@ -193,8 +198,8 @@ int run_can_pdo_map(const Options& options) {
         return all;
     };
     if (entries(now) != entries(after) || now.transmission != after.transmission || now.cob != after.cob)
-        return print(line_of(now)), fail(options, "the node took every value but has others now: this is how it is");
-    return print(line_of(now)) ? 0 : 1;
+        return print(lines_of(now)), fail(options, "the node took every value but has others now: this is how it is");
+    return print(lines_of(now)) ? 0 : 1;
 }
 
 namespace {

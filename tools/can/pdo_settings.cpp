@@ -85,7 +85,7 @@ std::string PdoSettings::timing() const {
     if (transmission <= 240 && received) text = "taken over at the SYNC";
     else if (transmission == 0) text = "at the SYNC after an event";
     else if (transmission == 1) text = "every SYNC";
-    else if (transmission <= 240) text = fmt::format("every {}th SYNC", transmission);
+    else if (transmission <= 240) text = fmt::format("every {} SYNCs", transmission);
     else if (transmission == 252) text = "on request, of the last SYNC";
     else if (transmission == 253) text = "on request";
     else if (transmission >= 254) text = received ? "at once" : "on event";

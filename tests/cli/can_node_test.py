@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""hal can sdo, pdo and lss: a simulated node on udp: is asked and set up by hand."""
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import unittest
+
+from harness import HAL, PATIENCE, Case, wait_until
+
+
+class Node(Case):
+    IDENTIFIER = "5"
+
+    def setUp(self):
+        super().setUp()
+        place = random.Random(os.urandom(8))  # tests run side by side: each has its own bus
+        self.bus = f"udp:239.{place.randrange(1, 255)}.{place.randrange(256)}.{place.randrange(1, 255)}%lo:{place.randrange(20000, 60000)}"
+        self.write("io.eds", self.run_program("node", "io", "--eds", *self.SIZE).stdout)
+        self.start_node()
+
+    SIZE = ("--inputs", "16", "--outputs", "16", "--analog-inputs", "2", "--analog-outputs", "2")
+
+    def start_node(self):
+        log = open(self.folder / "node.log", "w")
+        self.addCleanup(log.close)
+        node = subprocess.Popen(["hal", "node", "io", "--link", self.bus, "--id", self.IDENTIFIER, *self.SIZE], executable=str(HAL), cwd=self.folder,
+                                env=self.environment, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
+        self.addCleanup(self.end, node)
+        wait_until(lambda: self.ready(), "the node answers")
+
+    def ready(self):
+        return self.run_program("can", "sdo", "read", self.bus, "5", "1000", "--timeout", "100ms").returncode == 0
+
+    def can(self, *words):
+        return self.good("can", *words)
+
+    def bad_can(self, *words):
+        return self.bad("can", *words)
+
+    def end(self, process, number=signal.SIGTERM):
+        if process.poll() is None:
+            process.send_signal(number)
+        process.wait(timeout=PATIENCE)
+
+
+class Sdo(Node):
+    def read(self, *words):
+        return self.can("sdo", "read", self.bus, "5", *words)
+
+    def test_values_in_their_types(self):
+        self.assertEqual("1001:0 = 0x00 (0)\n1018:4 = 0x00000001 (1)\n", self.read("1001", "1018:4"))
+        self.can("sdo", "write", self.bus, "5", "6411:1", "-300", "--type", "i16")
+        self.assertEqual("6411:1 = 0xFED4 (65236, or -300)\n", self.read("6411:1"))
+        self.assertEqual("6411:1 = -300 (0xFED4)\n", self.read("6411:1", "--type", "i16"))
+        self.assertEqual("6411:1 Write analogue output 16-bit, Analogue output 1 = -300 (0xFED4)\n", self.read("6411:1", "--eds", "io.eds"))
+        self.can("sdo", "write", self.bus, "5", "0x6200:2", "0x5A")  # as wide as the node says it is
+        self.assertEqual("6200:2 = 0x5A (90)\n", self.read("6200sub2"))
+        self.assertRegex(self.read("1008"), r'^1008:0 = "[^"]+" \(\d+ bytes\)\n$')
+
+    def test_names_of_the_eds(self):
+        self.assertEqual("1018:4 Identity object, Serial number = 0x00000001 (1)\n", self.read("serial-number", "--eds", "io.eds"))
+        self.can("sdo", "write", self.bus, "5", "Write output 8-bit/Output block 1", "17", "--eds", "io.eds")
+        self.assertEqual("6200:1 = 0x11 (17)\n", self.read("6200:1"))
+        self.assertEqual("hal can sdo read: 'serial-nomber' is no object of io.eds; did you mean 'serial-number'?\n",
+                         self.bad_can("sdo", "read", self.bus, "5", "serial-nomber", "--eds", "io.eds"))
+        self.assertRegex(self.bad_can("sdo", "read", self.bus, "5", "event timer", "--eds", "io.eds"),
+                         r"^hal can sdo read: 'event timer' is the name of \d+ objects \(1400:5, 1401:5, .*; write which, such as 1400:5\n$")
+        self.assertEqual("hal can sdo read: 'serial' is no object; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names\n",
+                         self.bad_can("sdo", "read", self.bus, "5", "serial"))
+
+    def test_for_programs(self):
+        self.assertEqual({"node": 5, "index": 0x1018, "sub": 4, "name": "Identity object, Serial number", "type": "u32", "value": 1, "bytes": 4,
+                          "data": "01000000"}, json.loads(self.read("1018:4", "--eds", "io.eds", "--json")))
+        name = json.loads(self.read("1008", "--eds", "io.eds", "--json"))
+        self.assertEqual(name["data"], name["value"].encode().hex().upper())
+        self.read("1008", "-o", "name.bin")
+        self.assertEqual(name["value"].encode(), (self.folder / "name.bin").read_bytes())
+        for how in ("--block", "--segmented"):
+            self.assertEqual(name["value"], json.loads(self.read("1008", how, "--json", "--eds", "io.eds"))["value"])
+
+    def test_aborts_say_what_to_do(self):
+        sdo = ("sdo", "read", self.bus, "5")
+        self.assertEqual("hal can sdo read: node 5, 2FFF:0: object does not exist in the object dictionary (0x06020000); the device's EDS lists the objects it has\n",
+                         self.bad_can(*sdo, "2fff"))
+        self.assertEqual("hal can sdo read: node 5, 1018:9: sub-index does not exist (0x06090011); sub-index 0 of the object tells the highest one it has\n",
+                         self.bad_can(*sdo, "1018:9"))
+        self.assertEqual("hal can sdo write: node 5, 1000:0: attempt to write a read-only object (0x06010002); it can only be read\n",
+                         self.bad_can("sdo", "write", self.bus, "5", "1000", "1"))
+        self.assertIn("(0x06070012); the object has another width: say --type, such as u16 or i32\n",
+                      self.bad_can("sdo", "write", self.bus, "5", "1017", "1", "--type", "u32"))
+        self.assertEqual(f"hal can sdo read: node 9 did not answer within 0.15 s (asked for 1000:0); the bus is active; hal can scan {self.bus} shows who is there\n",
+                         self.bad_can("sdo", "read", self.bus, "9", "1000", "--timeout", "50ms"))
+
+    def test_wrong_words(self):
+        sdo = ("sdo", "write", self.bus, "5", "1017")
+        self.assertEqual("hal can sdo write: '70000' does not fit into UNSIGNED16 (0..65535)\n", self.bad_can(*sdo, "70000", "--eds", "io.eds"))
+        self.assertEqual("hal can sdo write: '010' would be octal; write it without the 0 in front, or 0x…\n", self.bad_can(*sdo, "010", "--type", "u16"))
+        self.assertIn("'u17' is no data type; there are bool, i8", self.bad_can(*sdo, "1", "--type", "u17"))
+        self.assertEqual("hal can sdo write: '200' is no node; write 1 to 127\n", self.bad_can("sdo", "write", self.bus, "200", "1017", "1"))
+        self.assertEqual("hal can sdo write: cannot read 'none.bin': No such file or directory\n", self.bad_can(*sdo, "--from", "none.bin"))
+        self.assertEqual("hal can sdo write: the value is missing or too many; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE for the value\n",
+                         self.bad_can(*sdo))
+        self.assertEqual("hal can sdo write: --block and --segmented exclude each other\n", self.bad_can(*sdo, "1", "--block", "--segmented"))
+        self.assertEqual("hal can sdo read: 'node.log' is no device description; hal can eds check node.log says why\n",
+                         self.bad_can("sdo", "read", self.bus, "5", "1000", "--eds", "node.log"))
+
+
+class Pdo(Node):
+    def shown(self):
+        return {p["pdo"]: p for p in map(json.loads, self.can("pdo", "show", self.bus, "5", "--json").splitlines())}
+
+    def test_show(self):
+        text = self.can("pdo", "show", self.bus, "5", "--eds", "io.eds")
+        self.assertIn("RPDO1        205  at once\n                  6200:1/8   Write output 8-bit, Output block 1\n"
+                      "                  6200:2/8   Write output 8-bit, Output block 2\n", text)
+        pdos = self.shown()
+        self.assertEqual([(0x6000, 1, 8), (0x6000, 2, 8)], [(m["index"], m["sub"], m["bits"]) for m in pdos["TPDO1"]["mapping"]])
+        self.assertEqual((True, 0x185), (pdos["TPDO1"]["on"], pdos["TPDO1"]["id"]))
+
+    def test_map_and_switch(self):
+        text = self.can("pdo", "map", self.bus, "5", "tpdo1", "6401:1", "6000:2/8", "--transmission", "3", "--inhibit", "5ms", "--event", "2s")
+        self.assertEqual("TPDO1        185  every 3 SYNCs, 5 ms apart or after 2000 ms\n                  6401:1/16\n                  6000:2/8\n", text)
+        self.can("pdo", "disable", self.bus, "5", "tpdo1")
+        self.assertFalse(self.shown()["TPDO1"]["on"])
+        self.can("pdo", "enable", self.bus, "5", "tpdo1")
+        self.assertTrue(self.shown()["TPDO1"]["on"])
+        self.can("pdo", "map", self.bus, "5", "tpdo1", "--id", "1A5")  # the mapping stays
+        self.assertEqual((0x1A5, 2), (self.shown()["TPDO1"]["id"], len(self.shown()["TPDO1"]["mapping"])))
+
+    def test_a_mapping_the_node_refuses_leaves_the_old_one(self):
+        before = self.shown()["RPDO1"]
+        self.assertEqual("hal can pdo map: node 5, 1600:2 (to map 6000:1/8): object cannot be mapped to a PDO (0x06040041); the device's EDS says which objects can be: "
+                         "PDOMapping=1\nhal can pdo map: RPDO1 is as it was before\n",
+                         self.bad_can("pdo", "map", self.bus, "5", "rpdo1", "6200:1", "6000:1"))
+        self.assertEqual(before, self.shown()["RPDO1"])
+
+    def test_wrong_words(self):
+        self.assertEqual("hal can pdo map: these are 72 bits, and a PDO holds 64; map 8 bits less, or use a second PDO\n",
+                         self.bad_can("pdo", "map", self.bus, "5", "tpdo1", "1000/32", "1018:1/32", "6000:1"))
+        self.assertEqual("hal can pdo disable: 'pdo1' is no PDO; write rpdo1 to rpdo512 or tpdo1 to tpdo512\n", self.bad_can("pdo", "disable", self.bus, "5", "pdo1"))
+        self.assertEqual(f"hal can pdo enable: node 5 has no TPDO77; hal can pdo show {self.bus} 5 shows those it has\n",
+                         self.bad_can("pdo", "enable", self.bus, "5", "tpdo77"))
+        self.assertEqual("hal can pdo map: RPDO1 has no inhibit time\n", self.bad_can("pdo", "map", self.bus, "5", "rpdo1", "--inhibit", "5ms"))
+
+    def test_watch(self):
+        watch = subprocess.Popen(["hal", "can", "pdo", "watch", self.bus, "5", "--eds", "io.eds", "-n", "2"], executable=str(HAL), cwd=self.folder,
+                                 env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(Case.end, self, watch)
+        self.assertIn("listening on", watch.stderr.readline())
+        self.can("send", self.bus, "205#1122", "305#2CFE0100")
+        out, _ = watch.communicate(timeout=2 * PATIENCE)
+        self.assertRegex(out, r"\A +\S+  RPDO1   Write output 8-bit, Output block 1 = 0x11 \(17\)  Write output 8-bit, Output block 2 = 0x22 \(34\)\n"
+                              r" +\S+  RPDO2   Write analogue output 16-bit, Analogue output 1 = -468 \(0xFE2C\)  Write analogue output 16-bit, Analogue output 2 = 1 \(0x0001\)\n\Z")
+
+    def test_watch_of_a_capture_goes_by_the_eds(self):
+        self.write("c.log", "(1.000000) can0 205#1122\n(1.500000) can0 185#0102\n(1.600000) can0 205#11\n")
+        seen = [json.loads(line) for line in self.run_program("can", "pdo", "watch", "replay:c.log", "5", "--eds", "io.eds", "--json").stdout.splitlines()]
+        self.assertEqual([{"time": 0.0, "pdo": "RPDO1", "values": {"6200:1": 17, "6200:2": 34}}, {"time": 0.5, "pdo": "TPDO1", "values": {"6000:1": 1, "6000:2": 2}},
+                          {"time": 0.6, "pdo": "RPDO1", "values": {"6200:1": 17}}], seen)
+        self.assertIn("short: 1 of 2 bytes", self.run_program("can", "pdo", "watch", "replay:c.log", "5", "--eds", "io.eds").stdout)
+        self.assertEqual("hal can pdo watch: a capture cannot be asked which PDOs the node has; add --eds FILE, an EDS or DCF with them\n",
+                         self.bad_can("pdo", "watch", "replay:c.log", "5"))
+
+
+class Lss(Node):
+    IDENTIFIER = "none"
+
+    def ready(self):
+        return self.run_program("can", "lss", self.bus, "identify", "--timeout", "100ms").returncode == 0
+
+    def test_a_node_without_id_is_found_and_gets_one(self):
+        identity = r"vendor (0x\w+), product (0x\w+), revision (0x\w+), serial (0x00000001)"
+        found = re.fullmatch(identity + ", now in configuration\n", self.can("lss", self.bus, "scan"))
+        self.assertTrue(found)
+        self.assertRegex(self.can("lss", self.bus, "inquire"), f"^{identity}, no node id\n$")
+        self.can("lss", self.bus, "node-id", "5")
+        self.can("lss", self.bus, "store")
+        self.can("lss", self.bus, "switch", "waiting")
+        wait_until(lambda: Node.ready(self), "the node has its id")
+        self.assertEqual("hal can lss: no slave answered; so none is without node id, as far as they know LSS\n", self.bad_can("lss", self.bus, "identify"))
+        self.assertEqual("there is such a slave\n", self.can("lss", self.bus, "identify", *found.groups()))
+        self.can("lss", self.bus, "select", *found.groups())
+        self.assertIn(", node id 5\n", self.can("lss", self.bus, "inquire"))
+
+    def test_what_goes_wrong(self):
+        self.assertEqual("hal can lss: no slave answered; one slave has to be in configuration: see switch and select in: hal help can lss\n",
+                         self.bad_can("lss", self.bus, "node-id", "5"))
+        self.can("lss", self.bus, "switch", "configuration")
+        self.assertEqual("hal can lss: '300k' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k\n", self.bad_can("lss", self.bus, "bit-rate", "300k"))
+        self.assertEqual("hal can lss: '128' is no node id; write 1 to 127, or none\n", self.bad_can("lss", self.bus, "node-id", "128"))
+        self.assertEqual("hal can lss: there is no command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
+        self.assertEqual("hal can lss: select takes other words; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
+        self.assertEqual("hal can lss: 'x' is no vendor id; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
+
+
+if __name__ == "__main__":
+    unittest.main()
