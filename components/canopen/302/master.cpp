@@ -36,7 +36,7 @@ void Master::start(Time now) noexcept {
     status_.resets = 0;
     status_.begun = now;
     halted_ = false;
-    for (auto& n : nodes_) n->removed = false;
+    for (auto& n : nodes_) n->removed = false, n->status.result = BootResult::none;
     boot_all(setup_.reset_at_start);
 }
 

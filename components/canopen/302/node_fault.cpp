@@ -115,7 +115,8 @@ void Master::Node::fail(BootResult result, Cause cause) noexcept {
     drop();
     const bool absent = result == BootResult::no_answer && cause == Cause::silent;
     if (cause == Cause::silent || cause == Cause::heartbeat || cause == Cause::guarding) status.online = false;
-    if (!absent) return react(setup.on_failure, setup.retry, How::reset);
+    // A device that is not ours may go on with what it does.
+    if (!absent) return react(setup.on_failure, setup.retry, status.failed_in == Step::identifying ? How::as_it_is : How::reset);
     missing = true;
     if (!setup.mandatory) return react(Reaction::restart, setup.retry, How::reset);
     if (now() - needed_since_ >= setup.boot_limit) return react(setup.on_failure, setup.retry, How::reset);
@@ -145,7 +146,7 @@ void Master::Node::react(Reaction reaction, Time delay, How how) noexcept {
 void Master::Node::try_again(Time delay, How how) noexcept {
     backoff_ = backoff_ == 0 ? setup.retry : std::min(backoff_ * 2, std::max(setup.retry, setup.retry_most));
     status.next_try = now() + delay;
-    how_ = delay == 0 ? how : How::reset;
+    how_ = delay != 0 && how == How::booted ? How::reset : how;
     enter(Step::waiting);
 }
 

@@ -100,6 +100,20 @@ TEST(BootNetwork, Does_not_wait_for_an_optional_node) {
     EXPECT_EQ(b.networks, (std::vector{NetworkState::booting, NetworkState::operational}));
 }
 
+TEST(BootNetwork, Leaves_a_device_alone_that_is_not_the_expected_one_and_looks_for_another) {
+    Three b([](std::uint8_t id, NodeSetup& n) {
+        if (id == 6) n.product = 99;
+    });
+    b.power();
+    b.start();
+    b.run(30 * second);
+    EXPECT_EQ(b.stations[1]->resets.size(), 1U);  // that at the start
+    EXPECT_GT(b.status(6).attempts, 3U);
+    EXPECT_EQ(b.status(6).result, BootResult::product);
+    store(b.stations[1]->device.dictionary().find(0x1018, 2)->data, std::uint32_t{99});  // the right one is fitted
+    EXPECT_TRUE(b.operational(5 * second));
+}
+
 TEST(BootNetwork, Waits_for_a_mandatory_node_and_says_for_which) {
     Three b;
     b.stations[0]->plug(true, b.now), b.stations[2]->plug(true, b.now);

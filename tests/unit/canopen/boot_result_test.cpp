@@ -303,6 +303,10 @@ TEST(BootResult, L_when_a_node_to_keep_alive_is_operational_already) {
     EXPECT_EQ(b.status(5).state, NmtState::operational);    // and watched:
     EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)),
               (std::vector<std::string>{"node 5 (arm) was operational already and was not touched"}));
+    b.master->start(b.now);  // nor the second time
+    b.run(second);
+    EXPECT_EQ(b.status(5).result, BootResult::was_operational);
+    EXPECT_EQ(b.station.resets.size(), 0U);
     b.station.plug(false, b.now);
     ASSERT_TRUE(b.until([&] { return b.status(5).losses == 1; }, second));
     b.station.plug(true, b.now);  // now it is booted as any other
