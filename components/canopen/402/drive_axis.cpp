@@ -158,7 +158,8 @@ std::uint16_t DriveAxis::mode_bits() const noexcept {
     const bool idle = !active_ && ref_.velocity == 0 && standing();
     switch (mode_) {
     case Mode::profile_position:
-        bits = when(active_ ? reached_ : idle, target_reached) | when(acknowledged_, set_point_acknowledge) |
+        // Of a set of set-points the last one counts.
+        bits = when(active_ ? reached_ && set_points_.count == 0 : idle, target_reached) | when(acknowledged_, set_point_acknowledge) |
                when(following_, following_error);
         break;
     case Mode::velocity: break;
@@ -181,7 +182,7 @@ std::uint16_t DriveAxis::mode_bits() const noexcept {
     }
     if (halted_ && !cyclic()) {
         bits &= ~unsigned{target_reached};
-        bits |= when(standing() && stop_time_ > 0, target_reached);
+        bits |= when(still_time_ > 0, target_reached);
     }
     return static_cast<std::uint16_t>(bits);
 }

@@ -150,7 +150,7 @@ private:
     bool stopping_ = false;
     Stop stop_ = Stop::disable;
     State after_stop_ = State::unknown;
-    double stop_time_ = 0;                  // since the demand is 0
+    double stop_time_ = 0, still_time_ = 0;  // since the demand is 0, and since it stands
     std::uint16_t faults_ = 0;              // a bit for each Cause
     double release_left_ = 0, engage_left_ = 0;
     bool connected_ = true;

@@ -143,9 +143,10 @@ bool DriveAxis::stop_step(Stop stop, double dt) noexcept {
         take(Control::position);
         ramp(ref_, 0, stop_rate(stop), stop_rate(stop), dt);
     }
-    if (ref_.velocity != 0) return stop_time_ = 0, false;
+    if (ref_.velocity != 0) return stop_time_ = still_time_ = 0, false;
     stop_time_ += dt;
-    return standing() || stop_time_ > 0.5;
+    still_time_ = standing() ? still_time_ + dt : 0;
+    return still_time_ * 1000 >= objects_.velocity_threshold_time || stop_time_ > 0.5;
 }
 
 void DriveAxis::select_mode() noexcept {
@@ -167,7 +168,7 @@ void DriveAxis::restart_mode() noexcept {
     edges_ = 0;
     last_target_ = measured_;
     homing_phase_ = HomingPhase::idle;
-    following_time_ = reached_time_ = stop_time_ = 0;
+    following_time_ = reached_time_ = stop_time_ = still_time_ = 0;
 }
 
 void DriveAxis::make_reference(double dt) noexcept {

@@ -54,7 +54,7 @@ void DriveAxis::stop_then(Stop stop, State then) noexcept {
     stopping_ = true;
     stop_ = stop;
     after_stop_ = then;
-    stop_time_ = 0;
+    stop_time_ = still_time_ = 0;
 }
 
 void DriveAxis::take_controlword() noexcept {

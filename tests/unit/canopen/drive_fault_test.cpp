@@ -451,6 +451,59 @@ TEST_F(DriveAxes, Pdos_move_it) {
     ASSERT_NE(position_frame, sent.end());
     EXPECT_NEAR(load<std::int32_t>(position_frame->data.data() + 2), 1000, 20);
 }
+TEST_F(DriveAxes, Mode_that_does_not_exist_is_not_heard_in_a_pdo) {
+    moving();
+    device().command(NmtCommand::start, now);
+    device().handle({0x305, {0x0f, 0, 5}}, now);
+    run(10);
+    EXPECT_EQ(get<std::int8_t>(object::modes_of_operation_display), 3);
+    EXPECT_NEAR(velocity(), 20000, 200);
+}
+TEST_F(DriveAxes, Any_value_in_any_object_leaves_it_a_drive) {
+    std::uint64_t seed = 1;
+    const auto random = [&] { return seed = seed * 6364136223846793005U + 1442695040888963407U, seed >> 33; };
+    for (int round = 0; round < 40; ++round) {
+        settings.axes = 2;
+        make();
+        auto entries = device().dictionary().entries();
+        for (int n = 0; n < 3000; ++n) {
+            auto& e = entries[random() % entries.size()];
+            if (e.index >= 0x2000 && e.size <= 8) {
+                // Small, large and any; as an SDO, and past all checks as a PDO.
+                const std::int64_t extreme[] = {0, 1, -1, 0x7fffffff, -0x80000000LL, static_cast<std::int64_t>(random()),
+                                                static_cast<std::int64_t>(random() % 1000)};
+                std::uint8_t bytes[8];
+                store(bytes, extreme[random() % 7]);
+                if (random() % 4 != 0 || !e.rpdo) {
+                    device().dictionary().write(e, {bytes, e.size});
+                } else {
+                    std::memcpy(e.data, bytes, e.size);
+                    e.handler->written(e);
+                }
+            }
+            if (n % 10 == 0) {
+                const std::uint16_t words[] = {0x00, 0x80, 0x06, 0x07, 0x0f, 0x1f, 0x7f, 0x3f, 0x02};
+                set(object::controlword, words[random() % 9], static_cast<unsigned>(random() % 2));
+            }
+            run(1);
+            for (unsigned axis = 0; axis < 2; ++axis) {
+                ASSERT_NE(state(axis), State::unknown) << round << ' ' << n;
+                ASSERT_TRUE(std::isfinite(drive->status(axis).place) && std::isfinite(drive->status(axis).torque)) << round << ' ' << n;
+            }
+        }
+    }
+}
+TEST_F(DriveAxes, Motor_that_cannot_be_is_made_possible) {
+    auto& m = settings.axis[0].motor;
+    m.inertia = m.rated_torque = m.peak_torque = m.rated_current = m.rated_voltage = m.highest_speed = 0;
+    m.viscous_friction = m.coulomb_friction = std::numeric_limits<double>::quiet_NaN();
+    m.resolution = 0;
+    make();
+    enable(Mode::profile_velocity);
+    set(object::target_velocity, 1);
+    run(100);
+    EXPECT_TRUE(std::isfinite(drive->status(0).place));
+}
 TEST_F(DriveAxes, A_pause_of_the_caller_is_no_leap) {
     moving();
     now += 3600 * second;
