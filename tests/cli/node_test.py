@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""hal node: simulated CANopen devices as processes, looked at by hal can over udp: on this machine."""
+import json
+import os
+import random
+import re
+import signal
+import struct
+import subprocess
+import unittest
+import zlib
+
+from harness import HAL, Case, wait_until
+
+
+class Node(Case):
+    def setUp(self):
+        super().setUp()
+        place = random.Random(os.urandom(8))  # tests run side by side: each has its own bus
+        self.bus = f"udp:239.{place.randrange(1, 255)}.{place.randrange(256)}.{place.randrange(1, 255)}%lo:{place.randrange(20000, 60000)}"
+        self.said = {}
+
+    def node(self, kind, *words):
+        """Starts a device and waits until it is on the bus."""
+        name = self.folder / f"{kind}-{len(self.said)}.txt"
+        with open(name, "w", encoding="utf-8") as out:
+            process = subprocess.Popen(["hal", "node", kind, "--link", self.bus, *map(str, words)], executable=str(HAL), cwd=self.folder,
+                                       env=self.environment, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, process)
+        self.said[process] = name
+        wait_until(lambda: " s  " in name.read_text() or process.poll() is not None, "the device boots")
+        if process.poll() is not None:
+            self.fail(process.communicate()[1])
+        return process
+
+    def expect(self, process, text):
+        wait_until(lambda: text in self.said[process].read_text(), f"{text!r} in {self.said[process].read_text()!r}")
+
+    def ended(self, process):
+        """Ctrl-C, and all it has said."""
+        process.send_signal(signal.SIGINT)
+        error = process.communicate(timeout=60)[1]
+        self.assertEqual((0, ""), (process.returncode, error))
+        return self.said[process].read_text()
+
+    def read(self, node, place, kind):
+        """The value of an object."""
+        return json.loads(self.good("can", "sdo", "read", self.bus, node, place, "--type", kind, "--json"))["value"]
+
+    def write_object(self, node, place, kind, *value):
+        self.good("can", "sdo", "write", self.bus, node, place, *value, "--type", kind)
+
+
+class Devices(Node):
+    def test_says_what_it_is_what_happens_and_how_it_ends(self):
+        io = self.node("io", "--id", 5, "--heartbeat", 20, "--set", "in-3=1")
+        scan = self.good("can", "scan", self.bus, "--for", "1s")
+        self.assertRegex(scan, r"   5  pre-operational  0x000F0191  0x0048414C  0x00000401  0x00010000  0x00000001  ")
+        self.good("can", "nmt", self.bus, "start", "5")
+        self.expect(io, "operational\n")
+        self.good("can", "send", self.bus, "205#8100000000000000")
+        self.expect(io, "outputs 10000001")
+        self.good("can", "nmt", self.bus, "stop", "5")
+        self.expect(io, "stopped\n")
+        text = self.ended(io)
+        first, *rest = text.splitlines()
+        self.assertEqual(f"io, node 5 on {self.bus} (CAN over UDP multicast): CiA 401, 64 digital inputs, 64 outputs, 12 analogue inputs and 12 outputs; "
+                         "Ctrl-C ends it", re.sub(r"on \S+ \([^)]*\)", f"on {self.bus} (CAN over UDP multicast)", first))
+        self.assertRegex(rest[0], r"^ +0\.\d{3} s  pre-operational$")
+        self.assertRegex(text, r"\n\d+\.\d s: \d+ frames sent, \d+ received, 0 dropped; [1-9]\d* SDO transfers, 0 aborted; [1-9]\d* PDOs sent\n"
+                               r"outputs 0{64}, at their error values\n$")
+
+    def test_world_around_it_is_set_now_and_later(self):
+        io = self.node("io", "--id", 5, "--set", "in-0=1", "--set", "analog-in-1=5@0.1s", "--start")
+        self.expect(io, "operational\n")
+        wait_until(lambda: self.read(5, "6401:2", "i16") == 16384, "the analogue input comes")
+        self.assertEqual(1, self.read(5, "6000:1", "u8"))
+
+    def test_drive_is_enabled(self):
+        drive = self.node("drive", "--id", 2, "--axes", 2, "--motor", "endless:1")
+        self.good("can", "nmt", self.bus, "start", "2")
+        self.expect(drive, "axis 0 switch on disabled, profile position; axis 1 switch on disabled, profile position")
+        for command, state in (("6", "ready to switch on"), ("7", "switched on"), ("0xf", "operation enabled")):
+            self.write_object(2, "6840:0", "u16", command)
+            self.expect(drive, f"axis 0 switch on disabled, profile position; axis 1 {state}, profile position")
+
+    def test_force_sensor_reads_what_acts_on_it(self):
+        self.node("jr3", "--set", "fz=-20")
+        wait_until(lambda: abs(self.read(80, "6130:3", "r32") + 20) < 0.05, "the force is measured")
+
+    def test_a_recorded_line_is_played(self):
+        self.good("node", "jr3", "--record", "line.bin", "--for", "50ms")
+        self.assertEqual(13750, os.path.getsize(self.folder / "line.bin"))
+        jr3 = self.node("jr3", "--stream", "line.bin", "--id", "0x51")
+        wait_until(lambda: self.read(81, "2203:0", "u32") > 1000, "packets are decoded")
+        self.assertIn("not calibrated yet, F", self.ended(jr3))
+
+    def test_program_is_updated_and_kept(self):
+        image = subprocess.run(["hal", "node", "bootloader", "--make-image", "2.1"], executable=str(HAL), env=self.environment,
+                               stdout=subprocess.PIPE, check=True).stdout
+        (self.folder / "image.bin").write_bytes(image)
+        self.assertEqual((b"HLCP", 0x302, 0x20001, len(image) - 20, zlib.crc32(image[20:])), struct.unpack_from("<4sIIII", image))
+        device = self.node("bootloader", "--id", 4, "--flash", "flash.bin")
+        self.expect(device, "program 1.0 runs")
+        self.write_object(4, "1f51:1", "u8", "0")
+        self.expect(device, "bootloader; flash: no error")
+        self.write_object(4, "1f51:1", "u8", "3")
+        wait_until(lambda: self.read(4, "1f57:1", "u32") == 2, "the flash is clear")
+        self.good("can", "sdo", "write", self.bus, 4, "1f50:1", "--from", "image.bin", "--type", "domain", "--block")
+        self.assertEqual(zlib.crc32(image), self.read(4, "1f56:1", "u32"))
+        self.write_object(4, "1f51:1", "u8", "1")
+        self.expect(device, "program 2.1 runs")
+        self.assertEqual(0x20001, self.read(4, "1018:3", "u32"))
+        self.ended(device)
+        self.assertEqual(image, (self.folder / "flash.bin").read_bytes())
+        again = self.node("bootloader", "--id", 4, "--flash", "flash.bin")
+        self.expect(again, "program 2.1 runs")
+
+    def test_faults(self):
+        self.node("io", "--id", 5, "--fault", "wrong-revision", "--fault", "no-heartbeat", "--heartbeat", "10")
+        self.assertRegex(self.good("can", "scan", self.bus, "--for", "1s"), r"   5  no heartbeat  .*0x000100FF  0x00000001")
+        late = self.node("io", "--id", 6, "--fault", "late-sdo:time=50ms")
+        self.read(6, "1000:0", "u32")
+        self.assertRegex(self.ended(late), r"\nfault late-sdo: \d+ times\n")
+
+    def test_a_node_id_comes_from_an_LSS_master(self):
+        io = self.node("io", "--id", "none", "--serial", 9)
+        self.good("can", "send", self.bus, "7E5#0401000000000000", "7E5#1107000000000000", "7E5#0400000000000000")
+        self.expect(io, "pre-operational\n")
+        self.assertRegex(self.good("can", "scan", self.bus, "--for", "1s"), r"   7  .*0x00000009")
+
+    def test_EDS_is_without_defect(self):
+        for kind in ("drive", "io", "jr3", "bootloader"):
+            self.write(f"{kind}.eds", self.good("node", kind, "--eds"))
+            done = self.run_program("can", "eds", "check", f"{kind}.eds")
+            self.assertEqual(0, done.returncode)
+            self.assertRegex(done.stderr, rf"^{kind}\.eds: Halcyon .* by Halcyon; \d+ objects, \d+ entries, \d RPDOs, \d TPDOs?; 0 warnings, 0 notes\n$")
+        self.write("eight.eds", self.good("node", "drive", "--axes", "8", "--eds"))
+        self.assertRegex(self.run_program("can", "eds", "check", "eight.eds").stderr, r"56 RPDOs, 56 TPDOs; 0 warnings, 0 notes")
+
+
+class WrongWords(Node):
+    def test_each_says_what_to_type(self):
+        cases = {
+            ("io",): "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node io",
+            ("io", "--link", self.bus): "which node-id shall it have? add --id 5; none for one that an LSS master gives",
+            ("io", "--link", self.bus, "--id", "128"): "'128' is no node-id; write 1 to 127, 0x50, or none for one that an LSS master gives",
+            ("io", "--link", "bus", "--id", "5"): "'bus' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
+                                                  "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0 or replay:FILE",
+            ("io", "--link", self.bus, "--id", "5", "--set", "in-64=1"): "there is no 'in-64' to set; there are in-0 … in-63, analog-in-0 … analog-in-11",
+            ("io", "--link", self.bus, "--id", "5", "--set", "in-6"): "'in-6' sets nothing; write NAME=VALUE, or NAME=VALUE@2s for later",
+            ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "nothing can be set of a bootloader",
+            ("bootloader", "--make-image", "2"): "'2' is no version; write 2.1",
+            ("drive", "--link", self.bus, "--id", "5", "--motor", "weight:3"):
+                "'weight:3' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of resolution, endless, inertia, viscous-friction, "
+                "coulomb-friction, rated-torque, peak-torque, rated-current, rated-voltage, highest-speed, start, negative-limit, positive-limit, "
+                "negative-stop, positive-stop, home-from, home-to, brake-torque",
+            ("jr3", "--record", "line.bin"): "for how long? add --for 2s; the calibration comes through in 1.02 s",
+            ("jr3", "--link", self.bus, "--stream", "none.bin"): "cannot read 'none.bin': No such file or directory",
+            ("io", "--link", self.bus, "--id", "5", "--fault", "mute:every=0"): "'every=0' is no property of the fault mute; write every=3, from=5s or for=1s",
+        }
+        for words, said in cases.items():
+            self.assertEqual(f"hal node {words[0]}: {said}\n", self.bad("node", *words))
+        self.assertIn("--axes: Value 9 not in range 1 to 8", self.bad("node", "drive", "--axes", "9"))
+        self.assertEqual("hal: there is no command 'node drve'; did you mean 'node drive'?\n", self.bad("node", "drve"))
+        self.assertIn("there is no fault 'lat-sdo'; there are mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
+
+    def test_faults_are_listed(self):
+        text = self.good("node", "faults")
+        self.assertIn("late-sdo        every SDO answer leaves late, by `time`; time=700ms\n", text)
+        self.assertEqual(27, text.count("\n"))
+
+
+if __name__ == "__main__":
+    unittest.main()
