@@ -55,7 +55,7 @@ constexpr Verb verbs[] = {
     {"on", "", "walk to operation enabled"},
     {"off", "", "brake and switch off"},
     {"go", "POSITION [relative] [nowait]", "move there (pp); ends when it is there"},
-    {"speed", "SPEED [nowait]", "turn at that speed (pv; vl when that is the mode)"},
+    {"speed", "SPEED [nowait]", "turn at that speed (pv; in mode vl: r/min)"},
     {"torque", "PERMILLE [nowait]", "give that torque, in thousandths of the rated one (tq)"},
     {"stop", "", "stand still, and stay on"},
     {"quickstop", "", "brake as fast as the drive may, and switch off"},
@@ -183,7 +183,8 @@ bool DriveShell::command(HandAxis& a, const std::string& verb, Words arguments) 
     if (verb == "go" || verb == "speed" || verb == "torque") {
         const bool relative = verb == "go" && flag("relative"), nowait = flag("nowait");
         if (arguments.size() != 1) return usage();
-        if (!number(arguments[0], value)) return wrong(fmt::format("'{}' is no number; type: {} {} {}", arguments[0], letter, verb, row->arguments));
+        if (!number(arguments[0], value))
+            return wrong(fmt::format("'{}' is no number; type: {} {} {}", arguments[0], letter, verb, row->arguments));
         if (verb == "go") {
             if (!a.go(value, relative, !nowait)) return false;
             return say(a, nowait ? fmt::format("{}: moves", letter) : fmt::format("{}: at {:g}", letter, a.position()));
@@ -208,8 +209,9 @@ bool DriveShell::command(HandAxis& a, const std::string& verb, Words arguments) 
             if (arguments[0] == abbreviation(mode)) return a.set_mode(mode) && say(a, fmt::format("{}: mode {}", letter, arguments[0]));
         for (const ModeRow& m : modes)
             if (arguments[0] == m.abbreviation)
-                return wrong(m.mode == Mode::homing ? fmt::format("homing is a command: {} home", letter)
-                                                    : fmt::format("{} wants a set-point every cycle; use component cia402 in a netlist", m.abbreviation));
+                return wrong(m.mode == Mode::homing
+                                 ? fmt::format("homing is a command: {} home", letter)
+                                 : fmt::format("{} wants a set-point every cycle; use component cia402 in a netlist", m.abbreviation));
         return wrong(fmt::format("'{}' is no mode; write pp, pv, tq or vl", arguments[0]));
     }
     if (verb == "set") {
@@ -234,7 +236,9 @@ double factor_of(const HandAxis& a, Setting::Unit unit) {
 }
 
 Factor* find_factor(HandAxis& a, const std::string& name) {
-    return name == factors[0] ? &a.rules.position : name == factors[1] ? &a.rules.velocity : name == factors[2] ? &a.rules.acceleration : nullptr;
+    Factor* const all[] = {&a.rules.position, &a.rules.velocity, &a.rules.acceleration};
+    const auto* found = std::find(std::begin(factors), std::end(factors), name);
+    return found == std::end(factors) ? nullptr : all[found - std::begin(factors)];
 }
 
 bool no_such_value(const Options& options, const std::string& name, bool reading) {
@@ -268,7 +272,8 @@ bool DriveShell::query(HandAxis& a, const std::string& name) {
 
 bool DriveShell::set(HandAxis& a, const std::string& name, const std::string& text) {
     if (Factor* f = find_factor(a, name)) {
-        if (!parse_factor(text, *f)) return wrong(fmt::format("'{}' is no factor; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0", text));
+        if (!parse_factor(text, *f))
+            return wrong(fmt::format("'{}' is no factor; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0", text));
         return query(a, name);
     }
     const auto* s = std::find_if(std::begin(settings), std::end(settings), [&](const Setting& each) { return name == each.name; });
@@ -281,7 +286,8 @@ bool DriveShell::set(HandAxis& a, const std::string& name, const std::string& te
     if (raw < least || raw > most)
         return wrong(fmt::format("{} {:g} is {:g} in the drive's units, which go from {:g} to {:g}", name, value, raw, least, most));
     std::int64_t back = 0;
-    if (!a.write(s->index, s->sub, static_cast<std::int64_t>(raw), s->bytes) || !a.read(s->index, s->sub, back, s->is_signed)) return false;
+    if (!a.write(s->index, s->sub, static_cast<std::int64_t>(raw), s->bytes)) return false;
+    if (!a.read(s->index, s->sub, back, s->is_signed)) return false;
     if (static_cast<double>(back) != raw)
         return a.refuse(fmt::format("drive keeps {} at {:g}", name, static_cast<double>(back) / factor_of(a, s->unit)));
     return say(a, fmt::format("{}: {} {:g}", a.letter(), name, static_cast<double>(back) / factor_of(a, s->unit)));
@@ -291,7 +297,8 @@ bool DriveShell::status(HandAxis& a) {
     if (!a.look()) return false;
     const AxisFeedback& seen = a.seen();
     const State state = state_of(seen.statusword);
-    std::string text = fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), word(state), abbreviation(seen.mode), seen.statusword);
+    std::string text =
+        fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), word(state), abbreviation(seen.mode), seen.statusword);
     constexpr std::pair<std::uint16_t, const char*> bits[] = {
         {status::voltage_enabled, "voltage enabled"}, {status::warning, "warning"}, {status::remote, "remote"},
         {status::target_reached, "target reached"}, {status::internal_limit, "internal limit"}};
@@ -327,7 +334,10 @@ bool take_options(Options& options) {
     std::string timeout;
     for (std::size_t i = 0; i < options.words.size(); ++i) {
         const std::string& w = options.words[i];
-        std::string* const to = w == "--node" ? &options.drive_node : w == "--axis" ? &options.drive_axis : w == "--timeout" ? &timeout : nullptr;
+        std::string* const to = w == "--node"      ? &options.drive_node
+                                : w == "--axis"    ? &options.drive_axis
+                                : w == "--timeout" ? &timeout
+                                                   : nullptr;
         if (w == "-k" || w == "--keep-going") options.keep_going = true;
         else if (to && i + 1 == options.words.size()) return fail(options, fmt::format("something is missing behind {}", w)), false;
         else if (to) *to = options.words[++i];

@@ -62,9 +62,11 @@ bool HandAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, 
 
 bool HandAxis::look() {
     std::int64_t value = 0;
-    if (!read(object::statusword, 0, value, false)) return false;
-    feedback_.statusword = static_cast<std::uint16_t>(value);
     bool missing = false;
+    if (!read(object::statusword, 0, value, false, &missing))
+        return missing && refuse(fmt::format("node {} has no such axis: object {:04X} is missing", node_,
+                                             of_axis(object::statusword, axis_)));
+    feedback_.statusword = static_cast<std::uint16_t>(value);
     const auto optional = [&](bool& there, std::uint16_t index, auto& to) {
         missing = false;
         if (!there) return true;
@@ -77,7 +79,8 @@ bool HandAxis::look() {
     if (!read(object::position_actual, 0, value, true)) return false;
     feedback_.position = static_cast<std::int32_t>(value);
     feedback_.error_code = 0;
-    if (state_of(feedback_.statusword) == State::fault && read(object::error_code, 0, value, false, &missing))
+    const State state = state_of(feedback_.statusword);
+    if ((state == State::fault || state == State::fault_reaction_active) && read(object::error_code, 0, value, false, &missing))
         feedback_.error_code = static_cast<std::uint16_t>(value);
     const std::int64_t now = now_ns();
     if (feedback_.position != rest_position_ || rest_since_ == 0) rest_since_ = now;
@@ -134,14 +137,15 @@ bool HandAxis::standing() { return now_ns() - rest_since_ >= rest_ns; }
 /// Not there, and it has not moved for long.
 bool HandAxis::arrived() {
     if (now_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
-    return refuse(fmt::format("drive stands at {:g} and does not report target reached (statusword 0x{:04X})", position(), feedback_.statusword));
+    return refuse(fmt::format("drive stands at {:g} and does not report target reached (statusword 0x{:04X})", position(),
+                              feedback_.statusword));
 }
 
 /// Why the machine gave up, after it has switched the axis off.
 bool HandAxis::report() {
-    const Failure failure = machine_.failure();
     const std::int64_t end = now_ns() + rules.limits.stop + rules.limits.step;
     while (machine_.walking() && now_ns() < end && cycle()) {}
+    const Failure& failure = machine_.failure();
     std::string why = text(failure);
     if (failure.cause == Cause::not_enabled) why += fmt::format("; type: {} on", letter());
     else if (failure.cause == Cause::drive_fault) why += fmt::format("; remove the cause, then type: {} reset", letter());
@@ -218,7 +222,8 @@ bool HandAxis::go(double position, bool relative, bool wait) {
     if (!cycle()) return false;
     command_.go = false;
     if (machine_.failure()) return report();
-    if (!until([&] { return machine_.set_points() == 0 && (machine_.target_reached() || !wait); }, wait ? &HandAxis::arrived : nullptr)) return false;
+    const auto done = [&] { return machine_.set_points() == 0 && (machine_.target_reached() || !wait); };
+    if (!until(done, wait ? &HandAxis::arrived : nullptr)) return false;
     if (wait) return true;
     for (int n = 0; n < 3; ++n)  // the edge, and its end
         if (!cycle()) return false;
@@ -264,7 +269,8 @@ bool HandAxis::stop() {
         command_.go = false;
     }
     command_.halt = false;
-    return until([] { return true; });
+    const bool by_set_point = command_.mode == Mode::profile_position && machine_.active();
+    return until([&] { return !by_set_point || machine_.target_reached(); }, &HandAxis::arrived);
 }
 
 bool HandAxis::quick_stop() {
