@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# find_package(Halcyon REQUIRED) gives Halcyon::sdk and add_hal_component(NAME SOURCE...).
+# find_package(Halcyon REQUIRED) gives Halcyon::sdk and add_hal_component(NAME SOURCE...), and Halcyon::canopen for CANopen devices.
+find_package(pugixml QUIET)  # Halcyon::canopen reads device descriptions in XML with it
 include("${CMAKE_CURRENT_LIST_DIR}/HalcyonTargets.cmake")
 include("${CMAKE_CURRENT_LIST_DIR}/HalcyonComponent.cmake")
 

@@ -12,7 +12,7 @@ set(HALCYON_PACKAGE_FILES cmake/HalcyonConfig.cmake cmake/HalcyonComponent.cmake
 install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" DESTINATION "${HALCYON_PACKAGE_DIR}")
 
 set(package "${PROJECT_BINARY_DIR}/lib/cmake/Halcyon")
-export(TARGETS halcyon_abi halcyon_sdk halcyon_link NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
+export(TARGETS halcyon_abi halcyon_sdk halcyon_link halcyon_canopen NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
 foreach(file IN LISTS HALCYON_PACKAGE_FILES ITEMS "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake")
     cmake_path(GET file FILENAME name)
     configure_file("${file}" "${package}/${name}" COPYONLY)

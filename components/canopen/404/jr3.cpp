@@ -44,7 +44,7 @@ void Jr3::attach(Device& device) {
     }
     dictionary.bind(0x2200, 0, supply_raw_), dictionary.bind(0x2201, 0, status_), dictionary.bind(0x2202, 0, counter_);
     dictionary.stream(0x2104, 0, memory_stream_);
-    for (const int index : {0x2203, 0x2204, 0x6100, 0x6125, 0x6139, 0x6140, 0x9130}) watch(static_cast<std::uint16_t>(index));
+    for (const int index : {0x2203, 0x2204, 0x6100, 0x6125, 0x6139, 0x6140, 0x6150, 0x9130}) watch(static_cast<std::uint16_t>(index));
 }
 
 void Jr3::on_reset(bool application) noexcept {
@@ -187,6 +187,11 @@ Abort Jr3::reading(Entry& e) noexcept {
     case 0x2204: store(e.data, decoder_.errors()); break;
     case 0x6100: store(e.data, static_cast<float>(field_[n])); break;
     case 0x6140: store(e.data, static_cast<float>(process(n) - double{channels_[n].tare})); break;
+    case 0x6150: {  // bit 0: not valid; bits 1 and 2: overload to the positive, to the negative
+        const bool over = raw_[n] == 32767 || raw_[n] == -32768 || std::abs(field_[n]) > static_cast<double>(limits_[n]);
+        *e.data = static_cast<std::uint8_t>(((status_ & jr3_status::no_signal) != 0 ? 1 : 0) | (over ? field_[n] > 0 ? 2 : 4 : 0));
+        break;
+    }
     case 0x9130: store(e.data, rounded<std::int32_t>(process(n) * powers[std::min<unsigned>(channels_[n].digits, 6)])); break;
     default: break;
     }

@@ -62,6 +62,7 @@ void add_profile(Description& d) {
         {0x6138, "AI tare zero float", Type::real32, read_write},
         {0x6139, "AI autotare", Type::unsigned32, write_only},
         {0x6140, "AI net value float", Type::real32, read_only, true},
+        {0x6150, "AI status", Type::unsigned8, read_only, true},
         {0x7100, "AI field value 16-bit", Type::integer16, read_only, true},
         {0x7130, "AI process value 16-bit", Type::integer16, read_only, true},
         {0x7133, "AI interrupt delta 16-bit", Type::integer16, read_write},

@@ -212,6 +212,8 @@ TEST_F(Jr3Node, warns_of_overload_supply_and_a_lost_sensor) {
     bench.run(5 * millisecond);
     EXPECT_EQ(bench.remote().emergency(0).code, jr3_error::overload);
     EXPECT_EQ(bench.remote().emergency(0).manufacturer[0], 0x04);
+    EXPECT_EQ(bench.read<std::uint8_t>(0x6150, 3), 2);
+    EXPECT_EQ(bench.read<std::uint8_t>(0x6150, 2), 0);
     jr3.set_wrench({0, 0, 195, 0, 0, 0});
     bench.run(5 * millisecond);
     EXPECT_EQ(bench.remote().emergencies(), 1U);  // not below 95 % yet
