@@ -122,7 +122,7 @@ constexpr Row inputs_and_outputs[] = {
 };
 
 constexpr Row force_torque[] = {
-    {0x6130, 1, 6, "Process value #", real32, sent},  {0x7130, 1, 6, "Process value #", integer16, sent},
+    {0x6130, 1, 6, "Process value float #", real32, sent},  {0x7130, 1, 6, "Process value #", integer16, sent},
     {0x7100, 1, 6, "Field value #", integer16, sent}, {0x7140, 1, 6, "Net value #", integer16, sent},
     {0x6150, 1, 6, "Status #", unsigned8, sent},      {0x6125, 1, 6, "Autozero #", unsigned32, kept},
     {0x6139, 1, 6, "Autotare #", unsigned32, kept},
@@ -224,6 +224,9 @@ Catalog::Catalog(std::string_view profile, unsigned axes) {
         map(all_, {false, 1, {map_entry(0x6000, 1, 8)}});
     } else if (profile == "jr3") {
         add(all_, force_torque, 0, "");
+        const auto channel = [](unsigned n) { return map_entry(0x7130, static_cast<std::uint8_t>(n), 16); };
+        map(all_, {false, 2, {channel(1), channel(2), channel(3), map_entry(0x2201, 0, 8), map_entry(0x2202, 0, 8)}});
+        map(all_, {false, 4, {channel(4), channel(5), channel(6), map_entry(0x2201, 0, 8), map_entry(0x2202, 0, 8)}});
     }
     finish();
 }

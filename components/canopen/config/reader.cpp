@@ -346,6 +346,7 @@ unsigned Pdo::bits() const {
 MasterSetup MasterConfig::setup() const {
     MasterSetup out = master;
     out.id = node_id;
+    out.start_self = false;  // we listen before all are there: what a node sends once, when it starts, must not be lost
     for (const Node& n : nodes) out.nodes.push_back(n.setup);
     return out;
 }

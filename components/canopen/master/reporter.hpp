@@ -65,13 +65,23 @@ private:
             if (n.setup.id == id) return "node " + std::to_string(id) + (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
         return "node " + std::to_string(id);
     }
-    std::string words(const Event& e) const {
+    std::string words(const Event& e) {
         switch (e.kind) {
         case Event::node:
             for (const NodeSetup& n : setup_.nodes)
                 if (n.id == e.of_node.id) return sentence(n, e.of_node);
             break;
-        case Event::network: return sentence(setup_, e.of_network, e.of_node);
+        case Event::network: {
+            const NetworkStatus& n = e.of_network;
+            if (n.state == NetworkState::booting && n.node == 0) return {};
+            if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
+            char text[120];
+            const double after = static_cast<double>(n.operational_since - n.begun) * 1e-9;
+            if (n.begun == told_) std::snprintf(text, sizeof text, "the network is operational again: %u of %u nodes", n.operational, n.nodes);
+            else std::snprintf(text, sizeof text, "the network is operational: %u of %u nodes, after %.2f s", n.operational, n.nodes, after);
+            told_ = n.begun;
+            return text;
+        }
         case Event::emergency: {
             char text[120];
             std::snprintf(text, sizeof text, "%s: emergency 0x%04X (%s), error register 0x%02X", called(e.of_node.id).c_str(),
@@ -93,6 +103,7 @@ private:
     const MasterSetup           setup_;
     const std::string           file_;
     hal::Queue<Event>           events_{512};      // cycle to thread
+    Time told_ = -1;  // of which start it was said that the network is operational
     std::atomic<bool>           ended_{false};
     std::thread                 thread_;
 };

@@ -52,6 +52,7 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
         if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) device_.pdos().send_on_change(sent.number);
         outputs_.push_back({&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
     }
+    was_operational_.assign(statuses_.size(), 0);
     produces_ = config.sync == config::SyncMode::cycle || config.sync == config::SyncMode::timed;
     sync_frame_ = make_frame(config.sync_cob, config.sync_counter != 0 ? 1 : 0);
 }
@@ -65,6 +66,7 @@ void Runner::open(can::Link& link) noexcept {
 void Runner::boot(Time now) noexcept {
     device_.out().clear();
     device_.start(now);
+    device_.command(NmtCommand::start, now);
     master_.start(now);
     sync_begun_ = time_begun_ = false;
 }
@@ -96,6 +98,14 @@ void Runner::receive(Time now) noexcept {
 }
 
 void Runner::take_wishes() noexcept {
+    for (std::size_t n = 0; n < statuses_.size(); ++n) {
+        const bool now = statuses_[n]->operational;
+        if (now && was_operational_[n] == 0)  // it has not heard what was sent on a change before
+            for (const Output& out : outputs_)
+                for (const Sent::Part& part : out.sent->parts)
+                    if (slots_[part.placed].node == n) device_.pdos().trigger(out.sent->number);
+        was_operational_[n] = now ? 1 : 0;
+    }
     for (Slot& s : slots_) {
         if (!s.to_node) continue;
         if (statuses_[s.node]->operational) set_value(*s.entry, s.wish);
@@ -121,7 +131,8 @@ void Runner::produce_sync(Time now, Time period) noexcept {
         const Time behind = now > next_sync_ ? (now - next_sync_ + period / 2) / config_.sync_period : 0;
         next_sync_ += (behind + 1) * config_.sync_period;
     }
-    const bool behind = sync_begun_ && (statistics_.queued != 0 || device_.out().size() > device_.out().capacity() / 2);
+    // Nodes that are being configured fill the queue, too.
+    const bool behind = sync_begun_ && master_.status().state == NetworkState::operational && statistics_.queued != 0;
     sync_begun_ = true;
     if (behind) {
         ++overruns_;
@@ -177,12 +188,6 @@ void Runner::on_step(const NodeStatus& status) noexcept {
     if (place_[status.id & 0x7f] != 255) events_.on_step(place_[status.id & 0x7f], status);
 }
 void Runner::on_network(const NetworkStatus& status) noexcept { events_.on_network(status); }
-void Runner::on_own_state(NmtState state) noexcept {
-    device_.command(state == NmtState::operational ? NmtCommand::start
-                    : state == NmtState::stopped   ? NmtCommand::stop
-                                                   : NmtCommand::enter_pre_operational,
-                    now_);
-}
 void Runner::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
     if (place_[node & 0x7f] != 255) events_.on_emergency(place_[node & 0x7f], e);
 }

@@ -92,7 +92,6 @@ private:
 
     void on_step(const NodeStatus&) noexcept override;
     void on_network(const NetworkStatus&) noexcept override;
-    void on_own_state(NmtState) noexcept override;
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
     void on_rpdo_late(unsigned number, Time) noexcept override;
 
@@ -105,6 +104,7 @@ private:
     std::vector<Slot>              slots_;
     std::vector<const NodeStatus*> statuses_;
     std::array<std::uint8_t, 128>  place_{};     // node-id to place in the configuration; 255: none
+    std::vector<std::uint8_t> was_operational_;  // by node
     std::vector<Output>            outputs_;
     std::vector<can::Frame>        farewell_;          // NMT commands for make_safe()
     can::Frame                     sync_frame_;

@@ -251,7 +251,7 @@ private:
         reporter_->bus(state);
     }
     void on_sync_overrun() noexcept override {
-        if (runner_->network().state == NetworkState::operational && !overran_) {
+        if (!overran_) {
             overran_ = true;
             raise("the frames of a SYNC were not all sent when the next was due; hal canopen plan says what fits", not_a_number);
         }
