@@ -37,7 +37,7 @@ public:
           serial_(*this, "serial", 1, "serial number in 1018h:4; a list has one for each instance", {.per_instance = true, .min = 0, .max = 0xffffffffLL}),
           heartbeat_(*this, "heartbeat", 0, "ms between heartbeats until a master says otherwise; 0: none", {.min = 0, .max = 65535}),
           itself_(*this, "start_by_itself", 0, "1: operational after boot-up without a master", {.min = 0, .max = 1}),
-          faults_(*this, "faults", "", "faults that get pins, as in late-sdo,mute; the list of all is in: hal help node"),
+          faults_(*this, "faults", "", "faults that get pins, as in late-sdo,mute; hal node faults lists them"),
           fault_rows_(chosen_faults(faults_.get())) {
         for (const auto* row : fault_rows_) {
             const std::string name = std::string("fault-") + row->name;

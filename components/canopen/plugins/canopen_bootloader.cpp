@@ -56,10 +56,7 @@ writes the image and starts it; the device boots with the revision number (1018h
 An image is 20 bytes of header and the program: `HLCP`, product code 0x302, version, length, CRC-32 of the program, all little endian.
 `hal node bootloader --make-image 2.1` prints one.
 
-```hal
-loadrt threads name1=fast period1=1000000
-loadrt canopen_bootloader link=sim:arm id=4
-addf canopen_bootloader.0.update fast
-start
-```
+    loadrt canopen_bootloader link=sim:arm id=4
+    addf canopen-bootloader.0.update servo
+    start
 )")

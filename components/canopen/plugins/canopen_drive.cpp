@@ -88,15 +88,14 @@ A servo drive on a CAN bus with its motors behind it, for machines without one: 
 tq, hm, ip, csp, csv, cst), homing methods 1 to 37, touch probes, limits, brakes and faults. Axis n of the node has its objects at
 +0x800 n and its PDOs at +64 n.
 
-`motor` says what its motors are like; every name of `hal node drive --help` is good: `motor=inertia:1e-4,endless:1` is a wheel.
+`motor` says what its motors are like, NAME:VALUE in SI units and encoder increments: `motor=inertia:1e-4,endless:1` is a wheel. Names:
+resolution, endless, inertia, viscous-friction, coulomb-friction, rated-torque, peak-torque, rated-current, rated-voltage, highest-speed,
+start, negative-limit, positive-limit, negative-stop, positive-stop, home-from, home-to, brake-torque.
 
 On a `sim:` bus an answer leaves in the cycle of `update` that saw the question, so put it into a thread as fast as the bus needs.
 `hal node drive` is the same as a process, `hal node drive --eds` prints its EDS.
 
-```hal
-loadrt threads name1=fast period1=1000000
-loadrt canopen_drive link=sim:arm id=2 axes=2
-addf canopen_drive.0.update fast
-start
-```
+    loadrt canopen_drive link=sim:arm id=2 axes=2
+    addf canopen-drive.0.update servo
+    start
 )")

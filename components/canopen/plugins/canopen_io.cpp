@@ -57,10 +57,7 @@ master's life guarding is lost, and at bus off; they keep them until they are wr
 On a `sim:` bus an answer leaves in the cycle of `update` that saw the question, so put it into a thread as fast as the bus needs.
 `hal node io` is the same as a process, `hal node io --eds` prints its EDS.
 
-```hal
-loadrt threads name1=fast period1=1000000
-loadrt canopen_io link=sim:arm id=5 start_by_itself=1
-addf canopen_io.0.update fast
-start
-```
+    loadrt canopen_io link=sim:arm id=5 start_by_itself=1
+    addf canopen-io.0.update servo
+    start
 )")

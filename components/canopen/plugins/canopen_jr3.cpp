@@ -69,11 +69,8 @@ TPDO 1 and 2 carry the forces in 0.01 N, TPDO 3 and 4 the torques in 0.001 N*m, 
 counter of samples. 2 and 4 are sent at each SYNC; 1 and 3, when a value changes, are closed until a master writes their COB-ID without
 bit 31 to 1800h:1 and 1802h:1.
 
-```hal
-loadrt threads name1=fast period1=1000000
-loadrt canopen_jr3 link=sim:arm id=0x50
-addf canopen_jr3.0.update fast
-setp canopen_jr3.0.fz -20
-start
-```
+    loadrt canopen_jr3 link=sim:arm id=0x50
+    addf canopen-jr3.0.update servo
+    setp canopen-jr3.0.fz -20
+    start
 )")
