@@ -6,6 +6,7 @@
 #include <new>
 
 #include "canopen/302/master.hpp"
+#include "canopen/402/drive.hpp"
 #include "canopen/device.hpp"
 
 namespace {
@@ -166,6 +167,50 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
     EXPECT_TRUE(was_operational && was_lost && came_back);
     EXPECT_EQ(master.status(6).result, BootResult::update);
     EXPECT_EQ(master.status().state, NetworkState::stopped);
+}
+
+TEST(Memory, Is_not_taken_by_a_drive_at_work) {
+    cia402::DriveSettings settings;
+    settings.axes = 2;
+    cia402::Drive drive(settings, {.node_id = 5});
+    auto& dictionary = drive.device().dictionary();
+    Time now = 0;
+    const auto write = [&](std::uint16_t index, std::int32_t value) {
+        std::uint8_t bytes[4];
+        store(bytes, value);
+        for (const unsigned axis : {0U, 1U}) {
+            auto* e = dictionary.find(cia402::of_axis(index, axis), 0);
+            dictionary.write(*e, {bytes, e->size});
+        }
+    };
+    const auto run = [&](int ms) {
+        while (ms-- > 0) {
+            drive.step(now += millisecond);
+            drive.device().poll(now);
+            for (Frame f; drive.device().out().pop(f);) continue;
+        }
+    };
+    counting = true;
+    drive.start(now);
+    drive.device().command(NmtCommand::start, now);
+    write(0x6098, 24);
+    for (int mode = 1; mode <= 10; ++mode) {
+        if (mode == 5) continue;
+        write(0x6060, mode);
+        for (const int word : {0x06, 0x0f, 0x0f, 0x1f, 0x7f, 0x10f}) {
+            write(0x607a, 1000 * mode);
+            write(0x60ff, 5000);
+            write(0x6071, 20);
+            write(0x6040, word);
+            run(50);
+        }
+    }
+    write(0x2011, 8);
+    run(300);
+    counting = false;
+    EXPECT_EQ(taken, 0);
+    EXPECT_EQ(drive.status(1).state, cia402::State::fault);
+    EXPECT_GT(drive.status(0).place, 1000);
 }
 
 }  // namespace
