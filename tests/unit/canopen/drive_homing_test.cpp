@@ -115,6 +115,16 @@ TEST_F(DriveHoming, Speeds_are_those_of_6099h) {
     run(400);
     EXPECT_NEAR(velocity(), -1000, 50);
 }
+TEST_F(DriveHoming, The_edge_that_counts_is_passed_slowly) {
+    for (const auto& p : places) {
+        if (p.at == At::start) continue;
+        prepare(p.method, p.method == 5 || p.method == 6 || p.method == 21 || p.method == 22 ? 15000 : -15000);
+        const double slow = get<std::uint32_t>(object::homing_speeds, 0, 2);
+        control(0x1f);
+        ASSERT_TRUE(until([&] { return bit(status::homing_attained); }, 20000)) << p.method;
+        EXPECT_LE(std::abs(velocity()), slow * 1.2) << p.method;
+    }
+}
 TEST_F(DriveHoming, Says_attained_before_it_says_done) {
     prepare(34, 100);
     control(0x1f);
