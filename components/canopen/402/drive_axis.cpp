@@ -9,7 +9,6 @@
 namespace hal::canopen::cia402 {
 
 namespace {
-constexpr std::uint32_t no_window = 0xffffffff;
 template <class T>
 T limited(double value) noexcept {
     return static_cast<T>(std::clamp<std::int64_t>(whole(value), std::numeric_limits<T>::min(), std::numeric_limits<T>::max()));

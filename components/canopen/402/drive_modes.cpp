@@ -2,7 +2,6 @@
 // What the axis shall do next: stops, limits, and the modes whose set-points it makes itself. drive_cyclic.cpp has the others.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "drive_axis.hpp"
 
@@ -10,7 +9,6 @@ namespace hal::canopen::cia402 {
 
 namespace {
 constexpr double turns(double per_minute) noexcept { return per_minute / 60; }
-constexpr std::uint32_t no_window = 0xffffffff;
 }  // namespace
 
 void DriveAxis::read_units() noexcept {

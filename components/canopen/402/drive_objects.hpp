@@ -20,6 +20,7 @@ inline constexpr std::uint16_t encoder_broken = 0x01, over_voltage = 0x02, under
 inline constexpr std::array<std::int8_t, 32> homing_methods{1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 17, 18,
                                                             19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37};
 inline constexpr unsigned interpolation_room = 32;
+inline constexpr std::uint32_t no_window = 0xffffffff;  ///< of 6065h and 6067h: not watched
 
 /// With what a motor cannot be without: inertia, torque, speed, an encoder. [setup]
 AxisSettings possible(AxisSettings);
