@@ -145,6 +145,9 @@ std::string what(const NodeSetup& n, const NodeStatus& s) {
         if (s.failed_in == Step::identifying)
             return "does not tell its " + std::string(identity(s.index, s.sub)) + ", " + object(n, s) + ": " + refusal(s) +
                    "; it is another device, or this is not to be checked";
+        if (static_cast<std::uint32_t>(s.abort) >> 24 == 5)
+            return "could not be talked to about object " + object(n, s) + ' ' + doing(s.failed_in) + ": " + refusal(s) +
+                   "; something spoils its answers, or its SDO server is wrong";
         if (s.failed_in == Step::configuring)
             return "refuses " + hex(s.expected) + " for object " + object(n, s) + ": " + refusal(s) +
                    "; correct the value in its configuration or take the object out";

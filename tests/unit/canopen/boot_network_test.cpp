@@ -280,6 +280,40 @@ TEST(BootNetwork, Survives_late_answers_and_stale_aborts) {
     EXPECT_GT(b.master->network().node(7)->sdo().strangers(), 0U);
 }
 
+TEST(BootNetwork, Survives_wrong_toggle_bits) {
+    Three b([](std::uint8_t id, NodeSetup& n) {
+        if (id == 5) n.guard_ms = 20;
+        n.writes = {ObjectWrite{{0x2005, 0, std::vector<std::uint8_t>(30, 'x')}}};
+    });
+    b.stations[0]->tamper = [](Frame& f) {  // never toggles: every second answer counts
+        if (f.id == 0x705) f.data[0] &= 0x7f;
+        return true;
+    };
+    int segments = 0;
+    b.stations[1]->tamper = [&](Frame& f) {  // one answer to a segment in nine has the wrong one
+        if (f.id == 0x586 && f.data[0] >> 5 <= 1 && ++segments % 9 == 0) f.data[0] ^= 0x10;
+        return true;
+    };
+    b.stations[2]->tamper = [](Frame& f) {  // and all of this node's
+        if (f.id == 0x587 && f.data[0] >> 5 <= 1) f.data[0] ^= 0x10;
+        return true;
+    };
+    b.power();
+    b.start();
+    ASSERT_TRUE(b.until([&] { return b.status(5).operational && b.status(7).result != BootResult::none; }));
+    EXPECT_GT(b.status(5).wrong_toggles, 0U);
+    EXPECT_EQ(b.status(7).result, BootResult::configuration);
+    EXPECT_EQ(b.master->sentence(7),
+              "node 7 could not be talked to about object 2005:0 while it was configured: toggle bit not alternated "
+              "(05030000h); something spoils its answers, or its SDO server is wrong [result J, configuration failed]");
+    ASSERT_TRUE(b.until([&] { return b.status(6).operational; }));
+    EXPECT_GT(b.status(6).sdo_retries, 0U);
+    b.run(20 * second);
+    EXPECT_EQ(b.status(5).losses, 0U);
+    EXPECT_EQ(b.master->status().state, NetworkState::booting);
+    EXPECT_EQ(b.master->status().node, 7);
+}
+
 TEST(BootNetwork, Starts_again_who_did_not_start) {
     Three b;
     int lost = 0;
