@@ -380,7 +380,9 @@ std::string to_string(const Reading& reading, const std::string& path) {
 }
 
 Reading read(const ByIndex& wish, const ReadFile& read_file) {
-    std::string text = "[bus]\nsync = cycle\nnode-id = " + std::to_string(wish.master) + "\n[node " + std::to_string(wish.slave) + "]\n";
+    // Other instances may have their nodes on the same bus, so those are not reset.
+    std::string text = "[bus]\nsync = cycle\nreset-at-start = no\nnode-id = " + std::to_string(wish.master);
+    text += "\n[node " + std::to_string(wish.slave) + "]\n";
     if (!wish.eds.empty()) text += "eds = " + wish.eds + "\n";
     Reading                                                       out;
     std::map<std::pair<std::uint16_t, std::uint8_t>, std::string> names;

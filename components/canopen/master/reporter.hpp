@@ -77,8 +77,10 @@ private:
             if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
             char text[120];
             const double after = static_cast<double>(n.operational_since - n.begun) * 1e-9;
-            if (n.begun == told_) std::snprintf(text, sizeof text, "the network is operational again: %u of %u nodes", n.operational, n.nodes);
-            else std::snprintf(text, sizeof text, "the network is operational: %u of %u nodes, after %.2f s", n.operational, n.nodes, after);
+            if (n.begun == told_)
+                std::snprintf(text, sizeof text, "the network is operational again: %u of %u nodes", n.operational, n.nodes);
+            else
+                std::snprintf(text, sizeof text, "the network is operational: %u of %u nodes, after %.2f s", n.operational, n.nodes, after);
             told_ = n.begun;
             return text;
         }

@@ -79,6 +79,8 @@ void Runner::receive(Time now) noexcept {
     for (std::size_t taken = 0; taken < most_frames;) {
         const std::size_t count = link_->receive(frames, now);
         for (std::size_t i = 0; i < count; ++i) {
+            // Another master of this process makes our heartbeat, and its NMT commands are no stranger's.
+            if (!leads_ && (frames[i].id == 0x700U + config_.node_id || frames[i].id == 0)) continue;
             device_.handle(frames[i], now);
             master_.handle(frames[i], now);
         }
@@ -120,6 +122,7 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
     if (produces_ && leads) produce_sync(now, period);
     if (config_.time_period > 0 && leads) produce_time(now);
     device_.poll(now);
+    leads_ = leads;
     send(now);
 }
 
@@ -158,7 +161,8 @@ void Runner::produce_time(Time now) noexcept {
 
 void Runner::send(Time now) noexcept {
     while (const Frame* f = device_.out().front()) {
-        const can::Sent sent = link_->send(*f, now);
+        const bool heartbeat = f->id == 0x700U + config_.node_id && !f->extended;
+        const can::Sent sent = heartbeat && !leads_ ? can::Sent::queued : link_->send(*f, now);
         if (sent == can::Sent::full) break;  // it stays, and goes first in the next cycle
         device_.out().drop();
     }

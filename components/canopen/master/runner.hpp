@@ -112,7 +112,7 @@ private:
     can::State                     bus_state_ = can::State::active;
     Time                           now_ = 0, next_sync_ = 0, next_time_ = 0;
     std::uint64_t                  syncs_ = 0, overruns_ = 0;
-    bool                           sync_begun_ = false, time_begun_ = false, produces_ = false;
+    bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
     std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
 };
 

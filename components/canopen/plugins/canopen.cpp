@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <array>
-#include <atomic>
 #include <deque>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 
 #include "canopen/config/config.hpp"
@@ -12,6 +9,7 @@
 #include "canopen/master/pins.hpp"
 #include "canopen/master/reporter.hpp"
 #include "canopen/master/runner.hpp"
+#include "canopen/master/shared_link.hpp"
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
@@ -24,19 +22,6 @@ std::string seconds_text(Time t) {
     char text[40];
     std::snprintf(text, sizeof text, "%g", static_cast<double>(t) * 1e-9);
     return text;
-}
-
-/// Instances on one bus: one of them makes the SYNC and the heartbeat; when it goes, another takes over in its next cycle.
-struct Shared {
-    std::atomic<const void*> leader{nullptr};
-};
-std::shared_ptr<Shared> shared_bus(const std::string& link) {
-    static std::mutex                                   mutex;
-    static std::map<std::string, std::weak_ptr<Shared>> all;
-    const std::lock_guard                               lock(mutex);
-    auto                                                found = all[link].lock();
-    if (!found) all[link] = found = std::make_shared<Shared>();
-    return found;
 }
 
 /// A node's faults in words, made before the first cycle.
@@ -88,16 +73,16 @@ public:
         hal::can::Options options;
         options.bit_rate = config_.link.starts_with("sim:") ? config_.bit_rate : 0;
         options.send_capacity = 4096;
-        auto opened = hal::can::open(config_.link, options);
-        if (!opened) throw std::runtime_error(opened.problem);
-        const auto& description = opened.link->description();
+        std::string problem;
+        auto        opened = SharedLink::open(config_.link, options, problem);
+        if (!opened) throw std::runtime_error(problem);
+        const auto& description = opened->description();
         if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate && description.bit_rate != hal::can::unlimited)
             throw std::runtime_error(config_.link + " runs at " + std::to_string(description.bit_rate) + " bit/s, the configuration says " +
                                      std::to_string(config_.bit_rate) +
                                      "; change one of them: bitrate = " + std::to_string(description.bit_rate) +
                                      ", or ip link set … type can bitrate " + std::to_string(config_.bit_rate));
-        link_ = std::move(opened.link);
-        shared_ = shared_bus(config_.link);
+        link_ = std::move(opened);
         period_ = 0;
         reporter_->start();
         runner_->open(*link_);
@@ -106,11 +91,6 @@ public:
     void stop() noexcept {
         runner_->close();
         reporter_->stop();
-        if (shared_) {
-            const void* self = this;
-            shared_->leader.compare_exchange_strong(self, nullptr);
-        }
-        shared_.reset();
         link_.reset();
     }
 
@@ -131,9 +111,7 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         objects_->take(*runner_);
-        const void* leader = shared_ ? shared_->leader.load(std::memory_order_relaxed) : this;
-        if (leader == nullptr && shared_->leader.compare_exchange_strong(leader, this)) leader = this;
-        runner_->transmit(cycle.start_ns(), cycle.period_ns(), leader == this);
+        runner_->transmit(cycle.start_ns(), cycle.period_ns(), link_ && link_->leads(cycle.start_ns(), cycle.period_ns()));
     }
 
     void update(hal::Cycle cycle) noexcept {
@@ -278,13 +256,12 @@ private:
     std::optional<BusPins>       bus_;
     std::deque<NodePins>         nodes_;
     std::deque<FaultWords>       words_;
-    std::optional<ObjectPins> objects_;
+    std::optional<ObjectPins>    objects_;
     std::unique_ptr<Reporter>    reporter_;
-    std::unique_ptr<hal::can::Link> link_;
-    std::shared_ptr<Shared>         shared_;
-    const hal_faults*               faults_ = nullptr;
-    Time                            period_ = 0, now_ = 0;
-    bool                            overran_ = false;
+    std::unique_ptr<SharedLink>  link_;
+    const hal_faults*            faults_ = nullptr;
+    Time                         period_ = 0, now_ = 0;
+    bool                         overran_ = false;
 };
 
 }  // namespace
