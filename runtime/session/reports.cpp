@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the session tells of the machine: threads, faults, delays, privileges.
 #include <algorithm>
+#include <cmath>
 
 #include "model/check/check.hpp"
 #include "session/state.hpp"
@@ -74,7 +75,7 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
         const std::string number = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
         if (const auto semicolon = what.find(';'); semicolon != std::string::npos) done = what.substr(semicolon), what.resize(semicolon);
         if (const auto braces = what.find("{}"); braces != std::string::npos) what.replace(braces, 2, number);
-        else what += " (" + number + ")";
+        else if (!std::isnan(event.value)) what += " (" + number + ")";
         return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at + done + (instance ? "; see: show pin " + instance->name : "")};
     }
     case HAL_FAULT_SILENT_THREAD:

@@ -179,7 +179,7 @@ typedef struct hal_faults {
     uint64_t last_cycle;
     void (*clear)(const struct hal_faults *);                                  /* [realtime] acknowledges all */
     void (*raise)(const struct hal_faults *, const void *self, const char *reason, double detail); /* [realtime]
-                              reason: a string that lives as long as the instance. `detail` stands where it has {}, or behind it; what
+                              reason: a string that lives as long as the instance. `detail` stands where it has {}, or behind it, or nowhere when it is NaN; what
                               was done about it follows a semicolon: "node 5 silent for {} s; its outputs were set to safe values" */
 } hal_faults;
 
