@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Configurations of CANopen networks: whatever is in the file, it is read or refused with a place, and what was read can be used.
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "components/canopen/config/schedule.hpp"
+#include "components/canopen/master/own_node.hpp"
+
+namespace {
+
+void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "broken: %s\n", what);
+    std::abort();
+}
+
+constexpr std::string_view eds = R"([DeviceInfo]
+VendorNumber=1
+[MandatoryObjects]
+SupportedObjects=1
+1=0x1000
+[1000]
+ParameterName=Device type
+DataType=0x0007
+AccessType=ro
+[ManufacturerObjects]
+SupportedObjects=1
+1=0x2000
+[2000]
+ParameterName=Value
+DataType=0x0003
+AccessType=rww
+PDOMapping=1
+)";
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    using namespace hal::canopen;
+    const std::string_view text(reinterpret_cast<const char*>(data), size);
+    const auto file = [](const std::string&, std::string& bytes) { return bytes = eds, true; };
+    const config::Reading reading = config::read(text, "folder/net.canopen", file);
+    for (const config::Message& m : reading.messages) {
+        require(m.at.offset + std::size_t{m.at.length} <= size, "a place lies in the text");
+        require(!m.sentence.empty(), "a message says something");
+    }
+    if (!reading.good()) return 0;
+    std::size_t pdos = 0;
+    for (const config::Node& n : reading.config.nodes) {
+        pdos += n.pdos.size();
+        for (const config::Pdo& p : n.pdos) require(p.bits() <= 64 && p.cob != 0, "a PDO fits into a frame and has an identifier");
+    }
+    require(problems_of(reading.config.setup()).empty(), "a master can be made of it");
+    const OwnNode own = own_node(reading.config);
+    require(own.sent.size() + own.received.size() <= pdos, "a PDO of ours for each of a node");
+    if (reading.config.nodes.size() + reading.config.foreign.size() < 40) config::schedule_of(reading.config, millisecond);
+    return 0;
+}
