@@ -16,15 +16,16 @@ struct Options {
 };
 
 /// What a ratio has to be. `at_most`: ours / theirs. `not_above`: the same with 1, where a tenth is the spread of the
-/// measurement. `times_less`: theirs / ours. `limit`: ours against a figure.
+/// measurement. `times_less`: theirs / ours. `limit`: ours against a figure; `at_least`: where more is better.
 struct Goal {
-    enum class Kind { none, at_most, not_above, times_less, limit } kind = Kind::none;
+    enum class Kind { none, at_most, not_above, times_less, limit, at_least } kind = Kind::none;
     double value = 0.0;
 };
 inline Goal not_above() { return {Goal::Kind::not_above, 1.1}; }
 inline Goal at_most(double ratio) { return {Goal::Kind::at_most, ratio}; }
 inline Goal times_less(double ratio) { return {Goal::Kind::times_less, ratio}; }
 inline Goal limit(double figure) { return {Goal::Kind::limit, figure}; }
+inline Goal at_least(double figure) { return {Goal::Kind::at_least, figure}; }
 
 struct Row {
     std::string what;
@@ -58,6 +59,7 @@ void shell(const Options&, Report&);
 void edit(const Options&, Report&);
 void coherence(const Options&, Report&);
 void python(const Options&, Report&);
+void can(const Options&, Report&);
 void size(const Options&, Report&);
 void canopen_boot(const Options&, Report&);
 

@@ -29,6 +29,7 @@ constexpr Section sections[] = {
     {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit, true},
     {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
     {"python", "a component of 100 pins in Python", python, true},
+    {"can", "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the Python package", can, true},
     {"size", "of the program; with --full its build from cold", size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };

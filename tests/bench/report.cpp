@@ -58,6 +58,11 @@ void Report::row(const Row& row) {
         if (both) ratio = "× " + number(*row.ours / *row.theirs);
         if (row.ours) reached = *row.ours <= row.goal.value;
         break;
+    case Goal::Kind::at_least:
+        target = "≥ " + goal_number(row.goal.value) + (row.unit.empty() ? "" : " " + row.unit);
+        if (both) ratio = "× " + number(*row.ours / *row.theirs);
+        if (row.ours) reached = *row.ours >= row.goal.value;
+        break;
     }
     if (row.goal.kind != Goal::Kind::none) verdict = !row.ours ? "not measured" : !reached ? "no peer here" : *reached ? "reached" : "NOT reached";
     lines_.push_back(std::move(line));
