@@ -63,9 +63,9 @@ int run_node_drive(const Options& options) {
 int run_node_io(const Options& options) {
     const NodeOptions& o = options.node;
     canopen::Io program({o.inputs, o.outputs, o.analog_inputs, o.analog_outputs, o.serial, o.heartbeat_ms});
-    return run_node(options, {"io", fmt::format("CiA 401, {}, {}, {} and {}", counted(o.inputs, "digital input"), counted(o.outputs, "output"),
-                                                counted(o.analog_inputs, "analogue input"), counted(o.analog_outputs, "output"))},
-                    program);
+    const std::string what = fmt::format("CiA 401, {}, {}, {} and {}", counted(o.inputs, "digital input"), counted(o.outputs, "output"),
+                                         counted(o.analog_inputs, "analogue input"), counted(o.analog_outputs, "output"));
+    return run_node(options, {"io", what}, program);
 }
 
 int run_node_jr3(const Options& options) {
@@ -76,7 +76,8 @@ int run_node_jr3(const Options& options) {
     if (!options.node.stream.empty()) {
         std::string bytes;
         if (!read_file(options.node.stream, bytes)) return fail(options, fmt::format("cannot read '{}': {}", options.node.stream, bytes));
-        if (bytes.empty()) return fail(options, fmt::format("'{}' is empty; it should hold the sensor's line, eight clocks to a byte", options.node.stream));
+        if (bytes.empty())
+            return fail(options, fmt::format("'{}' is empty; it should hold the sensor's line, eight clocks to a byte", options.node.stream));
         settings.recording.assign(bytes.begin(), bytes.end());
     }
     const std::string source = options.node.stream.empty() ? "a simulated sensor" : "the sensor's line in " + options.node.stream;

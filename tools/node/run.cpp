@@ -86,7 +86,9 @@ public:
     bool look(std::int64_t now) {
         std::string text;
         auto& device = node_.device();
-        const auto say = [&](const std::string& what) { text += fmt::format("{:9.3f} s  {}\n", static_cast<double>(now - began_) / 1e9, what); };
+        const auto say = [&](const std::string& what) {
+            text += fmt::format("{:9.3f} s  {}\n", static_cast<double>(now - began_) / 1e9, what);
+        };
         if (device.state() != state_ || device.node_id() != id_) {
             state_ = device.state(), id_ = device.node_id();
             say(id_ == canopen::unconfigured ? "waits for a node-id" : canopen::word(state_));
@@ -154,7 +156,8 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
     std::size_t next = 0;
     std::int64_t now = began;
     while (!stop.requested() && now < end) {
-        for (; next < settings.size() && now - began >= settings[next].at_ns; ++next) program.set(settings[next].name, settings[next].value);
+        for (; next < settings.size() && now - began >= settings[next].at_ns; ++next)
+            program.set(settings[next].name, settings[next].value);
         node.turn(now, about.simulated ? now : can::unclocked);
         if (!reporter.look(now)) return 1;
         node.link().wait(1'000'000);
@@ -170,7 +173,7 @@ int run_node(const Options& options, const NodeKind& kind, canopen::Program& pro
     std::string problem;
     std::uint8_t id = 0;
     if (options.node.link.empty())
-        return fail(options, fmt::format("on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node {}", kind.name));
+        return fail(options, "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node " + kind.name);
     if (!parse_id(options, kind, id, problem)) return fail(options, problem);
     std::vector<std::pair<canopen::Fault, canopen::FaultSetting>> faults(options.node.faults.size());
     for (std::size_t n = 0; n < faults.size(); ++n)

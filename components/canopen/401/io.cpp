@@ -136,7 +136,8 @@ Abort Io::reading(Entry& e) noexcept {
     case 0x6400: *e.data = static_cast<std::uint8_t>(analog_in_[n] >> 8); break;
     case 0x6402: store(e.data, justified(analog_in_[n])); break;
     case 0x6403:
-        store(e.data, static_cast<float>(analog_in_[n]) * dictionary.get<float>(0x642f, e.sub, 1.0F) + dictionary.get<float>(0x642e, e.sub));
+        store(e.data,
+              static_cast<float>(analog_in_[n]) * dictionary.get<float>(0x642f, e.sub, 1.0F) + dictionary.get<float>(0x642e, e.sub));
         break;
     case 0x6422:
         store(e.data, interrupted_);

@@ -91,8 +91,9 @@ void Bootloader::examine() noexcept {
     identification_ = 0;
     if (used_ == 0) return void(error_ = FlashError::no_program);
     const auto* at = flash_.data();
-    if (used_ < ProgramHeader::size || load<std::uint32_t>(at) != ProgramHeader::signature) return void(error_ = FlashError::unknown_format);
-    const ProgramHeader h{load<std::uint32_t>(at + 4), load<std::uint32_t>(at + 8), load<std::uint32_t>(at + 12), load<std::uint32_t>(at + 16)};
+    const auto field = [&](std::size_t n) { return load<std::uint32_t>(at + 4 * n); };
+    if (used_ < ProgramHeader::size || field(0) != ProgramHeader::signature) return void(error_ = FlashError::unknown_format);
+    const ProgramHeader h{field(1), field(2), field(3), field(4)};
     if (h.product != settings_.product) return void(error_ = FlashError::unknown_format);
     if (h.length != used_ - ProgramHeader::size || h.crc != crc32({at + ProgramHeader::size, h.length}))
         return void(error_ = FlashError::wrong_data);

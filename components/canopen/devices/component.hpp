@@ -34,7 +34,8 @@ public:
         : Component(host),
           address_(*this, "link", "sim:can0", "the bus, as in sim:arm, can:can0 or udp:239.74.163.2:43113"),
           id_(*this, "id", default_id, "node-id; a list has one for each instance", {.per_instance = true, .min = 1, .max = 127}),
-          serial_(*this, "serial", 1, "serial number in 1018h:4; a list has one for each instance", {.per_instance = true, .min = 0, .max = 0xffffffffLL}),
+          serial_(*this, "serial", 1, "serial number in 1018h:4; a list has one for each instance",
+                  {.per_instance = true, .min = 0, .max = 0xffffffffLL}),
           heartbeat_(*this, "heartbeat", 0, "ms between heartbeats until a master says otherwise; 0: none", {.min = 0, .max = 65535}),
           itself_(*this, "start_by_itself", 0, "1: operational after boot-up without a master", {.min = 0, .max = 1}),
           faults_(*this, "faults", "", "faults that get pins, as in late-sdo,mute; hal node faults lists them"),
@@ -44,7 +45,8 @@ public:
             every_.emplace_back(*this, name.c_str(), (std::string("0: off; 1: every ") + row->what + "; n: every n-th").c_str());
             if (row->time == 0) continue;
             const std::string doc = std::string("`time` of the fault ") + row->name;
-            times_.emplace_back(*this, (name + "-ms").c_str(), doc.c_str(), PinOptions<double>{.initial = static_cast<double>(row->time) / 1e6, .unit = "ms"});
+            const PinOptions<double> usual{.initial = static_cast<double>(row->time) / 1e6, .unit = "ms"};
+            times_.emplace_back(*this, (name + "-ms").c_str(), doc.c_str(), usual);
         }
     }
 

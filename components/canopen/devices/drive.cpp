@@ -65,8 +65,8 @@ std::string parse_motor(std::string_view text, cia402::MotorSettings& motor) {
         double value = 0;
         const auto digits = sign == part.npos ? std::string_view{} : part.substr(sign + 1);
         const auto [end, wrong] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        if (wrong == std::errc{} && !digits.empty() && end == digits.data() + digits.size() && set_motor(motor, part.substr(0, sign), value))
-            continue;
+        const bool number = wrong == std::errc{} && !digits.empty() && end == digits.data() + digits.size();
+        if (number && set_motor(motor, part.substr(0, sign), value)) continue;
         std::string names = "resolution, endless";
         for (const auto& row : motor_rows) names += std::string(", ") + row.name;
         return "'" + std::string(part) + "' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of " + names;

@@ -48,7 +48,8 @@ TEST_F(DriveNode, feels_what_is_done_to_it) {
     EXPECT_EQ(bench.remote().emergency(0).code, cia402::error::under_voltage);
     EXPECT_NE(program.summary().find("error DC link under-voltage"), std::string::npos);
     for (const auto& name : program.settable()) EXPECT_TRUE(program.set(name, 0)) << name;
-    for (const char* name : {"load-torque", "load-torque-2", "load-torque-x", "load-torque-00", "weight-0"}) EXPECT_FALSE(program.set(name, 0)) << name;
+    for (const char* name : {"load-torque", "load-torque-2", "load-torque-x", "load-torque-00", "weight-0"})
+        EXPECT_FALSE(program.set(name, 0)) << name;
 }
 
 TEST_F(DriveNode, is_off_after_its_power_failed) {
@@ -72,9 +73,9 @@ TEST(Motor, is_read_from_text) {
     EXPECT_EQ(motor.home_from, -5);
     EXPECT_EQ(parse_motor("endless:1", motor), "");
     EXPECT_EQ(motor.positive_limit, std::numeric_limits<double>::infinity());
-    for (const char* wrong : {"inertia", "inertia:", "inertia:x", "inertia:0", "inertia:nan", "resolution:1.5", "weight:3", ":1", "rated-torque:-1"})
-        EXPECT_EQ(parse_motor(wrong, motor).find("'" + std::string(wrong) + "' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of resolution, endless, inertia, "), 0U)
-            << wrong;
+    const std::string rest = "' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of resolution, endless, inertia, ";
+    for (const std::string wrong : {"inertia", "inertia:", "inertia:x", "inertia:0", "inertia:nan", "resolution:1.5", "weight:3", ":1"})
+        EXPECT_TRUE(parse_motor(wrong, motor).starts_with("'" + wrong + rest)) << wrong;
 }
 
 }  // namespace
