@@ -316,7 +316,7 @@ void declare_node(CLI::App& app, Options& o) {
 
 void declare_node_drive(CLI::App& app, Options& o) {
     declare_node(app, o);
-    app.add_option("--axes", o.node.axes, "1-8 (default 1)")->check(CLI::Range(1, 8))->type_name("N");
+    app.add_option("--axes", o.node.axes, "1-8 (default 1)")->check(CLI::Range(1, 8).description(""))->type_name("N");
     app.add_option("--motor", o.node.motor, "of all axes: NAME:VALUE, as in inertia:1e-4,resolution:8192,endless:1; may be repeated")
         ->type_name("NAME:VALUE")->allow_extra_args(false);
 }
@@ -324,10 +324,10 @@ void declare_node_drive(CLI::App& app, Options& o) {
 void declare_node_io(CLI::App& app, Options& o) {
     declare_node(app, o);
     NodeOptions& n = o.node;
-    app.add_option("--inputs", n.inputs, "digital inputs, 0-64 (default 64)")->check(CLI::Range(0, 64))->type_name("N");
-    app.add_option("--outputs", n.outputs, "digital outputs, 0-64 (default 64)")->check(CLI::Range(0, 64))->type_name("N");
-    app.add_option("--analog-inputs", n.analog_inputs, "0-12 (default 12)")->check(CLI::Range(0, 12))->type_name("N");
-    app.add_option("--analog-outputs", n.analog_outputs, "0-12 (default 12)")->check(CLI::Range(0, 12))->type_name("N");
+    app.add_option("--inputs", n.inputs, "digital inputs, 0-64 (default 64)")->check(CLI::Range(0, 64).description(""))->type_name("N");
+    app.add_option("--outputs", n.outputs, "digital outputs, 0-64 (default 64)")->check(CLI::Range(0, 64).description(""))->type_name("N");
+    app.add_option("--analog-inputs", n.analog_inputs, "0-12 (default 12)")->check(CLI::Range(0, 12).description(""))->type_name("N");
+    app.add_option("--analog-outputs", n.analog_outputs, "0-12 (default 12)")->check(CLI::Range(0, 12).description(""))->type_name("N");
 }
 
 void declare_node_jr3(CLI::App& app, Options& o) {
