@@ -17,7 +17,7 @@ void require(bool holds, const char* what) {
     std::abort();
 }
 
-constexpr std::string_view eds = R"([DeviceInfo]
+constexpr std::string_view description = R"([DeviceInfo]
 VendorNumber=1
 [MandatoryObjects]
 SupportedObjects=1
@@ -41,7 +41,7 @@ PDOMapping=1
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace hal::canopen;
     const std::string_view text(reinterpret_cast<const char*>(data), size);
-    const auto file = [](const std::string&, std::string& bytes) { return bytes = eds, true; };
+    const auto file = [](const std::string&, std::string& bytes) { return bytes = description, true; };
     const config::Reading reading = config::read(text, "folder/net.canopen", file);
     for (const config::Message& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= size, "a place lies in the text");
