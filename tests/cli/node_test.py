@@ -139,6 +139,61 @@ class Devices(Node):
         self.assertRegex(self.run_program("can", "eds", "check", "eight.eds").stderr, r"56 RPDOs, 56 TPDOs; 0 warnings, 0 notes")
 
 
+NETWORK = """[bus]
+link = sim:house
+sync = cycle
+[node 2 drive]
+eds = drive.eds
+rpdo1 = 0x6040:0, 0x607a:0
+tpdo1 = 0x6041:0, 0x6064:0
+[node 5 io]
+eds = io.eds
+[node 80 force]
+eds = jr3.eds
+tpdo2 = default
+tpdo4 = default
+[node 4 updated]
+eds = bootloader.eds
+revision = any
+"""
+HOUSE = """loadrt threads name1=bus period1=1000000
+loadrt canopen config=house.canopen
+loadrt canopen_drive link=sim:house id=2
+loadrt canopen_io link=sim:house id=5
+loadrt canopen_jr3 link=sim:house id=80
+loadrt canopen_bootloader link=sim:house id=4
+addf canopen.0.receive bus
+addf canopen.0.transmit bus
+addf canopen-drive.0.update bus
+addf canopen-io.0.update bus
+addf canopen-jr3.0.update bus
+addf canopen-bootloader.0.update bus
+setp canopen-io.0.in-63 TRUE
+setp canopen-jr3.0.fx 30
+start
+advance 1s
+getp canopen.0.operational
+getp canopen.0.nodes-operational
+getp canopen.0.io.read-input-8-bit-input-block-8-7
+getp canopen.0.force.ai-process-value-16-bit-fx
+getp canopen.0.drive.statusword
+"""
+
+
+class Masters(Node):
+    def test_our_master_is_configured_from_the_EDS_of_each(self):
+        for kind in ("drive", "io", "jr3", "bootloader"):
+            self.write(f"{kind}.eds", self.good("node", kind, "--eds"))
+        self.write("house.canopen", NETWORK)
+        self.write("house.hal", HOUSE)
+        self.good("canopen", "check", "house.canopen")
+        done = self.run_program("sim", "house.hal")
+        self.assertEqual(0, done.returncode, done.stderr)
+        operational, nodes, last_input, force, statusword = done.stdout.split()
+        self.assertEqual(("TRUE", "4", "TRUE", 0x250), (operational, nodes, last_input, int(statusword, 0)), done.stderr)
+        self.assertLess(abs(int(force) - 3000), 5)
+
+
 class WrongWords(Node):
     def test_each_says_what_to_type(self):
         cases = {
