@@ -32,6 +32,7 @@ if(HALCYON_SANITIZE)
     add_compile_options("-fsanitize=${HALCYON_SANITIZE}" -fno-sanitize=null,alignment -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
     string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
     add_link_options("-fsanitize=${HALCYON_SANITIZE}")
+    set(HALCYON_TEST_OPTIONS -O0)  # of the tests' own sources: their assertions take longer to optimise than to run
 endif()
 
 # ccache: the same object for the same text, wherever the tree lies.
@@ -50,10 +51,15 @@ if(HALCYON_MOLD)
 endif()
 
 # The real-time guard: clang 19's runtime archive (Debian: libclang-rt-19-dev) works with g++ when it is linked whole into the program.
-if(HALCYON_RT_GUARD)
+# HALCYON_RT_GUARD puts it into every program of the tree; the tests have a guarded program of their own.
+if(NOT HALCYON_SANITIZE)
     find_library(HALCYON_RTSAN_ARCHIVE NAMES "libclang_rt.rtsan-${CMAKE_SYSTEM_PROCESSOR}.a"
-                 PATHS /usr/lib/llvm-19/lib/clang/19/lib/linux NO_DEFAULT_PATH REQUIRED)
-    add_compile_definitions(HALCYON_RT_GUARD=1)
+                 PATHS /usr/lib/llvm-19/lib/clang/19/lib/linux NO_DEFAULT_PATH)
+endif()
+if(HALCYON_RT_GUARD AND NOT HALCYON_RTSAN_ARCHIVE)
+    message(FATAL_ERROR "HALCYON_RT_GUARD needs clang 19's real-time sanitizer; type: apt install libclang-rt-19-dev")
+endif()
+if(HALCYON_RTSAN_ARCHIVE)
     add_library(halcyon_rtsan INTERFACE)
     target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)
 endif()

@@ -15,6 +15,7 @@ need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-d
     cmark-gfm.h=libcmark-gfm-dev cmark-gfm-core-extensions.h=libcmark-gfm-extensions-dev \
     /usr/lib/python3/dist-packages/can=python3-can /usr/lib/python3/dist-packages/msgpack=python3-msgpack \
     /usr/lib/python3/dist-packages/serial=python3-serial \
+    "/usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.rtsan-$(uname -m).a=libclang-rt-19-dev" \
     linux.uml=user-mode-linux busybox=busybox-static ip=iproute2 candump=can-utils socat=socat
 
 # run_tests TREE CTEST-ARGUMENT...: prints the closing lines of ctest, and the whole of what failed.
@@ -34,11 +35,6 @@ compile_release "the program, its components, tests and benchmarks" all bench
 run_tests release
 
 if [ "${1-}" != quick ]; then
-    need "/usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.rtsan-$(uname -m).a=libclang-rt-19-dev"
-    compile rt-guard "the program and its components under the real-time guard" hal components rt_tests
-    # Left out: the tests of the other guard, whose bad components this one stops first.
-    run_tests rt-guard -L 'rt|netlists' -E 'Guard.catches'
-
     compile asan "everything under the address and undefined-behaviour sanitizers" all
     # Left out: what runs in user-mode-linux, whose addresses are where this sanitizer has its shadow.
     run_tests asan -LE 'check|docs' -E 'buses/(socketcan|can_utils)_test'
