@@ -34,6 +34,15 @@ void loop(void* const* instances, std::size_t count, const hal_cycle* cycle) {
     for (void* const* at = instances; at != instances + count; ++at) (static_cast<C*>(*at)->*Step)(Cycle{cycle});
 }
 
+void loop_mixed(void* const* instances, std::size_t count, const hal_cycle* cycle) {
+    for (void* const* at = instances; at != instances + count; at += 4) {
+        static_cast<and2_source::And2*>(at[0])->update(Cycle{cycle});
+        static_cast<sum2_source::Sum2*>(at[1])->add(Cycle{cycle});
+        static_cast<mux2_source::Mux2*>(at[2])->update(Cycle{cycle});
+        static_cast<limit1_source::Limit1*>(at[3])->update(Cycle{cycle});
+    }
+}
+
 }  // namespace
 
 Loop loop_over(std::string_view component) {
@@ -42,6 +51,7 @@ Loop loop_over(std::string_view component) {
     if (component == "mux2") return loop<mux2_source::Mux2, &mux2_source::Mux2::update>;
     if (component == "limit1") return loop<limit1_source::Limit1, &limit1_source::Limit1::update>;
     if (component == "pid") return loop<pid_source::Pid, &pid_source::Pid::calculate>;
+    if (component == "mixed") return loop_mixed;
     throw std::logic_error("no loop over " + std::string(component));
 }
 
