@@ -79,7 +79,7 @@ public:
     hal::Outs<double> ultimate_gain{*this, "ultimate-gain", debug, "gain at which the loop would oscillate, found by auto-tuning"};
     hal::Outs<double> ultimate_period{*this, "ultimate-period", debug, "period of that oscillation", {.unit = "s"}};
 
-    hal::Function run{*this, "do-pid-calcs", &Pid::calculate, "one step of the loop"};
+    hal::Function run{*this, "do-pid-calcs", hal::step<&Pid::calculate>, "one step of the loop"};
 
     void calculate(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();

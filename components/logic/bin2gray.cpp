@@ -7,7 +7,7 @@ struct Bin2gray : hal::Component {
     using Component::Component;
     hal::In<std::uint32_t>  in{*this, "in", "a number"};
     hal::Out<std::uint32_t> out{*this, "out", "the number in Gray code"};
-    hal::Function           run{*this, "", &Bin2gray::update, "converts"};
+    hal::Function           run{*this, "", hal::step<&Bin2gray::update>, "converts"};
 
     void update(hal::Cycle) noexcept { out = in ^ in >> 1; }
 };

@@ -8,7 +8,7 @@ struct Bitmerge : hal::Component {
     hal::Argument           count{*this, "personality", 32, "how many bits, from the lowest", {.min = 1, .max = 32}};
     hal::Ins<bool>          in{*this, "in-##", count, "bit # of out"};
     hal::Out<std::uint32_t> out{*this, "out", "the word"};
-    hal::Function           run{*this, "", &Bitmerge::update, "puts the word together"};
+    hal::Function           run{*this, "", hal::step<&Bitmerge::update>, "puts the word together"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t word = 0;

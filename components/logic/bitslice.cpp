@@ -8,7 +8,7 @@ struct Bitslice : hal::Component {
     hal::Argument          personality{*this, "personality", 32, "how many bits, from the lowest", {.min = 1, .max = 32}};
     hal::In<std::uint32_t> in{*this, "in", "the word"};
     hal::Outs<bool>        out{*this, "out-##", personality, "bit # of in"};
-    hal::Function          run{*this, "", &Bitslice::update, "takes the word apart"};
+    hal::Function          run{*this, "", hal::step<&Bitslice::update>, "takes the word apart"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t rest = in;

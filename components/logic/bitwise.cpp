@@ -13,7 +13,7 @@ struct Bitwise : hal::Component {
     hal::Out<std::uint32_t> out_nand{*this, "out-nand", "out-and, inverted"};
     hal::Out<std::uint32_t> out_nor{*this, "out-nor", "out-or, inverted"};
     hal::Out<std::uint32_t> out_xnor{*this, "out-xnor", "out-xor, inverted"};
-    hal::Function           run{*this, "", &Bitwise::update, "computes all outputs"};
+    hal::Function           run{*this, "", hal::step<&Bitwise::update>, "computes all outputs"};
 
     void update(hal::Cycle) noexcept {
         const std::uint32_t a = in0, b = in1;

@@ -18,13 +18,13 @@ struct Seen {
 struct Counter : hal::Component {
     using Component::Component;
 
-    hal::Function count{*this, "update-counters", &Counter::update_counters, "samples the inputs and counts; in the fastest thread",
+    hal::Function count{*this, "update-counters", hal::step<&Counter::update_counters>, "samples the inputs and counts; in the fastest thread",
                         {.shared = true}};
     hal::In<bool> phase_a{*this, count, "phase-A", "a rising edge counts"};
     hal::In<bool> phase_z{*this, count, "phase-Z", "index pulse"};
     hal::Out<std::int32_t> raw_counts{*this, count, "rawcounts", "counts since the start; knows nothing of reset and index"};
 
-    hal::Function capture{*this, "capture-position", &Counter::capture_position, "scales and publishes; in the servo thread",
+    hal::Function capture{*this, "capture-position", hal::step<&Counter::capture_position>, "scales and publishes; in the servo thread",
                           {.shared = true}};
     hal::Io<bool> index_enable{*this, capture, "index-enable", "TRUE: at the next rising edge of phase-Z counts become 0, and this FALSE"};
     hal::In<bool> reset{*this, capture, "reset", "while TRUE, counts and position are 0"};

@@ -8,7 +8,7 @@ struct Dbounce : hal::Component {
     hal::In<bool>          in{*this, "in", "noisy input"};
     hal::Out<bool>         out{*this, "out", "the last stable input"};
     hal::In<std::uint32_t> delay{*this, "delay", "cycles the input must hold after its change; 0: out is in", {.initial = 5}};
-    hal::Function          run{*this, "", &Dbounce::update, "samples the input"};
+    hal::Function          run{*this, "", hal::step<&Dbounce::update>, "samples the input"};
 
     void update(hal::Cycle) noexcept {
         if (in == out) differs_ -= differs_ > 0 ? 1 : 0;

@@ -8,7 +8,7 @@ struct Debounce : hal::Component {
     hal::Ins<bool>            in{*this, "#.in", size, "noisy input of filter #"};
     hal::Outs<bool>           out{*this, "#.out", size, "the last stable input of filter #"};
     hal::Param<std::int32_t>  delay{*this, "delay", "cycles an input must hold before its output follows; up to 1 does not filter", {.initial = 5}};
-    hal::Function             run{*this, "", &Debounce::update, "samples all inputs of the group"};
+    hal::Function             run{*this, "", hal::step<&Debounce::update>, "samples all inputs of the group"};
 
     explicit Debounce(const hal_host* host)
         : Component(host), counts_(static_cast<std::int32_t*>(host->allocate(host, in.size() * sizeof(std::int32_t), alignof(std::int32_t)))) {

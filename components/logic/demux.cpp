@@ -10,7 +10,7 @@ struct Demux : hal::Component {
     hal::In<std::uint32_t> sel{*this, "sel-u32", "added to the number made of the bits"};
     hal::Outs<bool>        out{*this, "out-##", count, "TRUE while # is chosen; as a bar, while more than # is"};
     hal::Param<bool>       bargraph{*this, "bargraph", "TRUE: as many outputs are TRUE as the choice says"};
-    hal::Function          run{*this, "", &Demux::update, "sets the outputs"};
+    hal::Function          run{*this, "", hal::step<&Demux::update>, "sets the outputs"};
 
     void update(hal::Cycle) noexcept {
         std::uint64_t chosen = sel;

@@ -13,7 +13,7 @@ struct Edge : hal::Component {
     hal::Param<std::int32_t> width_ns{*this, "out-width-ns", "length of the output pulse; 0 is one cycle", {.unit = "ns"}};
     hal::Out<std::int32_t>   time_left_ns{*this, "time-left-ns", "what is left of the output pulse", {.unit = "ns"}};
     hal::Out<bool>           last_in{*this, "last-in", "the input as last seen"};
-    hal::Function            run{*this, "", &Edge::update, "looks for an edge"};
+    hal::Function            run{*this, "", hal::step<&Edge::update>, "looks for an edge"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool now = in;

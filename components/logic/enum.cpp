@@ -47,7 +47,7 @@ struct Enum : hal::Component {
     hal::InstanceName        name{*this, config.decode ? "enum-decode" : "enum-encode", 2};
     hal::Ins<std::uint32_t>  input{*this, "input", config.decode ? 1 : 0, "the value to decode"};
     hal::Outs<std::uint32_t> output{*this, "output", config.decode ? 0 : 1, "value of the last label that is TRUE; 0 when none is"};
-    hal::Function            run{*this, "", &Enum::update, "decodes or encodes"};
+    hal::Function            run{*this, "", hal::step<&Enum::update>, "decodes or encodes"};
 
     explicit Enum(const hal_host* host) : Component(host) {
         for (const Config::Label& label : config.labels) {

@@ -11,7 +11,7 @@ struct Flipflop : hal::Component {
     hal::In<bool> reset{*this, "reset", "while TRUE out is FALSE, whatever set is"};
     hal::Io<bool> out{*this, "out", "the stored bit"};
     hal::Io<bool> out_not{*this, "out-not", "the stored bit, inverted"};
-    hal::Function run{*this, "", &Flipflop::update, "stores"};
+    hal::Function run{*this, "", hal::step<&Flipflop::update>, "stores"};
 
     void update(hal::Cycle) noexcept {
         bool stored = out;

@@ -7,7 +7,7 @@ struct Gray2bin : hal::Component {
     using Component::Component;
     hal::In<std::uint32_t>  in{*this, "in", "a number in Gray code"};
     hal::Out<std::uint32_t> out{*this, "out", "the number"};
-    hal::Function           run{*this, "", &Gray2bin::update, "converts"};
+    hal::Function           run{*this, "", hal::step<&Gray2bin::update>, "converts"};
 
     /// Each bit of the number is the parity of the code's bits from there up: a prefix sum in five doublings.
     void update(hal::Cycle) noexcept {

@@ -13,7 +13,7 @@ struct Logic : hal::Component {
     hal::Outs<bool> odd{*this, "xor", has(0x400), "TRUE while an odd number of inputs is TRUE"};
     hal::Outs<bool> not_all{*this, "nand", has(0x800), "FALSE while every input is TRUE"};
     hal::Outs<bool> none{*this, "nor", has(0x1000), "FALSE while an input is TRUE"};
-    hal::Function   run{*this, "", &Logic::update, "computes the outputs"};
+    hal::Function   run{*this, "", hal::step<&Logic::update>, "computes the outputs"};
 
     explicit Logic(const hal_host* host) : Component(host) {
         if (in.size() < 1 || in.size() > 16)

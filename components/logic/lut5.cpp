@@ -8,7 +8,7 @@ struct Lut5 : hal::Component {
     hal::Ins<bool>            in{*this, "in-#", 5, "bit # of the row of the table"};
     hal::Out<bool>            out{*this, "out", "the table's entry for the inputs"};
     hal::Param<std::uint32_t> function{*this, "function", "the table: bit n is the output for row n"};
-    hal::Function             run{*this, "", &Lut5::update, "looks up the output"};
+    hal::Function             run{*this, "", hal::step<&Lut5::update>, "looks up the output"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t row = 0;

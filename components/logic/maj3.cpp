@@ -10,7 +10,7 @@ struct Maj3 : hal::Component {
     hal::In<bool>    in3{*this, "in3", "third voter"};
     hal::Out<bool>   out{*this, "out", "what at least two of the inputs say"};
     hal::Param<bool> invert{*this, "invert", "TRUE: out is what the minority says"};
-    hal::Function    run{*this, "", &Maj3::update, "counts the votes"};
+    hal::Function    run{*this, "", hal::step<&Maj3::update>, "counts the votes"};
 
     void update(hal::Cycle) noexcept {
         const int votes = in1 + in2 + in3;

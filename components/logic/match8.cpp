@@ -9,7 +9,7 @@ struct Match8 : hal::Component {
     hal::Ins<bool> a{*this, "a#", 8, "bit # of the first number"};
     hal::Ins<bool> b{*this, "b#", 8, "bit # of the second number"};
     hal::Out<bool> out{*this, "out", "TRUE while in is and both numbers are equal"};
-    hal::Function  run{*this, "", &Match8::update, "compares"};
+    hal::Function  run{*this, "", hal::step<&Match8::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         bool equal = in;

@@ -20,7 +20,7 @@ struct Multiclick : hal::Component {
     hal::Param<std::uint32_t> max_space{*this, "max-space-ns", "a longer pause ends the row of clicks",
                                         {.initial = 250'000'000, .unit = "ns"}};
     hal::Param<std::uint32_t> output_hold{*this, "output-hold-ns", "length of the output pulses", {.initial = 100'000'000, .unit = "ns"}};
-    hal::Function run{*this, "", &Multiclick::update, "detects clicks"};
+    hal::Function run{*this, "", hal::step<&Multiclick::update>, "detects clicks"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t period = cycle.period_ns();

@@ -20,7 +20,7 @@ struct Multiswitch : hal::Component {
     hal::Param<std::uint32_t> top{*this, "top-position", "the last position",
                                   {.initial = static_cast<std::uint32_t>(std::int64_t{cfg}) - 1}};
     Position                  position{*this, "position", "the present position; may be set"};
-    hal::Function             run{*this, "", &Multiswitch::update, "moves the switch"};
+    hal::Function             run{*this, "", hal::step<&Multiswitch::update>, "moves the switch"};
 
     void update(hal::Cycle) noexcept {
         const bool up_now = up, down_now = down;

@@ -8,7 +8,7 @@ struct Mux2 : hal::Component {
     hal::In<bool>    sel{*this, "sel", "chooses the input"};
     hal::In<double>  in[2]{{*this, "in0", "goes to out while sel is FALSE"}, {*this, "in1", "goes to out while sel is TRUE"}};
     hal::Out<double> out{*this, "out", "the chosen input"};
-    hal::Function    run{*this, "", &Mux2::update, "computes out"};
+    hal::Function    run{*this, "", hal::step<&Mux2::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in[sel].get(); }  // by index: a branch would be mispredicted
 };

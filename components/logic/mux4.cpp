@@ -12,7 +12,7 @@ struct Mux4 : hal::Component {
     hal::In<double>  in2{*this, "in2", "goes to out while sel1 sel0 are TRUE FALSE"};
     hal::In<double>  in3{*this, "in3", "goes to out while sel1 sel0 are TRUE TRUE"};
     hal::Out<double> out{*this, "out", "the chosen input"};
-    hal::Function    run{*this, "", &Mux4::update, "computes out"};
+    hal::Function    run{*this, "", hal::step<&Mux4::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         const hal::In<double>& low = sel0 ? in1 : in0;

@@ -8,7 +8,7 @@ struct Mux8 : hal::Component {
     hal::Ins<bool>   sel{*this, "sel#", 3, "bit # of the choice"};
     hal::Out<double> out{*this, "out", "the chosen input"};
     hal::Ins<double> in{*this, "in#", 8, "goes to out while # is chosen"};
-    hal::Function    run{*this, "", &Mux8::update, "computes out"};
+    hal::Function    run{*this, "", hal::step<&Mux8::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in[(sel[2] ? 4u : 0u) + (sel[1] ? 2u : 0u) + (sel[0] ? 1u : 0u)].get(); }
 };

@@ -17,7 +17,7 @@ struct Button : hal::Component {
     hal::Out<bool>         off{*this, "off", "TRUE until is-on is FALSE, after a request to switch off"};
     hal::In<std::uint32_t> debounce{*this, "debounce", "cycles in must hold before its change counts; 0 and 1: at once", {.initial = 2}};
     hal::In<std::uint32_t> max_pulse{*this, "max-pulse-length", "cycles after which on or off is given up; 0: never", {.initial = 1000}};
-    hal::Function          run{*this, "", &Button::update, "reads the button and the device"};
+    hal::Function          run{*this, "", hal::step<&Button::update>, "reads the button and the device"};
 
     void update(hal::Cycle) noexcept {
         if (on && (is_on || spent())) on = false;

@@ -14,7 +14,7 @@ struct Oneshot : hal::Component {
     hal::Param<bool> retriggerable{*this, "retriggerable", "an edge during the pulse starts it again", {.initial = true}};
     hal::Param<bool> rising{*this, "rising", "rising edges start a pulse", {.initial = true}};
     hal::Param<bool> falling{*this, "falling", "falling edges start a pulse"};
-    hal::Function    run{*this, "", &Oneshot::update, "turns edges into pulses"};
+    hal::Function    run{*this, "", hal::step<&Oneshot::update>, "turns edges into pulses"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool now = in;

@@ -9,7 +9,7 @@ struct OutputBuffer : hal::Component {
     hal::In<bool>   enable{*this, "enable", "FALSE: all outputs are FALSE"};
     hal::Ins<bool>  in{*this, "in-#", count, "input #"};
     hal::Outs<bool> out{*this, "out-#", count, "input # while enable is TRUE", {.safe = false}};
-    hal::Function   run{*this, "", &OutputBuffer::update, "copies the bits"};
+    hal::Function   run{*this, "", hal::step<&OutputBuffer::update>, "copies the bits"};
 
     void update(hal::Cycle) noexcept {
         const bool pass = enable;

@@ -8,7 +8,7 @@ struct Radiobutton : hal::Component {
     hal::Argument   count{*this, "personality", 4, "how many buttons", {.min = 1, .max = 32}};
     hal::Ins<bool>  in{*this, "in-##", count, "button #"};
     hal::Outs<bool> out{*this, "out-##", count, "TRUE from a press of button # until another one is pressed"};
-    hal::Function   run{*this, "", &Radiobutton::update, "reads the buttons"};
+    hal::Function   run{*this, "", hal::step<&Radiobutton::update>, "reads the buttons"};
 
     void update(hal::Cycle) noexcept {
         std::size_t pressed = in.size();

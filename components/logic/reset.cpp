@@ -16,7 +16,7 @@ struct Reset : hal::Component {
     hal::In<bool>           reset_bit{*this, "reset-bit", "value for out-bit"};
     hal::Param<bool>        rising{*this, "rising", "rising edges of trigger count", {.initial = true}};
     hal::Param<bool>        falling{*this, "falling", "falling edges of trigger count"};
-    hal::Function           run{*this, "", &Reset::update, "waits for an edge"};
+    hal::Function           run{*this, "", hal::step<&Reset::update>, "waits for an edge"};
 
     void update(hal::Cycle) noexcept {
         const bool now = trigger;

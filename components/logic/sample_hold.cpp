@@ -8,7 +8,7 @@ struct SampleHold : hal::Component {
     hal::In<std::int32_t>  in{*this, "in", "the value"};
     hal::In<bool>          hold{*this, "hold", "TRUE: out stays as it is"};
     hal::Out<std::int32_t> out{*this, "out", "in, or what it was when hold became TRUE"};
-    hal::Function          run{*this, "", &SampleHold::update, "copies in"};
+    hal::Function          run{*this, "", hal::step<&SampleHold::update>, "copies in"};
 
     void update(hal::Cycle) noexcept {
         if (!hold) out = in.get();

@@ -8,7 +8,7 @@ struct Select8 : hal::Component {
     hal::In<std::int32_t> sel{*this, "sel", "which output is TRUE; none below 0 and above 7"};
     hal::Outs<bool>       out{*this, "out#", 8, "TRUE while sel is #"};
     hal::In<bool>         enable{*this, "enable", "FALSE: all outputs are FALSE", {.initial = true}};
-    hal::Function         run{*this, "", &Select8::update, "sets one output"};
+    hal::Function         run{*this, "", hal::step<&Select8::update>, "sets one output"};
 
     void update(hal::Cycle) noexcept {
         const std::int32_t chosen = enable ? sel.get() : -1;

@@ -10,7 +10,7 @@ struct Timedelay : hal::Component {
     hal::In<double>  on_delay{*this, "on-delay", "how long in must be TRUE before out is", {.initial = 0.5, .unit = "s"}};
     hal::In<double>  off_delay{*this, "off-delay", "how long in must be FALSE before out is", {.initial = 0.5, .unit = "s"}};
     hal::Out<double> elapsed{*this, "elapsed", "how long in has been other than out", {.unit = "s"}};
-    hal::Function    run{*this, "", &Timedelay::update, "measures the time"};
+    hal::Function    run{*this, "", hal::step<&Timedelay::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool now = in;

@@ -9,7 +9,7 @@ struct Tof : hal::Component {
     hal::Out<bool>     q{*this, "q", "TRUE until in has been FALSE for pt"};
     hal::Out<double>   et{*this, "et", "time since the falling edge, up to pt", {.unit = "s"}};
     hal::Param<double> pt{*this, "pt", "the delay", {.unit = "s"}};
-    hal::Function      run{*this, "", &Tof::update, "measures the time"};
+    hal::Function      run{*this, "", hal::step<&Tof::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         if (in) waiting_ = true, elapsed_.restart();

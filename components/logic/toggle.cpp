@@ -9,7 +9,7 @@ struct Toggle : hal::Component {
     hal::Io<bool>             out{*this, "out", "turns over with each press; others may write it, too"};
     hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles the button must hold its new state; 0 and 1: it counts at once",
                                        {.initial = 2}};
-    hal::Function             run{*this, "", &Toggle::update, "reads the button"};
+    hal::Function             run{*this, "", hal::step<&Toggle::update>, "reads the button"};
 
     void update(hal::Cycle) noexcept {
         if (in == pressed_) {

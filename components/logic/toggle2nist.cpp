@@ -11,7 +11,7 @@ struct Toggle2nist : hal::Component {
     hal::Out<bool>         off{*this, "off", "TRUE until is-on is FALSE, after a request to switch off"};
     hal::In<std::uint32_t> debounce{*this, "debounce", "cycles in must hold before its change counts; 0 and 1: at once", {.initial = 2}};
     hal::In<std::uint32_t> patience{*this, "max-pulse-length", "cycles after which on or off is given up; 0: never", {.initial = 1000}};
-    hal::Function          run{*this, "", &Toggle2nist::update, "reads the button and the device"};
+    hal::Function          run{*this, "", hal::step<&Toggle2nist::update>, "reads the button and the device"};
 
     void update(hal::Cycle) noexcept {
         if (changed()) {

@@ -9,7 +9,7 @@ struct Ton : hal::Component {
     hal::Out<bool>     q{*this, "q", "TRUE once in has been TRUE for pt"};
     hal::Out<double>   et{*this, "et", "time since the rising edge, up to pt", {.unit = "s"}};
     hal::Param<double> pt{*this, "pt", "the delay", {.unit = "s"}};
-    hal::Function      run{*this, "", &Ton::update, "measures the time"};
+    hal::Function      run{*this, "", hal::step<&Ton::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         if (in && was_in_) elapsed_.advance(cycle.period_ns());

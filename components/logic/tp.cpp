@@ -9,7 +9,7 @@ struct Tp : hal::Component {
     hal::Out<bool>     q{*this, "q", "TRUE during the pulse"};
     hal::Out<double>   et{*this, "et", "time since the start of the pulse, up to pt", {.unit = "s"}};
     hal::Param<double> pt{*this, "pt", "length of the pulse", {.unit = "s"}};
-    hal::Function      run{*this, "", &Tp::update, "measures the time"};
+    hal::Function      run{*this, "", hal::step<&Tp::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         if (q) elapsed_.advance(cycle.period_ns());

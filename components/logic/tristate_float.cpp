@@ -8,7 +8,7 @@ struct TristateFloat : hal::Component {
     hal::In<double> in{*this, "in", "the value to place"};
     hal::Io<double> out{*this, "out", "takes in while enable is TRUE; left alone otherwise"};
     hal::In<bool>   enable{*this, "enable", "TRUE: in goes to out"};
-    hal::Function   run{*this, "", &TristateFloat::update, "places the value"};
+    hal::Function   run{*this, "", hal::step<&TristateFloat::update>, "places the value"};
 
     void update(hal::Cycle) noexcept {
         if (enable) out = in.get();

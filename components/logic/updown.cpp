@@ -13,7 +13,7 @@ struct Updown : hal::Component {
     hal::Param<bool>         wrap{*this, "wrap", "TRUE: after max comes min, and the other way round; clamp is not needed then"};
     hal::Param<std::int32_t> max{*this, "max", "largest count", {.initial = INT32_MAX}};
     hal::Param<std::int32_t> min{*this, "min", "smallest count"};
-    hal::Function            run{*this, "", &Updown::update, "counts edges"};
+    hal::Function            run{*this, "", hal::step<&Updown::update>, "counts edges"};
 
     void update(hal::Cycle) noexcept {
         const bool up = count_up, down = count_down;

@@ -10,7 +10,7 @@ struct Abs : hal::Component {
     hal::Out<bool>   sign{*this, "sign", "TRUE while in is below 0"};
     hal::Out<bool>   is_positive{*this, "is-positive", "TRUE while in is above 0"};
     hal::Out<bool>   is_negative{*this, "is-negative", "TRUE while in is below 0"};
-    hal::Function    run{*this, "", &Abs::update, "computes out and the sign"};
+    hal::Function    run{*this, "", hal::step<&Abs::update>, "computes out and the sign"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;

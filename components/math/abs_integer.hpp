@@ -14,7 +14,7 @@ struct AbsInteger : hal::Component {
     hal::Out<bool> sign{*this, "sign", "TRUE while in is negative"};
     hal::Out<bool> is_positive{*this, "is-positive", "TRUE while in is above 0"};
     hal::Out<bool> is_negative{*this, "is-negative", "TRUE while in is below 0"};
-    hal::Function  run{*this, "", &AbsInteger::update, "computes the amount"};
+    hal::Function  run{*this, "", hal::step<&AbsInteger::update>, "computes the amount"};
 
     void update(hal::Cycle) noexcept {
         const T value = in;

@@ -10,7 +10,7 @@ struct Blend : hal::Component {
     hal::In<double>  select{*this, "select", "share of in1"};
     hal::Out<double> out{*this, "out", "between in0 and in1"};
     hal::Param<bool> open{*this, "open", "TRUE: select below 0 or above 1 leads beyond in0 and in1; FALSE: it is limited"};
-    hal::Function    run{*this, "", &Blend::update, "computes out"};
+    hal::Function    run{*this, "", hal::step<&Blend::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         const double share = open ? select.get() : std::min(std::max(select.get(), 0.0), 1.0);

@@ -10,7 +10,7 @@ struct Comp : hal::Component {
     hal::Out<bool>     out{*this, "out", "TRUE while in1 is above in0, with hysteresis"};
     hal::Out<bool>     equal{*this, "equal", "TRUE while the inputs differ by no more than hyst / 2"};
     hal::Param<double> hyst{*this, "hyst", "width of the hysteresis"};
-    hal::Function      run{*this, "", &Comp::update, "compares"};
+    hal::Function      run{*this, "", hal::step<&Comp::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         const double difference = in1 - in0, half = 0.5 * std::fabs(hyst);

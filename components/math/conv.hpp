@@ -57,7 +57,7 @@ struct Widening : hal::Component {
     using Component::Component;
     hal::In<From> in{*this, "in", "the value to convert"};
     hal::Out<To>  out{*this, "out", "the same value in the other type"};
-    hal::Function run{*this, "", &Widening::update, "converts"};
+    hal::Function run{*this, "", hal::step<&Widening::update>, "converts"};
 
     void update(hal::Cycle) noexcept { out = convert<To, From>(in, false); }
 
@@ -80,7 +80,7 @@ struct Narrowing : hal::Component {
     hal::Out<To>     out{*this, "out", "the value in the other type"};
     hal::Out<bool>   out_of_range{*this, "out-of-range", "TRUE while in is not in the range of out"};
     hal::Param<bool> clamp{*this, "clamp", "TRUE: what is out of range goes to the nearest end of it; FALSE: it wraps around"};
-    hal::Function    run{*this, "", &Narrowing::update, "converts"};
+    hal::Function    run{*this, "", hal::step<&Narrowing::update>, "converts"};
 
     void update(hal::Cycle) noexcept {
         const From value = in;

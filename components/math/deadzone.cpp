@@ -9,7 +9,7 @@ struct Deadzone : hal::Component {
     hal::Out<double>   out{*this, "out", "center inside the zone, in outside"};
     hal::Param<double> center{*this, "center", "the middle of the zone"};
     hal::Param<double> threshold{*this, "threshold", "width of the zone", {.initial = 1.0}};
-    hal::Function      run{*this, "", &Deadzone::update, "computes out"};
+    hal::Function      run{*this, "", hal::step<&Deadzone::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         const double value = in, middle = center;

@@ -18,7 +18,7 @@ struct Delay : hal::Component {
     hal::Out<bool>         bit_out{*this, "bit-out", "bit-in, later"};
     hal::Out<double>       delayed{*this, "delay", "how much later out is", {.unit = "s", .finite = true}};
     hal::Out<bool>         limited{*this, "limited", "TRUE: more than depth is wanted, or less than nothing"};
-    hal::Function          run{*this, "", &Delay::update, "stores in, gives out"};
+    hal::Function          run{*this, "", hal::step<&Delay::update>, "stores in, gives out"};
 
     void update(hal::Cycle cycle) noexcept {
         const double most = static_cast<double>(size_ - 1);

@@ -12,7 +12,7 @@ struct DemuxGeneric : hal::Component {
     routed::Choice             choice{*this, config};
     routed::AnyType<hal::Ins>  in{*this, config.from, "in-", "", 1, "the value"};
     routed::AnyType<hal::Outs> out{*this, config.to, "out-", "-##", config.ways, "follows the value while # is chosen"};
-    hal::Function              run{*this, "", &DemuxGeneric::update, "computes the chosen output"};
+    hal::Function              run{*this, "", hal::step<&DemuxGeneric::update>, "computes the chosen output"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::uint64_t way = choice.update(cycle);

@@ -9,7 +9,7 @@ struct Div2 : hal::Component {
     hal::In<double>    in1{*this, "in1", "divisor"};
     hal::Out<double>   out{*this, "out", "in0 / in1"};
     hal::Param<double> deadband{*this, "deadband", "smallest amount of the divisor: one nearer to 0 counts as this"};
-    hal::Function      run{*this, "", &Div2::update, "divides"};
+    hal::Function      run{*this, "", hal::step<&Div2::update>, "divides"};
 
     void update(hal::Cycle) noexcept {
         const double smallest = std::fabs(deadband);

@@ -9,7 +9,7 @@ struct Ilowpass : hal::Component {
     hal::Out<std::int32_t> out{*this, "out", "in * scale, smoothed; goes round at the ends of the type"};
     hal::Param<double>     scale{*this, "scale", "steps of out per count", {.initial = 1024.0}};
     hal::Param<double>     gain{*this, "gain", "share of the way to the input in each cycle, 0 to 1", {.initial = 0.5}};
-    hal::Function          run{*this, "", &Ilowpass::update, "smooths"};
+    hal::Function          run{*this, "", hal::step<&Ilowpass::update>, "smooths"};
 
     void update(hal::Cycle) noexcept {
         const double next = state_ + (in * scale.get() - state_) * gain;

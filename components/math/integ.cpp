@@ -11,7 +11,7 @@ struct Integ : hal::Component {
     hal::In<bool>    reset{*this, "reset", "while TRUE out is 0"};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::Function    run{*this, "", &Integ::update, "integrates"};
+    hal::Function    run{*this, "", hal::step<&Integ::update>, "integrates"};
 
     void update(hal::Cycle cycle) noexcept {
         const double sum = std::min(std::max(sum_ + gain * in * cycle.seconds(), min.get()), max.get());

@@ -8,7 +8,7 @@ struct Invert : hal::Component {
     hal::In<double>    in{*this, "in", "the input"};
     hal::Out<double>   out{*this, "out", "1 / in, or 0 close to 0"};
     hal::Param<double> deadband{*this, "deadband", "out is 0 while in is between -deadband and deadband"};
-    hal::Function      run{*this, "", &Invert::update, "computes out"};
+    hal::Function      run{*this, "", hal::step<&Invert::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;

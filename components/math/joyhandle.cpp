@@ -16,7 +16,7 @@ struct Joyhandle : hal::Component {
     hal::Param<double> scale{*this, "scale", "value of the curve at the stop", {.initial = 1.0}};
     hal::Param<double> offset{*this, "offset", "added to the amount of the curve outside the dead band"};
     hal::Param<bool>   inverse{*this, "inverse", "TRUE: steep first and flat at the stop"};
-    hal::Function      run{*this, "", &Joyhandle::update, "shapes the value"};
+    hal::Function      run{*this, "", hal::step<&Joyhandle::update>, "shapes the value"};
 
     void update(hal::Cycle) noexcept {
         const double x = std::fmin(std::fabs(in), 1.0), d = std::fmin(std::fmax(deadband, 0.0), 0.99);

@@ -11,7 +11,7 @@ struct Knob2float : hal::Component {
     hal::Out<double>      out{*this, "out", "the value"};
     hal::Param<double>    max_out{*this, "max-out", "largest value; counts beyond are lost", {.initial = 1.0}};
     hal::Param<double>    min_out{*this, "min-out", "smallest value; counts beyond are lost", {.initial = 0.0}};
-    hal::Function         run{*this, "", &Knob2float::update, "follows the knob"};
+    hal::Function         run{*this, "", hal::step<&Knob2float::update>, "follows the knob"};
 
     void update(hal::Cycle) noexcept {
         const std::int32_t now = counts;

@@ -9,7 +9,7 @@ struct Limit1 : hal::Component {
     hal::Out<double> out{*this, "out", "in, kept between min and max"};
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::Function    run{*this, "", &Limit1::update, "computes out"};
+    hal::Function    run{*this, "", hal::step<&Limit1::update>, "computes out"};
 
     // Not std::clamp: min above max is the user's right, and then max wins.
     void update(hal::Cycle) noexcept { out = std::min(std::max(in.get(), min.get()), max.get()); }

@@ -11,7 +11,7 @@ struct Limit2 : hal::Component {
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>  maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
-    hal::Function    run{*this, "", &Limit2::update, "follows in"};
+    hal::Function    run{*this, "", hal::step<&Limit2::update>, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
         const double goal = limited(in);

@@ -65,7 +65,7 @@ struct Limit3 : hal::Component {
     hal::In<double>  maxa{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
     hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop in which acceleration fades out; 2: the fastest stop",
                                         {.initial = 2}};
-    hal::Function    run{*this, "", &Limit3::update, "follows in"};
+    hal::Function    run{*this, "", hal::step<&Limit3::update>, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
         const double period = cycle.seconds();

@@ -18,7 +18,7 @@ struct LimitAxis : hal::Component {
     hal::Ins<double>        max_range{*this, "max-range-##", count, "range # ends at this fb"};
     hal::Ins<bool>          enable{*this, "enable-##", count, "FALSE: range # is not there", {.initial = true}};
     hal::Ins<bool>          sticky{*this, "sticky-##", count, "TRUE: range # stays the present one while fb is in it", {.initial = true}};
-    hal::Function           run{*this, "", &LimitAxis::update, "chooses the range"};
+    hal::Function           run{*this, "", hal::step<&LimitAxis::update>, "chooses the range"};
 
     void update(hal::Cycle) noexcept {
         std::size_t chosen = current_;

@@ -11,7 +11,7 @@ struct Lincurve : hal::Component {
     hal::Io<double>     out_io{*this, "out-io", "the same, for pins that are io"};
     hal::Params<double> x{*this, "x-val-##", count, "x of point #; must not fall from point to point"};
     hal::Params<double> y{*this, "y-val-##", count, "y of point #"};
-    hal::Function       run{*this, "", &Lincurve::update, "looks up the curve"};
+    hal::Function       run{*this, "", hal::step<&Lincurve::update>, "looks up the curve"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;

@@ -9,7 +9,7 @@ struct Lowpass : hal::Component {
     hal::Out<double> out{*this, "out", "the input, smoothed"};
     hal::In<bool>    load{*this, "load", "while TRUE out is in"};
     hal::In<double>  gain{*this, "gain", "share of the new value, 0 to 1"};
-    hal::Function    run{*this, "", &Lowpass::update, "filters"};
+    hal::Function    run{*this, "", hal::step<&Lowpass::update>, "filters"};
 
     void update(hal::Cycle) noexcept {
         const double value = load ? in.get() : state_ + (in - state_) * gain;

@@ -9,7 +9,7 @@ struct Minmax : hal::Component {
     hal::In<bool>    reset{*this, "reset", "while TRUE min and max are in"};
     hal::Out<double> max{*this, "max", "highest input since the reset"};
     hal::Out<double> min{*this, "min", "lowest input since the reset"};
-    hal::Function    run{*this, "", &Minmax::update, "watches the input"};
+    hal::Function    run{*this, "", hal::step<&Minmax::update>, "watches the input"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;

@@ -15,7 +15,7 @@ struct Modmath : hal::Component {
     hal::Out<bool>         up{*this, "up", "TRUE: the way up is not longer"};
     hal::Out<bool>         down{*this, "down", "TRUE: the way down is shorter"};
     hal::Out<bool>         on_target{*this, "on-target", "TRUE: it is there"};
-    hal::Function          run{*this, "", &Modmath::update, "chooses the way"};
+    hal::Function          run{*this, "", hal::step<&Modmath::update>, "chooses the way"};
 
     void update(hal::Cycle) noexcept {
         const std::int64_t positions = std::int64_t{max} - min + 1, apart = std::int64_t{desired} - actual;

@@ -14,7 +14,7 @@ struct Mux16 : hal::Component {
     hal::Ins<double>       in{*this, "in##", 16, "goes to the outputs while # is chosen"};
     hal::Out<double>       elapsed{*this, "elapsed", "how long the choice has held", {.unit = "s"}};
     hal::Out<std::int32_t> selected{*this, "selected", "the choice, from Gray code or binary"};
-    hal::Function          run{*this, "", &Mux16::update, "computes the outputs"};
+    hal::Function          run{*this, "", hal::step<&Mux16::update>, "computes the outputs"};
 
     void update(hal::Cycle cycle) noexcept {
         unsigned bits = 0;

@@ -12,7 +12,7 @@ struct MuxGeneric : hal::Component {
     routed::Choice              choice{*this, config};
     routed::AnyType<hal::Ins>   in{*this, config.from, "in-", "-##", config.ways, "goes to the output while # is chosen"};
     routed::AnyType<hal::Outs>  out{*this, config.to, "out-", "", 1, "the chosen input"};
-    hal::Function               run{*this, "", &MuxGeneric::update, "computes the output"};
+    hal::Function               run{*this, "", hal::step<&MuxGeneric::update>, "computes the output"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::uint64_t way = choice.update(cycle);

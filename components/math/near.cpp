@@ -10,7 +10,7 @@ struct Near : hal::Component {
     hal::Out<bool>     out{*this, "out", "TRUE while the values are near each other"};
     hal::Param<double> scale{*this, "scale", "largest ratio of the two", {.initial = 1.0}};
     hal::Param<double> difference{*this, "difference", "largest difference of the two"};
-    hal::Function      run{*this, "", &Near::update, "compares"};
+    hal::Function      run{*this, "", hal::step<&Near::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         const double a = in1, b = in2;

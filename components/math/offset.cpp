@@ -10,8 +10,8 @@ struct Offset : hal::Component {
     hal::Out<double> out{*this, "out", "in + offset"};
     hal::In<double>  feedback_in{*this, "fb-in", "the feedback, with the offset in it"};
     hal::Out<double> feedback_out{*this, "fb-out", "fb-in - offset"};
-    hal::Function    forward{*this, "update-output", &Offset::update_output, "adds the offset to the input"};
-    hal::Function    backward{*this, "update-feedback", &Offset::update_feedback, "takes the offset out of the feedback"};
+    hal::Function    forward{*this, "update-output", hal::step<&Offset::update_output>, "adds the offset to the input"};
+    hal::Function    backward{*this, "update-feedback", hal::step<&Offset::update_feedback>, "takes the offset out of the feedback"};
 
     void update_output(hal::Cycle) noexcept { out = in + offset; }
     void update_feedback(hal::Cycle) noexcept { feedback_out = feedback_in - offset; }

@@ -18,7 +18,7 @@ struct Quantizer : hal::Component {
     hal::Out<double>       error{*this, "error", "in - out", {.finite = true}};
     hal::Out<std::int64_t> level{*this, "level", "the level"};
     hal::Out<bool>         limited{*this, "limited", "TRUE: in lies beyond the lowest or the highest level"};
-    hal::Function          run{*this, "", &Quantizer::update, "rounds in to a level"};
+    hal::Function          run{*this, "", hal::step<&Quantizer::update>, "rounds in to a level"};
 
     void update(hal::Cycle) noexcept {
         if (std::isfinite(in)) in_ = in;

@@ -9,7 +9,7 @@ struct Scale : hal::Component {
     hal::In<double>  gain{*this, "gain", "factor of in"};
     hal::In<double>  offset{*this, "offset", "added after the gain"};
     hal::Out<double> out{*this, "out", "in * gain + offset"};
-    hal::Function    run{*this, "", &Scale::update, "computes out"};
+    hal::Function    run{*this, "", hal::step<&Scale::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in * gain + offset; }
 };

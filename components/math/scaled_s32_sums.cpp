@@ -9,7 +9,7 @@ struct ScaledS32Sums : hal::Component {
     hal::Ins<double>       scale{*this, "scale#", 4, "factor of summand #", {.initial = 1.0}};
     hal::Out<std::int32_t> out_s{*this, "out-s", "the sum without its fraction, limited to the type"};
     hal::Out<double>       out_f{*this, "out-f", "the sum"};
-    hal::Function          run{*this, "", &ScaledS32Sums::update, "adds up"};
+    hal::Function          run{*this, "", hal::step<&ScaledS32Sums::update>, "adds up"};
 
     void update(hal::Cycle) noexcept {
         double sum = 0.0;

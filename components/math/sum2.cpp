@@ -11,7 +11,7 @@ struct Sum2 : hal::Component {
     hal::Param<double> gain1{*this, "gain1", "factor of in1", {.initial = 1.0}};
     hal::Param<double> offset{*this, "offset", "always added"};
     hal::Out<double>   out{*this, "out", "the sum"};
-    hal::Function      run{*this, "", &Sum2::add, "adds up"};
+    hal::Function      run{*this, "", hal::step<&Sum2::add>, "adds up"};
 
     void add(hal::Cycle) noexcept { out = gain0 * in0 + gain1 * in1 + offset; }
 };

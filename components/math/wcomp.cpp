@@ -11,7 +11,7 @@ struct Wcomp : hal::Component {
     hal::Out<bool>  out{*this, "out", "TRUE while in is strictly between min and max"};
     hal::Out<bool>  under{*this, "under", "TRUE while in is at or below min"};
     hal::Out<bool>  over{*this, "over", "TRUE while in is at or above max"};
-    hal::Function   run{*this, "", &Wcomp::update, "compares"};
+    hal::Function   run{*this, "", hal::step<&Wcomp::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         const double value = in, low = min, high = max;

@@ -12,7 +12,7 @@ struct WeightedSum : hal::Component {
     hal::In<bool>           hold{*this, "hold", "TRUE: the sum stays"};
     hal::Out<std::int32_t>  sum{*this, "sum", "the sum"};
     hal::Io<std::int32_t>   offset{*this, "offset", "always added"};
-    hal::Function           run{*this, "process_wsums", &WeightedSum::update, "adds up all sums", {.shared = true}};
+    hal::Function           run{*this, "process_wsums", hal::step<&WeightedSum::update>, "adds up all sums", {.shared = true}};
 
     explicit WeightedSum(const hal_host* host) : Component(host) {
         std::uint32_t power = 1;

@@ -168,16 +168,17 @@ void Core::run() noexcept {
             initialising_ = false;
         } else if (const auto& functions = plan_->functions; !functions.empty()) {
             const plan::Step* const steps = plan_->steps.data();
+            const plan::Row* row = plan_->rows.data();
             if (!measure_) {
-                run_steps(steps, steps + functions.back().end);
+                run_rows(row, steps, steps + functions.back().end);
             } else if (profile_every.load(std::memory_order_relaxed)) {
                 for (const plan::Function& function : functions) run_timed(function, steps);
             } else {
                 const plan::Function& function = functions[sampled_];
                 sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
-                run_steps(steps, steps + function.begin);
+                run_rows(row, steps, steps + function.begin);
                 run_timed(function, steps);
-                run_steps(steps + function.end, steps + functions.back().end);
+                run_rows(row, steps + function.end, steps + functions.back().end);
             }
         }
         in_function_ = false;
@@ -188,6 +189,17 @@ void Core::run() noexcept {
         initialising_ = false;
         stopped_.store(true, std::memory_order_release);
         make_safe();
+    }
+}
+
+/// `row` is one that begins at or before `first`; left at one that begins at or before `last`.
+void Core::run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept {
+    for (const plan::Step* const steps = plan_->steps.data(); first != last;) {
+        while (steps + row->end <= first) ++row;
+        const plan::Step* const end = std::min(last, steps + row->end);
+        if (row->run) row->run(first, end, &info_, &current_);
+        else run_steps(first, end);
+        first = end;
     }
 }
 

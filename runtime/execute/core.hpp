@@ -102,6 +102,7 @@ private:
     void answer() noexcept;
     void run() noexcept;
     void run_timed(const plan::Function& function, const plan::Step* steps) noexcept;
+    void run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
     void account(std::int64_t busy_ns) noexcept;
 

@@ -173,7 +173,24 @@ private:
         };
         fill(thread.init, plan.init_steps, plan.init);
         fill(thread.functions, plan.steps, plan.functions);
+        rows(thread, plan);
         note_working_set(thread, plan);
+    }
+
+    void rows(const Thread& thread, plan::Plan& plan) const {
+        std::unordered_map<hal_step, hal_row> known;
+        for (const Function* function : thread.functions)
+            if (function->row.run) known[function->row.step] = function->row.run;
+        const auto add = [&](hal_row row, std::size_t end) {
+            if (!plan.rows.empty() && !row && !plan.rows.back().run) plan.rows.back().end = static_cast<std::uint32_t>(end);
+            else plan.rows.push_back({row, static_cast<std::uint32_t>(end)});
+        };
+        for (std::size_t begin = 0, end; begin < plan.steps.size(); begin = end) {
+            const hal_step step = plan.steps[begin].step;
+            for (end = begin + 1; end < plan.steps.size() && plan.steps[end].step == step;) ++end;
+            const auto row = end - begin < plan::Row::worth ? known.end() : known.find(step);
+            add(row == known.end() ? nullptr : row->second, end);
+        }
     }
 
     // Instances of one loadrt lie in a row: mostly one entry for all of them.
@@ -186,6 +203,8 @@ private:
         std::unordered_set<hal_step> met;
         for (const plan::Step& step : plan.steps)
             if (met.insert(step.step).second) set.push_back({reinterpret_cast<const void*>(step.step), code});
+        for (const plan::Row& row : plan.rows)
+            if (row.run) set.push_back({reinterpret_cast<const void*>(row.run), code});
         const std::size_t before = set.size();
         for (const Function* function : thread.functions) {
             if (excluded(function)) continue;

@@ -60,6 +60,7 @@ void swap_declarations(Pin& a, Pin& b) {
 void swap_declarations(Function& a, Function& b) {
     std::swap(a.doc, b.doc);
     std::swap(a.steps, b.steps);
+    std::swap(a.row, b.row);
     std::swap(a.instances, b.instances);
     std::swap(a.shared, b.shared);
     std::swap(a.halted, b.halted);

@@ -70,6 +70,7 @@ struct Function {
     std::string name;
     const char* doc = "";
     std::vector<plan::Step> steps;   ///< one, or one per instance of a shared function
+    struct { hal_row run = nullptr; hal_step step = nullptr; } row;  ///< runs many calls of that step
     std::vector<Instance*> instances;///< whose steps these are, in the same order
     Component* component = nullptr;
     bool shared = false;

@@ -13,9 +13,13 @@
 namespace hal::plan {
 
 /// The one call of the cycle's inner loop.
-struct Step {
-    hal_step step;
-    void* self;
+using Step = hal_call;
+
+/// Steps that are run by one call of their plugin, or (`run` is nullptr) one by one. Rows cover all of Plan::steps, in order.
+struct Row {
+    hal_row run;
+    std::uint32_t end;  ///< in Plan::steps
+    static constexpr std::uint32_t worth = 4;  ///< fewer steps are not worth a row of their own
 };
 
 /// Times of one HAL function. The pins are linkable like any other; written by the function's thread when it samples.
@@ -111,6 +115,7 @@ struct Memory {
 struct Plan {
     std::uint64_t epoch = 0;
     std::vector<Step> steps;
+    std::vector<Row> rows;
     std::vector<Function> functions;
     std::vector<Function> init;              ///< run once, in a cycle of their own, before the first cyclic pass
     std::vector<Step> init_steps;

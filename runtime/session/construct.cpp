@@ -29,6 +29,7 @@ std::vector<std::string> split(const std::string& text, char by) {
 struct DeclaredFunction {
     std::string full, doc;
     hal_step step;
+    hal_row row;
     void* self;
     const void* identity;
     bool shared;
@@ -108,7 +109,7 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
 
 bool take_function(const hal_host* host, const hal_function_decl* decl) {
     Construction& c = of(host);
-    if (decl->size < sizeof *decl || !decl->name || !decl->step) return refuse(c, "it declares a function that is none");
+    if (decl->size < HAL_FUNCTION_DECL_SIZE_1_0 || !decl->name || !decl->step) return refuse(c, "it declares a function that is none");
     if (decl->flags & HAL_FUNCTION_EMERGENCY) {
         c.instance.emergency.push_back({decl->step, decl->self});
         return true;
@@ -117,7 +118,8 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
     const bool whole = c.whole_function_names || whole_names(c.instance);
     std::string full = whole ? decl->name : shared ? dashed(c.instance.component->name) : c.instance.name;
     if (*decl->name && !whole) full += std::string(".") + decl->name;
-    c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step, decl->self, decl->identity, shared});
+    c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step,
+                           decl->size >= sizeof *decl ? decl->row : nullptr, decl->self, decl->identity, shared});
     return true;
 }
 
@@ -275,6 +277,7 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
             function->name = decl.full;
             function->doc = c.model.keep(decl.doc);
             function->steps.push_back({decl.step, decl.self});
+            function->row = {decl.row, decl.step};
             function->instances.push_back(instance.get());
             function->component = &component;
             function->shared = decl.shared;

@@ -88,6 +88,16 @@ typedef struct hal_cycle {
 
 typedef void (*hal_step)(void *self, const hal_cycle *cycle); /* [realtime] */
 
+/* One call of a thread's cycle. */
+typedef struct hal_call {
+    hal_step step;
+    void *self;
+} hal_call;
+
+/* Since 1.1: does `*current = call; call->step(call->self, cycle)` for each call from `first` up to, not with, `last`, which all have the
+ * same step. `current` tells the host where it is, should a call not come back. [realtime] */
+typedef void (*hal_row)(const hal_call *first, const hal_call *last, const hal_cycle *cycle, const hal_call *volatile *current);
+
 enum {
     HAL_FUNCTION_SHARED = 1,   /* one function per component, running all its instances in order of creation */
     HAL_FUNCTION_EMERGENCY = 2 /* never in a thread: the host calls it to make hardware outputs safe; async-signal-safe */
@@ -101,7 +111,10 @@ typedef struct hal_function_decl {
     hal_step step;
     void *self;
     const void *identity;
+    hal_row row; /* since 1.1: NULL, or what runs many of these in a row with less than a call each */
 } hal_function_decl;
+
+#define HAL_FUNCTION_DECL_SIZE_1_0 offsetof(hal_function_decl, row)
 
 enum {
     HAL_ARGUMENT_PER_INSTANCE = 1 /* a comma list, an element per instance; its length is the number of instances

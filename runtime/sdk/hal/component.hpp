@@ -167,6 +167,24 @@ public:
     Component& operator=(const Component&) = delete;
 };
 
+namespace detail {
+template <class B, auto step>
+void run_row(const hal_call* call, const hal_call* last, const hal_cycle* cycle, const hal_call* volatile* current) noexcept {
+    for (; call != last; ++call) {
+        *current = call;
+        (static_cast<B*>(call->self)->*step)(Cycle{cycle});
+    }
+}
+}  // namespace detail
+
+/// A member function as a constant: `Function run{*this, "", hal::step<&And2::update>, "computes out"}`. Where many instances stand in
+/// a row in a thread, they are run by one loop in the plugin, in which the compiler can inline `update`: worth it where the work is a few
+/// instructions, and the call would cost as much.
+template <auto member>
+struct Step {};
+template <auto member>
+inline constexpr Step<member> step{};
+
 /// A function that can be added to a thread with `addf`. `step` must be a noexcept member taking a hal::Cycle.
 class Function {
 public:
@@ -174,6 +192,12 @@ public:
         requires std::derived_from<C, B>
     Function(C& component, const char* name, void (B::*step)(Cycle) noexcept, const char* doc, FunctionOptions options = {}) {
         declare(static_cast<B*>(&component), name, entry(step), doc, options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u);
+    }
+    template <std::derived_from<Component> C, class B, void (B::*step)(Cycle) noexcept>
+        requires std::derived_from<C, B>
+    Function(C& component, const char* name, Step<step>, const char* doc, FunctionOptions options = {}) {
+        declare(static_cast<B*>(&component), name, entry(step), doc, options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u,
+                detail::run_row<B, step>);
     }
     Function(const Function&) = delete;
     Function& operator=(const Function&) = delete;
@@ -197,8 +221,8 @@ protected:
         if (!plain) throw std::logic_error("a component's function must not be virtual");
         return reinterpret_cast<hal_step>(words[0]);
     }
-    void declare(void* self, const char* name, hal_step step, const char* doc, unsigned flags) {
-        const hal_function_decl decl{sizeof decl, flags, name, doc, step, self, this};
+    void declare(void* self, const char* name, hal_step step, const char* doc, unsigned flags, hal_row row = nullptr) {
+        const hal_function_decl decl{sizeof decl, flags, name, doc, step, self, this, row};
         if (!detail::creating->function(detail::creating, &decl)) detail::refused();
     }
 };
