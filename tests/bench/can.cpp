@@ -35,7 +35,8 @@ public:
         const auto found = all_.find(name);
         if (found == all_.end()) return std::nullopt;
         const bool time = name.find("cpu") != name.npos || name.starts_with("sync");
-        return time ? *std::min_element(found->second.begin(), found->second.end()) : *std::max_element(found->second.begin(), found->second.end());
+        return time ? *std::min_element(found->second.begin(), found->second.end())
+                    : *std::max_element(found->second.begin(), found->second.end());
     }
     std::optional<double> middle(const std::string& name) const {
         auto found = all_.find(name);
@@ -78,7 +79,9 @@ public:
         if (!real_) interface_ = fmt::format("shim{}", getpid());
     }
     std::string about() const {
-        return real_ ? "SocketCAN on " + interface_ : "raw CAN sockets over UDP on the loopback interface (can_shim.c), because there is no SocketCAN interface " + std::string("vcan0");
+        return real_ ? "SocketCAN on " + interface_
+                     : "raw CAN sockets over UDP on the loopback interface (can_shim.c), because there is no SocketCAN interface " +
+                           std::string("vcan0");
     }
     Start program(std::vector<std::string> words) const {
         Start start{.arguments = std::move(words), .everywhere = true};
@@ -110,11 +113,13 @@ std::string pair(const Start& slave, const Start& master) {
 void can(const Options& options, Report& report) {
     report.section("CANopen: one node, no pacing of the bus");
     const Rig rig(options);
-    if (access(rig.ours().c_str(), X_OK) != 0 || access(rig.neutral().c_str(), X_OK) != 0) return report.note("can_stack and can_neutral are not built here");
+    if (access(rig.ours().c_str(), X_OK) != 0 || access(rig.neutral().c_str(), X_OK) != 0)
+        return report.note("can_stack and can_neutral are not built here");
     const int rounds = options.quick ? 2 : 5;
     const std::string part = options.quick ? "4" : "1", count = options.quick ? "10000" : "40000", &name = rig.interface();
     const Start neutral_slave = rig.program({rig.neutral(), name, "slave"}), our_slave = rig.program({rig.ours(), "can:" + name, "slave"});
-    const Start neutral_master = rig.program({rig.neutral(), name, "master", part}), our_master = rig.program({rig.ours(), "can:" + name, "master", part});
+    const Start neutral_master = rig.program({rig.neutral(), name, "master", part}),
+                our_master = rig.program({rig.ours(), "can:" + name, "master", part});
     const TemporaryFolder files;
     const std::string script = files.file("master.py", python_master);
     const bool python = run({.arguments = {"python3", "-c", "import can, canopen"}}).status == 0;
@@ -141,8 +146,14 @@ void can(const Options& options, Report& report) {
         for (const auto& [side, figures] : {std::pair<std::string, const Figures*>{"master", &master}, {"device", &slave}}) {
             if (!figures->best(figure)) continue;
             Goal wanted = goal;
-            if (goal.kind == Goal::Kind::limit && figure.starts_with("sync_p")) wanted.value = std::max(goal.value, reference.best(figure).value_or(0));  // or as the instrument
-            report.row({.what = side + ": " + what, .unit = unit, .ours = figures->best(figure), .peer = "no stack", .theirs = reference.best(figure), .goal = wanted});
+            if (goal.kind == Goal::Kind::limit && figure.starts_with("sync_p"))
+                wanted.value = std::max(goal.value, reference.best(figure).value_or(0));  // or as the instrument
+            report.row({.what = side + ": " + what,
+                        .unit = unit,
+                        .ours = figures->best(figure),
+                        .peer = "no stack",
+                        .theirs = reference.best(figure),
+                        .goal = wanted});
         }
     };
     add("SDO expedited upload", "exp_up", "/s", at_least(80'000));
@@ -152,27 +163,49 @@ void can(const Options& options, Report& report) {
     add("SDO block download, 1 MiB", "blk1m_down", "kB/s", at_least(1500));
     add("SDO block upload, 1 MiB", "blk1m_up", "kB/s", at_least(1500));
     for (const char* which : {"up", "down"})
-        report.row({.what = fmt::format("master: CPU of an expedited {}load", which), .unit = "us", .ours = master.best(fmt::format("exp_{}_cpu", which)),
-                    .peer = "no stack", .theirs = reference.best(fmt::format("exp_{}_cpu", which)), .goal = limit(6)});
+        report.row({.what = fmt::format("master: CPU of an expedited {}load", which),
+                    .unit = "us",
+                    .ours = master.best(fmt::format("exp_{}_cpu", which)),
+                    .peer = "no stack",
+                    .theirs = reference.best(fmt::format("exp_{}_cpu", which)),
+                    .goal = limit(6)});
     add("SYNC to TPDO in the application, p50", "sync_p50", "us", limit(35));
     add("SYNC to TPDO in the application, p99", "sync_p99", "us", limit(70));
-    report.row({.what = "master: CPU of a cycle of SYNC and TPDO, 1 kHz", .unit = "us", .ours = master.best("sync_cpu"), .peer = "no stack",
-                .theirs = reference.best("sync_cpu"), .goal = limit(38)});
+    report.row({.what = "master: CPU of a cycle of SYNC and TPDO, 1 kHz",
+                .unit = "us",
+                .ours = master.best("sync_cpu"),
+                .peer = "no stack",
+                .theirs = reference.best("sync_cpu"),
+                .goal = limit(38)});
     report.row({.what = "master: CPU of a received PDO, 10 kHz", .unit = "us", .ours = master.best("receive_cpu"), .goal = limit(8)});
-    for (const auto& [figure, what] : {std::pair{"blk_down", "block download"}, {"blk_up", "block upload"}, {"seg_down", "segmented download"}, {"seg_up", "segmented upload"}})
+    for (const auto& [figure, what] : {std::pair{"blk_down", "block download"},
+                                       {"blk_up", "block upload"},
+                                       {"seg_down", "segmented download"},
+                                       {"seg_up", "segmented upload"}})
         for (const auto& [bus, where] : {std::pair{"sim_", "bus in memory"}, {"memory_", "queue to queue"}})
-            report.row({.what = fmt::format("{}: SDO {}, 1 MiB", where, what), .unit = "kB/s", .ours = memory.best(std::string(bus) + figure),
+            report.row({.what = fmt::format("{}: SDO {}, 1 MiB", where, what),
+                        .unit = "kB/s",
+                        .ours = memory.best(std::string(bus) + figure),
                         .goal = figure[0] == 'b' ? at_least(5000) : Goal{}});
     report.row({.what = "queue to queue: SDO expedited, both sides", .unit = "/s", .ours = memory.best("memory_exp_up")});
     if (python)
-        for (const auto& [figure, what] : {std::pair{"exp_up", "expedited upload, /s"}, {"exp_up_cpu", "its CPU, us"}, {"seg64k_down", "segmented download, 64 KiB, kB/s"},
-                                           {"blk64k_down", "block download, 64 KiB, kB/s"}, {"blk64k_up", "block upload, 64 KiB, kB/s"}})
-            report.row({.what = fmt::format("master: SDO {}", what), .unit = "", .ours = master.best(figure), .peer = "Python canopen", .theirs = foreign.best(figure)});
+        for (const auto& [figure, what] : {std::pair{"exp_up", "expedited upload, /s"},
+                                           {"exp_up_cpu", "its CPU, us"},
+                                           {"seg64k_down", "segmented download, 64 KiB, kB/s"},
+                                           {"blk64k_down", "block download, 64 KiB, kB/s"},
+                                           {"blk64k_up", "block upload, 64 KiB, kB/s"}})
+            report.row({.what = fmt::format("master: SDO {}", what),
+                        .unit = "",
+                        .ours = master.best(figure),
+                        .peer = "Python canopen",
+                        .theirs = foreign.best(figure)});
     else report.note("the Python package canopen is not installed: python3 -m pip install canopen python-can");
     report.note("lely-core and CANopenNode are not installed as programs; docs/performance.md has their figures by the same method.");
-    report.note(fmt::format("Over {}. Both sides on one CPU. Best of {} rounds, all pairs in turn; median of the same rounds: SDO upload {:.0f}/s (no stack {:.0f}/s), SYNC p50 {:.1f} us ({:.1f} us).",
-                            rig.about(), rounds, master.middle("exp_up").value_or(0), reference.middle("exp_up").value_or(0), master.middle("sync_p50").value_or(0),
-                            reference.middle("sync_p50").value_or(0)));
+    report.note(
+        fmt::format("Over {}. Both sides on one CPU. Best of {} rounds, all pairs in turn; median of the same rounds: SDO upload {:.0f}/s "
+                    "(no stack {:.0f}/s), SYNC p50 {:.1f} us ({:.1f} us).",
+                    rig.about(), rounds, master.middle("exp_up").value_or(0), reference.middle("exp_up").value_or(0),
+                    master.middle("sync_p50").value_or(0), reference.middle("sync_p50").value_or(0)));
 }
 
 }  // namespace hal::bench

@@ -237,7 +237,9 @@ static void transfers(const char* name, uint32_t size, int block) {
     printf("%s_up %.1f\n", name, size * 1e6 / (double)(now_ns(CLOCK_MONOTONIC) - began));
     if (memcmp(domain, back, size) != 0) fail("other bytes came back");
 }
-static int by_size(const void* a, const void* b) { return *(const int64_t*)a < *(const int64_t*)b ? -1 : *(const int64_t*)a > *(const int64_t*)b; }
+static int by_size(const void* a, const void* b) {
+    return *(const int64_t*)a < *(const int64_t*)b ? -1 : *(const int64_t*)a > *(const int64_t*)b;
+}
 static void synchronous(unsigned count) {
     int64_t* const took = calloc(count, sizeof *took);
     struct can_frame f;
@@ -254,7 +256,8 @@ static void synchronous(unsigned count) {
     }
     const double cpu_us = (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / count / 1000;
     qsort(took, count, sizeof *took, by_size);
-    printf("sync_p50 %.1f\nsync_p99 %.1f\nsync_cpu %.2f\n", (double)took[count / 2] / 1000, (double)took[count - count / 100 - 1] / 1000, cpu_us);
+    printf("sync_p50 %.1f\nsync_p99 %.1f\nsync_cpu %.2f\n", (double)took[count / 2] / 1000, (double)took[count - count / 100 - 1] / 1000,
+           cpu_us);
 }
 
 int main(int argc, char** argv) {

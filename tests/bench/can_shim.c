@@ -33,11 +33,11 @@ static struct can_socket {
 } table[sockets];
 
 /* The C library's function of that name, looked up once. */
-#define REAL(name)                                                              \
-    (__extension__({                                                            \
-        static __typeof__(&name) real_;                                         \
-        if (!real_) real_ = (__typeof__(&name))dlsym(RTLD_NEXT, #name);         \
-        real_;                                                                  \
+#define REAL(name)                                                      \
+    (__extension__({                                                    \
+        static __typeof__(&name) real_;                                 \
+        if (!real_) real_ = (__typeof__(&name))dlsym(RTLD_NEXT, #name); \
+        real_;                                                          \
     }))
 
 static struct can_socket* can_of(int fd) { return fd >= 0 && fd < sockets && table[fd].there ? &table[fd] : NULL; }
@@ -49,7 +49,7 @@ static unsigned index_of(const char* name) {
     return first_index + (hash & 0xffff);
 }
 
-/* The payload begins 8 bytes behind the start of the UDP header with the identifier; the cookie is at the end. Words are loaded big endian. */
+/* The payload begins behind the 8 bytes of the UDP header, with the identifier; the cookie is at its end. Words are loaded big endian. */
 static void attach(int fd) {
     const struct can_socket* s = &table[fd];
     struct sock_filter code[12 + 3 * most_filters];
@@ -206,7 +206,8 @@ int sendmmsg(int fd, struct mmsghdr* messages, unsigned count, int flags) {
 /* Of what was received into `buffer`: the frame's size; the cookie, where it found room, tells whose it is. */
 static size_t frame_size(const struct can_socket* s, size_t got, const void* buffer, int* flags) {
     const size_t frame = got >= CANFD_MTU ? CANFD_MTU : got >= CAN_MTU ? CAN_MTU : got;
-    if (s->hears_itself && got == frame + 8 && memcmp((const char*)buffer + frame, &s->cookie, 8) == 0) *flags |= MSG_CONFIRM | MSG_DONTROUTE;
+    if (s->hears_itself && got == frame + 8 && memcmp((const char*)buffer + frame, &s->cookie, 8) == 0)
+        *flags |= MSG_CONFIRM | MSG_DONTROUTE;
     *flags &= ~MSG_TRUNC;
     return frame;
 }
@@ -226,6 +227,7 @@ int recvmmsg(int fd, struct mmsghdr* messages, unsigned count, int flags, struct
     const struct can_socket* s = can_of(fd);
     const int got = REAL(recvmmsg)(fd, messages, count, flags, limit);
     for (int n = 0; s && n < got; ++n)
-        messages[n].msg_len = (unsigned)frame_size(s, messages[n].msg_len, messages[n].msg_hdr.msg_iov[0].iov_base, &messages[n].msg_hdr.msg_flags);
+        messages[n].msg_len =
+            (unsigned)frame_size(s, messages[n].msg_len, messages[n].msg_hdr.msg_iov[0].iov_base, &messages[n].msg_hdr.msg_flags);
     return got;
 }

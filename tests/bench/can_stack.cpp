@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Our side of the CAN figures, over any link: `can_stack ADDRESS slave`, `… master [FACTOR]`, `… receive COUNT`, as can_neutral.c has them,
-// and `can_stack memory [FACTOR]`: SDO from queue to queue. Results are lines "name value".
+// Our side of the CAN figures, over any link: `can_stack ADDRESS slave`, `… master [FACTOR]`, `… receive COUNT`, as can_neutral.c has
+// them, and `can_stack memory [FACTOR]`: SDO from queue to queue. Results are lines "name value".
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -127,8 +127,8 @@ struct Master {
             else r.data = bytes;
             run(r);
         }
-        std::printf("exp_%s %.0f\nexp_%s_cpu %.3f\n", upload ? "up" : "down", count * 1e9 / static_cast<double>(now() - began), upload ? "up" : "down",
-                    static_cast<double>(cpu() - used) / count / 1000);
+        std::printf("exp_%s %.0f\nexp_%s_cpu %.3f\n", upload ? "up" : "down", count * 1e9 / static_cast<double>(now() - began),
+                    upload ? "up" : "down", static_cast<double>(cpu() - used) / count / 1000);
     }
     void transfers(const char* name, std::size_t size, SdoMode mode) {
         std::vector<std::uint8_t> data(size), back(size);

@@ -16,8 +16,8 @@
 #include <cstring>
 
 #include "can/bus.hpp"
-#include "canopen/309/gateway.hpp"
 #include "canopen/305/lss.hpp"
+#include "canopen/309/gateway.hpp"
 #include "say.hpp"
 
 namespace hal::tools {
@@ -45,23 +45,26 @@ bool listen_locally(const Options& options, Listener& out) {
     const std::string path = options.socket.empty() ? default_socket() : options.socket;
     sockaddr_un at{};
     at.sun_family = AF_UNIX;
-    if (path.size() >= sizeof at.sun_path) return fail(options, fmt::format("the path '{}' is too long for a socket; at most {} bytes", path, sizeof at.sun_path - 1)), false;
+    if (path.size() >= sizeof at.sun_path)
+        return fail(options, fmt::format("the path '{}' is too long for a socket; at most {} bytes", path, sizeof at.sun_path - 1)), false;
     std::memcpy(at.sun_path, path.c_str(), path.size() + 1);
     out.fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const bool taken = ::connect(probe, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
     ::close(probe);
     if (taken) return fail(options, fmt::format("another gateway listens on '{}'; give this one its own: --socket PATH", path)), false;
-    struct stat about {};
+    struct stat about{};
     if (::lstat(path.c_str(), &about) == 0) {
-        if (!S_ISSOCK(about.st_mode)) return fail(options, fmt::format("'{}' is there and no socket; give another: --socket PATH", path)), false;
+        if (!S_ISSOCK(about.st_mode))
+            return fail(options, fmt::format("'{}' is there and no socket; give another: --socket PATH", path)), false;
         ::unlink(path.c_str());  // left behind by one that was killed
     }
     const mode_t before = ::umask(0177);  // for its owner only
     const bool bound = ::bind(out.fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
     const int why = errno;
     ::umask(before);
-    if (!bound || ::listen(out.fd, 16) != 0) return fail(options, fmt::format("cannot listen on '{}': {}", path, std::strerror(bound ? errno : why))), false;
+    if (!bound || ::listen(out.fd, 16) != 0)
+        return fail(options, fmt::format("cannot listen on '{}': {}", path, std::strerror(bound ? errno : why))), false;
     out.file = out.shown = path;
     return true;
 }
@@ -77,7 +80,9 @@ bool listen_on_port(const Options& options, Listener& out) {
                       ::inet_pton(AF_INET, text.substr(0, colon).c_str(), &at.sin_addr) == 1;
     if (!good) return fail(options, fmt::format("'{}' is no place to listen; write 127.0.0.1:6000", text)), false;
     if ((ntohl(at.sin_addr.s_addr) >> 24) != 127)
-        return fail(options, fmt::format("'{}' would let other machines command this bus; listen on 127.0.0.1 and forward it: ssh -L", text)), false;
+        return fail(options,
+                    fmt::format("'{}' would let other machines command this bus; listen on 127.0.0.1 and forward it: ssh -L", text)),
+               false;
     at.sin_port = htons(port);
     out.fd = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     const int yes = 1;
@@ -206,7 +211,8 @@ int run_can_gateway(const Options& options) {
     if (!(options.listen.empty() ? listen_locally(options, listener) : listen_on_port(options, listener))) return 1;
     stop.listen();
     std::string nets;
-    for (std::size_t n = 0; n < links.size(); ++n) nets += fmt::format("{}net {} is {}", n == 0 ? "" : ", ", n + 1, links[n]->description().address);
+    for (std::size_t n = 0; n < links.size(); ++n)
+        nets += fmt::format("{}net {} is {}", n == 0 ? "" : ", ", n + 1, links[n]->description().address);
     write_all(STDERR_FILENO, fmt::format("{}: {}; listening on {}; Ctrl-C ends it\n", options.program, nets, listener.shown));
     return Server(options, links, stop).run(listener);
 }

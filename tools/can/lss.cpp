@@ -39,7 +39,8 @@ struct Lss {
         case 0: return 0;
         case 1: return fail(options, fmt::format("the slave refused: {}", out_of_range));
         case 255: return fail(options, fmt::format("the slave refused with its own error 0x{:02X}; see its manual", r.specific));
-        default: return fail(options, fmt::format("the slave refused with error {}: it has no access to its memory; see its manual", r.error));
+        default:
+            return fail(options, fmt::format("the slave refused with error {}: it has no access to its memory; see its manual", r.error));
         }
     }
     bool number(std::size_t n, const char* what, std::uint64_t most, std::uint32_t& value) const {
@@ -105,9 +106,11 @@ int bit_rate(Lss& l) {
     else if (text.ends_with("M")) scale = 1'000'000, text.pop_back();
     const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), rate);
     const std::uint8_t index = error == std::errc() && stop == text.data() + text.size() && rate <= 1'000'000 / scale
-                                   ? canopen::lss_bit_rate_index(rate * scale) : std::uint8_t{255};
+                                   ? canopen::lss_bit_rate_index(rate * scale)
+                                   : std::uint8_t{255};
     if (index == 255)
-        return fail(l.options, fmt::format("'{}' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k", l.arguments[0]));
+        return fail(l.options,
+                    fmt::format("'{}' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k", l.arguments[0]));
     l.station.lss.configure_bit_timing(index, now_ns());
     return l.configured("it does not know this bit rate");
 }
@@ -135,12 +138,14 @@ int fastscan(Lss& l) {
 int identify(Lss& l) {
     if (l.arguments.empty()) {
         l.station.lss.identify_unconfigured(now_ns());
-        return l.wait() ? print("at least one slave has no node id\n") ? 0 : 1 : l.silent("so none is without node id, as far as they know LSS");
+        return l.wait() ? print("at least one slave has no node id\n") ? 0 : 1
+                        : l.silent("so none is without node id, as far as they know LSS");
     }
     Identity low{}, high{};
     std::uint32_t revision = 0, serial = 0;
     if (l.arguments.size() != 4 && l.arguments.size() != 6)
-        return fail(l.options, "identify takes nothing, VENDOR PRODUCT REVISION SERIAL, or the last two from and to: VENDOR PRODUCT FROM TO FROM TO");
+        return fail(l.options,
+                    "identify takes nothing, VENDOR PRODUCT REVISION SERIAL, or the last two from and to: VENDOR PRODUCT FROM TO FROM TO");
     if (l.arguments.size() == 4) {
         if (!l.identity(0, low)) return 1;
         high = low;
@@ -178,7 +183,8 @@ constexpr Command commands[] = {
 
 int run_can_lss(const Options& options) {
     if (options.words.size() < 2)
-        return fail(options, "two words are needed; type: hal can lss ADDRESS scan|switch|select|inquire|node-id|bit-rate|activate|store|identify");
+        return fail(options,
+                    "two words are needed; type: hal can lss ADDRESS scan|switch|select|inquire|node-id|bit-rate|activate|store|identify");
     const std::string& word = options.words[1];
     const Command* command = nullptr;
     std::vector<std::string> names;

@@ -38,7 +38,9 @@ bool hex_number(std::string_view text, unsigned most, unsigned& value) {
     return !text.empty() && error == std::errc() && end == text.data() + text.size() && value <= most;
 }
 
-Type basic(std::uint16_t code) { return code <= 0x1b && canopen::word(static_cast<Type>(code))[0] != '\0' ? static_cast<Type>(code) : Type::none; }
+Type basic(std::uint16_t code) {
+    return code <= 0x1b && canopen::word(static_cast<Type>(code))[0] != '\0' ? static_cast<Type>(code) : Type::none;
+}
 
 ObjectName object_of(const eds::Object& object, const eds::Entry& entry) {
     const bool whole = object.single() || entry.name.empty();
@@ -48,7 +50,8 @@ ObjectName object_of(const eds::Object& object, const eds::Entry& entry) {
 bool looks_like_text(std::span<const std::uint8_t> bytes) {
     std::size_t end = bytes.size();
     while (end > 0 && bytes[end - 1] == 0) --end;
-    return end >= 3 && std::all_of(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end), [](std::uint8_t c) { return c >= 0x20 && c < 0x7f; });
+    return end >= 3 && std::all_of(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end),
+                                   [](std::uint8_t c) { return c >= 0x20 && c < 0x7f; });
 }
 
 std::string text_in(std::span<const std::uint8_t> bytes) {
@@ -64,7 +67,9 @@ std::uint64_t natural(std::span<const std::uint8_t> bytes) {
 }
 
 bool is_text(Type type) { return type == Type::visible_string; }
-bool is_number(Type type, std::size_t size) { return canopen::bits_of(type) != 0 && canopen::bytes_of(type) == size && type != Type::time_of_day && type != Type::time_difference; }
+bool is_number(Type type, std::size_t size) {
+    return canopen::bits_of(type) != 0 && canopen::bytes_of(type) == size && type != Type::time_of_day && type != Type::time_difference;
+}
 
 }  // namespace
 
@@ -105,22 +110,28 @@ bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& pr
     if (numbered && (colon == text.npos || hex_number(text.substr(colon + (text[colon] == ':' ? 1 : 3)), 0xff, sub)))
         return out = named(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)), true;
     if (!description_)
-        return problem = fmt::format("'{}' is no object; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names", text), false;
+        return problem = fmt::format(
+                   "'{}' is no object; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names", text),
+               false;
     const std::string wanted = plain(text);
     std::vector<const ObjectName*> found;
     std::vector<std::string> names;
     for (const Row& row : rows_) {
         names.push_back(row.words);
-        const bool again = std::any_of(found.begin(), found.end(), [&](const ObjectName* f) { return f->index == row.object.index && f->sub == row.object.sub; });
+        const bool again = std::any_of(found.begin(), found.end(),
+                                       [&](const ObjectName* f) { return f->index == row.object.index && f->sub == row.object.sub; });
         if (row.words == wanted && !again) found.push_back(&row.object);
     }
     if (found.size() == 1) return out = *found[0], true;
     if (found.empty()) {
         const std::string hint = did_you_mean(wanted, names);
-        return problem = fmt::format("'{}' is no object of {}; {}", text, file_, hint.empty() ? "write INDEX:SUB in hex, or one of its names" : hint), false;
+        return problem = fmt::format("'{}' is no object of {}; {}", text, file_,
+                                     hint.empty() ? "write INDEX:SUB in hex, or one of its names" : hint),
+               false;
     }
     std::string all;
-    for (std::size_t n = 0; n < found.size() && n < 4; ++n) all += (n == 0 ? "" : ", ") + fmt::format("{:04X}:{:X}", found[n]->index, found[n]->sub);
+    for (std::size_t n = 0; n < found.size() && n < 4; ++n)
+        all += (n == 0 ? "" : ", ") + fmt::format("{:04X}:{:X}", found[n]->index, found[n]->sub);
     return problem = fmt::format("'{}' is the name of {} objects ({}{}); write which, such as {:04X}:{:X}", text, found.size(), all,
                                  found.size() > 4 ? ", …" : "", found[0]->index, found[0]->sub),
            false;
@@ -128,15 +139,21 @@ bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& pr
 
 std::optional<Type> parse_type(std::string_view word) {
     if (const gateway::Format* f = gateway::format(word); f && f->type != Type::none) return f->type;
-    if (const eds::DataType* type = eds::data_type(word)) return basic(type->code) != Type::none ? std::optional(basic(type->code)) : std::nullopt;
-    constexpr std::pair<std::string_view, Type> others[] = {
-        {"bool", Type::boolean}, {"string", Type::visible_string}, {"octets", Type::octet_string}, {"float", Type::real32}, {"double", Type::real64}};
+    if (const eds::DataType* type = eds::data_type(word))
+        return basic(type->code) != Type::none ? std::optional(basic(type->code)) : std::nullopt;
+    constexpr std::pair<std::string_view, Type> others[] = {{"bool", Type::boolean},
+                                                            {"string", Type::visible_string},
+                                                            {"octets", Type::octet_string},
+                                                            {"float", Type::real32},
+                                                            {"double", Type::real64}};
     for (const auto& [name, type] : others)
         if (eds::same_word(name, word)) return type;
     return std::nullopt;
 }
 
-std::string type_words() { return "bool, i8 … i64, u8 … u64, r32, r64, visible_string, octet_string, unicode_string, domain, time_of_day or time_difference"; }
+std::string type_words() {
+    return "bool, i8 … i64, u8 … u64, r32, r64, visible_string, octet_string, unicode_string, domain, time_of_day or time_difference";
+}
 
 std::string type_word(Type type) {
     const gateway::Format* f = type == Type::none ? nullptr : gateway::format(type);
@@ -149,7 +166,9 @@ std::string hex_bytes(std::span<const std::uint8_t> bytes, const char* separator
     return text;
 }
 
-std::string json_text(std::string_view text) { return nlohmann::json(std::string(text)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace); }
+std::string json_text(std::string_view text) {
+    return nlohmann::json(std::string(text)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 
 std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
     if (bytes.empty()) return "nothing (0 bytes)";
@@ -157,11 +176,13 @@ std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
     if (type == Type::boolean && bytes.size() == 1) return fmt::format("{} ({})", bytes[0] != 0 ? "true" : "false", raw);
     if (is_number(type, bytes.size())) {
         const std::string decimal = gateway::text_of(bytes, *gateway::format(type));
-        return canopen::is_signed(type) || canopen::is_real(type) ? fmt::format("{} ({})", decimal, raw) : fmt::format("{} ({})", raw, decimal);
+        return canopen::is_signed(type) || canopen::is_real(type) ? fmt::format("{} ({})", decimal, raw)
+                                                                  : fmt::format("{} ({})", raw, decimal);
     }
     if ((type == Type::time_of_day || type == Type::time_difference) && bytes.size() == 6) {
         const auto ms = natural(bytes.first(4)) & 0x0fffffff;
-        return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)), ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, raw);
+        return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)), ms / 3'600'000, ms / 60'000 % 60,
+                           ms / 1000 % 60, ms % 1000, raw);
     }
     const auto count = [&] { return fmt::format("{} byte{}", bytes.size(), bytes.size() == 1 ? "" : "s"); };
     if (is_text(type) || (type == Type::none && bytes.size() > 8 && looks_like_text(bytes)))
@@ -193,7 +214,8 @@ bool parse_value(const std::string& text, Type type, std::vector<std::uint8_t>& 
     const eds::Encoded value = eds::encode(text, static_cast<std::uint16_t>(type), 0);
     if (!value) return problem = value.error, false;
     if (value.node_id) return problem = fmt::format("'{}' has a $NODEID in it; write the number", text), false;
-    if (value.spelling == eds::Spelling::octal) return problem = fmt::format("'{}' would be octal; write it without the 0 in front, or 0x…", text), false;
+    if (value.spelling == eds::Spelling::octal)
+        return problem = fmt::format("'{}' would be octal; write it without the 0 in front, or 0x…", text), false;
     if (value.bytes.empty() && canopen::bits_of(type) != 0) return problem = "the value is empty", false;
     return bytes = value.bytes, true;
 }

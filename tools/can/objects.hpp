@@ -51,7 +51,7 @@ std::string type_words();
 /// "u16"; "" for none.
 std::string type_word(canopen::Type);
 
-/// The value for a reader: "0x0237 (567)", "-5 (0xFFFB)", "1.5 (0x3FC00000)", "\"text\" (4 bytes)"; without a type, what the bytes look like.
+/// The value for a reader: "0x0237 (567)", "-5 (0xFFFB)", "1.5 (0x3FC00000)", "\"text\" (4 bytes)"; without a type, what the bytes could be.
 std::string value_text(std::span<const std::uint8_t> bytes, canopen::Type);
 /// The value for a program: a JSON number, string or true/false.
 std::string value_json(std::span<const std::uint8_t> bytes, canopen::Type);

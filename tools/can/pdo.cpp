@@ -17,7 +17,9 @@ namespace {
 /// ADDRESS NODE and, where `with_pdo`, PDO.
 bool read_words(const Options& options, bool with_pdo, std::uint8_t& node, ObjectNames& names, PdoSettings* pdo) {
     if (options.words.size() < (with_pdo ? 3U : 2U))
-        return fail(options, fmt::format("{} words are needed; type: {} ADDRESS NODE{}", with_pdo ? "three" : "two", options.program, with_pdo ? " PDO" : "")), false;
+        return fail(options, fmt::format("{} words are needed; type: {} ADDRESS NODE{}", with_pdo ? "three" : "two", options.program,
+                                         with_pdo ? " PDO" : "")),
+               false;
     if (!node_of(options, options.words[1], node) || !names.load(options)) return false;
     if (with_pdo && !parse_pdo(options.words[2], *pdo))
         return fail(options, fmt::format("'{}' is no PDO; write rpdo1 to rpdo512 or tpdo1 to tpdo512", options.words[2])), false;
@@ -25,14 +27,15 @@ bool read_words(const Options& options, bool with_pdo, std::uint8_t& node, Objec
 }
 
 std::string item_text(const PdoSettings::Item& item) {
-    return fmt::format("{:04X}:{:X}/{}{}", item.object.index, item.object.sub, item.bits, item.object.name.empty() ? "" : " " + item.object.name);
+    return fmt::format("{:04X}:{:X}/{}{}", item.object.index, item.object.sub, item.bits,
+                       item.object.name.empty() ? "" : " " + item.object.name);
 }
 
 std::string json_of(const PdoSettings& p) {
     std::string mapping;
     for (const auto& item : p.mapping)
-        mapping += fmt::format(R"({}{{"index":{},"sub":{},"bits":{},"name":{}}})", mapping.empty() ? "" : ",", item.object.index, item.object.sub, item.bits,
-                               item.object.name.empty() ? "null" : json_text(item.object.name));
+        mapping += fmt::format(R"({}{{"index":{},"sub":{},"bits":{},"name":{}}})", mapping.empty() ? "" : ",", item.object.index,
+                               item.object.sub, item.bits, item.object.name.empty() ? "null" : json_text(item.object.name));
     return fmt::format(R"({{"pdo":"{}","on":{},"id":{},"transmission":{},"inhibit_us":{},"event_ms":{},"sync_start":{},"mapping":[{}]}})"
                        "\n",
                        p.name(), p.on(), canopen::cob_id(p.cob), p.transmission, p.inhibit_100us * 100, p.event_ms, p.sync_start, mapping);
@@ -41,12 +44,14 @@ std::string json_of(const PdoSettings& p) {
 /// A line, and one below it for each object.
 std::string lines_of(const PdoSettings& p) {
     std::string text = fmt::format("{:7} {:>8}  {}", p.name(), p.identifier(), p.timing());
-    if (p.count > 64) return text + (p.count == 0xff ? ", multiplexed: to an object of another node\n" : ", multiplexed: from an object of its own\n");
+    if (p.count > 64)
+        return text + (p.count == 0xff ? ", multiplexed: to an object of another node\n" : ", multiplexed: from an object of its own\n");
     if (p.mapping.empty()) return text + ", empty\n";
     text += '\n';
     for (const auto& item : p.mapping) {
         const std::string place = fmt::format("{:04X}:{:X}/{}", item.object.index, item.object.sub, item.bits);
-        text += item.object.name.empty() ? fmt::format("                  {}\n", place) : fmt::format("                  {:10} {}\n", place, item.object.name);
+        text += item.object.name.empty() ? fmt::format("                  {}\n", place)
+                                         : fmt::format("                  {:10} {}\n", place, item.object.name);
     }
     return text;
 }
@@ -80,7 +85,8 @@ struct Step {
 /// The order of CiA 301: off, mapping off, the entries, mapping on, the parameters, and then on again.
 std::vector<Step> steps_to(const PdoSettings& p, std::uint32_t old_cob) {
     const std::uint16_t communication = p.communication_index(), mapping = p.mapping_index();
-    std::vector<Step> steps{{communication, 1, old_cob | canopen::cob_invalid, 4, "switch the PDO off"}, {mapping, 0, 0, 1, "switch the mapping off"}};
+    std::vector<Step> steps{{communication, 1, old_cob | canopen::cob_invalid, 4, "switch the PDO off"},
+                            {mapping, 0, 0, 1, "switch the mapping off"}};
     for (std::size_t n = 0; n < p.mapping.size(); ++n)
         steps.push_back({mapping, static_cast<std::uint8_t>(n + 1), p.mapping[n].entry(), 4, "map " + item_text(p.mapping[n])});
     steps.push_back({mapping, 0, static_cast<std::uint32_t>(p.mapping.size()), 1, "switch the mapping on"});
@@ -104,7 +110,8 @@ bool write_steps(Station& station, std::uint8_t node, const std::vector<Step>& s
 }
 
 /// How many bits an object has: as typed, as described, or as the node answers.
-bool parse_item(Station& station, std::uint8_t node, const ObjectNames& names, const std::string& word, PdoSettings::Item& item, std::string& problem) {
+bool parse_item(Station& station, std::uint8_t node, const ObjectNames& names, const std::string& word, PdoSettings::Item& item,
+                std::string& problem) {
     // A name may have a slash in it; only digits behind the last one are a length.
     const auto slash = word.rfind('/');
     unsigned bits = 0;
@@ -154,7 +161,9 @@ bool present(Station& station, const Options& options, std::uint8_t node, const 
     SdoRequest request{.index = p.communication_index(), .sub = 1};
     request.abort = why, request.aborted_there = why != Abort::timeout;
     if (why == Abort::no_object || why == Abort::no_sub)
-        return fail(options, fmt::format("node {} has no {}; hal can pdo show {} {} shows those it has", node, p.name(), options.words[0], node)), false;
+        return fail(options,
+                    fmt::format("node {} has no {}; hal can pdo show {} {} shows those it has", node, p.name(), options.words[0], node)),
+               false;
     return station.fail_transfer(node, request, ObjectName{p.communication_index(), 1, {}, {}}.label()), false;
 }
 
@@ -176,11 +185,13 @@ int run_can_pdo_map(const Options& options) {
         after.mapping.push_back(std::move(item));
     }
     if (after.bits() > 64)
-        return fail(options, fmt::format("these are {} bits, and a PDO holds 64; map {} bits less, or use a second PDO", after.bits(), after.bits() - 64));
+        return fail(options, fmt::format("these are {} bits, and a PDO holds 64; map {} bits less, or use a second PDO", after.bits(),
+                                         after.bits() - 64));
     if (!take_options(options, after)) return 1;
     after.cob &= ~canopen::cob_invalid;
     if (canopen::cob_id(after.cob) == 0)
-        return fail(options, fmt::format("{} has no identifier yet; add --id, such as --id {:X}", after.name(), (after.received ? 0x200U : 0x180U) + node));
+        return fail(options, fmt::format("{} has no identifier yet; add --id, such as --id {:X}", after.name(),
+                                         (after.received ? 0x200U : 0x180U) + node));
     SdoRequest last;
     const Step* failed = nullptr;
     const std::vector<Step> steps = steps_to(after, before.cob), back = steps_to(before, before.cob);
@@ -188,10 +199,13 @@ int run_can_pdo_map(const Options& options) {
         const std::string step = fmt::format("{:04X}:{:X} (to {})", failed->index, failed->sub, failed->what);
         const int status = station.fail_transfer(node, last, step);
         const bool restored = !station.bus.stop.requested() && write_steps(station, node, back, failed, last);
-        return fail(options, restored ? fmt::format("{} is as it was before", before.name()) : fmt::format("{} may be off now: hal can pdo show", before.name())), status;
+        return fail(options, restored ? fmt::format("{} is as it was before", before.name())
+                                      : fmt::format("{} may be off now: hal can pdo show", before.name())),
+               status;
     }
     PdoSettings now = after;
-    if (const Abort why = read_pdo(station, node, names, now); why != Abort::none) return fail(options, "what was written cannot be read back");
+    if (const Abort why = read_pdo(station, node, names, now); why != Abort::none)
+        return fail(options, "what was written cannot be read back");
     const auto entries = [](const PdoSettings& p) {
         std::vector<std::uint32_t> all;
         for (const auto& item : p.mapping) all.push_back(item.entry());
@@ -213,8 +227,8 @@ int set_on(const Options& options, bool on) {
     Station station(options);
     if (!station.open(options.words[0]) || !present(station, options, node, names, p)) return 1;
     if (on && canopen::cob_id(p.cob) == 0)
-        return fail(options, fmt::format("{0} has no identifier yet; type: hal can pdo map {1} {2} {3} --id {4:X}", p.name(), options.words[0], node,
-                                         options.words[2], (p.received ? 0x200U : 0x180U) + node));
+        return fail(options, fmt::format("{0} has no identifier yet; type: hal can pdo map {1} {2} {3} --id {4:X}", p.name(),
+                                         options.words[0], node, options.words[2], (p.received ? 0x200U : 0x180U) + node));
     std::uint8_t bytes[4];
     canopen::store(bytes, on ? p.cob & ~canopen::cob_invalid : p.cob | canopen::cob_invalid);
     SdoRequest request{.index = p.communication_index(), .sub = 1, .data = bytes};
@@ -263,7 +277,8 @@ int run_can_pdo_watch(const Options& options) {
     std::vector<PdoSettings> pdos;
     if (station.bus.is_capture()) {
         pdos = described_pdos(names, node);
-        if (pdos.empty()) return fail(options, "a capture cannot be asked which PDOs the node has; add --eds FILE, an EDS or DCF with them");
+        if (pdos.empty())
+            return fail(options, "a capture cannot be asked which PDOs the node has; add --eds FILE, an EDS or DCF with them");
     } else if (!read_pdos(station, options, node, names, pdos)) {
         return 1;
     }
@@ -277,10 +292,12 @@ int run_can_pdo_watch(const Options& options) {
         std::string text;
         for (const can::Frame& f : batch) {
             if (!any) any = true, first = f.time_ns;
-            const auto p = std::find_if(pdos.begin(), pdos.end(), [&](const PdoSettings& one) { return !f.own && !f.error && one.matches(f); });
+            const auto p =
+                std::find_if(pdos.begin(), pdos.end(), [&](const PdoSettings& one) { return !f.own && !f.error && one.matches(f); });
             if (p == pdos.end()) continue;
             const double time = static_cast<double>(f.time_ns - first) / 1e9;
-            if (options.json) text += fmt::format("{{\"time\":{:.6f},\"pdo\":\"{}\",\"values\":{{{}}}}}\n", time, p->name(), values_of(*p, f, true));
+            if (options.json)
+                text += fmt::format("{{\"time\":{:.6f},\"pdo\":\"{}\",\"values\":{{{}}}}}\n", time, p->name(), values_of(*p, f, true));
             else text += fmt::format("{:12.6f}  {:6}{}\n", time, p->name(), values_of(*p, f, false));
             if (++seen == options.count) break;
         }

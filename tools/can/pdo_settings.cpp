@@ -101,10 +101,13 @@ bool parse_pdo(const std::string& text, PdoSettings& p) {
     const char kind = text[0];
     p.received = kind == 'r' || kind == 'R';
     const auto [end, error] = std::from_chars(text.data() + 4, text.data() + text.size(), p.number);
-    return (p.received || kind == 't' || kind == 'T') && error == std::errc() && end == text.data() + text.size() && p.number >= 1 && p.number <= 512;
+    return (p.received || kind == 't' || kind == 'T') && error == std::errc() && end == text.data() + text.size() && p.number >= 1 &&
+           p.number <= 512;
 }
 
-Abort read_pdo(Station& station, std::uint8_t node, const ObjectNames& names, PdoSettings& p) { return fill(of_node(station, node), names, p); }
+Abort read_pdo(Station& station, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {
+    return fill(of_node(station, node), names, p);
+}
 
 bool read_pdos(Station& station, const Options& options, std::uint8_t node, const ObjectNames& names, std::vector<PdoSettings>& out) {
     const auto take = [&](bool received, unsigned number, bool& there) {

@@ -48,7 +48,8 @@ std::string json_line(std::uint8_t node, const ObjectName& object, Type type, st
     return fmt::format(R"({{"node":{},"index":{},"sub":{},"name":{},"type":{},"value":{},"bytes":{},"data":"{}"}})"
                        "\n",
                        node, object.index, object.sub, object.name.empty() ? "null" : json_text(object.name),
-                       type == Type::none ? "null" : json_text(type_word(type)), value_json(bytes, type), bytes.size(), hex_bytes(bytes, ""));
+                       type == Type::none ? "null" : json_text(type_word(type)), value_json(bytes, type), bytes.size(),
+                       hex_bytes(bytes, ""));
 }
 
 }  // namespace
@@ -71,7 +72,9 @@ int run_can_sdo_read(const Options& options) {
         const std::span<const std::uint8_t> bytes(room.get(), request.size);
         const Type type = words.type.value_or(object.type);
         if (!options.output.empty()) return save(options, bytes) ? 0 : 1;
-        if (!print(options.json ? json_line(words.node, object, type, bytes) : fmt::format("{} = {}\n", object.label(), value_text(bytes, type)))) return 1;
+        if (!print(options.json ? json_line(words.node, object, type, bytes)
+                                : fmt::format("{} = {}\n", object.label(), value_text(bytes, type))))
+            return 1;
     }
     return 0;
 }
@@ -92,7 +95,8 @@ bool width_of(Station& station, std::uint8_t node, const ObjectName& object, Typ
     }
     problem = read ? fmt::format("it holds {} bytes now", request.size)
                    : fmt::format("it could not be read to see ({})", canopen::word(request.abort));
-    problem = fmt::format("the type of {} is not known: {}; add --type, such as u16 or visible_string, or --eds FILE", object.label(), problem);
+    problem =
+        fmt::format("the type of {} is not known: {}; add --type, such as u16 or visible_string, or --eds FILE", object.label(), problem);
     return false;
 }
 
@@ -101,7 +105,8 @@ bool width_of(Station& station, std::uint8_t node, const ObjectName& object, Typ
 int run_can_sdo_write(const Options& options) {
     const bool from_file = !options.input.empty();
     if (options.words.size() != (from_file ? 3 : 4))
-        return fail(options, "the value is missing or too many; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE for the value");
+        return fail(options,
+                    "the value is missing or too many; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE for the value");
     Words words;
     if (!read_words(options, words)) return 1;
     ObjectName object;

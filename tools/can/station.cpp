@@ -100,17 +100,19 @@ const char* advice(Abort why) {
 }
 
 int Station::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request, const std::string& object) const {
-    if (bus.stop.requested() && !request.aborted_there) return fail(options_, fmt::format("ended while node {} was asked for {}", node, object));
+    if (bus.stop.requested() && !request.aborted_there)
+        return fail(options_, fmt::format("ended while node {} was asked for {}", node, object));
     if (request.abort == Abort::timeout && !request.aborted_there) {
         const can::Statistics s = bus.link->statistics();
-        return fail(options_, fmt::format("node {} did not answer within {:g} s (asked for {}); the bus is {}; hal can scan {} shows who is there",
-                                          node, static_cast<double>(settings_of(options_).timeout) * (settings_of(options_).resends + 1) / 1e9,
-                                          object, can::word(s.state), options_.words.front()));
+        return fail(options_,
+                    fmt::format("node {} did not answer within {:g} s (asked for {}); the bus is {}; hal can scan {} shows who is there",
+                                node, static_cast<double>(settings_of(options_).timeout) * (settings_of(options_).resends + 1) / 1e9,
+                                object, can::word(s.state), options_.words.front()));
     }
     const std::string what = advice(request.abort);
-    return fail(options_, fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object, request.aborted_there ? "" : "gave up: ",
-                                      canopen::word(request.abort), static_cast<std::uint32_t>(request.abort),
-                                      what.empty() ? "" : "; " + what));
+    return fail(options_, fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object,
+                                      request.aborted_there ? "" : "gave up: ", canopen::word(request.abort),
+                                      static_cast<std::uint32_t>(request.abort), what.empty() ? "" : "; " + what));
 }
 
 bool parse_node(const std::string& text, std::uint8_t& node) {

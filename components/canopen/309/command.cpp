@@ -16,9 +16,9 @@ enum class Scope : std::uint8_t { gateway, net, node };
 
 struct Row {
     std::string_view first, second;  ///< words; the second may be empty
-    Verb verb;
-    Scope scope;
-    std::uint8_t least = 0, most = 0;  ///< numbers behind them
+    Verb             verb;
+    Scope            scope;
+    std::uint8_t     least = 0, most = 0;  ///< numbers behind them
 };
 
 constexpr Row rows[] = {
@@ -119,7 +119,8 @@ struct Reader {
     }
     bool scope(Scope scope, const std::vector<std::uint32_t>& before) {
         Command& c = out.command;
-        if (before.size() > (scope == Scope::gateway ? 0U : scope == Scope::net ? 1U : 2U)) return fail("there are too many numbers before the command");
+        if (before.size() > (scope == Scope::gateway ? 0U : scope == Scope::net ? 1U : 2U))
+            return fail("there are too many numbers before the command");
         if (scope == Scope::node && !before.empty()) c.node = before.back();
         if (scope == Scope::node ? before.size() == 2 : !before.empty()) c.net = before.front();
         return true;
@@ -134,7 +135,8 @@ struct Reader {
         if (!c.format) return fail("'" + words[at].substr(0, 40) + "' is no data type; see: help");
         ++at;
         if (!writes) return end();
-        if (!bytes_of(std::span(words).subspan(at), *c.format, c.value)) return fail("this is no value of type " + std::string(c.format->word));
+        if (!bytes_of(std::span(words).subspan(at), *c.format, c.value))
+            return fail("this is no value of type " + std::string(c.format->word));
         at = words.size();
         return true;
     }
@@ -150,7 +152,8 @@ struct Reader {
     bool pdo_setup() {
         Command&      c = out.command;
         std::uint32_t number = 0, cob = 0, type = 0, count = 0;
-        if (!take(512, number, "PDO number") || !take(UINT32_MAX, cob, "COB-ID") || !transmission(type) || !take(64, count, "count")) return false;
+        if (!take(512, number, "PDO number") || !take(UINT32_MAX, cob, "COB-ID") || !transmission(type) || !take(64, count, "count"))
+            return false;
         c.numbers = {number, cob, type};
         for (; count > 0; --count, ++at) {
             if (!more()) return fail("a data type is missing");
@@ -190,7 +193,7 @@ bool Reader::command() {
     if (!more()) return fail("the command is missing");
     const std::string first = words[at++];
     const auto        is = [&](const char* a, const char* b) { return same_word(first, a) || same_word(first, b); };
-    const auto        next_is = [&](const char* a, const char* b) { return more() && (same_word(words[at], a) || same_word(words[at], b)); };
+    const auto next_is = [&](const char* a, const char* b) { return more() && (same_word(words[at], a) || same_word(words[at], b)); };
     if (is("read", "r") || is("write", "w")) {
         const bool writes = is("write", "w"), pdo = next_is("pdo", "p");
         c.verb = pdo ? writes ? Verb::write_pdo : Verb::read_pdo : writes ? Verb::write : Verb::read;
@@ -217,7 +220,9 @@ bool Reader::command() {
         c.verb = row.verb;
         return scope(row.scope, before) && numbers(row.least, row.most);
     }
-    if (known) return fail("what to " + first + (more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing") + "; see: help", Error::not_supported);
+    if (known)
+        return fail("what to " + first + (more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing") + "; see: help",
+                    Error::not_supported);
     return fail("there is no command '" + first.substr(0, 40) + "'; see: help", Error::not_supported);
 }
 
@@ -271,7 +276,8 @@ Parsed parse(std::string_view line) {
 }
 
 std::string_view help_text() {
-    return "[SEQ] begins a line; NET and NODE may be left out after `set network`, `set node`; numbers as in C; answers are OK, a value, or ERROR:n\n"
+    return "[SEQ] begins a line; NET and NODE may be left out after `set network`, `set node`; numbers as in C; answers are OK, a value, "
+           "or ERROR:n\n"
            "[[NET] NODE] r[ead] INDEX SUB [TYPE]            [[NET] NODE] w[rite] INDEX SUB TYPE VALUE\n"
            "[[NET] NODE] start | stop | preop[erational] | reset node | reset comm[unication]\n"
            "[[NET] NODE] enable guarding MS FACTOR | disable guarding | enable heartbeat MS | disable heartbeat\n"

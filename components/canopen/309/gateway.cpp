@@ -31,7 +31,7 @@ Gateway::Net::Net(Gateway& owner, unsigned n) : gateway(owner), number(n), netwo
 
 void Gateway::Net::on_node(std::uint8_t node, NodeEvent event, NmtState state, Time) noexcept {
     const std::string who = std::to_string(number) + " " + std::to_string(node) + " ";
-    const bool guarded = watches[node];
+    const bool        guarded = watches[node];
     if (event == NodeEvent::boot_up) {
         if (boot_up) gateway.say(who + "BOOT_UP");
     } else if (event == NodeEvent::lost) {
@@ -108,7 +108,7 @@ void Gateway::disconnect(int client) {
 
 void Gateway::receive(int client, std::string_view bytes, Time now) {
     for (std::size_t n = 0; n < bytes.size();) {
-        Client& c = clients_[static_cast<std::size_t>(client)];
+        Client&    c = clients_[static_cast<std::size_t>(client)];
         const auto end = bytes.find('\n', n);
         const auto piece = bytes.substr(n, end == bytes.npos ? end : end - n);
         n = end == bytes.npos ? bytes.size() : end + 1;
@@ -120,7 +120,7 @@ void Gateway::receive(int client, std::string_view bytes, Time now) {
         }
         if (end == bytes.npos) continue;
         const std::string text = std::move(c.in);
-        const bool skips = c.skips;
+        const bool        skips = c.skips;
         c.in.clear(), c.skips = false;
         if (!skips) line(client, text, now);
     }
@@ -136,7 +136,8 @@ void Gateway::answer(int client, std::uint32_t sequence, const std::string& text
     output(client) += "[" + std::to_string(sequence) + "] " + text + "\r\n";
 }
 void Gateway::refuse(int client, std::uint32_t sequence, Error error, const std::string& why) {
-    answer(client, sequence, "ERROR:" + std::to_string(static_cast<unsigned>(error)) + " #" + word(error) + (why.empty() ? "" : ": " + why));
+    answer(client, sequence,
+           "ERROR:" + std::to_string(static_cast<unsigned>(error)) + " #" + word(error) + (why.empty() ? "" : ": " + why));
 }
 void Gateway::say(const std::string& event) {
     for (Client& c : clients_)
@@ -163,10 +164,11 @@ bool Gateway::address(Client& c, const Command& command, int client, bool with_n
 }
 
 void Gateway::execute(int client, Command&& command, Time now) {
-    Client& c = clients_[static_cast<std::size_t>(client)];
-    unsigned net = 0;
+    Client&      c = clients_[static_cast<std::size_t>(client)];
+    unsigned     net = 0;
     std::uint8_t node = 0;
-    const bool to_node = command.verb == Verb::read || command.verb == Verb::write || (command.verb >= Verb::start && command.verb <= Verb::disable_heartbeat);
+    const bool   to_node = command.verb == Verb::read || command.verb == Verb::write ||
+                         (command.verb >= Verb::start && command.verb <= Verb::disable_heartbeat);
     switch (command.verb) {
     case Verb::none: return;
     case Verb::help: {
@@ -225,7 +227,8 @@ void Gateway::error_control(int client, const Command& c, Net& net, std::uint8_t
     RemoteNode& remote = *net.network.node(node);
     switch (c.verb) {
     case Verb::enable_guarding:
-        if (c.numbers[0] < 1 || c.numbers[0] > 65535 || c.numbers[1] < 1 || c.numbers[1] > 255) return refuse(client, c.sequence, Error::syntax, "1 to 65535 ms, factor 1 to 255");
+        if (c.numbers[0] < 1 || c.numbers[0] > 65535 || c.numbers[1] < 1 || c.numbers[1] > 255)
+            return refuse(client, c.sequence, Error::syntax, "1 to 65535 ms, factor 1 to 255");
         remote.guard(c.numbers[0] * millisecond, static_cast<std::uint8_t>(c.numbers[1]), now);
         break;
     case Verb::disable_guarding: remote.guard(0, 0, now); break;
@@ -263,7 +266,7 @@ std::string Gateway::commands() const {
     std::string text;
     for (const auto& net : nets_) {
         const std::string to = std::to_string(net->number) + " set ";
-        const auto line = [&](const char* what, std::uint64_t value) { text += to + what + " " + std::to_string(value) + "\n"; };
+        const auto        line = [&](const char* what, std::uint64_t value) { text += to + what + " " + std::to_string(value) + "\n"; };
         if (net->id != 0) line("id", net->id);
         line("heartbeat", static_cast<std::uint64_t>(net->heartbeat / millisecond));
         line("command_timeout", static_cast<std::uint64_t>(net->command_timeout / millisecond));
@@ -277,7 +280,7 @@ std::string Gateway::commands() const {
 
 void Gateway::setting(int client, const Command& c, Net& net, Time now) {
     const std::uint32_t value = c.numbers.empty() ? 0 : c.numbers[0];
-    const auto range = [&](std::uint32_t least, std::uint32_t most) {
+    const auto          range = [&](std::uint32_t least, std::uint32_t most) {
         if (value >= least && value <= most) return true;
         return refuse(client, c.sequence, Error::syntax, std::to_string(least) + " to " + std::to_string(most)), false;
     };
@@ -317,7 +320,8 @@ void Gateway::setting(int client, const Command& c, Net& net, Time now) {
         if (!keep("")) return refuse(client, c.sequence, Error::state, "there is no place to store in");
         break;
     }
-    case Verb::info_version: return answer(client, c.sequence, "0 0 0.0 0 3 3.0 1.0");  // vendor, product, revision, serial, class, CiA 309, ours
+    case Verb::info_version:
+        return answer(client, c.sequence, "0 0 0.0 0 3 3.0 1.0");  // vendor, product, revision, serial, class, CiA 309, ours
     default: return refuse(client, c.sequence, Error::not_supported);
     }
     answer(client, c.sequence, "OK");
@@ -327,7 +331,8 @@ void Gateway::setting(int client, const Command& c, Net& net, Time now) {
 
 bool Gateway::enqueue(int client, Command&& command, Net& net, std::uint8_t node, Time now) {
     Client& c = clients_[static_cast<std::size_t>(client)];
-    if (c.pending >= most_pending) return refuse(client, command.sequence, Error::no_memory, "too many commands wait for their answers"), false;
+    if (c.pending >= most_pending)
+        return refuse(client, command.sequence, Error::no_memory, "too many commands wait for their answers"), false;
     ++c.pending;
     Pending& p = pending_.emplace_back();
     p.client = client, p.net = net.number, p.node = node, p.command = std::move(command);
@@ -337,7 +342,8 @@ bool Gateway::enqueue(int client, Command&& command, Net& net, std::uint8_t node
 
 void Gateway::start_transfer(int client, Command&& command, Net& net, std::uint8_t node, Time now) {
     if (node == 0) return refuse(client, command.sequence, Error::bad_node);
-    if (command.value.size() > net.command_size) return refuse(client, command.sequence, Error::no_memory, "set command_size allows " + std::to_string(net.command_size) + " bytes");
+    if (command.value.size() > net.command_size)
+        return refuse(client, command.sequence, Error::no_memory, "set command_size allows " + std::to_string(net.command_size) + " bytes");
     if (!enqueue(client, std::move(command), net, node, now)) return;
     Pending& p = pending_.back();
     p.request.index = p.command.index, p.request.sub = p.command.sub;
@@ -354,7 +360,7 @@ void Gateway::start_transfer(int client, Command&& command, Net& net, std::uint8
 
 void Gateway::pdo_command(int client, Command&& c, Net& net, Time now) {
     std::string text;
-    Error error = Error::none;
+    Error       error = Error::none;
     switch (c.verb) {
     case Verb::set_rpdo:
     case Verb::set_tpdo: error = net.pdos.configure(c.verb == Verb::set_rpdo, c); break;
@@ -392,7 +398,7 @@ bool Gateway::proceed(Pending& p, Time now) {
     case Verb::read:
     case Verb::write: return proceed_transfer(p, now);
     case Verb::read_pdo: {
-        Net& net = *nets_[p.net - 1];
+        Net&        net = *nets_[p.net - 1];
         std::string text;
         if (net.pdos.read(p.command.numbers[0], text) == Error::none) {
             answer(p.client, p.command.sequence, std::to_string(p.net) + " " + text);

@@ -45,16 +45,16 @@ public:
     std::string& output(int client) { return clients_[static_cast<std::size_t>(client)].out; }
 
     FrameQueue& out(unsigned net) { return nets_[net - 1]->out; }
-    void handle(unsigned net, const Frame&, Time now);
-    void poll(Time now);
+    void        handle(unsigned net, const Frame&, Time now);
+    void        poll(Time now);
     /// Nobody waits for anything.
     bool idle() const { return pending_.empty(); }
 
 private:
     struct Client {
-        bool there = false, skips = false;  ///< skips: the rest of a line that was too long
+        bool        there = false, skips = false;  ///< skips: the rest of a line that was too long
         std::string in, out;
-        unsigned net = 0, node = 0;         ///< defaults; 0: none
+        unsigned    net = 0, node = 0;         ///< defaults; 0: none
         std::size_t pending = 0;
     };
     struct Pending;
@@ -63,31 +63,31 @@ private:
         void on_node(std::uint8_t node, NodeEvent, NmtState, Time) noexcept override;
         void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
 
-        Gateway& gateway;
+        Gateway&       gateway;
         const unsigned number;
-        FrameQueue out{4096};
-        Network network;
-        LssMaster lss;
-        Pdos pdos;
-        std::uint8_t id = 0;
-        Time heartbeat = 0, next_heartbeat = 0;
-        Time command_timeout = 0, sdo_timeout = 500 * millisecond;
-        std::size_t command_size = 1 << 20;
-        bool block = false, boot_up = true, watches[128] = {};
+        FrameQueue     out{4096};
+        Network        network;
+        LssMaster      lss;
+        Pdos           pdos;
+        std::uint8_t   id = 0;
+        Time           heartbeat = 0, next_heartbeat = 0;
+        Time           command_timeout = 0, sdo_timeout = 500 * millisecond;
+        std::size_t    command_size = 1 << 20;
+        bool           block = false, boot_up = true, watches[128] = {};
         const Pending* lss_owner = nullptr;  ///< whose service it is
     };
     /// A command that has no answer yet.
     struct Pending {
-        int client = 0;
-        unsigned net = 0;
-        std::uint8_t node = 0;
-        Command command = {};
-        SdoRequest request = {};
+        int                             client = 0;
+        unsigned                        net = 0;
+        std::uint8_t                    node = 0;
+        Command                         command = {};
+        SdoRequest                      request = {};
         std::unique_ptr<std::uint8_t[]> room = {};
-        Time since = 0, limit = 0;
-        bool lss_started = false;
-        unsigned part = 0;            ///< of lss_inquire_addr
-        std::string text = {};
+        Time                            since = 0, limit = 0;
+        bool                            lss_started = false;
+        unsigned                        part = 0;            ///< of lss_inquire_addr
+        std::string                     text = {};
     };
 
     void line(int client, std::string_view text, Time now);
@@ -105,17 +105,17 @@ private:
     void start_lss(int client, Command&&, Net&, Time now);
     bool enqueue(int client, Command&&, Net&, std::uint8_t node, Time now);
     /// True: it has its answer.
-    bool proceed(Pending&, Time now);
-    bool proceed_transfer(Pending&, Time now);
-    bool proceed_lss(Pending&, Time now);
-    bool begin_lss(Pending&, Net&, Time now);
-    void cancel(Pending&);
-    void reset(Net&, Time now);
+    bool        proceed(Pending&, Time now);
+    bool        proceed_transfer(Pending&, Time now);
+    bool        proceed_lss(Pending&, Time now);
+    bool        begin_lss(Pending&, Net&, Time now);
+    void        cancel(Pending&);
+    void        reset(Net&, Time now);
     std::string commands() const;
 
     std::vector<std::unique_ptr<Net>> nets_;
-    std::vector<Client> clients_;
-    std::list<Pending> pending_;
+    std::vector<Client>               clients_;
+    std::list<Pending>                pending_;
 };
 
 }  // namespace hal::canopen::gateway

@@ -39,12 +39,16 @@ bool fits(const Command& c) {
 
 void Gateway::start_lss(int client, Command&& c, Net& net, Time now) {
     if (fits(c)) enqueue(client, std::move(c), net, 0, now);
-    else refuse(client, c.sequence, c.verb == Verb::lss_bit_rate ? Error::lss_bit_rate : c.verb == Verb::lss_set_node ? Error::lss_node_id : Error::syntax);
+    else
+        refuse(client, c.sequence,
+               c.verb == Verb::lss_bit_rate   ? Error::lss_bit_rate
+               : c.verb == Verb::lss_set_node ? Error::lss_node_id
+                                              : Error::syntax);
 }
 
 /// False: not yet, the bus has no room.
 bool Gateway::begin_lss(Pending& p, Net& net, Time now) {
-    LssMaster& lss = net.lss;
+    LssMaster&  lss = net.lss;
     const auto& n = p.command.numbers;
     switch (p.command.verb) {
     case Verb::lss_switch_global: return lss.switch_global(n[0] != 0);
@@ -72,7 +76,7 @@ bool Gateway::proceed_lss(Pending& p, Time now) {
     }
     if (net.lss.busy()) return false;
     const LssMaster::Result& r = net.lss.result();
-    const auto end = [&](Error error, const std::string& text = "OK") {
+    const auto               end = [&](Error error, const std::string& text = "OK") {
         net.lss_owner = nullptr;
         if (error != Error::none) refuse(p.client, p.command.sequence, error);
         else answer(p.client, p.command.sequence, text);
@@ -89,7 +93,8 @@ bool Gateway::proceed_lss(Pending& p, Time now) {
         return false;
     case Verb::lss_get_node: return end(Error::none, std::to_string(r.value));
     case Verb::lss_fastscan:
-        return end(Error::none, hexadecimal(r.identity[0]) + " " + hexadecimal(r.identity[1]) + " " + hexadecimal(r.identity[2]) + " " + hexadecimal(r.identity[3]));
+        return end(Error::none, hexadecimal(r.identity[0]) + " " + hexadecimal(r.identity[1]) + " " + hexadecimal(r.identity[2]) + " " +
+                                    hexadecimal(r.identity[3]));
     default: return end(error_of(p.command.verb, r));
     }
 }

@@ -16,9 +16,9 @@ unsigned Pdos::bits(const Pdo& p) {
 }
 
 std::string Pdos::text(unsigned number, const Pdo& p) {
-    std::string   out = "pdo " + std::to_string(number) + " " + std::to_string(p.formats.size());
-    const auto    image = load<std::uint64_t>(p.data.data());
-    unsigned      first = 0;
+    std::string out = "pdo " + std::to_string(number) + " " + std::to_string(p.formats.size());
+    const auto  image = load<std::uint64_t>(p.data.data());
+    unsigned    first = 0;
     for (const Format* f : p.formats) {
         const unsigned      size = bits_of(f->type);
         const std::uint64_t value = image >> first & (size == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << size) - 1);
@@ -33,7 +33,8 @@ Error Pdos::configure(bool received, const Command& c) {
     Pdo   p{.cob = c.numbers[1], .transmission = c.numbers[2], .formats = c.formats};
     if (c.numbers[0] < 1) return Error::syntax;
     const auto id = cob_id(p.cob);
-    if ((p.cob & cob_invalid) == 0 && (p.cob & cob_extended) == 0 && (restricted(id) || id == 0x80 || (p.cob & 0x1ffff800) != 0)) return Error::syntax;
+    if ((p.cob & cob_invalid) == 0 && (p.cob & cob_extended) == 0 && (restricted(id) || id == 0x80 || (p.cob & 0x1ffff800) != 0))
+        return Error::syntax;
     if (bits(p) > 64) return Error::pdo_length;
     if ((p.cob & cob_invalid) != 0 || p.formats.empty()) return pdos.erase(c.numbers[0]), Error::none;
     for (const auto& [number, other] : pdos)
@@ -80,7 +81,8 @@ Error Pdos::write(const Command& c, std::string& why) {
         std::vector<std::uint8_t> bytes;
         const std::size_t         words = words_of(*f);
         if (at + words > c.values.size()) return why = "a value is missing", Error::syntax;
-        if (!bytes_of(std::span(c.values).subspan(at, words), *f, bytes)) return why = "'" + c.values[at].substr(0, 40) + "' is no " + std::string(f->word), Error::syntax;
+        if (!bytes_of(std::span(c.values).subspan(at, words), *f, bytes))
+            return why = "'" + c.values[at].substr(0, 40) + "' is no " + std::string(f->word), Error::syntax;
         at += words;
         std::uint64_t value = 0;
         std::copy(bytes.begin(), bytes.end(), reinterpret_cast<std::uint8_t*>(&value));

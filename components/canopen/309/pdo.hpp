@@ -32,19 +32,19 @@ public:
 
 private:
     struct Pdo {
-        std::uint32_t cob = 0, transmission = on_event;
-        std::vector<const Format*> formats = {};
+        std::uint32_t               cob = 0, transmission = on_event;
+        std::vector<const Format*>  formats = {};
         std::array<std::uint8_t, 8> data = {};
-        bool fresh = false;        ///< has a value; of a synchronous one sent: it waits for its SYNC
-        bool held = false;         ///< received, and waits for the SYNC
+        bool                        fresh = false;        ///< has a value; of a synchronous one sent: it waits for its SYNC
+        bool                        held = false;         ///< received, and waits for the SYNC
         std::array<std::uint8_t, 8> waiting = {};
-        unsigned syncs = 0;
+        unsigned                    syncs = 0;
     };
-    static unsigned bits(const Pdo&);
+    static unsigned    bits(const Pdo&);
     static std::string text(unsigned number, const Pdo&);
-    bool send(const Pdo&);
+    bool               send(const Pdo&);
 
-    FrameQueue& out_;
+    FrameQueue&             out_;
     std::map<unsigned, Pdo> received_, sent_;
 };
 

@@ -13,14 +13,36 @@ namespace hal::canopen::gateway {
 namespace {
 
 constexpr Format table[] = {
-    {"b", Type::boolean},          {"i8", Type::integer8},         {"i16", Type::integer16},      {"i24", Type::integer24},
-    {"i32", Type::integer32},      {"i40", Type::integer40},       {"i48", Type::integer48},      {"i56", Type::integer56},
-    {"i64", Type::integer64},      {"u8", Type::unsigned8},        {"u16", Type::unsigned16},     {"u24", Type::unsigned24},
-    {"u32", Type::unsigned32},     {"u40", Type::unsigned40},      {"u48", Type::unsigned48},     {"u56", Type::unsigned56},
-    {"u64", Type::unsigned64},     {"r32", Type::real32},          {"r64", Type::real64},         {"t", Type::time_of_day},
-    {"td", Type::time_difference}, {"vs", Type::visible_string},   {"os", Type::octet_string},    {"us", Type::unicode_string},
-    {"d", Type::domain},           {"x8", Type::unsigned8, true},  {"x16", Type::unsigned16, true}, {"x32", Type::unsigned32, true},
-    {"x64", Type::unsigned64, true}, {"hex", Type::none, true},
+    {"b", Type::boolean},
+    {"i8", Type::integer8},
+    {"i16", Type::integer16},
+    {"i24", Type::integer24},
+    {"i32", Type::integer32},
+    {"i40", Type::integer40},
+    {"i48", Type::integer48},
+    {"i56", Type::integer56},
+    {"i64", Type::integer64},
+    {"u8", Type::unsigned8},
+    {"u16", Type::unsigned16},
+    {"u24", Type::unsigned24},
+    {"u32", Type::unsigned32},
+    {"u40", Type::unsigned40},
+    {"u48", Type::unsigned48},
+    {"u56", Type::unsigned56},
+    {"u64", Type::unsigned64},
+    {"r32", Type::real32},
+    {"r64", Type::real64},
+    {"t", Type::time_of_day},
+    {"td", Type::time_difference},
+    {"vs", Type::visible_string},
+    {"os", Type::octet_string},
+    {"us", Type::unicode_string},
+    {"d", Type::domain},
+    {"x8", Type::unsigned8, true},
+    {"x16", Type::unsigned16, true},
+    {"x32", Type::unsigned32, true},
+    {"x64", Type::unsigned64, true},
+    {"hex", Type::none, true},
 };
 
 constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -33,7 +55,7 @@ std::string number_text(std::span<const std::uint8_t> bytes, const Format& forma
         std::snprintf(text.data(), text.size(), "0x%0*llX", static_cast<int>(2 * bytes.size()), static_cast<unsigned long long>(value));
         return text.data();
     }
-    char* end = text.data();
+    char*       end = text.data();
     char* const limit = text.data() + text.size();
     if (format.type == Type::real32) end = std::to_chars(end, limit, load<float>(bytes.data())).ptr;
     else if (format.type == Type::real64) end = std::to_chars(end, limit, load<double>(bytes.data())).ptr;
@@ -60,7 +82,7 @@ bool number(std::string_view text, const Format& format, std::vector<std::uint8_
     const unsigned bits = bits_of(format.type);
     std::uint64_t  value = 0;
     if (is_real(format.type)) {
-        double     real = 0;
+        double real = 0;
         const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), real);
         if (text.empty() || error != std::errc() || end != text.data() + text.size()) return false;
         if (format.type == Type::real32) store(&value, static_cast<float>(real));
@@ -84,7 +106,8 @@ bool hex_bytes(std::span<const std::string> words, std::vector<std::uint8_t>& by
         if (word.size() % 2 != 0) return false;
         for (std::size_t n = 0; n < word.size(); n += 2) {
             std::uint8_t byte = 0;
-            if (const auto r = std::from_chars(word.data() + n, word.data() + n + 2, byte, 16); r.ec != std::errc() || r.ptr != word.data() + n + 2)
+            if (const auto r = std::from_chars(word.data() + n, word.data() + n + 2, byte, 16);
+                r.ec != std::errc() || r.ptr != word.data() + n + 2)
                 return false;
             bytes.push_back(byte);
         }
@@ -126,7 +149,8 @@ std::string text_of(std::span<const std::uint8_t> bytes, const Format& format) {
     case Type::time_of_day:
     case Type::time_difference:
         if (bytes.size() == 6)
-            return std::to_string(load<std::uint16_t>(bytes.data() + 4)) + " " + std::to_string(load<std::uint32_t>(bytes.data()) & 0x0fffffff);
+            return std::to_string(load<std::uint16_t>(bytes.data() + 4)) + " " +
+                   std::to_string(load<std::uint32_t>(bytes.data()) & 0x0fffffff);
         break;
     default:
         if (bytes_of(format.type) == bytes.size() && !bytes.empty()) return number_text(bytes, format);
@@ -168,8 +192,8 @@ std::string base64(std::span<const std::uint8_t> bytes) {
     std::string text;
     text.reserve((bytes.size() + 2) / 3 * 4);
     for (std::size_t n = 0; n < bytes.size(); n += 3) {
-        const std::size_t   have = std::min<std::size_t>(3, bytes.size() - n);
-        std::uint32_t       group = 0;
+        const std::size_t have = std::min<std::size_t>(3, bytes.size() - n);
+        std::uint32_t     group = 0;
         for (std::size_t i = 0; i < 3; ++i) group = group << 8 | (i < have ? bytes[n + i] : 0U);
         for (std::size_t i = 0; i < 4; ++i) text += i <= have ? digits[group >> (18 - 6 * i) & 63] : '=';
     }
@@ -183,8 +207,8 @@ bool base64(std::string_view text, std::vector<std::uint8_t>& bytes) {
     while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
     std::uint32_t group = 0;
     for (std::size_t n = 0; n < text.size(); ++n) {
-        const bool   pad = n >= text.size() - padding;
-        const auto   digit = pad ? 0 : digits.find(text[n]);
+        const bool pad = n >= text.size() - padding;
+        const auto digit = pad ? 0 : digits.find(text[n]);
         if (digit == std::string_view::npos) return false;
         group = group << 6 | static_cast<std::uint32_t>(digit);
         if (n % 4 != 3) continue;

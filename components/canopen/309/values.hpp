@@ -27,7 +27,9 @@ const Format* format(Type type);
 /// The value in one word, quoted where it needs to be; two words for times. Bytes of another length than the type's come as `hex`.
 std::string text_of(std::span<const std::uint8_t> bytes, const Format& format);
 /// How many words its value has.
-constexpr std::size_t words_of(const Format& format) { return format.type == Type::time_of_day || format.type == Type::time_difference ? 2 : 1; }
+constexpr std::size_t words_of(const Format& format) {
+    return format.type == Type::time_of_day || format.type == Type::time_difference ? 2 : 1;
+}
 /// Reads the value from words_of() words, the last of which may be followed by more for `hex`; false when they do not spell one.
 bool bytes_of(std::span<const std::string> words, const Format& format, std::vector<std::uint8_t>& bytes);
 

@@ -9,8 +9,14 @@ namespace hal::canopen::test {
 
 /// A device with everything the cases ask for: objects of all access rights and limits, four PDOs each way, SDO channels, storing.
 inline Description conforming() {
-    Description d = basic_device({.device_type = 0x191, .vendor = 1, .product = 2, .revision = 3, .serial = 4, .name = "a conforming device",
-                                  .heartbeat_consumers = 4, .emcy_consumers = 4});
+    Description d = basic_device({.device_type = 0x191,
+                                  .vendor = 1,
+                                  .product = 2,
+                                  .revision = 3,
+                                  .serial = 4,
+                                  .name = "a conforming device",
+                                  .heartbeat_consumers = 4,
+                                  .emcy_consumers = 4});
     using enum Access;
     for (const std::uint16_t index : {std::uint16_t{0x1010}, std::uint16_t{0x1011}}) {
         d.add(index, 0, Type::unsigned8, constant, 2);
@@ -46,7 +52,9 @@ inline Description conforming() {
 struct Conformance : Node {
     void SetUp() override { make(conforming()); }
 
-    static Abort abort_of(const Frame& f) { return f.length == 8 && f.data[0] == 0x80 ? static_cast<Abort>(load<std::uint32_t>(f.data.data() + 4)) : Abort::none; }
+    static Abort abort_of(const Frame& f) {
+        return f.length == 8 && f.data[0] == 0x80 ? static_cast<Abort>(load<std::uint32_t>(f.data.data() + 4)) : Abort::none;
+    }
     static bool one_of(Abort why, std::initializer_list<Abort> all) { return std::find(all.begin(), all.end(), why) != all.end(); }
     /// Why it cannot be read; none when it can.
     Abort read_abort(std::uint16_t index, std::uint8_t sub) {

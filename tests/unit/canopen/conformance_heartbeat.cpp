@@ -124,7 +124,8 @@ TEST_F(ConformanceErrorControl, Heartbeat_07_consumer_starts_anew_after_a_boot_u
 }
 
 TEST_F(ConformanceErrorControl, Versus_01_both_sets_of_objects_are_there) {
-    for (const std::uint16_t index : {std::uint16_t{0x100c}, std::uint16_t{0x100d}, std::uint16_t{0x1017}}) EXPECT_EQ(read_abort(index, 0), Abort::none);
+    for (const std::uint16_t index : {std::uint16_t{0x100c}, std::uint16_t{0x100d}, std::uint16_t{0x1017}})
+        EXPECT_EQ(read_abort(index, 0), Abort::none);
 }
 TEST_F(ConformanceErrorControl, Versus_02_heartbeat_switched_off) {
     put(0x1017, 0, 0);

@@ -132,7 +132,9 @@ TEST_F(ConformanceNmt, Other_04_restore_all_holds_from_the_next_reset_on) {
     EXPECT_EQ(get(0x1017, 0), 0U);
     EXPECT_EQ(get(0x2000, 0), 5U);
 }
-TEST_F(ConformanceNmt, Other_05_store_communication_with_a_wrong_signature) { EXPECT_EQ(write(0x1010, 2, wrong_save, 4), Abort::cannot_store); }
+TEST_F(ConformanceNmt, Other_05_store_communication_with_a_wrong_signature) {
+    EXPECT_EQ(write(0x1010, 2, wrong_save, 4), Abort::cannot_store);
+}
 TEST_F(ConformanceNmt, Other_06_store_communication_only) {
     put(0x1017, 0, 123), put(0x2000, 0, 77);
     EXPECT_EQ(write(0x1010, 2, save, 4), Abort::none);
@@ -140,7 +142,9 @@ TEST_F(ConformanceNmt, Other_06_store_communication_only) {
     EXPECT_EQ(get(0x1017, 0), 123U);
     EXPECT_EQ(get(0x2000, 0), 5U);
 }
-TEST_F(ConformanceNmt, Other_07_restore_communication_with_a_wrong_signature) { EXPECT_EQ(write(0x1011, 2, wrong_save, 4), Abort::cannot_store); }
+TEST_F(ConformanceNmt, Other_07_restore_communication_with_a_wrong_signature) {
+    EXPECT_EQ(write(0x1011, 2, wrong_save, 4), Abort::cannot_store);
+}
 TEST_F(ConformanceNmt, Other_08_restore_communication_only) {
     put(0x1017, 0, 123), put(0x2000, 0, 77);
     write(0x1010, 1, save, 4);
@@ -171,17 +175,20 @@ TEST_F(ConformanceNmt, Other_10_restricted_identifiers_are_refused_everywhere) {
         return ids;
     };
     std::vector<std::uint32_t> ids;
-    for (const auto& [first, last] : {std::pair{0U, 0x7fU}, {0x101U, 0x180U}, {0x581U, 0x5ffU}, {0x601U, 0x67fU}, {0x6e0U, 0x6ffU}, {0x701U, 0x7ffU}})
+    for (const auto& [first, last] :
+         {std::pair{0U, 0x7fU}, {0x101U, 0x180U}, {0x581U, 0x5ffU}, {0x601U, 0x67fU}, {0x6e0U, 0x6ffU}, {0x701U, 0x7ffU}})
         for (const auto id : all(first, last)) ids.push_back(id);
     struct Place {
         std::uint16_t index;
         std::uint8_t sub;
     };
-    for (const Place& p : {Place{0x1005, 0}, {0x1012, 0}, {0x1014, 0}, {0x1201, 1}, {0x1201, 2}, {0x1280, 1}, {0x1280, 2}, {0x1400, 1}, {0x1800, 1}}) {
+    for (const Place& p :
+         {Place{0x1005, 0}, {0x1012, 0}, {0x1014, 0}, {0x1201, 1}, {0x1201, 2}, {0x1280, 1}, {0x1280, 2}, {0x1400, 1}, {0x1800, 1}}) {
         // 1012h in use and channels of SDO that are on refuse any other identifier, too: they are off here.
         write(p.index, p.sub, cob_invalid | (p.index == 0x1014 ? 0x85 : p.index >= 0x1800 ? 0x185 : p.index >= 0x1400 ? 0x205 : 0), 4);
         for (const auto id : ids) {
-            if ((p.index == 0x1201 || p.index == 0x1280) && ((id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f))) continue;  // these are SDO's
+            if ((p.index == 0x1201 || p.index == 0x1280) && ((id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f)))
+                continue;  // these are SDO's
             EXPECT_NE(write(p.index, p.sub, id, 4), Abort::none) << std::hex << p.index << " " << id;
         }
     }

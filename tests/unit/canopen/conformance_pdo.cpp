@@ -44,9 +44,7 @@ struct ConformancePdo : Conformance {
         ASSERT_EQ(put(static_cast<std::uint16_t>(communication + 0x200), 0, 0), Abort::none);
     }
     Abort map(std::uint16_t mapping, std::uint8_t n, std::uint32_t entry) { return put(mapping, n, entry); }
-    void SetUp() override {
-        make(conforming());
-    }
+    void SetUp() override { make(conforming()); }
 };
 
 TEST_F(ConformancePdo, Pdo_01_receive_pdos_have_their_predefined_identifiers) {

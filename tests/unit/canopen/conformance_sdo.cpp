@@ -19,7 +19,8 @@ struct ConformanceSdo : Conformance {
     }
     /// Block download of up to seven bytes.
     Abort block(std::uint16_t index, std::uint32_t value, std::uint8_t size, bool crc) {
-        const auto begun = sdo({static_cast<std::uint8_t>(crc ? 0xc6 : 0xc2), static_cast<std::uint8_t>(index), static_cast<std::uint8_t>(index >> 8), 0, size, 0, 0, 0});
+        const auto begun = sdo({static_cast<std::uint8_t>(crc ? 0xc6 : 0xc2), static_cast<std::uint8_t>(index),
+                                static_cast<std::uint8_t>(index >> 8), 0, size, 0, 0, 0});
         if (begun.data[0] != 0xa4) return abort_of(begun);
         std::uint8_t bytes[8] = {0x81};
         store(bytes + 1, value);
@@ -28,7 +29,8 @@ struct ConformanceSdo : Conformance {
         const auto taken = since(0x585);
         if (taken.size() != 1 || taken[0].data[0] != 0xa2 || taken[0].data[1] != 1) return Abort::sequence;
         const auto sum = crc16({bytes + 1, size});
-        const auto end = sdo({static_cast<std::uint8_t>(0xc1 | (7 - size) << 2), static_cast<std::uint8_t>(crc ? sum : 0), static_cast<std::uint8_t>(crc ? sum >> 8 : 0), 0, 0, 0, 0, 0});
+        const auto end = sdo({static_cast<std::uint8_t>(0xc1 | (7 - size) << 2), static_cast<std::uint8_t>(crc ? sum : 0),
+                              static_cast<std::uint8_t>(crc ? sum >> 8 : 0), 0, 0, 0, 0, 0});
         return end.data[0] == 0xa1 ? Abort::none : abort_of(end);
     }
     /// Upload by segments; empty when something is wrong on the way.
@@ -45,7 +47,8 @@ struct ConformanceSdo : Conformance {
         }
     }
     std::string block_upload(std::uint16_t index, bool crc) {
-        const auto begun = sdo({static_cast<std::uint8_t>(crc ? 0xa4 : 0xa0), static_cast<std::uint8_t>(index), static_cast<std::uint8_t>(index >> 8), 0, 20, 0, 0, 0});
+        const auto begun = sdo({static_cast<std::uint8_t>(crc ? 0xa4 : 0xa0), static_cast<std::uint8_t>(index),
+                                static_cast<std::uint8_t>(index >> 8), 0, 20, 0, 0, 0});
         if ((begun.data[0] & 0xe3) != 0xc2) return {};
         EXPECT_EQ((begun.data[0] & 4) != 0, true) << "the server offers the CRC";
         const auto size = load<std::uint32_t>(begun.data.data() + 4);
@@ -119,7 +122,9 @@ TEST_F(ConformanceSdo, Sdo_12_1200h_holds_the_predefined_identifiers) {
     EXPECT_EQ(read(0x1200, 2), 0x585U);
     EXPECT_EQ(write(0x1200, 1, 0x606, 4), Abort::read_only);
 }
-TEST_F(ConformanceSdo, Sdo_13_1000h_of_a_client_that_takes_segments) { EXPECT_EQ(sdo({0x40, 0, 0x10, 0, 0, 0, 0, 0}).data[0] & 0xe0, 0x40); }
+TEST_F(ConformanceSdo, Sdo_13_1000h_of_a_client_that_takes_segments) {
+    EXPECT_EQ(sdo({0x40, 0, 0x10, 0, 0, 0, 0, 0}).data[0] & 0xe0, 0x40);
+}
 TEST_F(ConformanceSdo, Sdo_14_100Ch_is_written_by_segments) {
     EXPECT_EQ(segmented(0x100c, 250, 2), Abort::none);
     EXPECT_EQ(get(0x100c, 0), 250U);
@@ -236,7 +241,8 @@ TEST_F(ConformanceOd, Od_03_read_only_entries_refuse_a_write) {
 }
 TEST_F(ConformanceOd, Od_04_write_only_entries_refuse_a_read) { EXPECT_EQ(read_abort(0x2002, 0), Abort::write_only); }
 TEST_F(ConformanceOd, Od_05_sub_index_255_is_not_there_when_it_is_not_described) {
-    for (const std::uint16_t index : {std::uint16_t{0x1018}, std::uint16_t{0x1400}, std::uint16_t{0x6000}}) EXPECT_EQ(read_abort(index, 255), Abort::no_sub);
+    for (const std::uint16_t index : {std::uint16_t{0x1018}, std::uint16_t{0x1400}, std::uint16_t{0x6000}})
+        EXPECT_EQ(read_abort(index, 255), Abort::no_sub);
 }
 TEST_F(ConformanceOd, Od_06_limits_of_writable_entries_hold_at_both_ends) {
     for (const auto& [index, sub] : all()) {
@@ -257,7 +263,8 @@ TEST_F(ConformanceOd, Od_08_defaults_are_back_after_a_reset) {
 TEST_F(ConformanceOd, Od_09_highest_sub_index_is_right_for_every_object) {
     for (const auto& [index, sub] : all()) {
         const auto object = device->dictionary().object(index);
-        if (sub != 0 || object.size() < 2 || index == 0x1003 || (index >= 0x1600 && index < 0x1800) || (index >= 0x1a00 && index < 0x1c00)) continue;
+        if (sub != 0 || object.size() < 2 || index == 0x1003 || (index >= 0x1600 && index < 0x1800) || (index >= 0x1a00 && index < 0x1c00))
+            continue;
         EXPECT_EQ(get(index, 0), object.back().sub) << std::hex << index;
     }
 }
