@@ -179,6 +179,7 @@ class WrongWords(Drive):
         done = self.run_program("can", "drive", self.bus, "--node", 2, "-k", given="""A foo
 A st
 A go x
+A go 1e12
 A go
 A set max-sped 1
 A set max-speed -1
@@ -197,6 +198,7 @@ A
         self.assertEqual("""there is no command 'foo'; type: help
 there is no command 'st'; did you mean 'set'?
 'x' is no number; type: A go POSITION [relative] [nowait]
+A: 1e+12 is 1e+12 of the drive's counts; its positions go from -2147483648 to 2147483647
 type: A go POSITION [relative] [nowait]
 there is no value 'max-sped'; did you mean 'max-speed'?
 max-speed -1 is -1 in the drive's units, which go from 0 to 4.29497e+09

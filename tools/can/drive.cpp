@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <charconv>
+#include <cmath>
 #include <fmt/core.h>
 #include <memory>
 #include <unistd.h>

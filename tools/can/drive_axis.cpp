@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "can/drive_axis.hpp"
 
+#include <cmath>
 #include <cstring>
 #include <fmt/core.h>
 
@@ -215,6 +216,9 @@ bool HandAxis::begin_motion(Mode mode) {
 }
 
 bool HandAxis::go(double position, bool relative, bool wait) {
+    const double counts = position * rules.position.ratio();
+    if (std::fabs(counts) > 2147483647.0)
+        return refuse(fmt::format("{:g} is {:g} of the drive's counts; its positions go from -2147483648 to 2147483647", position, counts));
     if (adopt() && command_.mode != Mode::profile_position) command_.velocity = 0.0;
     if (!begin_motion(Mode::profile_position)) return false;
     command_.position = position, command_.relative = relative;

@@ -23,9 +23,13 @@ namespace {
 std::string quoted(const char* text) { return std::string("\"") + text + "\""; }
 double seconds(Time t) { return static_cast<double>(t) / static_cast<double>(second); }
 
+constexpr Mode any_other{-128};  // in sentences made beforehand: a mode without a name
+
 /// A mode as people write it, or its number.
 std::string name(Mode mode) {
-    return mode == Mode::none || *abbreviation(mode) != '-' ? std::string(abbreviation(mode)) : std::to_string(static_cast<int>(mode));
+    if (mode == Mode::none) return "none";
+    if (mode == any_other) return "another";
+    return *abbreviation(mode) != '-' ? std::string(abbreviation(mode)) : std::to_string(static_cast<int>(mode));
 }
 
 std::string state_words(State state) { return state == State::unknown ? "no state of CiA 402" : quoted(word(state)); }
@@ -101,6 +105,10 @@ std::string text(const Failure& f) {
 
 namespace {
 
+std::uint8_t known(Mode mode) noexcept {
+    return static_cast<std::uint8_t>(mode == Mode::none || *abbreviation(mode) != '-' ? mode : any_other);
+}
+
 /// All that changes the sentence, as one number.
 std::uint32_t key_of(const Failure& f) noexcept {
     unsigned a = 0, b = 0;
@@ -108,7 +116,7 @@ std::uint32_t key_of(const Failure& f) noexcept {
     case Cause::stays: a = static_cast<unsigned>(f.step), b = static_cast<unsigned>(f.state); break;
     case Cause::drive_fault: a = static_cast<unsigned>(f.step); break;
     case Cause::left: a = static_cast<unsigned>(f.before), b = static_cast<unsigned>(f.state); break;
-    case Cause::mode_refused: a = static_cast<std::uint8_t>(f.mode), b = static_cast<std::uint8_t>(f.shown); break;
+    case Cause::mode_refused: a = known(f.mode), b = known(f.shown); break;
     case Cause::homing_error: a = static_cast<unsigned>(homing_of(f.statusword)); break;
     case Cause::set_point: a = f.statusword >> 12 & 1; break;
     case Cause::step_refused: a = f.step != Step::wait; break;
@@ -164,10 +172,12 @@ Sentences::Sentences() {
         Failure& f = add(Cause::left, Request::run);
         f.before = State::operation_enabled, f.state = static_cast<State>(state);
     }
-    for (int mode = -128; mode <= 127; ++mode)  // a display may show anything
-        for (const ModeRow& asked : modes) {
+    std::vector<Mode> all_modes{any_other, Mode::none};
+    for (const ModeRow& row : modes) all_modes.push_back(row.mode);
+    for (const Mode asked : all_modes)
+        for (const Mode shown : all_modes) {
             Failure& f = add(Cause::mode_refused, Request::mode);
-            f.mode = asked.mode, f.shown = static_cast<Mode>(mode);
+            f.mode = asked, f.shown = shown;
         }
     for (unsigned bits = 0; bits < 2; ++bits) {
         add(Cause::set_point, Request::go).statusword = bits != 0 ? status::set_point_acknowledge : std::uint16_t{0};

@@ -209,6 +209,8 @@ keeps a copy of the drive's state machine and walks it to where it should be, a 
 * A fault (see the table) brakes by quick stop, switches off, and stays until a rising edge of `reset`. After it, after `quick-stop`
   and after the node was lost, `enable` needs another rising edge. Before the node was there, it waits.
 * `mode` may change at any time; the command is followed when the drive shows the new mode.
+* `halt` brakes by the ramp of the drive in modes 1 to 7. In the cyclic ones the target stays where it is, or is 0, at once: bring the
+  command to rest first.
 * `home` selects mode hm, starts homing with what the drive's objects 6098h, 6099h and 609Ah say, waits, and returns to `mode`.
   Then `position-fb` is what the drive counts.
 * `position-fb` = counts * `position-scale-divisor` / `position-scale`, without end though the drive's counter wraps.

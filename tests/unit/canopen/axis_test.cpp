@@ -430,6 +430,12 @@ TEST(AxisFailure, Every_sentence_of_the_cycle_is_there_beforehand) {
     p.enable();
     EXPECT_STREQ(R"(enable: drive stays in "switched on" after "enable operation" for {} s; it is off)", sentences.find(p.axis.failure()));
     EXPECT_DOUBLE_EQ(0.5, Sentences::number(p.axis.failure()));
+    Failure odd;
+    odd.cause = Cause::mode_refused, odd.request = Request::mode, odd.mode = Mode::cyclic_position, odd.shown = static_cast<Mode>(-3);
+    EXPECT_STREQ("mode: drive does not take mode csp, it shows another for {} s; it is off", sentences.find(odd));
+    EXPECT_EQ("mode: drive does not take mode csp, it shows -3", sentence(odd));
+    odd.shown = Mode::none;
+    EXPECT_STREQ("mode: drive does not take mode csp, it shows none for {} s; it is off", sentences.find(odd));
     for (unsigned cause = 1; cause < causes; ++cause) {
         Failure f;
         f.cause = static_cast<Cause>(cause);
