@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Our side of canopen_peer_test.py: `device ADDRESS NODE` is a node on that bus until it is killed; `client ADDRESS NODE` does what its
 // standard input says to that node, a line each: `write INDEX SUB MODE HEXBYTES`, `read INDEX SUB MODE`, `nmt COMMAND`. One line answers.
+// `master ADDRESS NODE` boots that node, prints a line for each of its steps, and goes on until it is killed.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -8,8 +9,8 @@
 #include <sstream>
 #include <string>
 
+#include "canopen/302/master.hpp"
 #include "canopen/device.hpp"
-#include "canopen/network.hpp"
 
 using namespace hal::canopen;
 
@@ -108,10 +109,38 @@ int client(const char* address, std::uint8_t id) {
     return 0;
 }
 
+struct Teller : MasterEvents {
+    const NodeSetup* setup = nullptr;
+    void on_step(const NodeStatus& s) noexcept override {
+        std::printf("%s %s\n", word(s.step), setup != nullptr ? sentence(*setup, s).c_str() : "");
+        std::fflush(stdout);
+    }
+};
+
+int master(const char* address, std::uint8_t id) {
+    Port port(address);
+    NodeSetup node;
+    node.id = id;
+    node.device_type = 0x1234;
+    node.writes = tpdo_writes(1, {.transmission = 1, .mapping = {map_entry(0x2001, 0, 16), map_entry(0x2000, 0, 32)}}, id);
+    node.writes.push_back(object_write(0x2000, 0, std::uint32_t{4711}));
+    node.writes.push_back(object_write(0x2001, 0, std::int16_t{-5}));
+    node.writes.push_back({{0x2005, 0, {'a', ' ', 'l', 'o', 'n', 'g', ' ', 't', 'e', 'x', 't'}}});
+    MasterSetup setup;
+    setup.nodes = {node};
+    setup.sdo.timeout = 1 * second;
+    FrameQueue out(1024);
+    Teller teller;
+    teller.setup = &setup.nodes.front();
+    Master master(setup, out, teller);
+    for (master.start(clock_now());; master.poll(clock_now())) port.turn(out, [&](const Frame& f, Time now) { master.handle(f, now); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 4) return std::fputs("canopen_peer device|client ADDRESS NODE\n", stderr), 2;
+    if (argc != 4) return std::fputs("canopen_peer device|client|master ADDRESS NODE\n", stderr), 2;
     const auto id = static_cast<std::uint8_t>(std::atoi(argv[3]));
+    if (argv[1][0] == 'm') return master(argv[2], id);
     return argv[1][0] == 'd' ? device(argv[2], id) : client(argv[2], id);
 }

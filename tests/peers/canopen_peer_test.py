@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""canopen_peer_test.py CANOPEN_PEER: our device under the Python package `canopen` as master, and its device under our SDO client,
-both on the `udp:` bus. 77: the package, or multicast, is not there."""
+"""canopen_peer_test.py CANOPEN_PEER: our device under the Python package `canopen` as master, and its device under our SDO client
+and our NMT master, all on the `udp:` bus. 77: the package, or multicast, is not there."""
 import subprocess
 import sys
 import threading
@@ -166,6 +166,36 @@ def our_client(program, network):
         ours.wait()
 
 
+def our_master(program, network):
+    od = dictionary()
+    node = network.add_node(canopen.LocalNode(10, od))
+    node.sdo[0x1000].raw = 0x1234
+    node.sdo[0x2001].raw = -5
+    ours = subprocess.Popen([program, "master", ADDRESS, "10"], stdout=subprocess.PIPE, text=True)
+    lines = []
+    threading.Thread(target=lambda: lines.extend(iter(ours.stdout.readline, "")), daemon=True).start()
+
+    def steps():
+        return [line.strip() for line in lines[-12:]]
+
+    try:
+        check("master boots a node of the package", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
+        check("its objects are configured", (node.sdo[0x2000].raw, node.sdo[0x2005].raw) == (4711, "a long text"))
+        check("its PDO is mapped", [node.sdo[0x1A00][n].raw for n in range(3)] == [2, 0x20010010, 0x20000020], steps())
+        check("its PDO is on", (node.sdo[0x1800][1].raw & 0xBFFFFFFF, node.sdo[0x1800][2].raw) == (0x18A, 1))
+        check("its heartbeat is set", node.sdo[0x1017].raw == 100)
+        check("it is operational", node.nmt.state == "OPERATIONAL")
+        node.nmt.stop_heartbeat()
+        check("its silence is noticed", wait_for(lambda: any(" sent no heartbeat for " in s for s in steps())), steps())
+        check("it is booted again", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
+        node.nmt.state = "PRE-OPERATIONAL"
+        check("that it left operational is noticed", wait_for(lambda: any(" left operational by itself" in s for s in steps())), steps())
+        check("it is brought back", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
+    finally:
+        ours.kill()
+        ours.wait()
+
+
 def main():
     network = canopen.Network()
     try:
@@ -173,7 +203,7 @@ def main():
     except (OSError, can.CanError) as error:
         print(f"no multicast on this machine: {error}")
         return 77
-    for part in (our_device, our_client):
+    for part in (our_device, our_client, our_master):
         part(sys.argv[1], network)
     network.disconnect()
     print(f"{sum(checks)} of {len(checks)} checks hold")

@@ -128,6 +128,7 @@ void Master::Node::compared() noexcept {
     bool as_wished = ok() && same_value(o.index, o.sub, o.value(), std::span(room_).first(request_.size));
     if (silent()) return fail_write(Cause::silent);
     if (lacks() && o.kind == Own::producer) return refused_producer();
+    if (o.kind == Own::producer && status.result == BootResult::watching) as_wished = false;  // it says so and does not do so: once more
     if (lacks() && o.optional) {
         if (o.kind == Own::date || o.kind == Own::time) status.notes |= note_no_date;
         o.absent = as_wished = true;

@@ -90,6 +90,8 @@ void Master::Node::rebooted_while_booting() noexcept {
     }
     drop();
     state_known_ = true;
+    // Some stay initialising after a reset and send that as their heartbeat, until they are told to leave it.
+    if (reboots_ >= 2) master_.send(NmtCommand::enter_pre_operational, setup.id);
     identify();
 }
 

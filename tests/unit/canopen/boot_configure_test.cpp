@@ -301,6 +301,17 @@ TEST(Configure, Takes_the_heartbeat_period_that_the_node_can_do) {
     EXPECT_EQ(late.status(5).cause, Cause::not_taken);
 }
 
+TEST(Configure, Writes_the_heartbeat_period_again_when_no_heartbeat_came) {
+    auto d = example();
+    d.find(0x1017, 0)->value = {50, 0};
+    Configured b({}, d);
+    b.station.tamper = [&](const Frame& f) { return f.id != 0x705 || f.data[0] == 0 || b.writes(0x1017) != 0; };
+    b.start();
+    ASSERT_TRUE(b.operational());
+    EXPECT_EQ(b.status(5).attempts, 2U);
+    EXPECT_EQ(b.writes(), 1U);
+}
+
 TEST(Configure, Writes_long_values) {
     Configured b([](NodeSetup& n) {
         ObjectWrite text{{0x2005, 0, {}}}, domain{{0x2006, 0, std::vector<std::uint8_t>(5000, 0x5a)}};

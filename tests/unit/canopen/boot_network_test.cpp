@@ -264,6 +264,21 @@ TEST(BootNetwork, Survives_power_cycles_at_any_moment_of_the_boot) {
     }
 }
 
+TEST(BootNetwork, Survives_a_node_that_stays_initialising) {
+    Three b;
+    bool told = false;
+    b.stations[1]->tamper = [&](Frame& f) {
+        if (f.id != 0x706) return true;
+        told = told || std::ranges::any_of(b.bus.sent(0), [](const Frame& c) { return c.data[0] == 0x80 && c.data[1] == 6; });
+        if (!told && f.data[0] == 0x7f) f.data[0] = 0;
+        return true;
+    };
+    b.power();
+    b.start();
+    EXPECT_TRUE(b.operational(5 * second)) << b.master->sentence();
+    EXPECT_TRUE(told);
+}
+
 TEST(BootNetwork, Survives_late_answers_and_stale_aborts) {
     Three b;
     b.stations[0]->delay = 45 * millisecond;  // just in time
