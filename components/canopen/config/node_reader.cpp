@@ -173,6 +173,14 @@ void NodeReader::firmware() {
 // What is written to the node before it is started.
 
 void NodeReader::writes() {
+    // What all nodes have to agree on about the SYNC; one that does not know it is not asked.
+    const auto agree = [&](std::uint16_t index, auto value) {
+        node_.setup.writes.push_back(object_write(index, 0, value));
+        node_.setup.writes.back().optional = true;
+    };
+    if (bus_.sync_counter != 0) agree(0x1019, bus_.sync_counter);
+    if (bus_.sync_window != 0) agree(0x1007, static_cast<std::uint32_t>(bus_.sync_window / microsecond));
+    if (bus_.sync_cob != 0x80) agree(0x1005, bus_.sync_cob);
     if (eds_ != nullptr && eds_->commissioning) {
         const auto configuration = eds::configuration_of(*eds_, node_.setup.id);
         for (const auto& w : configuration.writes)

@@ -35,6 +35,7 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
         out.messages.push_back(m);
         out.names.push_back(std::move(name));
         out.places.push_back(at);
+        out.assumed.push_back(false);
     };
     if (sync != 0) add(config.sync_cob, config.sync_counter != 0 ? 1 : 0, sync, "SYNC", config.at, true);
     if (config.time_period != 0) add(0x100, 6, config.time_period, "TIME", config.at, false);
@@ -51,6 +52,7 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
             const bool  of_sync = p.synchronous() && sync != 0;
             const Time  every = of_sync ? sync * std::max<Time>(p.transmission, 1) : event_period(p, cycle);
             add(p.cob, p.bytes(), every, std::move(name), p.at, of_sync);
+            out.assumed.back() = !of_sync && p.inhibit_100us == 0;
         }
     for (const Node& n : config.nodes) {
         if (n.setup.heartbeat_ms != 0) add(0x700U + n.setup.id, 1, n.setup.heartbeat_ms * millisecond, n.name + " heartbeat", n.at, false);
@@ -66,6 +68,7 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
         out.messages.push_back(m);
         out.names.push_back(f.name);
         out.places.push_back(f.at);
+        out.assumed.push_back(false);
     }
     const auto analysis = plan::analyse(out.messages, out.bus);
     Time       together = 0;
@@ -76,7 +79,14 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
 }
 
 std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const std::string& path) {
-    const Schedule schedule = schedule_of(config, cycle);
+    Schedule schedule = schedule_of(config, cycle);
+    // A warning is only about what is known: a PDO that is sent on a change may be as rare as its changes.
+    for (std::size_t i = schedule.messages.size(); i-- > 0;) {
+        if (!schedule.assumed[i]) continue;
+        const auto at = static_cast<std::ptrdiff_t>(i);
+        schedule.messages.erase(schedule.messages.begin() + at);
+        schedule.names.erase(schedule.names.begin() + at);
+    }
     const auto     analysis = plan::analyse(schedule.messages, schedule.bus);
     std::size_t    late = schedule.messages.size();
     for (std::size_t i = 0; i < schedule.messages.size() && late == schedule.messages.size(); ++i)

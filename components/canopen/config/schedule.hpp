@@ -15,6 +15,7 @@ struct Schedule {
     std::vector<plan::Message> messages;
     std::vector<std::string>   names;  ///< of each message
     std::vector<Place>         places;       ///< where the file says it
+    std::vector<bool> assumed;       ///< nothing says how often it comes at most: counted once a SYNC or cycle
     unsigned                   per_sync = 0;           ///< frames that belong to one SYNC
     Time                       sync = 0;                   ///< its period; 0: none
     double                     sync_share = 0;           ///< share of the SYNC's period that these frames take, at worst

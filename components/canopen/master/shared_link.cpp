@@ -44,8 +44,11 @@ public:
     const std::unique_ptr<can::Link> link;
     std::array<SharedLink*, most>    users{};
     std::size_t                      count = 0;
-    std::atomic<const SharedLink*>   leader{nullptr};
-    std::atomic<std::int64_t>        led_at{0};
+    struct Leader {
+        std::atomic<const SharedLink*> link{nullptr};
+        std::atomic<std::int64_t> at{0};
+    };
+    std::array<Leader, 128> leaders{};  // by node-id
 
 private:
     std::atomic_flag busy_;
@@ -69,17 +72,20 @@ SharedLink::SharedLink(std::shared_ptr<SharedBus> bus) : bus_(std::move(bus)) { 
 
 SharedLink::~SharedLink() {
     bus_->change(this, nullptr);
-    const SharedLink* self = this;
-    bus_->leader.compare_exchange_strong(self, nullptr);
+    for (auto& leader : bus_->leaders) {
+        const SharedLink* self = this;
+        leader.link.compare_exchange_strong(self, nullptr);
+    }
 }
 
-bool SharedLink::leads(std::int64_t now_ns, std::int64_t period_ns) noexcept {
-    const SharedLink* leader = bus_->leader.load(std::memory_order_relaxed);
+bool SharedLink::leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t period_ns) noexcept {
+    auto& of_id = bus_->leaders[node_id & 0x7f];
+    const SharedLink* leader = of_id.link.load(std::memory_order_relaxed);
     if (leader != this) {
-        const bool silent = leader == nullptr || now_ns - bus_->led_at.load(std::memory_order_relaxed) > 4 * period_ns;
-        if (!silent || !bus_->leader.compare_exchange_strong(leader, this)) return false;
+        const bool silent = leader == nullptr || now_ns - of_id.at.load(std::memory_order_relaxed) > 4 * period_ns;
+        if (!silent || !of_id.link.compare_exchange_strong(leader, this)) return false;
     }
-    bus_->led_at.store(now_ns, std::memory_order_relaxed);
+    of_id.at.store(now_ns, std::memory_order_relaxed);
     return true;
 }
 

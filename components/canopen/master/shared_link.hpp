@@ -23,9 +23,9 @@ public:
     static std::unique_ptr<SharedLink> open(const std::string& address, const can::Options&, std::string& problem);
     ~SharedLink() override;
 
-    /// True for the one that makes the SYNC and the heartbeat. When it goes, or has not asked for four periods, another takes over.
-    /// [realtime]
-    bool leads(std::int64_t now_ns, std::int64_t period_ns) noexcept;
+    /// True for the one of those with this node-id that makes the SYNC and the heartbeat. When it goes, or has not asked for four periods,
+    /// another takes over. [realtime]
+    bool leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t period_ns) noexcept;
 
     can::Sent send(const can::Frame&, std::int64_t now_ns) noexcept override;
     void flush(std::int64_t now_ns) noexcept override;

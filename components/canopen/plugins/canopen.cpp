@@ -111,7 +111,7 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         objects_->take(*runner_);
-        runner_->transmit(cycle.start_ns(), cycle.period_ns(), link_ && link_->leads(cycle.start_ns(), cycle.period_ns()));
+        runner_->transmit(cycle.start_ns(), cycle.period_ns(), link_ && link_->leads(config_.node_id, cycle.start_ns(), cycle.period_ns()));
     }
 
     void update(hal::Cycle cycle) noexcept {
@@ -245,7 +245,7 @@ private:
     hal::TextArgument outputs_{*this, "outputs", "", "objects the node sends"};
     hal::Argument     slave_{*this, "slavenodeid", 0, "the node's id", {.per_instance = true, .min = 0, .max = 127}};
     hal::Argument     own_id_{*this, "masternodeid", 127, "the master's id", {.min = 1, .max = 127}};
-    hal::TextArgument bit_rate_{*this, "bitrate", "", "of a bus in memory, bit/s; 1000000 if not given"};
+    hal::TextArgument bit_rate_{*this, "bitrate", "", "of the bus, bit/s; 1000000 if not given"};
     hal::TextArgument eds_{*this, "eds", "", "the node's device description"};
 
     std::string                  file_;
