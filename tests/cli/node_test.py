@@ -111,10 +111,19 @@ class Devices(Node):
         self.write_object(4, "1f51:1", "u8", "1")
         self.expect(device, "program 2.1 runs")
         self.assertEqual(0x20001, self.read(4, "1018:3", "u32"))
-        self.ended(device)
+        device.kill()  # it was kept at once
+        device.wait()
         self.assertEqual(image, (self.folder / "flash.bin").read_bytes())
         again = self.node("bootloader", "--id", 4, "--flash", "flash.bin")
         self.expect(again, "program 2.1 runs")
+
+    def test_a_flash_that_cannot_be_kept_is_said(self):
+        device = self.node("bootloader", "--id", 4, "--flash", "nowhere/flash.bin")
+        self.write_object(4, "1f51:1", "u8", "0")
+        self.expect(device, "bootloader; flash: no error")
+        self.write_object(4, "1f51:1", "u8", "3")
+        self.assertEqual("hal node bootloader: cannot write 'nowhere/flash.bin.new': No such file or directory\n", device.communicate(timeout=60)[1])
+        self.assertEqual(1, device.returncode)
 
     def test_faults(self):
         self.node("io", "--id", 5, "--fault", "wrong-revision", "--fault", "no-heartbeat", "--heartbeat", "10")

@@ -104,11 +104,12 @@ int run_node_bootloader(const Options& options) {
             return fail(options, problem);
     try {
         canopen::Bootloader program(std::move(settings));
-        const int status = run_node(options, {"bootloader", "program download after CiA 302"}, program);
-        if (!options.node.flash.empty() && program.changes() != 0)
-            if (const std::string problem = canopen::write_flash(options.node.flash, program.flash()); !problem.empty())
-                return fail(options, problem);
-        return status;
+        const auto keep = [&options, &program, kept = 0U]() mutable {
+            if (program.changes() == kept || options.node.flash.empty()) return std::string();
+            kept = program.changes();
+            return canopen::write_flash(options.node.flash, program.flash());
+        };
+        return run_node(options, {"bootloader", "program download after CiA 302", 0, keep}, program);
     } catch (const std::invalid_argument& e) {
         return fail(options, e.what());
     }

@@ -160,6 +160,8 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
             program.set(settings[next].name, settings[next].value);
         node.turn(now, about.simulated ? now : can::unclocked);
         if (!reporter.look(now)) return 1;
+        if (kind.keep)
+            if (const std::string problem = kind.keep(); !problem.empty()) return fail(options, problem);
         node.link().wait(1'000'000);
         now = now_ns();
     }

@@ -2,6 +2,7 @@
 // One device as a process: opens the bus, turns the node until somebody ends it, says what happens.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "canopen/devices/program.hpp"
@@ -14,6 +15,7 @@ struct NodeKind {
     std::string name;     ///< "drive"
     std::string what;     ///< "CiA 402, 2 axes"
     std::uint8_t id = 0;  ///< node-id when none is given; 0: one must be given
+    std::function<std::string()> keep = {};  ///< called in every turn: writes to disk what shall outlast the process. What is wrong, or nothing
 };
 
 /// Runs it, or prints its EDS, as the options say. Returns the exit code.

@@ -174,8 +174,9 @@ void Bootloader::written(Entry& e) noexcept {
 Abort Bootloader::Flash::open_write(Entry&, std::uint32_t size) noexcept {
     auto& d = device_;
     if (d.running_ || d.erasing_) return Abort::device_state;
-    if (d.used_ != 0) return d.error_ = FlashError::not_cleared, Abort::device_state;
+    if (d.used_ != 0 && !d.broken_off_) return d.error_ = FlashError::not_cleared, Abort::device_state;
     if (size > d.flash_.size()) return d.error_ = FlashError::address, Abort::too_long;
+    d.used_ = 0;
     d.writing_ = true;
     return Abort::none;
 }
@@ -192,8 +193,9 @@ Abort Bootloader::Flash::close(Entry&, bool writing, bool whole) noexcept {
     auto& d = device_;
     if (!writing) return Abort::none;
     d.writing_ = false;
+    d.broken_off_ = !whole;
     ++d.changes_;
-    if (!whole) {  // half a program is none, and the flash wants clearing
+    if (!whole) {  // half a program is none
         d.header_ = {}, d.identification_ = 0;
         if (d.error_ != FlashError::address) d.error_ = d.used_ == 0 ? FlashError::no_program : FlashError::wrong_data;
         return Abort::none;

@@ -83,6 +83,7 @@ private:
     std::uint32_t identification_ = 0;
     FlashError error_ = FlashError::no_program;
     bool running_ = false, writing_ = false, erasing_ = false, wants_reset_ = false, starts_ = false;
+    bool broken_off_ = false;  // a download was; it may be begun anew
     Time now_ = 0, erased_at_ = 0;
     unsigned changes_ = 0;
     Flash stream_{*this};

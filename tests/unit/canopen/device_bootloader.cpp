@@ -114,7 +114,6 @@ TEST_F(BootloaderDevice, survives_a_download_that_breaks_off) {
     bench.run(5 * millisecond);
     EXPECT_EQ(device.error(), FlashError::wrong_data);
     EXPECT_EQ(control(start), Abort::device_state);
-    stop_and_clear();
     ASSERT_EQ(bench.write(0x1f50, 1, update), Abort::none);
     ASSERT_EQ(control(start), Abort::none);
     EXPECT_EQ(device.version(), 0x00020001U);
