@@ -4,8 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <fmt/core.h>
 #include <optional>
+#include <unistd.h>
 
 #include "base/diagnostic.hpp"
 #include "base/types.hpp"
@@ -21,7 +25,7 @@ struct Subcommand {
     const char* name;     ///< more than one word in a group: "can dump"
     const char* usage;    ///< what may follow the name
     const char* summary;
-    int (*run)(const Options&);
+    int (*run)(const Options&);  ///< nullptr: in hal-bus
     void (*declare)(CLI::App&, Options&);
     bool verbatim = false;  ///< from the first word on everything belongs to the words, `-1` and `--` too
 };
@@ -345,6 +349,14 @@ void declare_node_bootloader(CLI::App& app, Options& o) {
 
 void declare_node_faults(CLI::App&, Options&) {}
 
+// What talks to a bus needs a third of the code, and other libraries: it is in the program hal-bus, which `hal` becomes then.
+// This source is compiled for both.
+#ifdef HALCYON_BUS_PROGRAM
+#define ON_BUS(run) run
+#else
+#define ON_BUS(run) nullptr
+#endif
+
 constexpr Subcommand table[] = {
     {"run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads", run_run, declare_run},
     {"sim", "FILE… [--for TIME] [-- ARG…]", "the same on a virtual clock: deterministic, as fast as it goes", run_sim, declare_sim},
@@ -358,31 +370,31 @@ constexpr Subcommand table[] = {
     {"explain", "[CODE]", "what a diagnostic means and what to do", run_explain, declare_explain},
     {"record", "[CHANNEL] [FILE]", "write what a sampler samples", run_record, declare_record},
     {"play", "[CHANNEL] [FILE]", "feed a streamer", run_play, declare_play},
-    {"can dump", "ADDRESS [--filter ID[/MASK]] [--for TIME] [--count N] [--json]", "the frames of a CAN bus, and what they mean", run_can_dump, declare_can_dump},
-    {"can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB", run_can_send, declare_can_send},
-    {"can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "write what is on a bus to a file", run_can_record, declare_can_record},
-    {"can replay", "FILE ADDRESS [--speed FACTOR]", "send what was recorded, at its times", run_can_replay, declare_can_replay},
-    {"can load", "ADDRESS [--for TIME]", "which identifiers fill the bus", run_can_load, declare_can_load},
-    {"can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take", run_can_nmt, declare_can_nmt},
-    {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", run_can_scan, declare_can_scan},
-    {"can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node", run_can_sdo_read, declare_can_sdo_read},
-    {"can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node", run_can_sdo_write, declare_can_sdo_write},
-    {"can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry", run_can_pdo_show, declare_can_pdo_show},
-    {"can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301", run_can_pdo_map, declare_can_pdo_map},
-    {"can pdo enable", "ADDRESS NODE PDO", "switch a PDO on", run_can_pdo_enable, declare_can_pdo_switch},
-    {"can pdo disable", "ADDRESS NODE PDO", "switch a PDO off", run_can_pdo_disable, declare_can_pdo_switch},
-    {"can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass", run_can_pdo_watch, declare_can_pdo_watch},
-    {"can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify", run_can_lss, declare_can_lss},
-    {"can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE]", "a CiA 309-3 gateway: programs command the network by lines of text", run_can_gateway, declare_can_gateway},
-    {"can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "a drive by hand: on, off, go, speed, stop, home, … or a shell of them", run_can_drive, declare_can_drive, true},
-    {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", run_can_eds_check, declare_can_eds_check},
-    {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", run_canopen_check, declare_canopen_check},
-    {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", run_canopen_plan, declare_canopen_plan},
-    {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", run_node_drive, declare_node_drive},
-    {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", run_node_io, declare_node_io},
-    {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", run_node_jr3, declare_node_jr3},
-    {"node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus", run_node_bootloader, declare_node_bootloader},
-    {"node faults", "", "what simulated devices can do wrong on purpose", run_node_faults, declare_node_faults},
+    {"can dump", "ADDRESS [--filter ID[/MASK]] [--for TIME] [--count N] [--json]", "the frames of a CAN bus, and what they mean", ON_BUS(run_can_dump), declare_can_dump},
+    {"can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB", ON_BUS(run_can_send), declare_can_send},
+    {"can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "write what is on a bus to a file", ON_BUS(run_can_record), declare_can_record},
+    {"can replay", "FILE ADDRESS [--speed FACTOR]", "send what was recorded, at its times", ON_BUS(run_can_replay), declare_can_replay},
+    {"can load", "ADDRESS [--for TIME]", "which identifiers fill the bus", ON_BUS(run_can_load), declare_can_load},
+    {"can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take", ON_BUS(run_can_nmt), declare_can_nmt},
+    {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", ON_BUS(run_can_scan), declare_can_scan},
+    {"can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node", ON_BUS(run_can_sdo_read), declare_can_sdo_read},
+    {"can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node", ON_BUS(run_can_sdo_write), declare_can_sdo_write},
+    {"can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry", ON_BUS(run_can_pdo_show), declare_can_pdo_show},
+    {"can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301", ON_BUS(run_can_pdo_map), declare_can_pdo_map},
+    {"can pdo enable", "ADDRESS NODE PDO", "switch a PDO on", ON_BUS(run_can_pdo_enable), declare_can_pdo_switch},
+    {"can pdo disable", "ADDRESS NODE PDO", "switch a PDO off", ON_BUS(run_can_pdo_disable), declare_can_pdo_switch},
+    {"can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass", ON_BUS(run_can_pdo_watch), declare_can_pdo_watch},
+    {"can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify", ON_BUS(run_can_lss), declare_can_lss},
+    {"can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE]", "a CiA 309-3 gateway: programs command the network by lines of text", ON_BUS(run_can_gateway), declare_can_gateway},
+    {"can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "a drive by hand: on, off, go, speed, stop, home, … or a shell of them", ON_BUS(run_can_drive), declare_can_drive, true},
+    {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", ON_BUS(run_can_eds_check), declare_can_eds_check},
+    {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", ON_BUS(run_canopen_check), declare_canopen_check},
+    {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", ON_BUS(run_canopen_plan), declare_canopen_plan},
+    {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", ON_BUS(run_node_drive), declare_node_drive},
+    {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", ON_BUS(run_node_io), declare_node_io},
+    {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", ON_BUS(run_node_jr3), declare_node_jr3},
+    {"node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus", ON_BUS(run_node_bootloader), declare_node_bootloader},
+    {"node faults", "", "what simulated devices can do wrong on purpose", ON_BUS(run_node_faults), declare_node_faults},
     {"doctor", "", "what on this machine spoils real time", run_doctor, declare_doctor},
     {"completion", "SHELL", "print a completion script: source <(hal completion bash)", run_completion, declare_completion},
 };
@@ -543,6 +555,13 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     return std::nullopt;
 }
 
+/// Does not return, unless there is no such program.
+int become_bus_program(char** argv) {
+    const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hal-bus");
+    ::execv(program.c_str(), argv);
+    return fail(Options{}, fmt::format("cannot start {}: {}; it belongs beside hal: build or install Halcyon again", program.string(), std::strerror(errno)));
+}
+
 }  // namespace
 
 int run_command_line(int argc, char** argv) {
@@ -553,6 +572,7 @@ int run_command_line(int argc, char** argv) {
     const auto [row, name_words] = find(all);
     if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
     if (!row) return no_such_command(all);
+    if (!row->run) return become_bus_program(argv);
     Options options;
     options.program = fmt::format("hal {}", row->name);
     if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, options)) return *end;

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Help, wrong words, explain, completion script, doctor."""
 import json
+import os
+import shutil
 import subprocess
 import unittest
 
@@ -27,6 +29,16 @@ class Help(Case):
 
     def test_version(self):
         self.assertRegex(self.good("--version"), r"^hal \d+\.\d+\.\d+\n$")
+
+
+class BusProgram(Case):
+    def test_a_missing_one_is_said(self):
+        alone = self.folder / "hal"
+        shutil.copy(HAL, alone)
+        done = subprocess.run([alone, "can", "dump", "can:can0"], capture_output=True, text=True,
+                              env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")))
+        self.assertEqual((1, f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it belongs beside hal: build or install Halcyon again\n"),
+                         (done.returncode, done.stderr))
 
 
 class WrongWords(Case):
