@@ -177,6 +177,7 @@ void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) no
 /// csp and ip: the command as it is, once it was joined to where the axis stands.
 void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const double asked = command.position;
+    if (!rules.position.sound()) return fail(Cause::bad_factor, rules.position.ratio(), 0.0);
     if (!(std::fabs(asked * rules.position.ratio()) < farthest_count)) return fail(Cause::bad_command, asked, 0.0);
     if (!following_) {
         const double away = position_ - asked;
@@ -199,6 +200,7 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
     } else {
         commanded_ = asked;
     }
+    if (!(std::fabs(commanded_ * rules.position.ratio()) < farthest_count)) return fail(Cause::bad_command, commanded_, 0.0);
     const auto count = static_cast<std::int64_t>(std::llround(commanded_ * rules.position.ratio()));
     orders_.target_position = Counter::low_bits(static_cast<std::uint32_t>(count), rules.counter_bits);
     const double error = std::fabs(commanded_ - position_);

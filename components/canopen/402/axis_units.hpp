@@ -12,7 +12,7 @@ namespace hal::canopen::cia402 {
 struct Factor {
     double numerator = 1.0, denominator = 1.0;
 
-    bool sound() const noexcept { return std::isfinite(ratio()) && ratio() != 0.0; }
+    bool sound() const noexcept { return std::fabs(ratio()) >= 1e-15 && std::fabs(ratio()) <= 1e15; }
     double ratio() const noexcept { return numerator / denominator; }
     double to_user(double drive) const noexcept { return drive / ratio(); }
     /// Rounded, and limited to what an integer of type T holds; what is not a number is 0. [any]

@@ -133,6 +133,14 @@ TEST(Axis, Refuses_what_is_no_number) {
     r.rules.position = {0, 1};
     EXPECT_FALSE(r.enable());
     EXPECT_EQ("enable: a scale is 0 or not a number (0)", r.why());
+    Pair s;
+    s.drive.out.position = 1000, s.command.position = 1000;
+    ASSERT_TRUE(s.enable()) << s.why();
+    s.cycle(5);
+    s.rules.position = {0, 1};
+    s.cycle();
+    EXPECT_EQ("run: a scale is 0 or not a number (0)", s.why());
+    EXPECT_EQ(1000, s.last.target_position);
 }
 
 TEST(Axis, Names_the_failing_step_and_switches_off) {
