@@ -22,7 +22,8 @@ set(HALCYON_COMPONENT_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/components")
 # No fused multiply-add behind our back: the same netlist gives the same bytes on every machine.
 add_compile_options(-Wall -Wextra -Wpedantic "$<$<COMPILE_LANGUAGE:CXX>:-Wconversion;-Wshadow>" -ffp-contract=off)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-    add_compile_options(-Wno-restrict -Wno-array-bounds)  # g++ 12 warns about its own std::string (GCC bugs 105651, 105329)
+    # g++ 12 warns about its own std::string and std::optional (GCC bugs 105651, 105329, 80635).
+    add_compile_options(-Wno-restrict -Wno-array-bounds -Wno-maybe-uninitialized)
 endif()
 if(HALCYON_WERROR)
     add_compile_options(-Werror)

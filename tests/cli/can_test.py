@@ -285,6 +285,7 @@ class Plan(Case):
         done = self.run_program("canopen", "plan", "arm.canopen")
         self.assertEqual(1, done.returncode)
         self.assertIn("17 frames with each SYNC of 1 ms take 1.895 ms at most: 189.5 %\n", done.stdout)
+        self.assertIn("  = help: the SYNC comes with each cycle of the thread, here taken as 1ms; for another period add: --cycle 2ms\n", done.stderr)
 
     def test_all_wrong_lines_are_named(self):
         self.write("plan.canopen", "[bus]\n[messages]\n0x100 = 9, 1ms\n0x100 = 8, soon\nxyz = 8, 1ms\n0x101 = 8\n0x102 = 8, 1ms\n0x102 = 4, 2ms\n0x103 = 8, 5\n")

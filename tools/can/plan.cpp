@@ -209,6 +209,8 @@ int run_canopen_plan(const Options& options) {
         if (!a.responses[i].in_time && ++late <= 3)
             said += fmt::format("{}:{}: {}\n", file, table.rows[i].line, why_late(table, messages, a, i));
     if (late > 3) said += fmt::format("{}: {} more are late\n", file, late - 3);
+    if (reading.config.sync != config::SyncMode::none && reading.config.sync_period == 0)
+        said += fmt::format("  = help: the SYNC comes with each cycle of the thread, here taken as {}; for another period add: --cycle 2ms\n", options.cycle);
     write_all(STDERR_FILENO, said + help_text(table, messages));
     return 1;
 }
