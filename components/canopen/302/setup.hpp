@@ -21,7 +21,7 @@ enum class Reaction : std::uint8_t {
 const char* word(Reaction) noexcept;
 
 /// The program of a node with a boot loader (CiA 302-3).
-struct Program {
+struct NodeProgram {
     std::uint8_t number = 1;             ///< sub-index of 1F50h, 1F51h, 1F56h, 1F57h
     std::uint32_t id = 0;                ///< what 1F56h shall say; 0: not checked
     std::string version{};               ///< what 100Ah shall say; empty: not checked
@@ -46,7 +46,7 @@ struct NodeSetup {
     std::uint32_t configuration_date = 0, configuration_time = 0;  ///< where 1020h says these, nothing is written (1F26h, 1F27h); 0: no
     bool restore = false;         ///< factory settings before it is configured (1011h; 1F81h bit 7)
     bool save = false;            ///< when something was written, it is saved (1010h)
-    Program program{};            ///< (1F81h bits 5 and 6)
+    NodeProgram program{};            ///< (1F81h bits 5 and 6)
 
     std::uint16_t heartbeat_ms = 100;   ///< what it shall produce (1017h); 0: its own, if any, counts
     Time heartbeat_limit = 0;           ///< silence that is a loss; 0: two and a half of its periods; < 0: it is not watched

@@ -162,7 +162,7 @@ void NodeReader::settings() {
 }
 
 void NodeReader::firmware() {
-    Program& p = node_.setup.program;
+    NodeProgram& p = node_.setup.program;
     if (const Line* line = keys_.find("firmware")) p.update = descriptions_.bytes(line->value, p.image, report_);
     keys_.take_small("firmware-number", p.number, 1, 254);
     keys_.take_small("firmware-id", p.id, 1, 0xffffffff);
