@@ -33,8 +33,8 @@ if(HALCYON_SANITIZE)
     add_compile_options("-fsanitize=${HALCYON_SANITIZE}" -fno-sanitize=null,alignment -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
     string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
     add_link_options("-fsanitize=${HALCYON_SANITIZE}")
-    set(HALCYON_TEST_OPTIONS -O0)  # of the tests' own sources: their assertions take longer to optimise than to run
 endif()
+set(HALCYON_TEST_OPTIONS -O0)  # of the tests' own sources: their assertions take longer to optimise than to run
 
 # ccache: the same object for the same text, wherever the tree lies.
 find_program(HALCYON_CCACHE ccache)

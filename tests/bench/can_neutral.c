@@ -223,7 +223,8 @@ static void upload(uint32_t size, int block, uint8_t* to) {
         while (f.can_id != 0x580 + node || (f.data[0] & 0xe3) != 0xc1);
         if (crc_of(to, size) != (f.data[1] | f.data[2] << 8)) fail("CRC of the upload");
         const uint8_t done[8] = {0xa1};
-        return put(0x600 + node, done, 8);
+        put(0x600 + node, done, 8);
+        return;
     }
 }
 static void transfers(const char* name, uint32_t size, int block) {

@@ -77,7 +77,7 @@ TEST(Page, troff_keeps_dots_and_backslashes) {
 
 /// A component in C: what it declares, and how it fails.
 extern "C" bool declare(const hal_host* host, void* memory) {
-    const hal_function_decl function{sizeof function, 0, "", "runs", [](void*, const hal_cycle*) {}, memory, memory};
+    const hal_function_decl function{sizeof function, 0, "", "runs", [](void*, const hal_cycle*) {}, memory, memory, nullptr};
     if (!host->function(host, &function)) return false;
     hal_pin_decl decl{};
     decl.size = sizeof decl;
