@@ -143,6 +143,18 @@ inline constexpr CodePage code_pages[] = {
      "A carriage return stands in the middle of a line. Such a line looks like several in an editor but is one for the netlist, so it "
      "is refused; other lines with the same fault are not listed.\n\n"
      "`tr '\\r' '\\n' < OLD > NEW` converts a file whose lines end in CR only."},
+    {"matrix-text",
+     "A file of matrices is NAME = and the numbers behind it, a row to a line or a `;` between rows, spaces or commas between numbers; `diag` before "
+     "the numbers of a diagonal; `#` before a comment. All rows of a matrix are of one length.\n\n"
+     "Example: `A = 0 1` and in the line below it `-2 -3`; `Q = diag 10 1`."},
+    {"matrix-value",
+     "A matrix can be read but does not do: its size does not go with the others', it should be symmetric or positive, or the plant that it "
+     "is part of cannot be steered or observed. The sentence names the mode or the state.\n\n"
+     "`hal doc COMPONENT` says what its matrices mean and which sizes they have."},
+    {"model-text",
+     "A file of a nonlinear model (`loadrt ekf model=FILE`) is lines of five kinds: `constant NAME = FORMULA`, `input NAME`, `state NAME = START sigma S noise N`, "
+     "`NAME' = FORMULA` for the derivative of each state, `measure NAME = FORMULA sigma S`. One of them cannot be read, names what is not there, or is missing.\n\n"
+     "Formulas have + - * / ^, brackets, pi, sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max. `hal doc ekf` has an example."},
     {"name-taken",
      "Pins, aliases, signals, functions, instances and threads have names of their own kind that stand for one thing; pins "
      "and signals share one set of names. The name is in use.\n\n"
@@ -250,6 +262,17 @@ inline constexpr CodePage code_pages[] = {
     {"substitution-too-long",
      "The values put in place of `$NAME` and `[SECTION]KEY` in one file are longer than 32 MB together. No machine needs that; a value is "
      "wrong, or a reference stands in a generated file far too often."},
+    {"tdma-line",
+     "A line of a TDMA schedule that means nothing where it stands: a block or key that does not exist, comes twice, or lacks its value; or "
+     "one that is missing, as the cycle.\n\n"
+     "Blocks are master:, backup-master:, slave:, as in RTnet's tdma.conf. docs/tdma.md lists their keys."},
+    {"tdma-schedule",
+     "A TDMA schedule that cannot work: slots in each other's time or beyond the cycle, a slot too short for its frame, a backup master that "
+     "decides before it can know, a station that cannot be calibrated. The sentence has the arithmetic, the help what to change.\n\n"
+     "`hal tdma plan FILE` shows a good one as a timeline."},
+    {"tdma-value",
+     "A value of a TDMA schedule that its key does not take. The help says what it takes.\n\n"
+     "Times are in microseconds, as RTnet writes them, or have a unit: 50, 50us, 1ms."},
     {"thread-refused",
      "The operating system gave no thread, mostly because a limit on processes or memory is reached: see `ulimit -a`."},
     {"too-many-errors",

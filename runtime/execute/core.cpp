@@ -34,16 +34,18 @@ std::int64_t monotonic_ns() noexcept {
 
 Core* Core::current() noexcept { return current_core; }
 
-Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, const std::atomic<bool>& running, bool measure)
-    : id_(id), period_ns_(period_ns), pins_(pins), board_(board), running_(running), measure_(measure) {
+Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,
+           const std::atomic<bool>& running, bool measure)
+    : id_(id), period_ns_(period_ns), pins_(pins), board_(board), timeline_(timeline), running_(running), measure_(measure) {
     info_.size = sizeof info_;
     info_.period_ns = period_ns;
     info_.period_s = static_cast<double>(period_ns) * 1e-9;
 }
 
-void Core::cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
+void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     current_core = this;
     const Guard guard;
+    grid_ns_ = grid_ns;
     info_.start_ns = due_ns;
     if (measure_) {
         busy_since_.store(woke_ns, std::memory_order_release);
@@ -263,6 +265,10 @@ void Core::make_safe() noexcept {
 void Core::raise(FaultEvent event) noexcept {
     board_.count(event, id_);
     faults_.push(event);  // when full the newest is lost but counted
+}
+
+void Core::step_clock(std::int64_t ns) noexcept {
+    if (in_function_) timeline_.step(grid_ns_, ns);
 }
 
 std::uint32_t Core::current_function() const noexcept {

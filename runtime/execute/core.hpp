@@ -9,6 +9,7 @@
 
 #include "execute/faults.hpp"
 #include "execute/histogram.hpp"
+#include "execute/timeline.hpp"
 #include "hal/abi.h"
 #include "hal/queue.hpp"
 #include "plan/plan.hpp"
@@ -37,11 +38,13 @@ struct ThreadPins {
 
 class Core {
 public:
-    Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, const std::atomic<bool>& running, bool measure);
+    Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,
+         const std::atomic<bool>& running, bool measure);
 
     // --- by the thread --------------------------------------------------------------------------------------------
-    /// One cycle that was due at `due_ns` and woke at `woke_ns`, just now: its execution time counts from there. [realtime]
-    void cycle(std::int64_t due_ns, std::int64_t woke_ns) noexcept;
+    /// The cycle at position `grid_ns`, which was due at `due_ns` and woke at `woke_ns`, just now: its execution time counts from
+    /// there. [realtime]
+    void cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept;
     /// Takes a new plan and writes, answers an observation: between two cycles. [realtime]
     void service() noexcept;
     /// Brings the memory of the next cycle into the caches, as far as it gets until `until_ns`. [realtime]
@@ -51,6 +54,8 @@ public:
     /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
     void make_safe() noexcept;
     void raise(FaultEvent event) noexcept;
+    /// Moves the grid for all positions after this cycle's; nothing outside a function. [realtime]
+    void step_clock(std::int64_t ns) noexcept;
 
     // --- by the session ---------------------------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
@@ -110,6 +115,7 @@ private:
     const std::int64_t period_ns_;
     const ThreadPins pins_;
     FaultBoard& board_;
+    Timeline& timeline_;
     const std::atomic<bool>& running_;
     const bool measure_;                  // false under the virtual clock: times are 0, so runs are identical
     std::atomic<plan::Plan*> inbox_{nullptr};         // written by the session, emptied by the thread
@@ -124,6 +130,7 @@ private:
     Queue<FaultEvent> faults_{256};                   // thread to session
     plan::Plan* plan_ = nullptr;          // the rest is the thread's own
     hal_cycle info_{};
+    std::int64_t grid_ns_ = 0;            // position of the cycle that runs
     const plan::Step* volatile current_ = nullptr;
     bool volatile in_function_ = false, initialising_ = false;
     bool safe_ = true;

@@ -34,6 +34,7 @@ constexpr std::size_t stack_bytes = 1 << 22;  // the sanitizer keeps more than h
 constexpr std::size_t stack_bytes = 1 << 20;
 #endif
 constexpr std::int64_t calm_ns = 5'000;  // before the deadline nothing but the clock is looked at
+constexpr std::int64_t look_ns = 1'000;  // how often a spinning thread looks whether its deadline has moved
 constexpr std::size_t signal_stack_bytes = 1 << 16;
 
 void prefault_stack() noexcept {
@@ -90,8 +91,9 @@ void unlist(Core* core) {
 }  // namespace
 
 struct Executor::Runner {
-    Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoard& board, const std::atomic<bool>& running, bool measure)
-        : core(id, o.period_ns, pins, board, running, measure), options(o) {
+    Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoard& board, Timeline& t, const std::atomic<bool>& running,
+           bool measure)
+        : core(id, o.period_ns, pins, board, t, running, measure), options(o), timeline(t) {
         core.budget_ns = o.budget_ns;
         core.profile_every = o.profile_every;
         wait.spin_ns = o.spin_ns >= 0 ? std::min(o.spin_ns, o.period_ns * 9 / 10) : Wait::default_spin_ns(o.period_ns);
@@ -99,9 +101,10 @@ struct Executor::Runner {
 
     Core core;
     CoreOptions options;
+    const Timeline& timeline;
     Wait wait;
     pthread_t thread{};
-    std::int64_t due_ns = 0;                  // virtual clock
+    std::int64_t grid_ns = 0;                 // position of the next cycle; the thread's, or the virtual clock's
     std::atomic<bool> quit{false}, ended{false}, ready{false};
     std::atomic<std::uint32_t> bell{0};       // futex of slow threads
     std::atomic<std::uint64_t> faults_before{0};
@@ -141,30 +144,67 @@ struct Executor::Runner {
         ready.store(true, std::memory_order_release);
     }
 
-    // The thread. Deadlines are epoch + k * period for ever: an overrun skips periods and keeps the phase.
-    void loop() noexcept {
-        set_up();
-        const std::int64_t period = options.period_ns;
-        std::int64_t due = epoch_ns + ((monotonic_ns() - epoch_ns) / period + 1) * period;
-        std::uint64_t served = 0;
-        while (!quit.load(std::memory_order_acquire)) {
+    // The first position that is due after `now_ns`.
+    void place(std::int64_t now_ns) noexcept {
+        const std::int64_t from = now_ns - timeline.shift_ns();
+        grid_ns = epoch_ns + ((from - epoch_ns) / options.period_ns + 1) * options.period_ns;
+        while (timeline.due_ns(grid_ns) <= now_ns) grid_ns += options.period_ns;
+    }
+
+    // Until a sleeper has to look whether its deadline has moved: no step is longer than a tenth of the time between two of them, so
+    // it cannot come before nine tenths of what is left. A spin window that is longer than that sees the steps anyway.
+    std::int64_t safe_until(std::int64_t due) const noexcept {
+        if (!timeline.led()) return due;
+        constexpr std::int64_t least_ns = 50'000;
+        const std::int64_t margin = (due - monotonic_ns()) / 10;
+        return margin <= std::max(wait.spin_ns, least_ns) ? due : due - margin + wait.spin_ns;
+    }
+
+    // Sleeps up to the spin window before the next deadline. False: called between two cycles.
+    bool sleep() noexcept {
+        for (;;) {
+            const std::int64_t due = timeline.due_ns(grid_ns), until = safe_until(due);
             if (callable()) {
                 const std::uint32_t heard = bell.load(std::memory_order_acquire);
                 core.service();  // what came before `heard` was read
-                if (!wait.sleep(due, bell, heard)) continue;  // called between two cycles
+                if (!wait.sleep(until, bell, heard)) return false;
             } else {
-                wait.sleep(due);
+                wait.sleep(until);
             }
-            core.warm(due - calm_ns);
-            const std::int64_t now = Wait::spin(due);
-            if (now >= due + period) {
-                const auto late = (now - due) / period;
+            if (until == due) return true;
+        }
+    }
+
+    struct Woken {
+        std::int64_t due_ns, now_ns;
+    };
+    // Spins to the deadline, wherever it is by then.
+    Woken spin() const noexcept {
+        for (;;) {
+            const Woken woken{timeline.due_ns(grid_ns), monotonic_ns()};
+            if (woken.now_ns >= woken.due_ns) return woken;
+            Wait::spin(std::min(woken.due_ns, woken.now_ns + look_ns));
+        }
+    }
+
+    // The thread. Positions are epoch + k * period for ever: an overrun skips periods and keeps the phase.
+    void loop() noexcept {
+        set_up();
+        place(monotonic_ns());
+        const std::int64_t period = options.period_ns;
+        std::uint64_t served = 0;
+        while (!quit.load(std::memory_order_acquire)) {
+            if (!sleep()) continue;
+            core.warm(timeline.due_ns(grid_ns) - calm_ns);
+            Woken woken = spin();
+            if (const std::int64_t late = (woken.now_ns - woken.due_ns) / period; late > 0) {
                 core.skip(static_cast<std::uint64_t>(late));
-                due += late * period;
+                grid_ns += late * period;
+                woken = spin();  // steps made meanwhile may have put this one later
             }
-            core.cycle(due, now);
+            core.cycle(grid_ns, woken.due_ns, woken.now_ns);
             if (++served == 100) faults_before.store(faults_of_this_thread(), std::memory_order_release);
-            due += period;
+            grid_ns += period;
         }
         core.make_safe();
         sigaltstack(&signal_stack_before, nullptr);
@@ -199,17 +239,18 @@ Executor::Runner& Executor::runner(const Core& core) const {
 }
 
 Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
-    auto owned = std::make_unique<Runner>(next_id_++, options, pins, board_, running_, !virtual_);
+    auto owned = std::make_unique<Runner>(next_id_++, options, pins, board_, timeline_, running_, !virtual_);
     Runner& runner = *owned;
     const auto place = std::upper_bound(runners_.begin(), runners_.end(), options.period_ns,
                                         [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
     runners_.insert(place, std::move(owned));
     list(&runner.core);
+    timeline_.bound(runners_.front()->options.period_ns);
+    runner.epoch_ns = epoch_ns_;
     if (virtual_) {
-        runner.due_ns = (virtual_now_ns_ / options.period_ns + 1) * options.period_ns;
+        runner.place(virtual_now_ns_);
         return runner.core;
     }
-    runner.epoch_ns = epoch_ns_;
     pthread_attr_t attributes;
     pthread_attr_init(&attributes);
     pthread_attr_setstacksize(&attributes, stack_bytes);
@@ -221,6 +262,7 @@ Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
     if (failed) {
         unlist(&runner.core);
         std::erase_if(runners_, [&](const auto& one) { return one.get() == &runner; });
+        timeline_.bound(runners_.empty() ? 0 : runners_.front()->options.period_ns);
         throw std::runtime_error(std::string("the system gives no thread: ") + std::strerror(failed));
     }
     while (!runner.ready.load(std::memory_order_acquire)) std::this_thread::yield();
@@ -247,6 +289,7 @@ bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     }
     unlist(&core);
     runners_.erase(at);
+    timeline_.bound(runners_.empty() ? 0 : runners_.front()->options.period_ns);
     return true;
 }
 
@@ -346,14 +389,30 @@ void Executor::advance(std::int64_t ns) {
     const std::int64_t end = virtual_now_ns_ + ns;
     for (;;) {
         Runner* next = nullptr;
+        std::int64_t next_ns = 0;
         for (const auto& runner : runners_)  // fastest first, so it wins at equal instants
-            if (runner->due_ns <= end && (!next || runner->due_ns < next->due_ns)) next = runner.get();
+            if (const std::int64_t due = timeline_.due_ns(runner->grid_ns); due <= end && (!next || due < next_ns)) {
+                next = runner.get();
+                next_ns = due;
+            }
         if (!next) break;
-        virtual_now_ns_ = next->due_ns;
-        next->core.cycle(next->due_ns, next->due_ns);
-        next->due_ns += next->options.period_ns;
+        virtual_now_ns_ = next_ns;
+        next->core.cycle(next->grid_ns, next_ns, next_ns);
+        next->grid_ns += next->options.period_ns;
     }
     virtual_now_ns_ = end;
+}
+
+void Executor::advance_cycles(const Core& core, std::uint64_t cycles) {
+    const Runner& of = runner(core);
+    if (!timeline_.led()) return advance(static_cast<std::int64_t>(cycles) * core.period_ns());
+    for (; cycles > 0; --cycles) advance(timeline_.due_ns(of.grid_ns) - virtual_now_ns_);
+}
+
+void Executor::lead() {
+    timeline_.lead();
+    for (const auto& runner : runners_)
+        if (!virtual_) call(*runner);
 }
 
 std::int64_t Executor::now_ns() const { return virtual_ ? virtual_now_ns_ : monotonic_ns(); }

@@ -59,6 +59,8 @@ public:
     /// Gives a running SCHED_FIFO thread another priority: a faster one has come, or one has gone.
     void set_priority(Core& core, int priority);
 
+    /// Virtual clock: runs until this thread has done so many cycles more, and what else is due until then. [setup]
+    void advance_cycles(const Core& core, std::uint64_t cycles);
     /// Virtual clock: runs every cycle due within the next `ns`, fastest thread first at equal instants.
     /// Real clock: waits so long.
     void advance(std::int64_t ns);
@@ -70,6 +72,10 @@ public:
     /// Page faults in the thread's cycles since its 100th.
     std::uint64_t page_faults(const Core& core) const;
     FaultBoard& board() { return board_; }
+    const Timeline& timeline() const { return timeline_; }
+    hal_clock& clock() { return timeline_.shared; }
+    /// Somebody will make steps: threads watch for them from now on, those that sleep long at once.
+    void lead();
 
     /// Memory locking and the CPU's sleep states, once per process. Returns what was refused: "memory locking", …
     static std::vector<std::string> prepare_process();
@@ -84,8 +90,9 @@ private:
     const bool virtual_;
     std::atomic<bool> running_{false};
     FaultBoard board_;
+    Timeline timeline_;
     std::vector<std::unique_ptr<Runner>> runners_;  // fastest first
-    std::int64_t epoch_ns_ = 0;      // all deadlines are epoch + k * period
+    std::int64_t epoch_ns_ = 0;      // all positions of the grid are epoch + k * period
     std::int64_t virtual_now_ns_ = 0;
     std::uint32_t next_id_ = 1;
 };

@@ -95,6 +95,7 @@ struct Instance {
     std::vector<std::pair<std::string, hal_stream*>> streams;
     std::vector<Pin*> finite;        ///< its declared-finite outputs
     bool constructed = false, started = false;
+    bool leads_clock = false;        ///< it makes the threads follow an outside beat
     Span loaded;
     std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances
 };

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <set>
 
+#include "execute/executor.hpp"
 #include "hal/naming.h"
 #include "hal/texts.h"
 
@@ -407,7 +408,8 @@ bool construct(Model& model, Edit& edit, Component& component, const LoadRequest
 namespace {
 struct Starting {
     Instance& instance;
-    const hal_faults* faults;
+    const Model& model;
+    Executor& executor;
     std::string failure;
 
     bool fail(const char* reason) noexcept {
@@ -429,10 +431,34 @@ bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) 
     }
 }
 constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};
+
+bool claim_clock(const hal_clock*, const hal_host* host) {
+    Starting& starting = *static_cast<Starting*>(host->data);
+    if (const Instance* const other = clock_leader(starting.model); other && other != &starting.instance) {
+        try {
+            return starting.fail(("the threads follow the beat of '" + other->name + "' (" + other->component->name +
+                                  "), and they can follow only one: let this one not follow, or unload '" + other->name + "' first")
+                                     .c_str());
+        } catch (const std::bad_alloc&) {
+            return starting.fail("the threads follow the beat of another instance, and they can follow only one");
+        }
+    }
+    starting.instance.leads_clock = true;
+    starting.executor.lead();
+    return true;
+}
 }  // namespace
 
-std::string start_instance(Instance& instance, const hal_faults* faults) {
-    Starting starting{instance, faults, {}};
+const Instance* clock_leader(const Model& model) {
+    for (const auto& component : model.components)
+        for (const auto& instance : component->instances)
+            if (instance->leads_clock) return instance.get();
+    return nullptr;
+}
+
+std::string start_instance(Instance& instance, const Model& model, Executor& executor) {
+    Starting starting{instance, model, executor, {}};
+    executor.clock().claim = claim_clock;
     const hal_host host{
         sizeof host, &starting,
         [](const hal_host* h, const hal_pin_decl*, hal_pin*) { return static_cast<Starting*>(h->data)->fail("pins are declared in the constructor, not in start"); },
@@ -442,12 +468,14 @@ std::string start_instance(Instance& instance, const hal_faults* faults) {
         [](const hal_host* h, const char* reason) { static_cast<Starting*>(h->data)->fail(reason ? reason : ""); },
         [](const hal_host* h, const char* id) -> const void* {
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
-            if (std::strcmp(id, "hal.faults/1") == 0) return static_cast<Starting*>(h->data)->faults;
+            if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
+            if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
             return nullptr;
         }};
     instance.started = instance.component->plugin->start(instance.memory, &host);
     if (instance.started) return {};
     instance.streams.clear();
+    instance.leads_clock = false;
     return starting.failure.empty() ? "it gave no reason" : starting.failure;
 }
 
@@ -457,6 +485,7 @@ void stop_instance(Instance& instance) noexcept {
     for (const plan::Step& step : instance.emergency) step.step(step.self, &none);
     instance.component->plugin->stop(instance.memory);
     instance.streams.clear();
+    instance.leads_clock = false;
     instance.started = false;
 }
 

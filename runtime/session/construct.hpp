@@ -12,6 +12,8 @@
 
 namespace hal {
 
+class Executor;
+
 /// A load argument as it was given.
 struct GivenArgument {
     std::string value;
@@ -35,7 +37,9 @@ bool construct_again(Model& beside, Edit& edit, const Component& old, Component&
 bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics);
 
 /// Starts one instance: it may acquire hardware. The reason of a refusal, or empty.
-std::string start_instance(Instance& instance, const hal_faults* faults);
+std::string start_instance(Instance& instance, const Model& model, Executor& executor);
+/// The instance that makes the threads follow an outside beat, or nullptr.
+const Instance* clock_leader(const Model& model);
 /// [setup] Not while a thread runs its functions.
 void stop_instance(Instance& instance) noexcept;
 void destroy_instance(Instance& instance) noexcept;

@@ -82,6 +82,16 @@ std::shared_ptr<void> open_copy(const std::string& path) {
             }};
 }
 
+/// The Debian package for want of which the build left a component out, or "": the build writes them down beside the plugins.
+std::string package_of(const std::string& name, const std::vector<std::string>& path) {
+    for (const std::string& folder : path) {
+        std::ifstream file(folder + "/absent");
+        for (std::string component, package; file >> component >> package;)
+            if (component == name) return package;
+    }
+    return {};
+}
+
 }  // namespace
 
 std::string user_folder(std::string_view kind) {
@@ -125,6 +135,11 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics&
             if (!found.empty()) break;
         }
     if (found.empty()) {
+        if (const std::string package = package_of(underlined, path_); !package.empty()) {
+            diagnostics.error("no-such-component", at, "component '" + std::string(name) + "' was left out of this build: it needs " + package, "",
+                              "apt-get install " + package + ", then build again");
+            return {};
+        }
         diagnostics.error("no-such-component", at, "there is no component '" + std::string(name) + "'", did_you_mean(name, available()), "hal doc lists all components");
         return {};
     }

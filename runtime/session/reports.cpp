@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model/check/check.hpp"
+#include "session/construct.hpp"
 #include "session/state.hpp"
 
 namespace hal {
@@ -154,6 +155,13 @@ std::vector<ThreadReport> Session::thread_reports() const {
     std::vector<ThreadReport> reports;
     for (const auto& thread : model().threads) reports.push_back(thread_report(*thread));
     return reports;
+}
+
+std::optional<ClockReport> Session::clock_report() const {
+    const Instance* const leader = clock_leader(model());
+    if (!leader) return {};
+    const Timeline& timeline = state_->executor->timeline();
+    return ClockReport{leader->name, timeline.shift_ns(), timeline.rate()};
 }
 
 std::vector<std::string> Session::missing_privileges() const {

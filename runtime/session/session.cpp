@@ -102,7 +102,7 @@ bool Session::State::carry_out(Diagnostics& diagnostics) {
 
     for (Instance* const instance : edit->added_instances()) {
         if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
-        if (const std::string why = start_instance(*instance, &executor->board().shared); !why.empty())
+        if (const std::string why = start_instance(*instance, model, *executor); !why.empty())
             diagnostics.error("start-failed", instance->loaded, "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
     }
     if (diagnostics.failed()) return false;
@@ -191,9 +191,10 @@ void Session::advance_cycles(std::uint64_t cycles) {
     const Thread& fastest = *s.model.threads.front();
     const Core* const core = s.core(&fastest);
     const std::uint64_t wanted = core->cycles.load() + cycles;
+    if (s.executor->is_virtual()) return s.executor->advance_cycles(*core, cycles);
     s.executor->advance(static_cast<std::int64_t>(cycles) * fastest.options.period_ns);
     // under the real clock periods may have been missed: cycles are what was asked for
-    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted && !s.executor->is_virtual(); ++turn) s.executor->advance(fastest.options.period_ns);
+    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted; ++turn) s.executor->advance(fastest.options.period_ns);
 }
 
 std::int64_t Session::now_ns() const { return state_->executor->now_ns(); }

@@ -58,6 +58,13 @@ struct ThreadReport {
     bool faulted = false;            ///< stopped by a fault
 };
 
+/// Who makes the threads follow an outside beat, and what it has come to.
+struct ClockReport {
+    std::string leader;              ///< an instance
+    std::int64_t shift_ns = 0;       ///< how much later than by their own clock the threads are due by now
+    double rate = 0;                 ///< how much longer their second has lately been: 200e-6 is 200 ppm
+};
+
 /// One recorded fault, worded.
 struct FaultRecord {
     std::uint64_t number = 0;
@@ -116,6 +123,7 @@ public:
     // --- reports ----------------------------------------------------------------------------------------------------
     std::vector<ThreadReport> thread_reports() const;
     ThreadReport thread_report(const Thread& thread) const;
+    std::optional<ClockReport> clock_report() const;  ///< nothing while the threads run by their own clock
     std::vector<FaultRecord> faults() const;
     std::uint64_t fault_count() const;
     void clear_faults();

@@ -51,7 +51,15 @@ void advance_cycles(Context& context, std::uint64_t cycles) {
                                   "make one with `newthread servo-thread 1000000`");
         return;
     }
-    if (session.options().virtual_clock) return advance_ns(context, static_cast<std::int64_t>(cycles) * session.model().threads.front()->options.period_ns);
+    if (session.options().virtual_clock) {
+        constexpr std::uint64_t piece = 1000;
+        for (; cycles > 0 && !context.interrupted(); cycles -= std::min(cycles, piece)) {
+            session.advance_cycles(std::min(cycles, piece));
+            context.lock.unlock();
+            context.lock.lock();
+        }
+        return;
+    }
     const std::string fastest = session.model().threads.front()->name;
     const std::uint64_t end = session.thread_report(*session.model().threads.front()).cycles + cycles;
     wait_for(context, [&] {

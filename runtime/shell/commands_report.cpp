@@ -7,6 +7,7 @@
 #include "shell/commands.hpp"
 #include "shell/json_text.hpp"
 #include "shell/describe.hpp"
+#include "shell/listing.hpp"
 
 namespace hal {
 namespace {
@@ -99,6 +100,7 @@ void show_timing(Context& context) {
                             figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns), figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
                             r.cpu >= 0 ? fmt::format(", CPU {}", r.cpu) : "", r.faulted ? ", stopped by a fault" : "");
     }
+    text += clock_text(context.session);
     text += "\nFunctions:                                    Mean       Max   Samples  Thread\n";
     std::vector<const Pin*> maxima;
     std::vector<const Function*> functions;

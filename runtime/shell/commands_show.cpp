@@ -123,6 +123,7 @@ void show_thread(Request& request) {
         }
         if (request.script()) request.text += '\n';
     }
+    if (!request.script()) request.text += clock_text(request.context.session);
     request.text += '\n';
 }
 

@@ -128,6 +128,7 @@ void describe_functions(std::string& to, Session& session, const Patterns& patte
 }
 
 void describe_threads(std::string& to, Session& session, const Patterns& patterns) {
+    const auto clock = session.clock_report();
     array(to, threads_slowest_first(session.model(), patterns), [&](const Thread* thread, std::size_t) {
         const ThreadReport report = session.thread_report(*thread);
         Object object(to);
@@ -146,6 +147,11 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
         object.real("busy_p50_ns", report.busy_p50_ns);
         object.real("busy_p99_ns", report.busy_p99_ns);
         object.real("busy_max_ns", report.busy_max_ns);
+        if (clock) {
+            object.text("clock_leader", clock->leader);
+            object.number("clock_shift_ns", clock->shift_ns);
+            object.real("clock_rate_ppm", clock->rate * 1e6);
+        }
         object.names("functions", thread->functions, [](const Function& function) { return function.name; });
         object.names("init", thread->init, [](const Function& function) { return function.name; });
     });

@@ -2,9 +2,12 @@
 #include "shell/listing.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 #include <fnmatch.h>
+
+#include "session/session.hpp"
 
 namespace hal {
 
@@ -58,6 +61,14 @@ std::vector<const Thread*> threads_slowest_first(const Model& model, const Patte
     for (auto thread = model.threads.rbegin(); thread != model.threads.rend(); ++thread)
         if (patterns.match((*thread)->name)) chosen.push_back(thread->get());
     return chosen;
+}
+
+std::string clock_text(const Session& session) {
+    const auto clock = session.clock_report();
+    if (!clock) return {};
+    const auto shift = static_cast<double>(clock->shift_ns);
+    return fmt::format("The threads follow the beat of {}: {} {} than by their own clock, of late {:+.1f} ppm\n", clock->leader,
+                       format_duration(std::abs(shift)), shift < 0 ? "earlier" : "later", clock->rate * 1e6);
 }
 
 const Component* owner(const Pin& pin) {

@@ -10,6 +10,8 @@
 
 namespace hal {
 
+class Session;
+
 /// LinuxCNC's patterns: one matches a name it is a prefix of, or as a shell glob. No pattern matches all.
 class Patterns {
 public:
@@ -38,6 +40,9 @@ std::vector<const Function*> functions_by_name(const Model& model, const Pattern
 std::vector<const Component*> components_newest_first(const Model& model, const Patterns& patterns);
 /// Slowest first, as LinuxCNC lists them.
 std::vector<const Thread*> threads_slowest_first(const Model& model, const Patterns& patterns);
+
+/// A line that says which beat the threads follow, and how that went so far; empty while they run by their own clock.
+std::string clock_text(const Session& session);
 
 /// Whose pin it is: the component of its instance or function, of a thread's own pins the one that
 /// made it; nullptr when nobody's.

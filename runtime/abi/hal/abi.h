@@ -200,6 +200,20 @@ typedef enum hal_fault_code {
     HAL_FAULT_NONE, HAL_FAULT_EXCEPTION, HAL_FAULT_NOT_FINITE, HAL_FAULT_BUDGET, HAL_FAULT_SILENT_THREAD, HAL_FAULT_COMPONENT
 } hal_fault_code;
 
+/* Extension "hal.clock/1": the grid of all threads' deadlines, which one instance may make follow an outside beat. */
+typedef struct hal_clock {
+    uint32_t size;
+    uint32_t pad;
+    int64_t shift_ns; /* sum of all steps; written by the host, read atomically [any] */
+    int64_t limit_ns; /* most that the steps of one cycle move the grid, either way: a tenth of the fastest thread's period; read
+                         atomically [any] */
+    /* [realtime] in a cycle, of the instance that leads only: what is due after this cycle comes so much later (negative: earlier), in all
+       threads, so that their phase to one another stays. hal_cycle.start_ns is the shifted time. */
+    void (*step)(const struct hal_clock *, int64_t ns);
+    /* [setup] in start: this instance leads until it is stopped. false, after fail(): another does. */
+    bool (*claim)(const struct hal_clock *, const hal_host *);
+} hal_clock;
+
 #ifndef HAL_EXPORT
 #define HAL_EXPORT __attribute__((visibility("default")))
 #endif

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// The deadline grid of all threads, and how an outside beat moves it.
+//
+// A thread's deadlines are positions on a grid, epoch + k * period, which never changes; where a position lies on the clock is the
+// position plus the shift. A step changes the shift for all positions after that of the cycle that makes it: threads that are due at
+// one position stay together, whichever of them has looked already, and their phase to one another is for ever what it was.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "hal/abi.h"
+
+namespace hal {
+
+class Timeline {
+public:
+    Timeline() noexcept;
+    Timeline(const Timeline&) = delete;
+
+    /// When position `grid_ns` is due, on the clock. [any]
+    std::int64_t due_ns(std::int64_t grid_ns) const noexcept {
+        for (;;) {
+            const std::uint32_t newest = newest_.load(std::memory_order_acquire);
+            const Step& step = steps_[newest & 1];
+            const std::int64_t shift = grid_ns > step.after.load(std::memory_order_acquire) ? step.shift.load(std::memory_order_acquire)
+                                                                                            : step.before.load(std::memory_order_acquire);
+            if (newest_.load(std::memory_order_relaxed) == newest) return grid_ns + shift;
+        }
+    }
+    /// A step of the cycle at position `grid_ns`; what exceeds the limit together with other steps of that cycle is cut off. One thread
+    /// makes steps at a time. [realtime]
+    void step(std::int64_t grid_ns, std::int64_t ns) noexcept;
+
+    std::int64_t shift_ns() const noexcept { return __atomic_load_n(&shared.shift_ns, __ATOMIC_RELAXED); }  ///< [any]
+    /// How much longer a second of the grid has lately been than a second of the clock, as a ratio: +200e-6 follows a beat that is
+    /// 200 ppm slow. 0 before the first second of steps. [any]
+    double rate() const noexcept { return rate_.load(std::memory_order_relaxed); }
+    /// The fastest thread has this period, 0: there is none. [setup]
+    void bound(std::int64_t fastest_period_ns) noexcept { __atomic_store_n(&shared.limit_ns, fastest_period_ns / 10, __ATOMIC_RELAXED); }
+    /// Somebody may make steps from now on, so that threads must look for them while they sleep. [setup]
+    void lead() noexcept { led_.store(true, std::memory_order_release); }
+    bool led() const noexcept { return led_.load(std::memory_order_acquire); }  ///< [any]
+
+    hal_clock shared{};  ///< given out as extension "hal.clock/1"; written with atomic builtins. The session puts `claim` in
+
+private:
+    // Two steps: the newest, and room for the next one. No reader waits for a writer that was interrupted:
+    //   1. reader sees newest = n        2. writer fills steps[(n + 1) & 1]      3. writer sets newest = n + 1     (release)
+    //   4. writer fills steps[n & 1]     (release, so that who sees a part of it sees 3)
+    //   5. reader, which has read a part of 4, finds newest changed and looks again. Before 3 nobody writes what it reads.
+    struct Step {
+        std::atomic<std::int64_t> after{INT64_MAX};  // positions up to this one have the shift `before`
+        std::atomic<std::int64_t> before{0}, shift{0};
+    };
+    Step steps_[2];                           // written by the thread that makes steps, read by all
+    std::atomic<std::uint32_t> newest_{0};
+    std::atomic<bool> led_{false};
+    std::atomic<double> rate_{0.0};
+    std::int64_t mark_grid_ns_ = 0, mark_shift_ns_ = 0;  // where the rate is counted from; the stepping thread's
+    bool marked_ = false;
+};
+
+}  // namespace hal

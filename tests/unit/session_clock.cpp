@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+// The disciplined clock: one instance moves the deadlines of all threads together.
+#include "machine.hpp"
+
+namespace hal::test {
+namespace {
+
+struct DisciplinedThreads : testing::Test {
+    DisciplinedThreads() {
+        machine.must("newthread f 1000000\nnewthread s 4000000");
+        machine.must("loadrt test-beat names=fast");
+        machine.must("loadrt test-beat names=slow lead=0");
+        machine.must("addf fast f\naddf slow s");
+    }
+    Machine machine;
+};
+
+TEST_F(DisciplinedThreads, A_step_moves_what_is_due_after_its_cycle_and_no_more) {
+    machine.start();
+    machine.cycles(2);
+    EXPECT_EQ(machine.number("fast.due"), 2'000'000);
+    machine.must("setp fast.step 300");
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("fast.due"), 3'000'000);
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("fast.due"), 4'000'300);
+    EXPECT_EQ(machine.number("fast.shift"), 600);
+}
+
+TEST_F(DisciplinedThreads, All_threads_keep_their_phase_to_one_another) {
+    machine.must("setp fast.step -20000");
+    machine.start();
+    for (int turn = 1; turn <= 50; ++turn) {
+        machine.cycles(4);
+        EXPECT_EQ(machine.number("slow.due"), machine.number("fast.due")) << turn;  // they are due at one position of the grid
+        EXPECT_EQ(machine.number("fast.due"), 4'000'000 * turn - 20'000 * (4 * turn - 1));
+    }
+}
+
+TEST_F(DisciplinedThreads, A_slow_thread_may_lead_a_fast_one) {
+    machine.must("unloadrt fast\nunloadrt slow\nloadrt test-beat names=fast lead=0");
+    machine.must("loadrt test-beat names=slow\naddf fast f\naddf slow s\nsetp slow.step 50000");
+    machine.start();
+    machine.cycles(4);
+    EXPECT_EQ(machine.number("fast.due"), 4'000'000);
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("fast.due"), 5'050'000);
+    machine.cycles(3);
+    EXPECT_EQ(machine.number("fast.due"), 8'050'000);
+    EXPECT_EQ(machine.number("slow.due"), 8'050'000);
+}
+
+TEST_F(DisciplinedThreads, The_steps_of_a_cycle_are_at_most_a_tenth_of_the_fastest_period) {
+    machine.start();
+    machine.must("setp fast.step 2000000000\nsetp fast.again 2000000000");
+    machine.cycles(3);
+    EXPECT_EQ(machine.number("fast.limit"), 100'000);
+    EXPECT_EQ(machine.number("fast.due"), 3'200'000);
+    machine.must("setp fast.step -2000000000\nsetp fast.again -2000000000");
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("fast.due"), 4'300'000);
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("fast.due"), 5'200'000);
+    machine.must("setp fast.step 70000\nsetp fast.again -30000");  // their sum counts
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("fast.shift"), 140'000);
+    machine.must("newthread faster 500000");
+    machine.cycles(2);
+    EXPECT_EQ(machine.number("fast.limit"), 50'000);
+}
+
+TEST_F(DisciplinedThreads, Threads_that_come_later_join_the_moved_grid) {
+    machine.must("setp fast.step 1000");
+    machine.start();
+    machine.cycles(6);
+    machine.must("setp fast.step 0");
+    machine.must("newthread n 2000000\nloadrt test-beat names=new lead=0\naddf new n");
+    machine.cycles(6);
+    EXPECT_EQ(machine.number("fast.due"), 12'006'000);
+    EXPECT_EQ(machine.number("new.due"), 12'006'000);
+    machine.must("delthread s");
+    machine.cycles(2);
+    EXPECT_EQ(machine.number("new.due"), 14'006'000);
+    EXPECT_EQ(machine.number("fast.backwards") + machine.number("new.backwards"), 0);
+}
+
+TEST_F(DisciplinedThreads, A_grid_that_goes_back_loses_no_cycle) {
+    machine.must("setp fast.step -100000");
+    machine.start();
+    machine.session.advance_ns(90'100'000);
+    EXPECT_EQ(machine.number("fast.due"), 90'100'000);
+    EXPECT_EQ(machine.number("fast.shift"), -10'000'000);
+    EXPECT_EQ(machine.session.thread_reports()[0].cycles, 100u);
+    EXPECT_EQ(machine.session.thread_reports()[1].cycles, 25u);
+}
+
+TEST_F(DisciplinedThreads, A_second_leader_is_refused_and_told_who_leads) {
+    machine.refused("loadrt test-beat names=other", "start-failed");
+    EXPECT_NE(machine.said.find("'other' (test-beat) cannot start: the threads follow the beat of 'fast' (test-beat), and they can "
+                                "follow only one: "
+                                "let this one not follow, or unload 'fast' first"),
+              std::string::npos)
+        << machine.said;
+    machine.must("unloadrt fast");
+    machine.must("loadrt test-beat names=other");
+    EXPECT_EQ(machine.session.clock_report()->leader, "other");
+}
+
+TEST_F(DisciplinedThreads, A_leader_may_be_exchanged_in_one_edit) {
+    machine.must("setp fast.step 5000");
+    machine.start();
+    machine.cycles(10);
+    machine.must("unloadrt fast\nloadrt test-beat names=other\naddf other f");
+    machine.cycles(1);
+    EXPECT_EQ(machine.number("other.due"), 11'050'000) << "the grid stays where it was brought to";
+    EXPECT_EQ(machine.session.clock_report()->leader, "other");
+    machine.must("unloadrt other");
+    EXPECT_FALSE(machine.session.clock_report());
+}
+
+TEST_F(DisciplinedThreads, An_edit_that_is_undone_claims_nothing) {
+    machine.must("unloadrt fast");
+    EXPECT_FALSE(machine.edit("loadrt test-beat names=a\nloadrt test-beat names=b"));
+    EXPECT_FALSE(machine.session.clock_report());
+    machine.must("loadrt test-beat names=a");
+    EXPECT_TRUE(machine.session.clock_report());
+}
+
+TEST_F(DisciplinedThreads, The_report_says_who_leads_where_and_how_fast) {
+    machine.must("setp fast.step 200");
+    machine.start();
+    machine.cycles(2500);
+    const auto report = machine.session.clock_report();
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->leader, "fast");
+    EXPECT_EQ(report->shift_ns, 500'000);
+    EXPECT_NEAR(report->rate, 200e-6, 1e-9);
+}
+
+TEST(DisciplinedRealThreads, Follow_steps_while_they_sleep_and_keep_their_phase) {
+    Machine machine(Clock::real);
+    machine.must("newthread f 1000000\nnewthread s 20000000\nnewthread ss 100000000\nloadrt test-beat names=fast");
+    machine.must("loadrt test-beat names=slow lead=0");
+    machine.must("loadrt test-beat names=slower lead=0");
+    machine.must("addf fast f\naddf slow s\naddf slower ss");
+    machine.must("setp fast.step -50000");
+    machine.start();
+    EXPECT_TRUE(eventually([&] { return machine.session.thread_reports()[2].cycles >= 4; }));
+    machine.must("setp fast.step 0");
+    machine.session.advance_ns(250'000'000);
+    // what was due last in each thread, brought back to the grid, is a multiple of the periods apart
+    const std::int64_t fast = machine.number("fast.due"), slow = machine.number("slow.due"), slower = machine.number("slower.due");
+    EXPECT_EQ((fast - slow) % 1'000'000, 0);
+    EXPECT_EQ((slow - slower) % 20'000'000, 0);
+    EXPECT_LT(machine.number("fast.shift"), 0);
+    EXPECT_EQ(machine.number("fast.backwards") + machine.number("slow.backwards") + machine.number("slower.backwards"), 0);
+}
+
+}  // namespace
+}  // namespace hal::test
