@@ -4,7 +4,9 @@
 #include <charconv>
 #include <exception>
 #include <optional>
+#include <utility>
 
+#include "cane/cane.hpp"
 #include "canudp/canudp.hpp"
 #include "link/can.hpp"
 #include "replay/replay.hpp"
@@ -19,9 +21,11 @@ namespace {
 struct Driver {
     std::string_view name;
     Opened (*open)(const std::string& place, const Options&);
+    bool (*is_own_option)(std::string_view key) = nullptr;  ///< those stay behind the place, for the driver itself to read
 };
 constexpr Driver drivers[] = {
-    {"can", socketcan::open}, {"sim", simbus::open}, {"udp", canudp::open}, {"slcan", slcan::open}, {"replay", replay::open},
+    {"can", socketcan::open}, {"sim", simbus::open},       {"udp", canudp::open},
+    {"slcan", slcan::open},   {"replay", replay::open},    {"cane", cane::open, cane::is_own_option},
 };
 
 std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
@@ -87,18 +91,23 @@ Opened open(std::string_view address, const Options& given) {
         auto place = address.substr(colon + 1);
         const auto question = place.find('?');
         auto rest = question == place.npos ? std::string_view{} : place.substr(question + 1);
-        place = place.substr(0, question);
+        std::string where(place.substr(0, question));
+        const char* separator = "?";
         while (!rest.empty()) {
             const auto end = std::min(rest.find('&'), rest.size());
             const auto item = rest.substr(0, end);
             rest.remove_prefix(std::min(end + 1, rest.size()));
             const auto equals = std::min(item.find('='), item.size());
             const bool has_value = equals < item.size();
+            if (driver.is_own_option != nullptr && driver.is_own_option(item.substr(0, equals))) {
+                where.append(std::exchange(separator, "&")).append(item);
+                continue;
+            }
             auto problem = apply(item.substr(0, equals), has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
             if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
         }
         try {
-            auto opened = driver.open(std::string(place), options);
+            auto opened = driver.open(where, options);
             if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
             return opened;
         } catch (const std::exception& e) {
@@ -107,7 +116,7 @@ Opened open(std::string_view address, const Options& given) {
     }
     return {nullptr, quoted(address) +
                          " is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0 or replay:FILE"};
+                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE"};
 }
 
 }  // namespace hal::can

@@ -29,6 +29,13 @@ public:
         head_.store(head + 1, std::memory_order_release);
         return true;
     }
+    /// The place of the next item, to be filled and then put in by commit(), or nullptr when full: an item that is large and mostly
+    /// empty is not copied whole. [realtime] writer
+    T* place() noexcept {
+        const auto head = head_.load(std::memory_order_relaxed);
+        return head - tail_.load(std::memory_order_acquire) > mask_ ? nullptr : &items_[head & mask_];
+    }
+    void commit() noexcept { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
     /// The oldest item, or nullptr; it stays until pop(). [realtime] reader
     T* front() noexcept { return at(0); }
     /// The item `n` behind the oldest, or nullptr. [realtime] reader

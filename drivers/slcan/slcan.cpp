@@ -87,6 +87,7 @@ public:
     }
 
     void flush(std::int64_t) noexcept override {
+        if (state() == State::down) return forget();
         for (;;) {
             while (text_size_ + longest_line <= sizeof text_) {
                 const Frame* f = outgoing_.front();
@@ -171,6 +172,11 @@ private:
     bool hung_up() const noexcept {
         pollfd p{line_.get(), 0, 0};
         return ::poll(&p, 1, 0) > 0 && (p.revents & (POLLHUP | POLLERR)) != 0;
+    }
+    /// What was to be sent is old when the line is back, and half a line would spoil the first new one. The sending thread's.
+    void forget() noexcept {
+        text_size_ = 0;
+        for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
     }
     void lose() noexcept { counting_.state.store(State::down, std::memory_order_relaxed); }
 

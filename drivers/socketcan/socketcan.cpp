@@ -26,6 +26,8 @@ namespace {
 
 constexpr std::size_t batch = 32;  // frames per system call
 constexpr std::size_t most_filters = CAN_RAW_FILTER_MAX;
+constexpr timeval patience{0, 20'000};  // of a receive that waits; the kernel adds up to a tick of its timer, 1 to 10 ms
+constexpr std::int64_t patience_ns = patience.tv_usec * 1000LL;
 
 template <class T>
 bool set(int fd, int level, int name, const T& value) {
@@ -34,7 +36,7 @@ bool set(int fd, int level, int name, const T& value) {
 
 /// A raw socket with all options, bound; nothing and `problem` when it cannot be had.
 Descriptor make_socket(int index, const Options& o, const std::vector<can_filter>& filters, std::string& problem) {
-    Descriptor fd(::socket(AF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
+    Descriptor fd(::socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
     if (!fd) {
         const int error = errno;
         if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT)
@@ -59,6 +61,7 @@ Descriptor make_socket(int index, const Options& o, const std::vector<can_filter
         setsockopt(fd.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size() * sizeof(can_filter)));
     set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
     set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
+    set(fd.get(), SOL_SOCKET, SO_RCVTIMEO, patience);
     const int room = static_cast<int>(std::min<std::size_t>(o.receive_capacity, 65536) * 1024);  // the kernel's cost of a frame
     if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
     sockaddr_can address{};
@@ -83,6 +86,10 @@ public:
                         counting_.data_rate, options.fd, false};
         for (std::size_t i = 0; i < batch; ++i) {
             parts_[i] = {&raw_[i], sizeof raw_[i]};
+            in_[i].msg_hdr.msg_iov = &parts_[i];
+            in_[i].msg_hdr.msg_iovlen = 1;
+            in_[i].msg_hdr.msg_control = control_[i];
+            in_[i].msg_hdr.msg_controllen = sizeof control_[i];
             out_parts_[i] = {&out_raw_[i], 0};
             out_[i].msg_hdr = {};
             out_[i].msg_hdr.msg_iov = &out_parts_[i];
@@ -116,7 +123,7 @@ public:
                 out_parts_[count].iov_len = to_kernel(*f, out_raw_[count]);
             }
             if (count == 0) return;
-            const int sent = ::sendmmsg(socket_.get(), out_, static_cast<unsigned>(count), MSG_DONTWAIT | MSG_NOSIGNAL);
+            const int sent = hand_over(count);
             const int error = errno;
             for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
             if (sent > 0) outgoing_.pop(static_cast<std::size_t>(sent));
@@ -134,10 +141,11 @@ public:
     }
 
     std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
-        if (now_ns != unclocked && now_ns == drained_at_) return 0;  // a cycle asks the kernel once when that was enough
+        if (std::exchange(waited_, false)) refilled_at_ = now_ns;
+        else if (now_ns != unclocked && now_ns == drained_at_) return 0;  // a cycle asks the kernel once when that was enough
         std::size_t count = 0;
         while (count < room.size()) {
-            if (next_ == filled_ && !refill(now_ns)) break;
+            if (next_ == filled_ && ((count != 0 && last_batch_short_) || !refill(now_ns))) break;
             room[count++] = buffer_[next_++];
         }
         return count;
@@ -163,7 +171,26 @@ public:
         return setsockopt(socket_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, kernel.data(), size) == 0;
     }
     const Description& description() const noexcept override { return description_; }
-    bool wait(std::int64_t at_most_ns) override { return next_ != filled_ || readable_within(socket_.get(), at_most_ns); }
+    /// What has come is received by the call that waits for it: poll and receive would be two, and as dear as the rest of a transfer. That
+    /// call's time-out is coarse, so the end of the time is waited for by poll.
+    bool wait(std::int64_t at_most_ns) override {
+        if (next_ != filled_) return true;
+        for (std::int64_t until = 0; at_most_ns >= patience_ns;) {
+            // Asking for a second frame where frames come one by one costs a tenth of the first: only now and then, or when many came.
+            const bool many = several_ || ++waits_ % 8 == 0;
+            if (const int got = take_batch(MSG_WAITFORONE, many ? batch : 1, unclocked); got > 0) {
+                if (many) several_ = got > 1;
+                else last_batch_short_ = true;  // what may be behind it comes with the next wait
+                return waited_ = true;
+            }
+            if (errno == EINTR) return false;
+            if (errno != EAGAIN) return true;
+            const auto now = monotonic_ns();
+            if (until == 0) until = now + at_most_ns - patience_ns;
+            at_most_ns = until - now;
+        }
+        return readable_within(socket_.get(), at_most_ns);
+    }
     int descriptor() const noexcept override { return socket_.get(); }
 
 private:
@@ -174,23 +201,38 @@ private:
             last_batch_short_ = false;
             return false;
         }
-        for (std::size_t i = 0; i < batch; ++i) {
-            in_[i].msg_hdr = {};
-            in_[i].msg_hdr.msg_iov = &parts_[i];
-            in_[i].msg_hdr.msg_iovlen = 1;
-            in_[i].msg_hdr.msg_control = control_[i];
-            in_[i].msg_hdr.msg_controllen = sizeof control_[i];
-        }
-        const int got = ::recvmmsg(socket_.get(), in_, batch, MSG_DONTWAIT, nullptr);
-        if (got < 0 && (errno == ENETDOWN || errno == ENODEV || errno == ENXIO)) lose_interface();
-        next_ = filled_ = 0;
-        const auto offset = got > 0 || now_ns == unclocked ? real_to_monotonic_ns() : 0;
-        counting_.tick(now_ns != unclocked ? now_ns : monotonic_ns());
+        const int got = take_batch(MSG_DONTWAIT, batch, now_ns);
         refilled_at_ = now_ns;
-        last_batch_short_ = got < static_cast<int>(batch);
-        for (int i = 0; i < got; ++i) take(in_[i], raw_[i], offset);
-        if (filled_ == 0 && now_ns != unclocked && last_batch_short_) drained_at_ = now_ns;
+        if (filled_ == 0 && now_ns != unclocked && got < static_cast<int>(batch)) drained_at_ = now_ns;
         return filled_ != 0;
+    }
+
+    /// One system call: what it took from the kernel, or -1 and errno.
+    int take_batch(int flags, std::size_t most, std::int64_t now_ns) noexcept {
+        for (; used_ > 0; --used_) in_[used_ - 1].msg_hdr.msg_controllen = sizeof control_[0];
+        next_ = filled_ = 0;
+        const int got = ::recvmmsg(socket_.get(), in_, static_cast<unsigned>(most), flags, nullptr);
+        const int error = errno;
+        last_batch_short_ = got < static_cast<int>(most);
+        if (got < 0 && (error == ENETDOWN || error == ENODEV || error == ENXIO)) lose_interface();
+        if (got > 0 || now_ns == unclocked) {
+            const auto monotonic = monotonic_ns();
+            counting_.tick(now_ns != unclocked ? now_ns : monotonic);
+            const auto offset = monotonic - clock_ns(CLOCK_REALTIME);
+            for (int i = 0; i < got; ++i) take(in_[i], raw_[i], offset);
+            used_ = static_cast<std::size_t>(got > 0 ? got : 0);
+        } else {
+            counting_.tick(now_ns);
+        }
+        errno = error;
+        return got;
+    }
+
+    /// What is ready in out_, in one system call: how many were taken, or -1 and errno.
+    int hand_over(std::size_t count) noexcept {
+        constexpr int flags = MSG_DONTWAIT | MSG_NOSIGNAL;
+        if (count > 1) return ::sendmmsg(socket_.get(), out_, static_cast<unsigned>(count), flags);
+        return ::send(socket_.get(), out_raw_, out_parts_[0].iov_len, flags) < 0 ? -1 : 1;
     }
 
     void take(const mmsghdr& message, const canfd_frame& raw, std::int64_t offset) noexcept {
@@ -277,7 +319,9 @@ private:
     Frame buffer_[batch];
     std::size_t next_ = 0, filled_ = 0;
     std::int64_t drained_at_ = unclocked, refilled_at_ = unclocked;
-    bool last_batch_short_ = false;
+    std::size_t used_ = 0;  // how many of in_ the last batch wrote to
+    bool last_batch_short_ = false, waited_ = false, several_ = false;
+    unsigned waits_ = 0;
     std::uint32_t lost_before_ = 0;
 
     Keeper keeper_;  // last: its thread uses all of the above, and ends first

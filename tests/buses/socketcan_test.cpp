@@ -104,6 +104,44 @@ TEST_F(Socketcan, bursts_lose_nothing) {
     EXPECT_EQ(b->statistics().lost, 0U);
 }
 
+TEST_F(Socketcan, waiting_takes_what_comes_one_by_one_and_in_bursts_and_keeps_the_order) {
+    auto a = link("can:vcan0"), b = link("can:vcan0");
+    std::uint32_t sent = 0, got = 0;
+    const auto take = [&](std::int64_t now_ns) {
+        Frame room[7];
+        for (std::size_t count; (count = b->receive(room, now_ns)) > 0;)
+            for (std::size_t n = 0; n < count; ++n, ++got) ASSERT_EQ(room[n].id, got & 0x7ffU);
+    };
+    for (const unsigned burst : {1U, 1U, 2U, 1U, 40U, 1U, 100U, 31U, 32U, 33U, 1U, 1U, 1U, 1U, 1U, 1U, 1U, 1U, 1U}) {
+        for (unsigned n = 0; n < burst; ++n, ++sent) ASSERT_EQ(a->send({sent & 0x7ffU, {}}, unclocked), Sent::queued);
+        a->flush(unclocked);
+        while (got < sent) {
+            ASSERT_TRUE(b->wait(2'000'000'000));
+            const auto before = got;
+            take(burst % 2 == 0 ? unclocked : monotonic_ns());
+            ASSERT_GT(got, before) << "there was something to receive, said wait()";
+        }
+    }
+    EXPECT_EQ(b->statistics().received, sent);
+}
+
+TEST_F(Socketcan, waiting_ends_when_nothing_comes) {
+    auto a = link("can:vcan0"), b = link("can:vcan0");
+    for (const std::int64_t at_most : {0, 1'000'000, 20'000'000, 70'000'000}) {
+        const auto began = monotonic_ns();
+        EXPECT_FALSE(b->wait(at_most));
+        EXPECT_GE(monotonic_ns() - began, at_most);
+        Frame f;
+        EXPECT_FALSE(b->receive(f, monotonic_ns()));
+    }
+    const auto before = monotonic_ns();  // a cycle that found nothing, then waited, is told in the same cycle
+    Frame f;
+    EXPECT_FALSE(b->receive(f, before));
+    a->send({0x7, {}}, unclocked), a->flush(unclocked);
+    EXPECT_TRUE(b->wait(2'000'000'000));
+    EXPECT_TRUE(b->receive(f, before));
+}
+
 TEST_F(Socketcan, a_full_queue_of_the_interface_is_waited_out) {
     auto a = link("can:vxcan0"), b = link("can:vxcan1");
     run("ip link set vxcan0 txqueuelen 2");
@@ -130,6 +168,7 @@ TEST_F(Socketcan, an_interface_goes_down_and_comes_up) {
     Frame f;
     EXPECT_TRUE(next(*b, f));
     EXPECT_EQ(a->statistics().restarts, 1U);
+    EXPECT_FALSE(a->wait(50'000'000));  // on the new socket, too, it ends
 }
 
 TEST_F(Socketcan, an_interface_is_removed_and_comes_back) {

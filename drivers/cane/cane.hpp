@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string_view>
+
+#include "link/can.hpp"
+
+namespace hal::can::cane {
+
+/// Whether `key` belongs to this driver rather than to every CAN link. [setup]
+bool is_own_option(std::string_view key);
+
+/// `cane:IF?key=value`: CAN messages in Ethernet frames. `place` has the driver's own options behind it. [setup]
+Opened open(const std::string& place, const Options&);
+
+}  // namespace hal::can::cane

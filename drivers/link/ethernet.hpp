@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+// The seam to every Ethernet segment: frames, launch times, timestamps, link state, statistics. An address picks the driver:
+// `eth:enp3s0` a real interface, `sim:NAME` a segment in memory with true wire times, `replay:FILE` a capture. Who opens `sim:NAME` is
+// a station of its own; all who open `sim:NAME/STATION` share that station's line and address, as the users of one interface do.
+//
+//     auto opened = hal::ethernet::open("eth:enp3s0", {.types = {0x9021}});   // [setup]
+//     if (!opened) throw std::runtime_error(opened.problem);
+//     ...
+//     while (auto arrival = port.receive(now_ns)) take(*arrival);             // in the cycle; now_ns is the start of the cycle
+//     port.send(frame, {.at_ns = slot_ns, .stamp_at = 22}, now_ns);           // leaves in its slot, stamped when it leaves
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hal::ethernet {
+
+#pragma GCC visibility push(default)
+
+/// "I have no cycle": as `now_ns`, for threads that do not know the runtime's time. A segment in memory takes the newest it was told.
+inline constexpr std::int64_t unclocked = INT64_MIN;
+
+using Address = std::array<std::uint8_t, 6>;
+inline constexpr Address broadcast{0xff, 0xff, 0xff, 0xff, 0xff, 0xff};
+
+inline constexpr std::size_t header_bytes = 14;   ///< destination, source, type
+inline constexpr std::size_t smallest_frame = 60; ///< without the check sequence; the driver pads with zeros
+inline constexpr std::size_t largest_frame = 1514;
+
+/// Bytes that a frame of `length` (without check sequence) occupies the wire for: preamble, check sequence and gap included, at
+/// least 84 (IEEE 802.3 clause 4.2.3.2, 4.4.2). [any]
+constexpr std::size_t wire_bytes(std::size_t length) noexcept { return (length < smallest_frame ? smallest_frame : length) + 24; }
+
+/// A frame that came. `bytes` is valid until the next receive() or wait() on the same port.
+struct Arrival {
+    std::span<const std::uint8_t> bytes;  ///< from the destination address on, without check sequence
+    std::int64_t time_ns = 0;             ///< when it arrived, stamped by the kernel or the segment, on the clock of `now_ns`
+};
+
+/// When and how a frame leaves.
+struct Launch {
+    std::int64_t at_ns = 0;       ///< not before; 0: at once
+    std::int64_t guard_ns = 0;    ///< not when it would leave later than this after `at_ns`: it is dropped and counted as late; 0: whenever
+    std::uint16_t stamp_at = 0;   ///< place in the frame where 8 bytes, big endian, receive the time of sending; 0: none
+    std::int64_t stamp_add_ns = 0;///< added to that time: from the clock of `now_ns` to the one that the receiver expects
+
+    /// A frame of `length` bytes is one, and holds the stamp. [any]
+    bool fits(std::size_t length) const noexcept {
+        return length >= header_bytes && (stamp_at == 0 || stamp_at + std::size_t{8} <= length);
+    }
+    /// [any]
+    bool is_late(std::int64_t time_ns) const noexcept { return at_ns != 0 && guard_ns > 0 && time_ns > at_ns + guard_ns; }
+};
+
+enum class Sent : std::uint8_t {
+    queued,  ///< it has left, or will at its time
+    full,    ///< no room, or too far ahead for a port without pacer; dropped and counted
+    late,    ///< its time and guard had passed; dropped and counted
+    down,    ///< no link; dropped and counted
+    refused, ///< longer than the segment takes, or shorter than a header; dropped and counted
+};
+const char* word(Sent) noexcept;
+
+struct Statistics {
+    bool up = true;               ///< the link has a carrier
+    std::uint32_t speed = 0;      ///< Mbit/s; 0: not known
+    std::uint32_t mtu = 1500;
+    std::uint64_t sent = 0, sent_bytes = 0;
+    std::uint64_t received = 0, received_bytes = 0;
+    std::uint64_t lost = 0;       ///< frames of others that found no room here, as far as can be known
+    std::uint64_t dropped = 0;    ///< own frames that did not leave, late ones apart
+    std::uint64_t late = 0;       ///< own frames dropped because their time had passed
+    std::uint64_t errors = 0;     ///< frames too short or too long, failed calls
+    std::uint64_t downs = 0;      ///< times the link went away
+    std::int64_t launch_error_ns = 0;  ///< how much later than asked the newest timed frame left
+    std::int64_t departure_ns = 0;     ///< when the newest frame left by the kernel's stamp; 0: it was not asked for, or gives none
+};
+
+/// How a port waits in wait().
+enum class Policy : std::uint8_t {
+    hybrid,  ///< asleep until `spin_ns` before the end, then looking all the time
+    block,   ///< asleep until a frame or the end comes
+    spin,    ///< looking all the time: for an isolated CPU
+};
+
+struct Options {
+    std::vector<std::uint16_t> types{};  ///< Ethertypes that are received; empty: all
+    Address address{};                   ///< own address on a segment in memory; zeros: one is given. On a real interface: its own
+    Policy policy = Policy::hybrid;
+    std::int64_t spin_ns = 150'000;
+    bool pacer = false;                  ///< a thread of the port launches frames whose time has not come; without it send() waits at
+                                         ///< most `spin_ns` for the time and refuses what is further off
+    int pacer_priority = 80, pacer_cpu = -1;
+    bool transmit_stamps = false;        ///< the kernel stamps what leaves: true times in Statistics, for two system calls a frame
+    bool promiscuous = false;            ///< frames to other stations are received too
+    std::uint32_t speed = 0;             ///< Mbit/s of a segment in memory; 0: as it is, 100 when it is new
+    std::size_t send_capacity = 64;
+    std::size_t receive_capacity = 256;  ///< frames
+};
+
+/// What a port is, in words.
+struct Description {
+    std::string address;    ///< as it was opened
+    std::string transport;  ///< "raw Ethernet", "segment in memory", "capture"
+    std::string interface;
+    bool simulated = false; ///< no hardware, time is the runtime's
+    std::string remark{};   ///< what it does not have here, in a sentence; empty: nothing
+};
+
+class Segment;  // link/segment.hpp
+
+/// One user's end of a segment. Opened and destroyed in setup; one thread sends, one receives; they may be two. Nothing here locks
+/// or allocates, except what is marked [setup]; nothing waits except wait() and a send() whose time is near.
+class Port {
+public:
+    virtual ~Port() = default;
+    Port() = default;
+    Port(const Port&) = delete;
+    Port& operator=(const Port&) = delete;
+
+    virtual const Address& address() const noexcept = 0;
+    /// The frame is whole: destination, source, type, payload; it is copied. [realtime] sender
+    virtual Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept = 0;
+    /// The next frame in order of arrival, or nothing. [realtime] receiver
+    virtual std::optional<Arrival> receive(std::int64_t now_ns) noexcept = 0;
+    /// Waits by the port's policy until receive() has something or the time has come; true: it has. Not on a segment in memory,
+    /// where time does not pass by waiting. [realtime], in a thread or function whose work it is to wait. receiver
+    virtual bool wait(std::int64_t until_ns) noexcept = 0;
+
+    virtual Statistics statistics() const noexcept = 0;            ///< [any]
+    virtual const Description& description() const noexcept = 0;   ///< [setup]
+    /// [setup] A descriptor that polls readable when something may have come, or -1.
+    virtual int descriptor() const noexcept { return -1; }
+    /// [setup] What can be disturbed on a segment in memory; nullptr on all others.
+    virtual Segment* segment() noexcept { return nullptr; }
+};
+
+struct Opened {
+    std::unique_ptr<Port> port;
+    std::string problem;  ///< a sentence: what, why, what to type
+    explicit operator bool() const noexcept { return port != nullptr; }
+};
+
+/// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&…`: `speed=100`, `policy=block`, `spin=50us`, `mac=02:00:00:00:00:07`,
+/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`. They win over the options given.
+Opened open(std::string_view address, const Options& options = {});
+
+/// "02:00:00:00:00:07", and back; nothing when it is none. [any]
+std::string to_string(const Address&);
+std::optional<Address> parse_address(std::string_view text) noexcept;
+
+/// A discipline (TDMA) that decides when frames may leave on its segment. Other users of the segment hand their frames to it.
+class Discipline {
+public:
+    virtual ~Discipline() = default;
+    /// Queues a frame for slot `slot` (RTnet's slot id; 0 the default one), `priority` 0 first … 31 last. It leaves in the slot's
+    /// next turn. [realtime] the thread of the discipline's transmit function
+    virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority) noexcept = 0;
+    /// Payload bytes that a frame in this slot may have; 0: there is no such slot. [any]
+    virtual std::size_t room(unsigned slot) const noexcept = 0;
+    /// The station may send: synchronous and calibrated. [any]
+    virtual bool ready() const noexcept = 0;
+    virtual const Address& address() const noexcept = 0;  ///< [any]
+};
+
+/// What a user of a discipline holds: the discipline itself may go, and another one come in its place, while the user is at work.
+class DisciplineSeat {
+public:
+    /// Calls `use` with the discipline, which stays until that returns; false, and nothing done, when there is none. [realtime]
+    template <class Use>
+    bool with(Use use) noexcept {
+        users_.fetch_add(1);
+        Discipline* const now = discipline_.load();
+        if (now != nullptr) use(*now);
+        users_.fetch_sub(1);
+        return now != nullptr;
+    }
+    /// [setup] nullptr: it goes; waits until nobody uses it.
+    void set(Discipline* discipline) noexcept;
+    bool holds(const Discipline* discipline) const noexcept { return discipline_.load() == discipline; }  ///< [any]
+
+private:
+    std::atomic<Discipline*> discipline_{nullptr};  // written by set(), read by users
+    std::atomic<unsigned> users_{0};
+};
+
+/// The disciplines of this process, by the address of their port without options ("eth:enp3s0"). [setup]
+/// False: there is one already. It has to be withdrawn before it is destroyed.
+bool offer_discipline(std::string_view address, Discipline* discipline);
+void withdraw_discipline(Discipline* discipline);
+/// nullptr: there is none now.
+std::shared_ptr<DisciplineSeat> discipline_of(std::string_view address);
+
+#pragma GCC visibility pop
+
+}  // namespace hal::ethernet

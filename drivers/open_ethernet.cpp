@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// From an address to a driver of an Ethernet segment: the one list of them.
+#include <algorithm>
+#include <charconv>
+#include <exception>
+
+#include "link/ethernet.hpp"
+#include "rawether/rawether.hpp"
+#include "replay/ethernet.hpp"
+#include "simbus/segment.hpp"
+
+namespace hal::ethernet {
+
+namespace {
+
+struct Driver {
+    std::string_view name;
+    Opened (*open)(const std::string& place, const Options&);
+};
+constexpr Driver drivers[] = {
+    {"eth", rawether::open}, {"sim", simbus::open}, {"replay", replay::open},
+};
+
+std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+template <class T>
+std::string to_number(std::string_view key, std::string_view value, T& to, long least, long most) {
+    long number = 0;
+    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
+    if (wrong != std::errc{} || end != value.data() + value.size() || number < least || number > most)
+        return std::string(key) + " is " + quoted(value) + "; write a whole number from " + std::to_string(least) + " to " +
+               std::to_string(most);
+    to = static_cast<T>(number);
+    return {};
+}
+
+/// 150us, 1ms, 20000ns.
+std::string to_duration(std::string_view key, std::string_view value, std::int64_t& to) {
+    double number = 0;
+    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
+    const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
+    number *= unit == "ns" ? 1.0 : unit == "us" ? 1e3 : unit == "ms" ? 1e6 : -1.0;
+    if (wrong != std::errc{} || !(number >= 0.0 && number <= 1e9))
+        return std::string(key) + " is " + quoted(value) + "; write a time up to a second with its unit, as in 150us";
+    to = static_cast<std::int64_t>(number);
+    return {};
+}
+
+std::string to_policy(std::string_view value, Policy& to) {
+    constexpr std::string_view words[] = {"hybrid", "block", "spin"};
+    const auto* const found = std::find(std::begin(words), std::end(words), value);
+    if (found == std::end(words)) return "policy is " + quoted(value) + "; write hybrid, block or spin";
+    to = static_cast<Policy>(found - std::begin(words));
+    return {};
+}
+
+/// What is wrong with `key=value`, or nothing.
+std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
+    const auto to_flag = [&](bool& flag) -> std::string {
+        if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
+        flag = !has_value || value == "1";
+        return {};
+    };
+    if (key == "policy") return to_policy(value, o.policy);
+    if (key == "spin") return to_duration(key, value, o.spin_ns);
+    if (key == "pacer") return to_flag(o.pacer);
+    if (key == "priority") return to_number(key, value, o.pacer_priority, 1, 99);
+    if (key == "cpu") return to_number(key, value, o.pacer_cpu, 0, 1023);
+    if (key == "promiscuous") return to_flag(o.promiscuous);
+    if (key == "txstamps") return to_flag(o.transmit_stamps);
+    if (key == "speed") return to_number(key, value, o.speed, 1, 100'000);
+    if (key == "sendqueue") return to_number(key, value, o.send_capacity, 1, 4096);
+    if (key == "receivequeue") return to_number(key, value, o.receive_capacity, 1, 16384);
+    if (key == "mac") {
+        const auto address = parse_address(value);
+        if (!address || ((*address)[0] & 1) != 0 || *address == Address{})
+            return "mac is " + quoted(value) + "; write the address of one station, as in 02:00:00:00:00:07";
+        o.address = *address;
+        return {};
+    }
+    return "there is no option " + quoted(key) +
+           "; there are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, sendqueue, receivequeue";
+}
+
+}  // namespace
+
+Opened open(std::string_view address, const Options& given) {
+    const auto colon = address.find(':');
+    const auto name = address.substr(0, colon);
+    for (const auto& driver : drivers) {
+        if (driver.name != name || colon == address.npos) continue;
+        Options options = given;
+        auto place = address.substr(colon + 1);
+        const auto question = place.find('?');
+        auto rest = question == place.npos ? std::string_view{} : place.substr(question + 1);
+        place = place.substr(0, question);
+        while (!rest.empty()) {
+            const auto end = std::min(rest.find('&'), rest.size());
+            const auto item = rest.substr(0, end);
+            rest.remove_prefix(std::min(end + 1, rest.size()));
+            const auto equals = std::min(item.find('='), item.size());
+            const bool has_value = equals < item.size();
+            auto problem = apply(item.substr(0, equals), has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
+            if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
+        }
+        try {
+            auto opened = driver.open(std::string(place), options);
+            if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
+            return opened;
+        } catch (const std::exception& e) {
+            return {nullptr, std::string(address) + ": " + e.what()};
+        }
+    }
+    return {nullptr, quoted(address) + " is no address of an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
+                                       "sim:NAME for a segment in memory or replay:FILE"};
+}
+
+}  // namespace hal::ethernet

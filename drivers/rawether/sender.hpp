@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// Frames to the interface, past its queueing discipline, so that nothing of ours waits behind something else.
+#pragma once
+
+#include <atomic>
+#include <string>
+
+#include "link/ethernet.hpp"
+#include "link/system.hpp"
+#include "rawether/clock.hpp"
+
+namespace hal::ethernet::rawether {
+
+class Sender {
+public:
+    explicit Sender(RealTime& clock) noexcept : clock_(clock) {}
+
+    /// What is wrong, or nothing. [setup]
+    std::string open(bool transmit_stamps);
+    /// [setup] keeper
+    bool bind(int index) noexcept;
+
+    /// The frame leaves now, if it is not late; stamped, if it wants to be. Any thread; several at a time. [realtime]
+    Sent leave(std::span<const std::uint8_t> frame, const Launch&) noexcept;
+    /// A frame that this cannot send for another reason than those leave() finds. [realtime]
+    Sent drop(Sent why) noexcept;
+    /// Forgets an error that the kernel kept from when the interface was down. [setup] keeper
+    void forget() noexcept;
+
+    std::atomic<bool> up{false};            ///< written by the keeper
+    std::atomic<std::uint32_t> mtu{1500};   ///< written by the keeper
+    std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, dropped{0}, late{0}, errors{0};
+    std::atomic<std::int64_t> launch_error_ns{0}, departure_ns{0};
+
+private:
+    void read_stamps() noexcept;
+
+    RealTime& clock_;
+    can::Descriptor socket_;
+    bool transmit_stamps_ = false;
+};
+
+}  // namespace hal::ethernet::rawether

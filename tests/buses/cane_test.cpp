@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: MIT
+// CAN in Ethernet frames: bytes worked out by hand, hostile ones, and links on a segment in memory.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "cane/format.hpp"
+#include "cane/stations.hpp"
+#include "link/can.hpp"
+#include "link/segment.hpp"
+
+namespace hal::can::cane {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Frame message(std::uint32_t id, std::initializer_list<std::uint8_t> data) { return {id, data}; }
+
+/// A packed Ethernet frame from one station to all.
+Bytes packed(std::initializer_list<Frame> messages, Stamp stamp = {}) {
+    Bytes whole(ethernet::largest_frame);
+    std::fill_n(whole.begin(), 6, std::uint8_t{0xff});
+    whole[6] = 2, whole[11] = 9, whole[12] = 0x90, whole[13] = 0x23;
+    std::size_t at = ethernet::header_bytes + packed_header;
+    for (const auto& f : messages) at += put_packed(f, std::span(whole).subspan(at));
+    whole.resize(at);
+    close_packed(whole, static_cast<std::uint8_t>(messages.size()), stamp);
+    return whole;
+}
+
+TEST(CaneSingle, is_what_the_source_system_sends) {
+    std::array<std::uint8_t, 64> room{};
+    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::big, room), 8U);
+    EXPECT_EQ(Bytes(room.begin(), room.begin() + 8), (Bytes{0, 0, 1, 0x81, 3, 1, 2, 3}));
+    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::little, room), 8U);
+    EXPECT_EQ(Bytes(room.begin(), room.begin() + 8), (Bytes{0x81, 1, 0, 0, 3, 1, 2, 3}));
+    ASSERT_EQ(put_single(Frame::request(0x1abcdef0, 4), Order::big, room), 5U);
+    EXPECT_EQ(Bytes(room.begin(), room.begin() + 5), (Bytes{0xda, 0xbc, 0xde, 0xf0, 4}));
+    Frame back;
+    EXPECT_EQ(get_single(std::span(room).first(46), Order::big, back), Wrong::none);
+    EXPECT_TRUE(back.same(Frame::request(0x1abcdef0, 4)));
+}
+
+TEST(CaneSingle, refuses_what_is_no_message) {
+    Frame f;
+    const auto wrong = [&](Bytes payload) { return get_single(payload, Order::big, f); };
+    EXPECT_EQ(wrong({0, 0, 1, 0x81}), Wrong::cut);
+    EXPECT_EQ(wrong({0, 0, 1, 0x81, 8, 1, 2}), Wrong::cut);
+    EXPECT_EQ(wrong({0, 0, 1, 0x81, 9, 1, 2, 3, 4, 5, 6, 7, 8, 9}), Wrong::form);
+    EXPECT_EQ(wrong({0, 0, 8, 0, 0}), Wrong::form);        // 0x800 has no 11 bits
+    EXPECT_EQ(wrong({0x20, 0, 1, 0x81, 0}), Wrong::form);  // an error frame
+    const auto other = packed({message(0x80, {})});
+    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::big, f), Wrong::version);
+    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::little, f), Wrong::version);
+}
+
+TEST(CanePacked, is_as_its_description_says) {
+    const auto whole = packed({message(0x080, {}), message(0x201, {0xaa, 0xbb}), Frame::request(0x1abcdef0, 3)}, {0x1234, 0x5678});
+    const Bytes payload(whole.begin() + 14, whole.end());
+    const Bytes head{0xec, 1, 3, 0xec, 0x34, 0x12, 0x78, 0x56};
+    EXPECT_EQ(Bytes(payload.begin(), payload.begin() + 8), head);
+    EXPECT_EQ(Bytes(payload.begin() + 10, payload.end()),
+              (Bytes{0x80, 0x00, 0x01, 0x22, 0xaa, 0xbb, 0x00, 0xf0, 0xf0, 0xde, 0xbc, 0xda, 3}));
+    const std::string known = "123456789";  // the check value of CRC-16 with this polynomial and beginning
+    EXPECT_EQ(crc16({reinterpret_cast<const std::uint8_t*>(known.data()), known.size()}), 0x29b1);
+    Unpacker u;
+    ASSERT_EQ(u.open(whole), Wrong::none);
+    EXPECT_EQ(u.stamp().session, 0x1234);
+    EXPECT_EQ(u.stamp().sequence, 0x5678);
+    Frame f;
+    ASSERT_TRUE(u.next(f) && f.same(message(0x080, {})));
+    ASSERT_TRUE(u.next(f) && f.same(message(0x201, {0xaa, 0xbb})));
+    ASSERT_TRUE(u.next(f) && f.same(Frame::request(0x1abcdef0, 3)));
+    EXPECT_FALSE(u.next(f));
+}
+
+TEST(CanePacked, takes_no_frame_with_a_byte_changed_or_cut_off) {
+    const auto whole = packed({message(0x080, {}), message(0x201, {1, 2, 3, 4, 5, 6, 7, 8}), message(0x601, {0x40})});
+    Unpacker u;
+    ASSERT_EQ(u.open(whole), Wrong::none);
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+        for (unsigned change = 1; change < 256; ++change) {
+            auto other = whole;
+            other[at] = static_cast<std::uint8_t>(other[at] ^ change);
+            if (at == 12 || at == 13) continue;  // another Ethertype does not come here
+            EXPECT_NE(u.open(other), Wrong::none) << "byte " << at << " with " << change;
+        }
+        EXPECT_NE(u.open(std::span(whole).first(at)), Wrong::none) << "cut to " << at;
+    }
+    auto padded = whole;
+    padded.resize(60);
+    EXPECT_EQ(u.open(padded), Wrong::none);
+}
+
+TEST(CanePacked, survives_random_bytes_with_a_right_check_sequence) {
+    std::mt19937 random(1);
+    for (int n = 0; n < 20000; ++n) {
+        Bytes whole(ethernet::header_bytes + packed_header + random() % 64);
+        for (auto& b : whole) b = static_cast<std::uint8_t>(random());
+        close_packed(whole, static_cast<std::uint8_t>(random() % 12), {});
+        Unpacker u;
+        if (u.open(whole) != Wrong::none) continue;
+        Frame f;
+        unsigned count = 0;
+        for (; u.next(f); ++count) EXPECT_TRUE(f.valid());
+        EXPECT_EQ(count, u.messages());
+    }
+}
+
+constexpr Address a{2, 0, 0, 0, 0, 1}, b{2, 0, 0, 0, 0, 2}, c{2, 0, 0, 0, 0, 3};
+
+TEST(CaneNodes, where_a_node_lives_is_learnt_from_what_it_sends) {
+    Nodes nodes;
+    EXPECT_FALSE(nodes.where(0x205, false));
+    EXPECT_TRUE(nodes.learn(0x705, b, 0));
+    EXPECT_EQ(nodes.where(0x205, false), b);
+    EXPECT_EQ(nodes.where(0x605, false), b);
+    EXPECT_FALSE(nodes.where(0x080, false));
+    EXPECT_FALSE(nodes.where(0x000, false));
+    EXPECT_FALSE(nodes.where(0x7e5, false));
+    EXPECT_FALSE(nodes.where(0x585, false));  // nobody asked yet
+    nodes.learn(0x605, a, 0);
+    EXPECT_EQ(nodes.where(0x585, false), a);
+    EXPECT_FALSE(nodes.where(0x185, true));
+    nodes.learn(0x000, c, 0);
+    EXPECT_EQ(nodes.where(0x185, true), c);
+    EXPECT_FALSE(nodes.where(0x185, false));
+}
+
+TEST(CaneNodes, one_heard_from_two_stations_is_reached_by_all_until_one_is_silent) {
+    Nodes nodes;
+    nodes.learn(0x705, b, 0);
+    EXPECT_FALSE(nodes.learn(0x705, c, 1000));
+    EXPECT_FALSE(nodes.where(0x205, false));
+    EXPECT_FALSE(nodes.learn(0x705, b, 2000));
+    EXPECT_TRUE(nodes.learn(0x705, b, 1000 + Nodes::moved_after_ns));
+    EXPECT_EQ(nodes.where(0x205, false), b);
+    EXPECT_TRUE(nodes.learn(0x705, c, 2000 + 2 * Nodes::moved_after_ns));  // it was replaced
+    EXPECT_EQ(nodes.where(0x205, false), c);
+}
+
+TEST(CaneNodes, a_fixed_one_stays) {
+    Nodes nodes;
+    nodes.fix(5, b);
+    EXPECT_FALSE(nodes.learn(0x705, c, 0));
+    EXPECT_EQ(nodes.where(0x205, false), b);
+}
+
+TEST(CaneStreams, copies_and_overtaken_frames_are_old_and_gaps_are_counted) {
+    Streams s;
+    EXPECT_TRUE(s.take(a, true, {1, 10}, 0).fresh);
+    EXPECT_FALSE(s.take(a, true, {1, 10}, 0).fresh);
+    EXPECT_TRUE(s.take(a, false, {1, 3}, 0).fresh);  // to one and to all are counted apart
+    const auto later = s.take(a, true, {1, 14}, 0);
+    EXPECT_TRUE(later.fresh);
+    EXPECT_EQ(later.lost, 3U);
+    EXPECT_FALSE(s.take(a, true, {1, 12}, 0).fresh);
+    EXPECT_TRUE(s.take(a, true, {2, 0}, 0).fresh);       // it was started again
+    EXPECT_TRUE(s.take(a, true, {1, 0xffff}, 0).fresh == false);
+    EXPECT_TRUE(s.take(b, true, {7, 0xffff}, 0).fresh);
+    EXPECT_TRUE(s.take(b, true, {7, 0}, 0).fresh);       // wraps
+}
+
+TEST(CaneStreams, find_back_when_it_is_the_memory_that_is_wrong) {
+    Streams s;
+    s.take(a, true, {1, 30000}, 0);
+    int refused = 0;
+    for (std::uint16_t n = 0; n < 20; ++n) refused += s.take(a, true, {1, n}, 0).fresh ? 0 : 1;
+    EXPECT_EQ(refused, 8);
+}
+
+std::unique_ptr<Link> opened(const std::string& address) {
+    auto o = can::open(address);
+    EXPECT_TRUE(o) << o.problem;
+    return std::move(o.link);
+}
+
+std::vector<Frame> all_of(Link& link, std::int64_t now) {
+    std::vector<Frame> frames;
+    for (Frame f; link.receive(f, now);) frames.push_back(f);
+    return frames;
+}
+
+TEST(CaneLink, carries_many_messages_in_one_frame_to_all_others) {
+    auto x = opened("cane:sim:many"), y = opened("cane:sim:many"), z = opened("cane:sim:many");
+    auto listener = ethernet::open("sim:many");
+    ASSERT_TRUE(listener);
+    for (std::uint8_t n = 1; n <= 6; ++n) ASSERT_EQ(x->send(message(0x200U + n, {n}), 0), Sent::queued);
+    x->send(message(0x080, {}), 0);
+    x->flush(0);
+    for (auto* link : {y.get(), z.get()}) {
+        const auto got = all_of(*link, 1'000'000);
+        ASSERT_EQ(got.size(), 7U);
+        EXPECT_TRUE(got[0].same(message(0x201, {1})));
+        EXPECT_TRUE(got[6].same(message(0x080, {})));
+        EXPECT_EQ(got[0].time_ns, got[6].time_ns);
+        EXPECT_GT(got[0].time_ns, 0);
+    }
+    EXPECT_TRUE(all_of(*x, 1'000'000).empty());
+    EXPECT_TRUE(listener.port->receive(1'000'000));
+    EXPECT_FALSE(listener.port->receive(1'000'000)) << "one frame was enough";
+    EXPECT_EQ(x->statistics().sent, 7U);
+    EXPECT_EQ(y->statistics().received, 7U);
+}
+
+TEST(CaneLink, process_data_goes_before_the_rest) {
+    auto x = opened("cane:sim:order"), y = opened("cane:sim:order");
+    x->send(message(0x605, {0x40}), 0);
+    x->send(message(0x080, {}), 0);
+    x->flush(0);
+    const auto got = all_of(*y, 1'000'000);
+    ASSERT_EQ(got.size(), 2U);
+    EXPECT_EQ(got[0].id, 0x080U);
+}
+
+TEST(CaneLink, a_message_for_one_node_goes_to_its_station_alone) {
+    auto master = opened("cane:sim:one"), five = opened("cane:sim:one"), six = opened("cane:sim:one");
+    five->send(message(0x705, {0}), 0);
+    five->flush(0);
+    ASSERT_EQ(all_of(*master, 1'000'000).size(), 1U);
+    all_of(*six, 1'000'000);
+    master->send(message(0x605, {0x40}), 1'000'000);
+    master->flush(1'000'000);
+    EXPECT_EQ(all_of(*five, 2'000'000).size(), 1U);
+    EXPECT_TRUE(all_of(*six, 2'000'000).empty());
+    five->send(message(0x585, {0x43}), 2'000'000);
+    five->flush(2'000'000);
+    EXPECT_EQ(all_of(*master, 3'000'000).size(), 1U);
+    EXPECT_TRUE(all_of(*six, 3'000'000).empty());
+}
+
+TEST(CaneLink, single_frames_carry_one_message_each_in_the_order_asked_for) {
+    auto x = opened("cane:sim:single?format=single&order=little"), y = opened("cane:sim:single?format=single&order=little");
+    auto other = opened("cane:sim:single?format=single");
+    auto listener = ethernet::open("sim:single");
+    x->send(message(0x181, {1, 2}), 0);
+    x->send(message(0x281, {3}), 0);
+    x->flush(0);
+    EXPECT_EQ(all_of(*y, 1'000'000).size(), 2U);
+    for (const auto& f : all_of(*other, 1'000'000)) EXPECT_TRUE(f.extended) << "read the other way round it is another message";
+    const auto first = listener.port->receive(1'000'000);
+    ASSERT_TRUE(first);
+    EXPECT_EQ(first->bytes.size(), 60U);
+    EXPECT_EQ(Bytes(first->bytes.begin() + 14, first->bytes.begin() + 21), (Bytes{0x81, 1, 0, 0, 2, 1, 2}));
+    EXPECT_TRUE(listener.port->receive(1'000'000));
+}
+
+TEST(CaneLink, lost_doubled_and_garbled_frames_are_counted_and_never_passed_on) {
+    auto x = opened("cane:sim:faulty"), y = opened("cane:sim:faulty");
+    auto listener = ethernet::open("sim:faulty");
+    auto& segment = *listener.port->segment();
+    std::uint64_t now = 0;
+    const auto send = [&](std::uint8_t n) {
+        x->send(message(0x181, {n}), static_cast<std::int64_t>(now));
+        x->flush(static_cast<std::int64_t>(now));
+        now += 1'000'000;
+        return all_of(*y, static_cast<std::int64_t>(now)).size();
+    };
+    ASSERT_EQ(send(0), 1U);
+    segment.disturb({.fault = ethernet::Fault::duplicate, .every = 1});
+    EXPECT_EQ(send(1), 1U);
+    EXPECT_EQ(y->statistics().errors, 1U);
+    segment.calm();
+    segment.disturb({.fault = ethernet::Fault::garble, .every = 1});
+    for (std::uint8_t n = 0; n < 50; ++n) {
+        x->send(message(0x181, {n}), static_cast<std::int64_t>(now));
+        x->flush(static_cast<std::int64_t>(now));
+        now += 1'000'000;
+        for (const auto& f : all_of(*y, static_cast<std::int64_t>(now))) EXPECT_TRUE(f.same(message(0x181, {n}))) << "only its padding was hit";
+    }
+    segment.calm();
+    segment.disturb({.fault = ethernet::Fault::loss, .every = 2});
+    std::size_t came = 0;
+    for (std::uint8_t n = 0; n < 10; ++n) came += send(n);
+    EXPECT_EQ(came, 5U);
+    segment.calm();
+    EXPECT_EQ(send(9), 1U);
+    EXPECT_GE(y->statistics().lost, 5U);
+}
+
+TEST(CaneLink, is_down_without_a_cable_and_comes_back) {
+    auto x = opened("cane:sim:cable/x"), y = opened("cane:sim:cable");
+    auto port = ethernet::open("sim:cable/x");
+    auto& segment = *port.port->segment();
+    Frame f;
+    x->receive(f, 1000);
+    EXPECT_EQ(x->state(), State::active);
+    segment.cut(segment.port(), true);
+    x->receive(f, 2000);
+    EXPECT_EQ(x->state(), State::down);
+    x->send(message(0x181, {1}), 2000);
+    x->flush(2000);
+    EXPECT_EQ(x->statistics().dropped, 1U);
+    segment.cut(segment.port(), false);
+    x->receive(f, 3000);
+    EXPECT_EQ(x->state(), State::active);
+    EXPECT_EQ(x->statistics().restarts, 1U);
+}
+
+/// A TDMA with one slot.
+struct Slots final : ethernet::Discipline {
+    std::vector<std::pair<Bytes, unsigned>> queue;
+    std::size_t most = 2;
+    bool is_ready = true;
+    ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority) noexcept override {
+        if (queue.size() == most) return ethernet::Sent::full;
+        queue.emplace_back(Bytes(frame.begin(), frame.end()), priority);
+        return ethernet::Sent::queued;
+    }
+    std::size_t room(unsigned slot) const noexcept override { return slot == 2 ? 60 : 0; }
+    bool ready() const noexcept override { return is_ready; }
+    const Address& address() const noexcept override { return b; }
+};
+
+TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
+    Slots slots;
+    ASSERT_TRUE(ethernet::offer_discipline("sim:slots/x", &slots));
+    EXPECT_NE(can::open("cane:sim:slots/x?slot=3").problem, "");
+    auto x = opened("cane:sim:slots/x?slot=2");
+    for (std::uint8_t n = 1; n <= 20; ++n) x->send(message(0x200U + n, {n, 0, 0, 0, 0, 0, 0, 0}), 0);
+    x->send(message(0x605, {0x40}), 0);
+    x->flush(0);
+    ASSERT_EQ(slots.queue.size(), 2U);
+    Unpacker u;
+    ASSERT_EQ(u.open(slots.queue[0].first), Wrong::none);
+    EXPECT_EQ(u.messages(), 5U);  // of ten bytes each in 60 without a header of ten
+    EXPECT_EQ(u.stamp().sequence, 0);
+    EXPECT_EQ(x->statistics().queued, 11U);
+    slots.queue.clear();
+    slots.most = 10;
+    x->flush(1'000'000);
+    ASSERT_EQ(slots.queue.size(), 3U);
+    ASSERT_EQ(u.open(slots.queue[0].first), Wrong::none);
+    EXPECT_EQ(u.stamp().sequence, 2);
+    EXPECT_EQ(slots.queue.back().second, 9U);  // ten of process data fill two frames, the request is alone
+    slots.is_ready = false;
+    Frame f;
+    x->receive(f, 2'000'000);
+    EXPECT_EQ(x->state(), State::down);
+
+    slots.is_ready = true;
+    x->receive(f, 3'000'000);
+    EXPECT_EQ(x->state(), State::active);
+    ethernet::withdraw_discipline(&slots);  // unloaded while the link is in use
+    x->receive(f, 4'000'000);
+    EXPECT_EQ(x->state(), State::down);
+    ASSERT_TRUE(ethernet::offer_discipline("sim:slots/x", &slots));
+    x->receive(f, 5'000'000);
+    EXPECT_EQ(x->state(), State::active);
+    ethernet::withdraw_discipline(&slots);
+}
+
+TEST(CaneOpen, says_what_is_wrong_and_what_to_type) {
+    EXPECT_EQ(can::open("cane:").problem, "cane:: the interface is missing; write cane:enp3s0, or cane:sim:bus0 for a segment in memory");
+    EXPECT_EQ(can::open("cane:sim:x?format=both").problem, "cane:sim:x?format=both: format is 'both'; write single or packed");
+    EXPECT_EQ(can::open("cane:sim:x?slot=2").problem,
+              "cane:sim:x?slot=2: no TDMA on sim:x has slots; loadrt tdma for it first, or leave slot= out");
+    EXPECT_EQ(can::open("cane:sim:x?node5=1").problem,
+              "cane:sim:x?node5=1: node5 is '1'; write the address of a station, as in 02:00:00:00:00:05");
+    EXPECT_EQ(can::open("cane:sim:x?node200=02:00:00:00:00:05").problem,
+              "cane:sim:x?node200=02:00:00:00:00:05: 'node200' names no node; write node5=02:00:00:00:00:05");
+    EXPECT_EQ(can::open("cane:sim:x?fd").problem, "cane:sim:x?fd: frames of CAN FD do not travel in 0x9023 frames; leave fd out");
+}
+
+}  // namespace
+}  // namespace hal::can::cane

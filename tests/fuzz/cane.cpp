@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// Frames of type 0x9023, as anybody on the segment can send them: the decoders as it comes, and again with the header made right.
+#include <algorithm>
+#include <cstdlib>
+
+#include "drivers/cane/format.hpp"
+#include "drivers/cane/stations.hpp"
+
+using namespace hal::can;
+using namespace hal::can::cane;
+
+namespace {
+
+void require(bool holds) {
+    if (!holds) std::abort();
+}
+
+void unpack(std::span<const std::uint8_t> whole, Nodes& nodes, Streams& streams) {
+    Unpacker u;
+    if (u.open(whole) != Wrong::none) return;
+    hal::ethernet::Address from{};
+    std::copy_n(whole.begin() + 6, 6, from.begin());
+    streams.take(from, (whole[0] & 1) != 0, u.stamp(), static_cast<std::int64_t>(whole.size()) * 100'000'000);
+    Frame f;
+    unsigned count = 0;
+    for (; u.next(f); ++count) {
+        require(f.valid() && !f.fd && !f.error);
+        nodes.learn(f.id, from, static_cast<std::int64_t>(count) * 300'000'000);
+        nodes.where(f.id, true);
+        std::array<std::uint8_t, longest_message> again{};
+        require(put_packed(f, again) != 0);
+    }
+    require(count == u.messages());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    const std::span<const std::uint8_t> bytes(data, size);
+    for (const auto order : {Order::big, Order::little}) {
+        Frame f;
+        if (get_single(bytes, order, f) != Wrong::none) continue;
+        require(f.valid());
+        std::array<std::uint8_t, single_bytes + 8> again{};
+        const auto length = put_single(f, order, again);
+        require(length != 0 && std::equal(again.begin(), again.begin() + static_cast<std::ptrdiff_t>(length), data));
+    }
+    Nodes nodes;
+    Streams streams;
+    unpack(bytes, nodes, streams);
+    if (size < hal::ethernet::header_bytes + packed_header || size > hal::ethernet::largest_frame) return 0;
+    std::array<std::uint8_t, hal::ethernet::largest_frame> room{};
+    const auto whole = std::span(room).first(size);
+    std::copy(bytes.begin(), bytes.end(), whole.begin());
+    const auto messages = whole[hal::ethernet::header_bytes + 2];
+    close_packed(whole, messages, {static_cast<std::uint16_t>(size % 5), static_cast<std::uint16_t>(size % 7)});
+    unpack(whole, nodes, streams);
+    return 0;
+}
