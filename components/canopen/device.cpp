@@ -28,6 +28,7 @@ Device::Device(const Description& description, const DeviceSettings& settings, E
       time_(dictionary_, out_),
       error_control_(dictionary_, out_),
       pdos_(dictionary_, out_, emcy_, events, settings.pdo),
+      srdos_(dictionary_, out_, emcy_),
       lss_(out_, events),
       node_id_(usable(settings.node_id) ? settings.node_id : unconfigured) {
     dictionary_.handle(0x1010, *this);
@@ -55,12 +56,14 @@ void Device::reset_communication(Time now) noexcept {
     emcy_.set_active(false);
     sync_.set_active(false);
     pdos_.set_operational(false, now);
+    srdos_.set_operational(false, now);
     emcy_.reset(false);
     emcy_consumer_.reset();
     sync_.reset();
     time_.reset();
     error_control_.reset(node_id_);
     pdos_.reset(node_id_);
+    srdos_.reset(node_id_);
     for (auto& s : servers_) configure_channel(s.index);
     for (auto& c : clients_) configure_channel(c.index);
     if (!usable(node_id_)) return;
@@ -88,6 +91,7 @@ void Device::enter(NmtState state, Time now) noexcept {
     sync_.set_active(communicating);
     error_control_.set_state(state);
     pdos_.set_operational(state == NmtState::operational, now);
+    srdos_.set_operational(state == NmtState::operational, now);
     if (!communicating) {
         for (auto& s : servers_) s.server->reset();
         for (auto& c : clients_) c.client->cancel_all(Abort::device_state);
@@ -157,6 +161,7 @@ void Device::handle(const Frame& f, Time now) noexcept {
     if (!usable(node_id_)) return;
     if (error_control_.handle(f, now, events_) || state_ == NmtState::stopped) return;
     if (sync_.handle(f, now)) return take_sync(now);
+    if (srdos_.handle(f, now)) return;
     for (auto& s : servers_)
         if (s.server->listens_to(f)) return s.server->handle(f, now);
     if (pdos_.handle(f, now)) return;
@@ -179,6 +184,7 @@ void Device::poll(Time now) noexcept {
     if (sync_.poll(now)) take_sync(now);
     if (sync_.lost(now)) events_.on_sync_lost(now);
     pdos_.poll(now);
+    srdos_.poll(now);
     for (auto& s : servers_) s.server->poll(now);
     for (auto& c : clients_) c.client->poll(now);
     emcy_.poll(now);

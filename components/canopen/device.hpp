@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A CANopen node: an object dictionary and all services of CiA 301 and 305 around it. A device is built on it, and so is the
+// A CANopen node: an object dictionary and all services of CiA 301, 304 and 305 around it. A device is built on it, and so is the
 // master's own node. It owns no bus, no clock and no thread:
 //
 //     Device device(description, {.node_id = 5}, events);   // [setup]
@@ -22,6 +22,7 @@
 #include "301/sdo_client.hpp"
 #include "301/sdo_server.hpp"
 #include "301/sync.hpp"
+#include "304/srdo.hpp"
 #include "305/lss_slave.hpp"
 
 namespace hal::canopen {
@@ -59,6 +60,8 @@ public:
 
     Dictionary& dictionary() noexcept { return dictionary_; }
     Pdos& pdos() noexcept { return pdos_; }
+    Srdos& srdos() noexcept { return srdos_; }
+    const Srdos& srdos() const noexcept { return srdos_; }
     Emcy& emcy() noexcept { return emcy_; }
     Sync& sync() noexcept { return sync_; }
     TimeStamp& time() noexcept { return time_; }
@@ -98,6 +101,7 @@ private:
     TimeStamp time_;
     ErrorControl error_control_;
     Pdos pdos_;
+    Srdos srdos_;
     LssSlave lss_;
     std::vector<Server> servers_;
     std::vector<Client> clients_;

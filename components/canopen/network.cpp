@@ -8,7 +8,7 @@ void RemoteNode::guard(Time period, std::uint8_t factor, Time now) noexcept {
     guard_factor_ = factor;
     next_guard_ = now;
     answered_ = now;
-    toggle_known_ = false;
+    toggle_known_ = toggle_stuck_ = false;
 }
 
 void RemoteNode::on_error_control(const Frame& f, Time now, Events& events) noexcept {
@@ -17,13 +17,16 @@ void RemoteNode::on_error_control(const Frame& f, Time now, Events& events) noex
     const bool boot_up = f.data[0] == 0;
     if (guard_period_ != 0 && !boot_up) {
         const auto toggle = static_cast<std::uint8_t>(f.data[0] & 0x80);
-        if (toggle_known_ && toggle != toggle_) {
-            ++wrong_toggles_;  // an answer that came twice, or of a node that restarted: not an answer
-            toggle_known_ = false;
+        // Behind a gap an answer got lost, and the toggle bit went on without us.
+        const bool wrong = toggle_known_ && toggle != toggle_ && now - guard_heard_ < guard_period_ * 3 / 2;
+        guard_heard_ = now;
+        toggle_ = toggle ^ 0x80;  // the next one, whatever this one was: an answer that never changes is never right again
+        toggle_known_ = true;
+        if (wrong) {
+            ++wrong_toggles_;  // an answer that came twice, or of a node whose guarding stands still: none (CiA 301)
+            wrong_at_ = now;
             return;
         }
-        toggle_ = toggle ^ 0x80;
-        toggle_known_ = true;
         answered_ = now;
     }
     if (boot_up) ++boot_ups_, toggle_known_ = false, answered_ = now;
@@ -58,6 +61,7 @@ void RemoteNode::poll(Time now, Events& events) noexcept {
     }
     if (!silent || lost_) return;
     lost_ = true;
+    toggle_stuck_ = guard_period_ != 0 && wrong_at_ > answered_ && now - wrong_at_ <= 2 * guard_period_;
     events.on_node(id_, NodeEvent::lost, state_, now);
 }
 

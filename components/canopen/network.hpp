@@ -30,6 +30,8 @@ public:
     void guard(Time period, std::uint8_t factor, Time now) noexcept;
 
     bool guarded() const noexcept { return guard_period_ != 0; }
+    /// It was lost although it answered guarding: with a toggle bit that did not change.
+    bool toggle_stuck() const noexcept { return toggle_stuck_; }
 
     bool heard() const noexcept { return heard_; }
     bool lost() const noexcept { return lost_; }
@@ -58,9 +60,9 @@ private:
     NmtState state_ = NmtState::initialising;
     bool heard_ = false, lost_ = false, watching_ = false;
     Time last_ = 0, heartbeat_limit_ = 0;
-    Time guard_period_ = 0, next_guard_ = 0, answered_ = 0;
+    Time guard_period_ = 0, next_guard_ = 0, answered_ = 0, wrong_at_ = 0, guard_heard_ = 0;
     std::uint8_t guard_factor_ = 0, toggle_ = 0;
-    bool toggle_known_ = false;
+    bool toggle_known_ = false, toggle_stuck_ = false;
     std::array<Emergency, history> emergencies_{};
     std::uint64_t emergency_count_ = 0, boot_ups_ = 0, wrong_toggles_ = 0;
     std::uint8_t error_register_ = 0;

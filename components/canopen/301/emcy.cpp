@@ -37,7 +37,7 @@ Emcy::Emcy(Dictionary& dictionary, FrameQueue& out) : dictionary_(dictionary), o
 
 void Emcy::read_parameters() noexcept {
     cob_ = dictionary_.get<std::uint32_t>(0x1014, 0, cob_invalid);
-    inhibit_ = dictionary_.get<std::uint16_t>(0x1015, 0) * 100 * microsecond;
+    inhibit_ = Time{dictionary_.get<std::uint16_t>(0x1015, 0)} * 100 * microsecond;
 }
 
 void Emcy::reset(bool all) noexcept {
@@ -96,6 +96,7 @@ void Emcy::queue(std::uint16_t code, const Bytes& manufacturer) noexcept {
 }
 
 void Emcy::poll(Time now) noexcept {
+    if (count_ == 0 || active(0x8140)) return;  // "recovered from bus off" (CiA 301): told when it is, not to a bus that is off
     while (count_ != 0 && active_ && (!sent_once_ || now - sent_ >= inhibit_)) {
         const auto& e = waiting_[head_];
         Frame f = make_frame(cob_, 8);

@@ -29,7 +29,7 @@ public:
     /// Pre-operational and operational nodes may send.
     void set_active(bool active) noexcept { active_ = active; }
     /// An error is there; as long as it is, saying so again does nothing. `source`: which of several parts that can have it, such as
-    /// the axes of a drive. [realtime]
+    /// the axes of a drive. While 8140h is there nobody would hear: that and what follows is sent when it is cleared. [realtime]
     void raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer = {}, std::uint8_t source = 0) noexcept;
     /// It is gone. [realtime]
     void clear(std::uint16_t code, std::uint8_t source = 0) noexcept;

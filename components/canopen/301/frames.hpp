@@ -46,6 +46,8 @@ public:
     std::size_t capacity() const noexcept { return mask_ + 1; }
     /// Room that bulk transfers leave to those who have one frame to send.
     std::size_t reserve() const noexcept { return std::min<std::size_t>(capacity() / 4, 64); }
+    /// Counts the frames that left it; who waits for room sees whether it moves at all.
+    std::size_t taken() const noexcept { return tail_; }
     /// How often push() found it full.
     std::uint64_t refused() const noexcept { return refused_; }
 

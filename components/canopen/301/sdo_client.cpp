@@ -18,7 +18,8 @@ void SdoClient::configure(std::uint32_t request_cob, std::uint32_t answer_cob) n
 bool SdoClient::submit(SdoRequest& request) noexcept {
     if (request.status == SdoRequest::Status::waiting || request.status == SdoRequest::Status::active) return false;
     request.status = SdoRequest::Status::waiting;
-    request.abort = Abort::none, request.aborted_there = false, request.size = 0, request.retries = 0, request.next = nullptr;
+    request.abort = Abort::none, request.aborted_there = request.unsent = false;
+    request.size = 0, request.retries = 0, request.next = nullptr;
     (first_ == nullptr ? first_ : last_->next) = &request;
     last_ = &request;
     return true;
@@ -386,16 +387,33 @@ void SdoClient::silence() noexcept {
 
 void SdoClient::poll(Time now) noexcept {
     now_ = now;
-    if (pending_) {
-        heard_ = now;
-        if (out_.room() > 0) send_again();
-    }
+    if (pending_ && out_.room() > 0) send_again();
     if (state_ == State::idle) {
         if (first_ != nullptr) begin();
         return;
     }
-    if (state_ == State::block_download && !block_sent_) pump();
+    if (state_ == State::block_download && !block_sent_ && !pending_) {
+        const auto before = sequence_;
+        pump();
+        const bool moves = sequence_ != before || out_.taken() != taken_;  // others may have had the room
+        taken_ = out_.taken();
+        if (!block_sent_ && !moves) return no_room();
+        if (!block_sent_) heard_ = now;
+    }
+    if (pending_) return no_room();
+    full_since_ = -1;
     if (now - heard_ >= settings_.timeout) silence();
+}
+
+/// The server cannot be blamed for not answering what did not leave. But a bus that takes nothing for as long as a silent server would be
+/// waited for is given up, too; without an abort, which would not leave either.
+void SdoClient::no_room() noexcept {
+    heard_ = now_;
+    if (full_since_ < 0) full_since_ = now_;
+    if (now_ - full_since_ < settings_.timeout * (settings_.resends + 1)) return;
+    full_since_ = -1;
+    first_->unsent = true;
+    finish(Abort::timeout);
 }
 
 }  // namespace hal::canopen

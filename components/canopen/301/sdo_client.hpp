@@ -37,6 +37,7 @@ struct SdoRequest {
     Status status = Status::fresh;
     Abort abort = Abort::none;     ///< none: it worked
     bool aborted_there = false;    ///< the server refused; otherwise the client gave up
+    bool unsent = false;           ///< it gave up because there was no room to send for all of its patience: the bus takes no frames
     std::size_t size = 0;          ///< bytes through
     unsigned retries = 0;          ///< frames sent again and transfers begun again
     SdoRequest* next = nullptr;
@@ -103,6 +104,7 @@ private:
     void on_block_acknowledge(const Frame&) noexcept;
     void on_block_end(const Frame&) noexcept;
     void silence() noexcept;
+    void no_room() noexcept;
     bool put(std::span<const std::uint8_t>) noexcept;
     void progress() noexcept { heard_ = now_, resends_left_ = settings_.resends; }
     void stranger(Abort why) noexcept { ++strangers_, wrong_ = why; }
@@ -127,6 +129,8 @@ private:
     Abort wrong_ = Abort::none;  // what was wrong with the answers dropped since the last good one
     Bytes sent_{};
     Time heard_ = 0, acknowledged_at_ = 0, now_ = 0;
+    Time full_since_ = -1;    // since when there is no room for what it has to say
+    std::size_t taken_ = 0;  // of out_, when room was looked for last
     std::uint64_t strangers_ = 0, retries_ = 0;
 };
 

@@ -80,6 +80,15 @@ void Master::stop(Time now) noexcept {
     halt(NetworkState::stopped, 0);
 }
 
+void Master::stand_by(Time now) noexcept {
+    now_ = now;
+    halted_ = true;
+    commands_waiting_ = 0;
+    for (auto& n : nodes_) n->leave(Step::off, Cause::none);
+    set_state(NetworkState::off, 0);
+    if (dirty_) update();
+}
+
 bool Master::command(NmtCommand command, std::uint8_t id, Time now) noexcept {
     now_ = now;
     if (id != 0) return id < by_id_.size() && by_id_[id] != nullptr && by_id_[id]->command(command, false);

@@ -51,6 +51,8 @@ public:
 
     /// Stops all nodes and leaves them stopped: until start(). [realtime]
     void stop(Time now) noexcept;
+    /// The network is another master's: nothing is asked or told any more, until start(). [realtime]
+    void stand_by(Time now) noexcept;
     /// A command to one node, or with id 0 to all. A node commanded so is not brought back by itself: stop and pre-operational hold until
     /// `start` or restart(); after a reset it is booted again. False: no such node. [realtime]
     bool command(NmtCommand, std::uint8_t id, Time now) noexcept;

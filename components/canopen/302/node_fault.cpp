@@ -52,7 +52,7 @@ void Master::Node::on_event(NodeEvent event) noexcept {
         status.online = false;
         master_.dirty_ = true;
         if (status.step == Step::ready || status.step == Step::starting || status.step == Step::running)
-            lose(guarding() ? Cause::guarding : Cause::heartbeat);
+            lose(remote_.toggle_stuck() ? Cause::guard_toggle : guarding() ? Cause::guarding : Cause::heartbeat);
         return;
     }
     if (event == NodeEvent::changed) return;
@@ -107,7 +107,9 @@ void Master::Node::about(std::uint16_t index, std::uint8_t sub, std::uint64_t ex
 void Master::Node::fail_transfer(BootResult result) noexcept {
     about_request(0, 0);
     status.abort = request_.abort;
-    fail(result, silent() ? Cause::silent : lacks() && result == BootResult::no_program ? Cause::no_object : Cause::aborted);
+    fail(result, request_.unsent                                 ? Cause::unsent
+                 : silent()                                      ? Cause::silent
+                 : lacks() && result == BootResult::no_program ? Cause::no_object : Cause::aborted);
 }
 
 void Master::Node::fail(BootResult result, Cause cause) noexcept {
@@ -115,7 +117,7 @@ void Master::Node::fail(BootResult result, Cause cause) noexcept {
     status.cause = cause;
     status.failed_in = status.step;
     drop();
-    const bool absent = result == BootResult::no_answer && cause == Cause::silent;
+    const bool absent = result == BootResult::no_answer && (cause == Cause::silent || cause == Cause::unsent);
     if (cause == Cause::silent || cause == Cause::heartbeat || cause == Cause::guarding) status.online = false;
     // A device that is not ours may go on with what it does.
     if (!absent) return react(setup.on_failure, setup.retry, status.failed_in == Step::identifying ? How::as_it_is : How::reset);

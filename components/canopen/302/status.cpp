@@ -141,6 +141,9 @@ std::string what(const NodeSetup& n, const NodeStatus& s) {
             return "does not answer (" + object(n, s) +
                    "): check its power, cable, bit rate and node id; 'hal can scan' shows who is there";
         return "fell silent at " + object(n, s) + ' ' + doing(s.failed_in) + ": check its power and cable";
+    case Cause::unsent:
+        return "could not be asked for " + object(n, s) + ' ' + doing(s.failed_in) +
+               ": the bus takes no frames from the master; check the master's cable, the bit rate, and that some node is there";
     case Cause::aborted:
         if (s.failed_in == Step::identifying)
             return "does not tell its " + std::string(identity(s.index, s.sub)) + ", " + object(n, s) + ": " + refusal(s) +
@@ -177,6 +180,9 @@ std::string what(const NodeSetup& n, const NodeStatus& s) {
     case Cause::guarding:
         return "did not answer guarding " + std::string(s.failed_in >= Step::ready ? "for its limit" : doing(s.failed_in)) +
                ": check its power and cable, and that it can be guarded";
+    case Cause::guard_toggle:
+        return "answered guarding with a toggle bit that did not change for its limit: its answers do not count; watch it by heartbeat, or "
+               "look for two devices with this id";
     case Cause::boot_up: return "booted by itself: check its supply voltage, and who else commands this network";
     case Cause::left_operational: {
         std::string result = "left operational by itself and is " + std::string(word(s.state));

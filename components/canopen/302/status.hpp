@@ -60,6 +60,7 @@ constexpr bool booted(BootResult r) noexcept { return r == BootResult::good || r
 enum class Cause : std::uint8_t {
     none,
     silent,            ///< no answer
+    unsent,            ///< it could not be asked: the bus took no frames from us
     aborted,           ///< `abort` says why
     differs,           ///< `found` instead of `expected`
     not_taken,         ///< written, but reads as something else
@@ -70,7 +71,8 @@ enum class Cause : std::uint8_t {
     flash,             ///< 1F57h reported an error; `found` is its status
     flash_busy,        ///< 1F57h said busy for too long
     heartbeat,         ///< silent for its limit
-    guarding,          ///< no answer to guarding, or always the wrong toggle bit
+    guarding,          ///< no answer to guarding
+    guard_toggle,      ///< answers to guarding whose toggle bit did not change
     boot_up,           ///< it booted by itself: power loss, reset
     left_operational,  ///< its state changed, and not by us
     not_started,       ///< told to start, it did not become operational

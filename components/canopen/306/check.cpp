@@ -19,8 +19,8 @@ public:
             const bool receive = object.index >= 0x1600 && object.index < 0x1800, send = object.index >= 0x1A00 && object.index < 0x1C00;
             if (receive || send) mapping(object, receive);
         }
-        count(0x1400, d_.device.rx_pdos, "NrOfRXPDO");
-        count(0x1800, d_.device.tx_pdos, "NrOfTXPDO");
+        count(0x1400, d_.device.rx_pdos, d_.device.rx_pdos_at, "NrOfRXPDO");
+        count(0x1800, d_.device.tx_pdos, d_.device.tx_pdos_at, "NrOfTXPDO");
     }
 
 private:
@@ -96,12 +96,12 @@ private:
         return bits;
     }
 
-    void count(std::uint16_t base, unsigned said, const char* key) {
+    void count(std::uint16_t base, unsigned said, const Place& at, const char* key) {
         const auto there =
             std::count_if(d_.objects.begin(), d_.objects.end(), [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
         if (said == static_cast<unsigned>(there) || d_.objects.empty()) return;
         if (said == 0 && d_.file.eds_version.empty()) return;  // a DCF made by hand
-        say(Severity::note, Topic::count, {1, 1, 0, 0},
+        say(Severity::note, Topic::count, at,
             "'" + std::string(key) + "' is " + std::to_string(said) + ", " + std::to_string(there) + " are described",
             "write " + std::string(key) + "=" + std::to_string(there) + " in [DeviceInfo]");
     }

@@ -91,6 +91,7 @@ struct DeviceInfo {
     bool                                dynamic_channels = false, group_messaging = false, lss = false;
     std::uint8_t  compact_pdo = 0;     ///< bit n-1: sub-index n of the communication parameters that are not described one by one
     std::uint16_t rx_pdos = 0, tx_pdos = 0;
+    Place         rx_pdos_at = {1, 1, 0, 0}, tx_pdos_at = {1, 1, 0, 0};  ///< the beginning, where the file does not say them
     Extras        extras = {};
 
     bool operator==(const DeviceInfo&) const = default;

@@ -122,6 +122,11 @@ private:
         d.compact_pdo = static_cast<std::uint8_t>(keys_.number(*section, "CompactPDO", 0xFF).value_or(0));
         d.rx_pdos = static_cast<std::uint16_t>(keys_.number(*section, "NrOfRXPDO", 512).value_or(0));
         d.tx_pdos = static_cast<std::uint16_t>(keys_.number(*section, "NrOfTXPDO", 512).value_or(0));
+        const auto place = [&](const char* key) {
+            const auto* found = section->find(key);
+            return found != nullptr ? found->value_at : section->at;
+        };
+        d.rx_pdos_at = place("NrOfRXPDO"), d.tx_pdos_at = place("NrOfTXPDO");
         d.extras = keys_.rest(*section, {"VendorName", "VendorNumber", "ProductName", "ProductNumber", "RevisionNumber", "OrderCode",
                                          "SimpleBootUpMaster", "SimpleBootUpSlave", "Granularity", "DynamicChannelsSupported",
                                          "GroupMessaging", "LSS_Supported", "NrOfRXPDO", "NrOfTXPDO"});

@@ -5,8 +5,6 @@
 #include <cstdarg>
 #include <cstdio>
 
-#include "canopen/301/emcy.hpp"
-
 namespace hal::canopen::cia402 {
 
 namespace {
@@ -38,8 +36,7 @@ std::string after(Step step) { return step == Step::wait ? "" : " after " + quot
 
 std::string error_words(std::uint16_t code) {
     if (code == 0) return "";
-    const char* const own = error_word(code);
-    return print(", error 0x%04X: ", code) + (own ? own : emergency_word(code));
+    return print(", error 0x%04X: ", code) + error_word(code);
 }
 
 /// What the other bits of the statusword say about it.

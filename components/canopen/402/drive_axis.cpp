@@ -246,7 +246,11 @@ Abort DriveAxis::writing(Entry& e, std::span<const std::uint8_t> value) noexcept
     case object::modes_of_operation:
         return byte == 0 || (byte > 0 && (objects_.supported_modes & bit_of(static_cast<Mode>(byte))) != 0) ? Abort::none : Abort::value;
     case object::homing_method: return byte == 0 || HomingSearch::supports(byte) ? Abort::none : Abort::value;
-    case object::motion_profile_type:
+    case object::motion_profile_type: {
+        const auto type = load<std::int16_t>(value.data());
+        return type == linear_ramps || type == jerk_limited ? Abort::none : Abort::value;
+    }
+    case object::profile_jerk_use: return value[0] == 1 ? Abort::none : Abort::value;  // one jerk for all corners
     case object::torque_profile_type:
     case object::interpolation_submode: return load<std::int16_t>(value.data()) == 0 ? Abort::none : Abort::value;  // linear only
     case object::touch_probe_function: return (value[0] & 0xc8) != 0 || (value[1] & 0xc8) != 0 ? Abort::value : Abort::none;

@@ -123,6 +123,8 @@ private:
     double acceleration(std::uint32_t wanted) const noexcept;
     double deceleration(std::uint32_t wanted) const noexcept;
     Profile::Limits profile_limits() const noexcept;
+    double corner_time() const noexcept;
+    Motion& unsmoothed(bool position_matters) noexcept;
     double period() const noexcept;
     double now_speed() const noexcept { return plant_.speed() * plant_.increments_per_radian(); }
     bool cyclic() const noexcept { return mode_ >= Mode::cyclic_position; }
@@ -165,6 +167,7 @@ private:
     bool limited_ = false, saturated_ = false;
 
     Profile profile_;
+    Smoother smoother_;                     // of pp and pv
     Interpolator interpolator_;
     Queue<SetPoint, 4> set_points_;
     SetPoint active_set_point_;

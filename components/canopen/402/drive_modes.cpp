@@ -38,6 +38,21 @@ Profile::Limits DriveAxis::profile_limits() const noexcept {
     return {std::min(speed * units_.speed, highest_speed()), acceleration(objects_.profile_acceleration),
             deceleration(objects_.profile_deceleration), 0};
 }
+/// Over which time the corners of a ramp are taken off, so that the steeper one keeps the jerk of 60A4h:1; 0: corners stay.
+double DriveAxis::corner_time() const noexcept {
+    const double jerk = objects_.profile_jerk * units_.acceleration;
+    if (objects_.motion_profile_type != jerk_limited || !(jerk > 0)) return 0;
+    return std::max(acceleration(objects_.profile_acceleration), deceleration(objects_.profile_deceleration)) / jerk;
+}
+/// What a ramp or profile is to move on. Where something else moved the reference meanwhile it begins anew from there.
+Motion& DriveAxis::unsmoothed(bool position_matters) noexcept {
+    Motion now = ref_;
+    if (!position_matters) now.position = 0;
+    const bool other = position_matters ? !smoother_.gave(now) : !smoother_.gave_velocity(now);
+    if (other || (smoother_.settled() && smoother_.raw().velocity == 0 && smoother_.time() != std::min(corner_time(), Smoother::longest)))
+        smoother_.begin(now, corner_time());
+    return smoother_.raw();
+}
 double DriveAxis::period() const noexcept {
     double result = objects_.interpolation_period;
     for (int n = objects_.interpolation_exponent; n < 0; ++n) result /= 10;
@@ -281,11 +296,11 @@ void DriveAxis::accept_set_point() noexcept {
     set_points_.push(next);
     if ((control_ & control::change_on_set_point) == 0 || set_points_.count != 1 || halted_) return;
     // Through the present one without a stop, as fast as the next allows, if it goes on in the same direction.
-    const double ahead = active_set_point_.target - ref_.position, further = next.target - active_set_point_.target;
+    const double ahead = active_set_point_.target - unsmoothed(true).position, further = next.target - active_set_point_.target;
     if (ahead * further <= 0 || profile_.done()) return;
     active_set_point_.limits.end_velocity = std::min({active_set_point_.limits.velocity, next.limits.velocity,
                                                       std::sqrt(2 * next.limits.deceleration * std::abs(further))});
-    profile_.plan(ref_, active_set_point_.target, active_set_point_.limits);
+    profile_.plan(unsmoothed(true), active_set_point_.target, active_set_point_.limits);
 }
 
 void DriveAxis::start_set_point(const SetPoint& next) noexcept {
@@ -294,7 +309,7 @@ void DriveAxis::start_set_point(const SetPoint& next) noexcept {
     reached_ = false;
     reached_time_ = 0;
     take(Control::position);
-    profile_.plan(ref_, next.target, next.limits);
+    profile_.plan(unsmoothed(true), next.target, next.limits);
 }
 
 void DriveAxis::profile_position(double dt) noexcept {
@@ -319,13 +334,15 @@ void DriveAxis::profile_position(double dt) noexcept {
         start_set_point(next);
     };
     if (reached_ && set_points_.count != 0) start_next();
-    double left = profile_.step(ref_, dt);
+    Motion& raw = unsmoothed(true);
+    double left = profile_.step(raw, dt);
     while (profile_.done() && active_set_point_.limits.end_velocity > 0 && set_points_.count != 0 && left > 0) {
         start_next();
-        left = profile_.step(ref_, left);
+        left = profile_.step(raw, left);
     }
-    if (!profile_.done()) return;
-    ref_.position += ref_.velocity * left;  // with an end velocity and nothing after it, it goes on
+    if (profile_.done()) raw.position += raw.velocity * left;  // with an end velocity and nothing after it, it goes on
+    ref_ = smoother_.step(dt);
+    if (!profile_.done() || (raw.velocity == 0 && !smoother_.settled())) return;
     const bool there = objects_.position_window == no_window ||
                        std::abs(active_set_point_.target - measured_) <= objects_.position_window * std::abs(units_.position);
     if (ref_.velocity == 0 && !there) reached_time_ = 0;
@@ -343,7 +360,10 @@ void DriveAxis::profile_velocity(double dt) noexcept {
     const double target = std::clamp(objects_.target_velocity * units_.velocity, -limits.velocity, limits.velocity);
     if (target != objects_.target_velocity * units_.velocity) limited_ = true;
     wanted_ = target;
-    ramp(ref_, target, limits.acceleration, limits.deceleration, dt);
+    ramp(unsmoothed(false), target, limits.acceleration, limits.deceleration, dt);
+    const Motion from = ref_;
+    ref_ = smoother_.step(dt);
+    ref_.position = from.position + (from.velocity + ref_.velocity) / 2 * dt;
     const double window = objects_.velocity_window * units_.speed;
     reached_time_ = std::abs(target - now_speed()) <= window ? reached_time_ + dt : 0;
     reached_ = reached_time_ * 1000 >= objects_.velocity_window_time && reached_time_ > 0;

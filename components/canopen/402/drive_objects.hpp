@@ -68,6 +68,8 @@ struct Objects {
     std::uint32_t max_profile_velocity = 0, max_motor_speed = 0, profile_velocity = 0, end_velocity = 0, profile_acceleration = 0,
                   profile_deceleration = 0, quick_stop_deceleration = 0;
     std::int16_t motion_profile_type = 0;
+    std::uint8_t profile_jerk_use = 1;
+    std::uint32_t profile_jerk = 0;
     std::uint32_t torque_slope = 10000;
     std::int16_t torque_profile_type = 0;
     Ratio position_encoder, velocity_encoder, gear, feed, velocity_factor, acceleration_factor;
@@ -190,6 +192,8 @@ void each_object(Objects& o, F&& f) {
     f(ObjectRow{profile_deceleration, 0, rw, rx, "Profile deceleration"}, o.profile_deceleration);
     f(ObjectRow{quick_stop_deceleration, 0, rw, rx, "Quick stop deceleration"}, o.quick_stop_deceleration);
     f(ObjectRow{motion_profile_type, 0, rw, no, "Motion profile type"}, o.motion_profile_type);
+    f(ObjectRow{object::profile_jerk_use, 0, rw, no, "Profile jerk use"}, o.profile_jerk_use);
+    f(ObjectRow{object::profile_jerk, 1, rw, no, "Profile jerk"}, o.profile_jerk);
     f(ObjectRow{torque_slope, 0, rw, rx, "Torque slope"}, o.torque_slope);
     f(ObjectRow{torque_profile_type, 0, rw, no, "Torque profile type"}, o.torque_profile_type);
     ratio(position_encoder_resolution, o.position_encoder, "Encoder increments", "Motor revolutions");

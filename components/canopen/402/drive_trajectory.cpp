@@ -93,6 +93,48 @@ double Profile::step(Motion& m, double dt) noexcept {
     return dt;
 }
 
+void Smoother::begin(const Motion& now, double time) noexcept {
+    time_ = std::clamp(time, 0.0, longest);
+    raw_ = {now.position + now.velocity * time_ / 2, now.velocity, 0};
+    before_ = raw_, given_ = now;
+    origin_ = raw_.position;
+    const double from = -now.velocity * time_;
+    pieces_[0] = {time_, from, 0, now.velocity, now.velocity, from / 2 * time_};
+    head_ = 0, count_ = 1;
+    held_ = time_, area_ = pieces_[0].area;
+    steady_ = time_;
+}
+
+Motion Smoother::step(double dt) noexcept {
+    steady_ = raw_.velocity == before_.velocity ? steady_ + dt : 0;
+    if (time_ <= 0 || (settled() && raw_.velocity == 0)) {
+        if (time_ > 0 && raw_.position != given_.position) begin(raw_, time_);
+        return before_ = raw_, given_ = raw_;
+    }
+    const double from = before_.position - origin_, to = raw_.position - origin_, area = (from + to) / 2 * dt;
+    auto& last = pieces_[(head_ + count_ - 1) % room];
+    if ((count_ > 1 && last.time + dt <= shortest) || count_ == room) {
+        last.time += dt, last.to = to, last.velocity_to = raw_.velocity, last.area += area;
+    } else {
+        pieces_[(head_ + count_++) % room] = {dt, from, to, before_.velocity, raw_.velocity, area};
+    }
+    held_ += dt, area_ += area;
+    while (count_ > 1 && held_ - pieces_[head_].time >= time_) {
+        held_ -= pieces_[head_].time, area_ -= pieces_[head_].area;
+        head_ = (head_ + 1) % room, --count_;
+    }
+    // Of the oldest piece only its end belongs to the last `time_`.
+    const Piece& oldest = pieces_[head_];
+    const double out = std::max(held_ - time_, 0.0), share = oldest.time > 0 ? out / oldest.time : 0;
+    const double position = oldest.from + (oldest.to - oldest.from) * share;
+    const double velocity = oldest.velocity_from + (oldest.velocity_to - oldest.velocity_from) * share;
+    given_.position = origin_ + (area_ - (oldest.from + position) / 2 * out) / time_;
+    given_.velocity = (to - position) / time_;
+    given_.acceleration = (raw_.velocity - velocity) / time_;
+    before_ = raw_;
+    return given_;
+}
+
 double Interpolator::step(Motion& m, double dt) noexcept {
     const double before = m.position, time = std::min(dt, left_);
     left_ -= time;

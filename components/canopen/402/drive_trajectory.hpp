@@ -41,6 +41,37 @@ private:
     double elapsed_ = 0, target_ = 0, end_velocity_ = 0;
 };
 
+/// Takes the corners off a motion: what it gives is the mean of the motion over the last `time` seconds, so an acceleration a grows and
+/// falls with the jerk a/time, the motion ends at the same place, `time` later, and no velocity or acceleration is exceeded.
+class Smoother {
+public:
+    static constexpr double longest = 1.0;  ///< s
+    /// The motion goes on from `now` with its velocity, as if it had always had it. [realtime]
+    void begin(const Motion& now, double time) noexcept;
+    /// The motion before its corners are off; whoever makes it moves it on, then calls step(). [realtime]
+    Motion& raw() noexcept { return raw_; }
+    /// `dt` after the last. [realtime]
+    Motion step(double dt) noexcept;
+    /// The last step() gave that.
+    bool gave(const Motion& m) const noexcept { return m.position == given_.position && m.velocity == given_.velocity; }
+    bool gave_velocity(const Motion& m) const noexcept { return m.velocity == given_.velocity; }
+    /// The motion has not changed its velocity for `time`. [realtime]
+    bool settled() const noexcept { return steady_ >= time_; }
+    double time() const noexcept { return time_; }
+
+private:
+    struct Piece {
+        double time, from, to, velocity_from, velocity_to, area;
+    };
+    static constexpr unsigned room = 1024;
+    static constexpr double shortest = 0.00105;  // pieces of less are put together
+    std::array<Piece, room> pieces_{};
+    unsigned head_ = 0, count_ = 0;
+    double time_ = 0, held_ = 0, area_ = 0, steady_ = 0;  // time and area of all pieces
+    double origin_ = 0;                                   // positions of the pieces count from here, so that no digit is lost
+    Motion raw_, before_, given_;
+};
+
 /// From where one is to the next set-point in the time between two of them; then it waits there.
 class Interpolator {
 public:

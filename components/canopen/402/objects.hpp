@@ -39,6 +39,7 @@ inline constexpr std::uint16_t
     torque_slope = 0x6087, torque_profile_type = 0x6088, position_encoder_resolution = 0x608f, velocity_encoder_resolution = 0x6090,
     gear_ratio = 0x6091, feed_constant = 0x6092, velocity_factor = 0x6096, acceleration_factor = 0x6097, homing_method = 0x6098,
     homing_speeds = 0x6099, homing_acceleration = 0x609a, position_unit = 0x60a8, velocity_unit = 0x60a9, acceleration_unit = 0x60aa,
+    profile_jerk_use = 0x60a3, profile_jerk = 0x60a4,
     position_offset = 0x60b0, velocity_offset = 0x60b1, torque_offset = 0x60b2, touch_probe_function = 0x60b8, touch_probe_status = 0x60b9,
     touch_probe_1_positive = 0x60ba, touch_probe_1_negative = 0x60bb, touch_probe_2_positive = 0x60bc, touch_probe_2_negative = 0x60bd,
     interpolation_submode = 0x60c0, interpolation_data = 0x60c1, interpolation_period = 0x60c2, interpolation_configuration = 0x60c4,
@@ -200,28 +201,18 @@ constexpr const char* homing_method_word(int method) noexcept {
     return method <= 37 ? words[method] : "reserved";
 }
 
+/// Values of 6086h: how pp and pv speed up and slow down. 1 (sin² ramps) and 2 (jerk-free ramps) are not known here.
+inline constexpr std::int16_t linear_ramps = 0, jerk_limited = 3;
+
 /// Error codes 603Fh of drives; they are EMCY codes, too.
 namespace error {
 inline constexpr std::uint16_t over_current = 0x2310, over_voltage = 0x3210, under_voltage = 0x3220, over_temperature = 0x4310,
                                motor_blocked = 0x7121, position_sensor = 0x7305, heartbeat = 0x8130, over_speed = 0x8480,
                                following_error = 0x8611, reference_limit = 0x8612;
 }
-/// In words; nullptr for a code that is no drive's own: emergency_word() has its class. [any]
-constexpr const char* error_word(std::uint16_t code) noexcept {
-    switch (code) {
-    case error::over_current: return "continuous over-current";
-    case error::over_voltage: return "DC link over-voltage";
-    case error::under_voltage: return "DC link under-voltage";
-    case error::over_temperature: return "drive over-temperature";
-    case error::motor_blocked: return "motor blocked";
-    case error::position_sensor: return "position sensor";
-    case error::heartbeat: return "life guard or heartbeat error";
-    case error::over_speed: return "over-speed";
-    case error::following_error: return "following error";
-    case error::reference_limit: return "position reference limit";
-    default: return nullptr;
-    }
-}
+/// The one table of the codes of CiA 402 (IEC 61800-7-201) in words; for any other code the word of its class in CiA 301, as
+/// emergency_word(). Manufacturers have codes of their own, too: FF00h and those the standard leaves free. [any]
+const char* error_word(std::uint16_t code) noexcept;
 
 /// Bits of 60FDh, and of 60FEh:1.
 namespace input {

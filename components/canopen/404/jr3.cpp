@@ -11,7 +11,6 @@
 namespace hal::canopen {
 
 namespace {
-constexpr std::uint32_t zero_command = 0x6f72657a, tare_command = 0x65726174;  // "zero", "tare"
 constexpr Time silence = 10 * millisecond;             // no packet for that long: no sensor
 constexpr Time most_at_once = 100 * millisecond;       // of a line that was not looked at, the rest is gone
 constexpr double overload_over_below = 0.95;           // of the limit
@@ -22,7 +21,6 @@ T rounded(double value) noexcept {
     constexpr double low = std::numeric_limits<T>::min(), high = std::numeric_limits<T>::max();
     return std::isnan(value) ? T{0} : static_cast<T>(std::llround(std::clamp(value, low, high)));
 }
-constexpr double powers[] = {1, 10, 100, 1e3, 1e4, 1e5, 1e6};
 }  // namespace
 
 Jr3::Jr3(Jr3Settings settings) : settings_(std::move(settings)), calibration_(settings_.calibration) {
@@ -34,17 +32,11 @@ Jr3::Jr3(Jr3Settings settings) : settings_(std::move(settings)), calibration_(se
 void Jr3::attach(Device& device) {
     Program::attach(device);
     auto& dictionary = device.dictionary();
-    for (std::uint8_t sub = 1; sub <= 6; ++sub) {
-        const auto n = sub - 1U;
-        auto& c = channels_[n];
-        dictionary.bind(0x7100, sub, raw_[n]), dictionary.bind(0x7130, sub, values_[n]), dictionary.bind(0x7140, sub, nets_[n]);
-        dictionary.bind(0x7133, sub, delta_[n]), dictionary.bind(0x2103, sub, limits_[n]);
-        dictionary.bind(0x6124, sub, c.offset), dictionary.bind(0x6126, sub, c.factor), dictionary.bind(0x6127, sub, c.scaling_offset);
-        dictionary.bind(0x6138, sub, c.tare), dictionary.bind(0x6132, sub, c.digits), dictionary.bind(0x6130, sub, c.process);
-    }
+    inputs_.attach(device, 6);
+    for (std::uint8_t sub = 1; sub <= 6; ++sub) dictionary.bind(0x2103, sub, limits_[sub - 1U]);
     dictionary.bind(0x2200, 0, supply_raw_), dictionary.bind(0x2201, 0, status_), dictionary.bind(0x2202, 0, counter_);
     dictionary.stream(0x2104, 0, memory_stream_);
-    for (const int index : {0x2203, 0x2204, 0x6100, 0x6125, 0x6139, 0x6140, 0x6150, 0x9130}) watch(static_cast<std::uint16_t>(index));
+    watch(0x2203), watch(0x2204);
 }
 
 void Jr3::on_reset(bool application) noexcept {
@@ -53,7 +45,7 @@ void Jr3::on_reset(bool application) noexcept {
     status_ = jr3_status::no_signal | jr3_status::not_calibrated;
     calibrated_ = false;
     heard_ = last_;
-    said_.fill(0);
+    inputs_.reset();
 }
 
 // The sensor.
@@ -140,30 +132,24 @@ void Jr3::supervise(Time now) noexcept {
     alarm(jr3_status::overload, over != 0, jr3_error::overload, over);
 }
 
-double Jr3::process(unsigned n) const noexcept {
-    const auto& c = channels_[n];
-    return field_[n] * double{c.factor} + double{c.scaling_offset} + double{c.offset};
-}
-
 void Jr3::publish() noexcept {
     field_ = calibration_.wrench(raw_);
+    const bool silent = (status_ & jr3_status::no_signal) != 0;
     for (unsigned n = 0; n < 6; ++n) {
-        auto& c = channels_[n];
-        const double value = process(n), scale = powers[std::min<unsigned>(c.digits, 6)];
-        c.process = static_cast<float>(value);
-        values_[n] = rounded<std::int16_t>(value * scale);
-        nets_[n] = rounded<std::int16_t>((value - double{c.tare}) * scale);
+        const bool over = raw_[n] == 32767 || raw_[n] == -32768 || std::abs(field_[n]) > static_cast<double>(limits_[n]);
+        const auto side = field_[n] > 0 ? AnalogInputs::too_high : AnalogInputs::too_low;
+        inputs_.sample(n, field_[n], raw_[n], static_cast<std::uint8_t>((silent ? AnalogInputs::not_valid : 0) | (over ? side : 0)), last_);
     }
     ++counter_;
 }
 
-/// The PDOs of forces and of torques, each when one of its three values is further off than its delta.
+/// The PDOs of forces and of torques, each when one of its three values is further off than its delta or passed a limit.
 void Jr3::trigger_changes() noexcept {
     for (unsigned group = 0; group < 2; ++group) {
         bool changed = status_ != said_status_;
-        for (unsigned n = group * 3; n < group * 3 + 3; ++n) changed = changed || std::abs(values_[n] - said_[n]) > delta_[n];
+        for (unsigned n = group * 3; n < group * 3 + 3; ++n) changed = changed || inputs_.changed(n);
         if (!changed) continue;
-        std::copy_n(values_.begin() + group * 3, 3, said_.begin() + group * 3);
+        for (unsigned n = group * 3; n < group * 3 + 3; ++n) inputs_.said(n);
         device_->pdos().trigger(group * 2 + 1);
         device_->pdos().trigger(group * 2 + 2);
     }
@@ -180,34 +166,9 @@ void Jr3::step(Time now) noexcept {
 }
 
 Abort Jr3::reading(Entry& e) noexcept {
-    const unsigned n = e.sub == 0 ? 0 : e.sub - 1U;
-    if (e.sub == 0 && e.index >= 0x6000) return Abort::none;
-    switch (e.index) {
-    case 0x2203: store(e.data, decoder_.packets()); break;
-    case 0x2204: store(e.data, decoder_.errors()); break;
-    case 0x6100: store(e.data, static_cast<float>(field_[n])); break;
-    case 0x6140: store(e.data, static_cast<float>(process(n) - double{channels_[n].tare})); break;
-    case 0x6150: {  // bit 0: not valid; bits 1 and 2: overload to the positive, to the negative
-        const bool over = raw_[n] == 32767 || raw_[n] == -32768 || std::abs(field_[n]) > static_cast<double>(limits_[n]);
-        *e.data = static_cast<std::uint8_t>(((status_ & jr3_status::no_signal) != 0 ? 1 : 0) | (over ? field_[n] > 0 ? 2 : 4 : 0));
-        break;
-    }
-    case 0x9130: store(e.data, rounded<std::int32_t>(process(n) * powers[std::min<unsigned>(channels_[n].digits, 6)])); break;
-    default: break;
-    }
+    if (e.index == 0x2203) store(e.data, decoder_.packets());
+    else if (e.index == 0x2204) store(e.data, decoder_.errors());
     return Abort::none;
-}
-
-Abort Jr3::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
-    if (e.sub == 0 || (e.index != 0x6125 && e.index != 0x6139)) return Abort::none;
-    return load<std::uint32_t>(value.data()) == (e.index == 0x6125 ? zero_command : tare_command) ? Abort::none : Abort::cannot_store;
-}
-
-void Jr3::written(Entry& e) noexcept {
-    if (e.sub == 0) return;
-    const unsigned n = e.sub - 1U;
-    if (e.index == 0x6125) channels_[n].offset -= static_cast<float>(process(n));
-    else if (e.index == 0x6139) channels_[n].tare = static_cast<float>(process(n));
 }
 
 Abort Jr3::Memory::open_read(Entry&, std::uint32_t& size) noexcept {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../devices/program.hpp"
+#include "analog_input.hpp"
 #include "jr3_calibration.hpp"
 
 namespace hal::canopen {
@@ -59,14 +60,8 @@ public:
     void on_sync(std::uint8_t, Time now) noexcept override { sample(now), publish(); }
     void on_reset(bool application) noexcept override;
     Abort reading(Entry&) noexcept override;
-    Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
-    void written(Entry&) noexcept override;
 
 private:
-    struct Channel {
-        float factor = 1, scaling_offset = 0, offset = 0, tare = 0, process = 0;
-        std::uint8_t digits = 2;
-    };
     class Memory final : public Stream {
     public:
         explicit Memory(Jr3& node) : node_(node) {}
@@ -88,7 +83,6 @@ private:
     void trigger_changes() noexcept;
     void alarm(std::uint8_t bit, bool on, std::uint16_t code, std::uint8_t about) noexcept;
     void show_calibration() noexcept;
-    double process(unsigned n) const noexcept;
 
     const Jr3Settings settings_;
     // the sensor
@@ -106,8 +100,8 @@ private:
     jr3::Decoder decoder_;
     jr3::MemoryReader memory_reader_;
     jr3::Calibration calibration_;  // of the last whole memory, until then the usual one
-    std::array<std::int16_t, 6> raw_{}, values_{}, nets_{}, said_{}, delta_{};
-    std::array<Channel, 6> channels_{};
+    AnalogInputs inputs_;
+    std::array<std::int16_t, 6> raw_{};
     std::array<float, 6> limits_{};
     jr3::Six field_{};
     std::int16_t supply_raw_ = 0;

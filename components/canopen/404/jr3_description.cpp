@@ -49,32 +49,9 @@ void add_own(Description& d, const jr3::Calibration& c) {
     d.add(0x2204, 0, Type::unsigned32, Access::read_only, 0, "Packets with errors");
 }
 
-void add_profile(Description& d) {
-    using enum Access;
-    const Row rows[] = {
-        {0x6100, "AI field value float", Type::real32, read_only, true},
-        {0x6124, "AI offset float", Type::real32, read_write},
-        {0x6125, "AI autozero", Type::unsigned32, write_only},
-        {0x6126, "AI scaling factor", Type::real32, read_write, false, 1.0},
-        {0x6127, "AI scaling offset", Type::real32, read_write},
-        {0x6130, "AI process value float", Type::real32, read_only, true},
-        {0x6132, "AI decimal digits", Type::unsigned8, read_write},
-        {0x6138, "AI tare zero float", Type::real32, read_write},
-        {0x6139, "AI autotare", Type::unsigned32, write_only},
-        {0x6140, "AI net value float", Type::real32, read_only, true},
-        {0x6150, "AI status", Type::unsigned8, read_only, true},
-        {0x7100, "AI field value 16-bit", Type::integer16, read_only, true},
-        {0x7130, "AI process value 16-bit", Type::integer16, read_only, true},
-        {0x7133, "AI interrupt delta 16-bit", Type::integer16, read_write},
-        {0x7140, "AI net value 16-bit", Type::integer16, read_only, true},
-        {0x9130, "AI process value 32-bit", Type::integer32, read_only, true},
-    };
-    for (const auto& row : rows) add(d, row);
-    for (std::uint8_t n = 1; n <= 6; ++n) {
-        d.find(0x6132, n)->limited(0, 6).value[0] = n <= 3 ? 2 : 3;
-        d.find(0x7133, n)->limited(0, 32767);
-    }
-}
+constexpr std::uint32_t newton = 0x00210000;  // CiA 303-2; none is said for the torques
+constexpr AnalogChannel channels[] = {{"Fx", 0, newton, 2}, {"Fy", 0, newton, 2}, {"Fz", 0, newton, 2},
+                                      {"Mx", 0, 0, 3}, {"My", 0, 0, 3}, {"Mz", 0, 0, 3}};
 
 }  // namespace
 
@@ -83,7 +60,7 @@ Description jr3_description(const Jr3Settings& s) {
                                   .serial = s.serial, .name = "Halcyon JR3", .heartbeat_ms = s.heartbeat_ms});
     add_storage(d);
     add_own(d, s.calibration);
-    add_profile(d);
+    add_analog_inputs(d, channels);
     for (unsigned pdo = 1; pdo <= 4; ++pdo) {
         PdoDescription p;
         const bool by_change = pdo % 2 == 1;

@@ -74,6 +74,8 @@ constexpr Row drive[] = {
     {0x6098, 0, 0, "Homing method", integer8, received},
     {0x6099, 1, 2, "Homing speeds #", unsigned32, kept},
     {0x609a, 0, 0, "Homing acceleration", unsigned32, kept},
+    {0x60a3, 0, 0, "Profile jerk use", unsigned8, kept},
+    {0x60a4, 1, 1, "Profile jerk #", unsigned32, kept},
     {0x60b0, 0, 0, "Position offset", integer32, received},
     {0x60b1, 0, 0, "Velocity offset", integer32, received},
     {0x60b2, 0, 0, "Torque offset", integer16, received},

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "../302/flying.hpp"
 #include "../302/setup.hpp"
 
 namespace hal::canopen::config {
@@ -68,6 +69,13 @@ struct Object {
     bool same(const Object& o) const { return !filler && !o.filler && index == o.index && sub == o.sub; }
 };
 
+/// What makes a PDO a safety-related one of EN 50325-5: two frames, the second inverted.
+struct Safety {
+    Time                       refresh = 25 * millisecond;     ///< of its sender
+    Time                       sct = 50 * millisecond, srvt = 20 * millisecond;  ///< of its receiver
+    std::vector<std::uint32_t> inverted;  ///< the node's inverted objects, as mapping entries
+};
+
 struct Pdo {
     bool                to_node = false;  ///< an RPDO of the node: the master sends it
     unsigned            number = 0;  ///< of the node, from 1
@@ -78,6 +86,7 @@ struct Pdo {
     Time                limit = 0;  ///< one the node sends: silence that is a fault; 0: none
     std::vector<Object> objects;
     Place               at{};
+    std::optional<Safety> safety{};  ///< an SRDO: `number` is that of the SRDO, `cob` of its first frame, and what is of PDOs only means nothing
 
     bool     synchronous() const { return transmission <= 240; }
     unsigned bits() const;
@@ -115,10 +124,13 @@ struct MasterConfig {
     std::uint32_t        sync_cob = 0x80;
     std::uint8_t         sync_counter = 0;  ///< 1019h
     Time                 sync_window = 0;  ///< 1007h
+    bool                 sync_clock = true;  ///< followed: the threads follow it, too
+    Time                 sync_phase = -1;    ///< followed: how long after it a cycle begins; < 0: half the thread's period
     Time                 time_period = 0;  ///< TIME; 0: none
     std::uint16_t        heartbeat_ms = 100;  ///< of the master; 0: none
     AtStop               at_stop = AtStop::pre_operational;
     MasterSetup          master;  ///< without its nodes, which are in `nodes`
+    FlyingSetup          flying;
     std::vector<Node>    nodes;
     std::vector<Foreign> foreign;
     Place                at{};  ///< of [bus]

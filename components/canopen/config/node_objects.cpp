@@ -183,7 +183,7 @@ void NodeReader::finish_objects() {
     for (Pdo& pdo : node_.pdos)
         for (Object& o : pdo.objects) {
             if (o.filler) continue;
-            if (!o.safe_given) o.safe = usual_safe(o, pdo.to_node);
+            if (!o.safe_given) o.safe = pdo.safety ? std::optional<std::uint64_t>(0) : usual_safe(o, pdo.to_node);
             if (o.as == PinType::none) o.as = usual(o.type);
             const bool lines = o.bits_wanted > 0 || (o.bits_wanted == 0 && is_lines(o.index) && o.as != PinType::real);
             if (lines && o.bit_pins.empty()) name_bits(o);
@@ -206,7 +206,7 @@ void NodeReader::leftover() {
         "type", "eds", "device", "axes", "device-type", "vendor", "product", "revision",
         "serial", "mandatory", "configure", "keep-alive", "start", "start-order", "restore", "save",
         "boot-time", "retry", "retry-most", "on-failure", "on-loss", "heartbeat", "silence", "guarding",
-        "watch-master", "firmware", "firmware-number", "firmware-id", "firmware-version", "firmware-time", "tpdo1", "rpdo1",
+        "watch-master", "firmware", "firmware-number", "firmware-id", "firmware-version", "firmware-time", "tpdo1", "rpdo1", "tsrdo1", "rsrdo2",
         "write OBJECT"};
     for (Line* line : keys_.rest()) {
         line->used = true;

@@ -25,6 +25,10 @@ std::optional<Type> type_named(std::string_view word) {
         if (lower(word) == t.word) return t.value;
     return {};
 }
+std::string upper(std::string text) {
+    for (char& c : text) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
+    return text;
+}
 constexpr const char* type_words = "u8, u16, u32, u64, i8, i16, i32, i64, real32, real64 or bool";
 
 /// INDEX or INDEX:SUB with a hexadecimal index; none when it is something else.
@@ -80,11 +84,14 @@ void NodeReader::read() {
     settings();
     firmware();
     pdos();
+    srdos();
     writes();
     object_options();
     finish_objects();
     leftover();
-    for (Pdo& pdo : node_.pdos) configure(pdo);
+    for (Pdo& pdo : node_.pdos)
+        if (!pdo.safety) configure(pdo);
+    configure_srdos();
 }
 
 void NodeReader::describe() {
@@ -224,17 +231,19 @@ void NodeReader::write_one(const Line& line) {
 
 // PDOs.
 
-std::map<std::pair<bool, unsigned>, NodeReader::PdoWish> NodeReader::wishes() {
+std::map<std::pair<bool, unsigned>, NodeReader::PdoWish> NodeReader::wishes(const char* what, unsigned most) {
     std::map<std::pair<bool, unsigned>, PdoWish> out;
-    for (const bool to_node : {true, false})
-        for (Line* line : keys_.all_of(to_node ? "rpdo" : "tpdo")) {
-            const std::string rest = line->key.text.substr(4);
+    for (const bool to_node : {true, false}) {
+        const std::string beginning = std::string(to_node ? "r" : "t") + what;
+        for (Line* line : keys_.all_of(beginning)) {
+            const std::string rest = line->key.text.substr(beginning.size());
             const std::size_t dot = std::min(rest.find('.'), rest.size());
             const auto        number = natural(rest.substr(0, dot));
             if (!number) continue;  // an object whose name begins so
             line->used = true;
-            if (*number < 1 || *number > 512) {
-                report_.error(Topic::value, line->key.at, "there is no PDO " + std::to_string(*number), "PDOs are numbered from 1 to 512");
+            if (*number < 1 || *number > most) {
+                report_.error(Topic::value, line->key.at, "there is no " + upper(what) + " " + std::to_string(*number),
+                              upper(what) + "s are numbered from 1 to " + std::to_string(most));
                 continue;
             }
             PdoWish& wish = out[{to_node, static_cast<unsigned>(*number)}];
@@ -242,6 +251,7 @@ std::map<std::pair<bool, unsigned>, NodeReader::PdoWish> NodeReader::wishes() {
             if (dot == rest.size()) wish.objects = line;
             else wish.options[rest.substr(dot + 1)] = line;
         }
+    }
     return out;
 }
 
@@ -456,7 +466,8 @@ bool NodeReader::object(const Word& word, Pdo& pdo, Object& out) {
 void NodeReader::configure(Pdo& pdo) {
     PdoDescription d;
     d.cob = pdo.cob, d.transmission = pdo.transmission, d.inhibit_100us = pdo.to_node ? std::uint16_t{0} : pdo.inhibit_100us;
-    d.event_ms = pdo.event_ms, d.sync_start = pdo.to_node ? std::uint8_t{0} : pdo.sync_start;
+    // Sent at least so often; the node misses it when three in a row did not come.
+    d.event_ms = static_cast<std::uint16_t>(std::min(pdo.to_node ? 3U * pdo.event_ms : pdo.event_ms, 65535U)), d.sync_start = pdo.to_node ? std::uint8_t{0} : pdo.sync_start;
     for (const Object& o : pdo.objects) d.mapping.push_back(map_entry(o.index, o.sub, o.bits));
     if (pdo.cob == 0) return;  // gets one when all nodes are known
     auto writes = pdo.to_node ? rpdo_writes(pdo.number, d, node_.setup.id) : tpdo_writes(pdo.number, d, node_.setup.id);

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 
+#include "../304/description.hpp"
 #include "../306/eds.hpp"
 #include "catalog.hpp"
 #include "keys.hpp"
@@ -48,10 +49,14 @@ private:
     void                                         writes();
     void                                         write_one(const Line& line);
     void                                         pdos();
-    std::map<std::pair<bool, unsigned>, PdoWish> wishes();
+    std::map<std::pair<bool, unsigned>, PdoWish> wishes(const char* what = "pdo", unsigned most = 512);
     void                                         pdo(const PdoWish& wish);
     void                                         pdo_options(const PdoWish& wish, Pdo& pdo);
     void                                         objects_of(const Word& list, Pdo& pdo);
+    void                                         srdos();
+    void                                         srdo(const PdoWish& wish);
+    void                                         srdo_options(const PdoWish& wish, Pdo& pdo);
+    void                                         configure_srdos();
     bool                                         default_objects(const PdoWish& wish, Pdo& pdo);
     bool                                         object(const Word& word, Pdo& pdo, Object& out);
     Object                                       known_object(const Known& known, unsigned bits) const;
@@ -70,6 +75,9 @@ private:
     const eds::DeviceDescription* eds_ = nullptr;
     std::unique_ptr<Catalog>      catalog_;
 };
+
+/// An SRDO as the node has to be configured. [setup]
+SrdoDescription node_srdo(const Pdo&);
 
 /// The object's bits for a value of its pin. The value is cut off at the object's limits.
 std::uint64_t raw_of(const Object&, double pin_value);

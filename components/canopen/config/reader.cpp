@@ -29,9 +29,44 @@ void take_sync(Keys& keys, MasterConfig& to) {
         else if (time && *time >= 100 * microsecond && *time <= 60 * second) to.sync = SyncMode::timed, to.sync_period = *time;
         else keys.refuse(*line, "cycle, a time such as 2ms, follow, follow 2ms, or none");
     }
+    constexpr Choice<bool> clocks[] = {{"sync", true}, {"own", false}};
+    for (const char* key : {"clock", "sync-phase"})
+        if (const Line* line = keys.find(key); line != nullptr && to.sync != SyncMode::follow)
+            keys.report().error(Topic::value, line->key.at, std::string("'") + key + "' is for those who follow the SYNC of another node",
+                                "write sync = follow, or leave it out");
+    keys.take_choice("clock", to.sync_clock, clocks);
+    keys.take_time("sync-phase", to.sync_phase, 0, 60 * second);
     keys.take_small("sync-counter", to.sync_counter, 2, 240);
     keys.take_time("sync-window", to.sync_window, microsecond, 60 * second);
     keys.take_small("sync-cob-id", to.sync_cob, 1, 0x7ff);
+}
+
+void take_flying(Keys& keys, MasterConfig& to) {
+    constexpr Choice<int> priorities[] = {{"no", -1}, {"high", 0}, {"medium", 1}, {"low", 2}};
+    FlyingSetup&          f = to.flying;
+    const Line* const     flying = keys.find("flying-master");
+    int                   priority = flying == nullptr ? -1 : -2;  // -2: it was refused
+    keys.take_choice("flying-master", priority, priorities);
+    f.enabled = priority >= 0;
+    f.id = to.node_id;
+    if (f.enabled) f.priority = static_cast<std::uint8_t>(priority);
+    for (const char* key :
+         {"flying-timeout", "flying-delay", "flying-priority-slot", "flying-device-slot", "flying-detect", "flying-silence"})
+        if (const Line* line = keys.find(key); line != nullptr && priority == -1)
+            keys.report().error(Topic::value, line->key.at, std::string("'") + key + "' is for flying masters",
+                                "write flying-master = medium");
+    f.silence = Time{to.heartbeat_ms} * millisecond * 5 / 2;
+    keys.take_time("flying-timeout", f.timeout, millisecond, 60 * second);
+    keys.take_time("flying-delay", f.delay, 0, 60 * second);
+    keys.take_time("flying-priority-slot", f.priority_slot, millisecond, 60 * second);
+    keys.take_time("flying-device-slot", f.device_slot, 10 * microsecond, second);
+    keys.take_time("flying-detect", f.detect_cycle, 100 * millisecond, 3600 * second);
+    keys.take_time("flying-silence", f.silence, millisecond, 60 * second);
+    if (f.enabled && to.heartbeat_ms == 0 && flying != nullptr)
+        keys.report().error(Topic::value, flying->key.at, "a flying master without a heartbeat would not be missed",
+                            "write heartbeat = 100ms");
+    for (const std::string& problem : problems_of(f))
+        if (flying != nullptr) keys.report().error(Topic::value, flying->key.at, problem);
 }
 
 void take_bus(Keys& keys, MasterConfig& to, Report& report) {
@@ -49,6 +84,7 @@ void take_bus(Keys& keys, MasterConfig& to, Report& report) {
     if (keys.take_time("heartbeat", heartbeat, millisecond, 65535 * millisecond, true))
         to.heartbeat_ms = static_cast<std::uint16_t>(heartbeat / millisecond);
     keys.take_choice("on-stop", to.at_stop, stops);
+    take_flying(keys, to);
     MasterSetup& m = to.master;
     m.id = to.node_id;
     keys.take_time("sdo-timeout", m.sdo.timeout, millisecond, 60 * second);
@@ -63,7 +99,9 @@ void take_bus(Keys& keys, MasterConfig& to, Report& report) {
         line->used = true;
         const std::vector<std::string> all{"link",        "bitrate",     "datarate", "node-id",   "sync",           "sync-counter",
                                            "sync-window", "sync-cob-id", "time",     "heartbeat", "on-stop",        "sdo-timeout",
-                                           "sdo-retries", "nmt-inhibit", "parallel", "resets",    "reset-at-start", "start"};
+                                           "sdo-retries", "nmt-inhibit", "parallel", "resets",    "reset-at-start", "start",
+                                           "clock",       "sync-phase",  "flying-master", "flying-timeout", "flying-delay",
+                                           "flying-priority-slot", "flying-device-slot", "flying-detect", "flying-silence"};
         const std::string              near = did_you_mean(line->key.text, all);
         report.error(Topic::line, line->key.at, "the bus has no '" + line->key.text + "'",
                      near.empty() ? "there are " + listed(all, 40) : near);
@@ -117,7 +155,7 @@ void share_out_identifiers(MasterConfig& config, Report& report) {
     for (const Foreign& f : config.foreign) taken.insert(f.id);
     for (Node& n : config.nodes)
         for (Pdo& p : n.pdos) {
-            if (p.cob != 0) continue;
+            if (p.cob != 0 || p.safety) continue;
             for (unsigned base = p.to_node ? 0x200 : 0x180; base < 0x580 && p.cob == 0; base += 0x100)
                 for (unsigned id = base + 1; id < base + 0x80 && p.cob == 0; ++id)
                     if (!taken.contains(id)) p.cob = id;
@@ -149,6 +187,7 @@ std::uint64_t used_bits(const Pdo& pdo) {
 
 /// Several nodes may take their parts of one message of the master's.
 std::string why_not_shared(const Pdo& a, const Pdo& b) {
+    if (a.safety || b.safety) return "an SRDO has its identifiers alone";
     if (!a.to_node || !b.to_node) return "two senders of one identifier destroy each other's frames";
     if (a.bits() != b.bits()) return "nodes that share a message have to map the same length; fill it with gap 8, gap 16 or gap 32";
     if ((used_bits(a) & used_bits(b)) != 0)
@@ -163,14 +202,16 @@ void check_whole(const MasterConfig& config, Report& report) {
         const Pdo*  pdo;
     };
     std::multimap<std::uint32_t, User> users;
-    unsigned                           sent = 0, received = 0;
+    unsigned                           sent = 0, received = 0, safety = 0;
     const auto                         called = [](const User& u) {
-        return std::string(u.pdo->to_node ? "rpdo" : "tpdo") + std::to_string(u.pdo->number) + " of '" + u.node->name + "'";
+        return std::string(u.pdo->to_node ? "r" : "t") + (u.pdo->safety ? "srdo" : "pdo") + std::to_string(u.pdo->number) + " of '" +
+               u.node->name + "'";
     };
     for (const Node& n : config.nodes)
         for (const Pdo& p : n.pdos) {
             const std::uint32_t cob = p.cob & (cob_extended | 0x1fffffff);
-            if (!p.to_node) ++received;
+            if (p.safety) ++safety;
+            else if (!p.to_node) ++received;
             else sent += !users.contains(cob);
             const auto [first, last] = users.equal_range(cob);
             for (auto u = first; u != last; ++u) {
@@ -195,6 +236,8 @@ void check_whole(const MasterConfig& config, Report& report) {
         if (count > 512)
             report.error(Topic::node, config.at, "the nodes have " + std::to_string(count) + " PDOs in one direction; a master has 512",
                          "use a second bus, with a configuration of its own");
+    if (safety > Srdos::most)
+        report.error(Topic::node, config.at, "the nodes have " + std::to_string(safety) + " SRDOs; a bus has room for 64");
     if (!std::any_of(report.messages.begin(), report.messages.end(), [](const Message& m) { return m.severity == Severity::error; }))
         for (const std::string& problem : problems_of(config.setup())) report.error(Topic::node, config.at, problem);
 }

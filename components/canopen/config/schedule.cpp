@@ -39,8 +39,18 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
     };
     if (sync != 0) add(config.sync_cob, config.sync_counter != 0 ? 1 : 0, sync, "SYNC", config.at, true);
     if (config.time_period != 0) add(0x100, 6, config.time_period, "TIME", config.at, false);
+    if (const FlyingSetup& f = config.flying; f.enabled) {  // while there is an active master; a negotiation is over by then
+        add(0x71, 2, f.look_every(), "who is the NMT master", config.at, false);
+        add(0x73, 0, f.look_every(), "NMT master wanted", config.at, false);
+    }
     for (const Node& n : config.nodes)
         for (const Pdo& p : n.pdos) {
+            if (p.safety) {
+                const std::string name = n.name + (p.to_node ? " rsrdo" : " tsrdo") + std::to_string(p.number);
+                add(p.cob, p.bytes(), p.safety->refresh, name, p.at, false);
+                add(p.cob + 1, p.bytes(), p.safety->refresh, name + " inverted", p.at, false);
+                continue;
+            }
             const auto same = std::find_if(out.messages.begin(), out.messages.end(), [&](const plan::Message& m) {
                 return p.to_node && !m.remote && m.id == cob_id(p.cob) && m.extended == ((p.cob & cob_extended) != 0);
             });
@@ -79,6 +89,7 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
 }
 
 std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const std::string& path) {
+    if (config.link.starts_with("cane:")) return {};  // there messages share Ethernet frames, not a bit rate
     Schedule schedule = schedule_of(config, cycle);
     // A warning is only about what is known: a PDO that is sent on a change may be as rare as its changes.
     for (std::size_t i = schedule.messages.size(); i-- > 0;) {

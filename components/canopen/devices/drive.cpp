@@ -106,10 +106,7 @@ std::string DriveProgram::summary() const {
         const auto s = drive_->status(n);
         text += (n == 0 ? "" : "; ") + (settings_.axes == 1 ? std::string() : "axis " + std::to_string(n) + " ") + cia402::word(s.state);
         if (s.mode != cia402::Mode::none) text += std::string(", ") + cia402::word(s.mode);
-        if (s.error_code != 0) {
-            const char* own = cia402::error_word(s.error_code);
-            text += std::string(", error ") + (own != nullptr ? own : emergency_word(s.error_code));
-        }
+        if (s.error_code != 0) text += std::string(", error ") + cia402::error_word(s.error_code);
     }
     return text;
 }

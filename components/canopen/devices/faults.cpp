@@ -37,6 +37,11 @@ constexpr FaultRow rows[] = {
     {Fault::wrong_software, "wrong-software", "reading of the software identification (1F56h:1) is wrong", 0},
     {Fault::babble, "babble", "`time` it sends a frame of the highest priority", 200 * microsecond},
     {Fault::emcy_storm, "emcy-storm", "`time` it sends an emergency", 10 * millisecond},
+    {Fault::no_srdo, "no-srdo", "SRDO is not sent", 0},
+    {Fault::srdo_half, "srdo-half", "SRDO is sent without its second frame", 0},
+    {Fault::srdo_wrong, "srdo-wrong", "SRDO has a wrong bit in its second frame", 0},
+    {Fault::srdo_order, "srdo-order", "SRDO is sent with its second frame first", 0},
+    {Fault::late_srdo, "late-srdo", "SRDO's second frame leaves late, by `time`", 30 * millisecond},
 };
 static_assert([] {
     for (std::size_t n = 0; n < std::size(rows); ++n)
@@ -60,6 +65,7 @@ std::string names() {
     return all;
 }
 
+constexpr bool is_srdo(const Frame& f) noexcept { return !f.extended && f.id > 0x100 && f.id <= 0x180; }
 constexpr bool is_pdo(const Frame& f, std::uint8_t node) noexcept {
     if (f.extended || f.remote) return f.extended;
     return f.id > 0x180 && f.id < 0x700 && f.id != 0x580U + node && f.id != 0x600U + node;
@@ -228,6 +234,20 @@ void Faults::hold(const Frame& f, Time due, FrameQueue& bus) noexcept {
     held_[held_count_++] = {f, due};
 }
 
+/// What becomes of a frame of an SRDO, the first one (odd) or the second. False: it is not sent now.
+bool Faults::safety(Frame& f, Time& late, FrameQueue& bus) noexcept {
+    if (f.id % 2 == 1) {
+        skips_srdo_ = hit(Fault::no_srdo), swaps_srdo_ = hit(Fault::srdo_order);
+        first_of_srdo_ = f;
+        return !skips_srdo_ && !swaps_srdo_;
+    }
+    if (skips_srdo_ || hit(Fault::srdo_half)) return false;
+    if (f.length > 0 && hit(Fault::srdo_wrong)) f.data[0] ^= 0x01;
+    if (hit(Fault::late_srdo)) late = time(Fault::late_srdo);
+    if (swaps_srdo_) bus.push(f), f = first_of_srdo_;
+    return true;
+}
+
 void Faults::send(Frame f, std::uint8_t node, FrameQueue& bus, Time now) noexcept {
     start(now);
     if (hit(Fault::mute)) return;
@@ -240,6 +260,8 @@ void Faults::send(Frame f, std::uint8_t node, FrameQueue& bus, Time now) noexcep
         if (boot_up ? hit(Fault::no_boot_up) : hit(Fault::no_heartbeat)) return;
         if (!boot_up && hit(Fault::wrong_state)) f.data[0] = static_cast<std::uint8_t>((f.data[0] & 0x80) | 0x04);
         if (!boot_up && hit(Fault::guard_toggle)) f.data[0] ^= 0x80;
+    } else if (is_srdo(f)) {
+        if (!safety(f, late, bus)) return;
     } else if (is_pdo(f, node)) {
         if (f.length > 0 && hit(Fault::short_pdo)) --f.length;
         else if (f.length < 8 && hit(Fault::long_pdo)) f.data[f.length++] = 0;

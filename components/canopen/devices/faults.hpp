@@ -17,7 +17,7 @@ namespace hal::canopen {
 enum class Fault : std::uint8_t {
     mute, deaf, twice, late_sdo, late_pdo, no_boot_up, boot_storm, reboot, no_heartbeat, wrong_state, guard_toggle, no_sdo, abort,
     stale_abort, toggle, block_gap, block_crc, short_pdo, long_pdo, wrong_type, wrong_vendor, wrong_product, wrong_revision, wrong_serial,
-    wrong_software, babble, emcy_storm,
+    wrong_software, babble, emcy_storm, no_srdo, srdo_half, srdo_wrong, srdo_order, late_srdo,
 };
 
 /// The one list of them.
@@ -58,7 +58,7 @@ public:
     bool poll(std::uint8_t node, FrameQueue& bus, Time now) noexcept;
 
 private:
-    static constexpr std::size_t kinds = static_cast<std::size_t>(Fault::emcy_storm) + 1;
+    static constexpr std::size_t kinds = static_cast<std::size_t>(Fault::late_srdo) + 1;
     static constexpr std::size_t index(Fault fault) noexcept { return static_cast<std::size_t>(fault); }
     struct Held {
         Frame frame;
@@ -73,6 +73,7 @@ private:
     void hold(const Frame&, Time due, FrameQueue& bus) noexcept;
     bool answer(Frame&, FrameQueue& bus) noexcept;
     void identity(Frame&) noexcept;
+    bool safety(Frame&, Time& late, FrameQueue& bus) noexcept;
 
     std::array<FaultSetting, kinds> settings_{};
     std::array<std::uint64_t, kinds> seen_{}, hits_{};
@@ -86,6 +87,8 @@ private:
     enum class Block : std::uint8_t { none, receiving, sending, ending } block_ = Block::none;
     std::uint8_t last_sequence_ = 0;
     std::array<std::uint8_t, 3> request_{}, previous_{};
+    Frame first_of_srdo_{};  // waits until its second frame went
+    bool skips_srdo_ = false, swaps_srdo_ = false;
 };
 
 }  // namespace hal::canopen

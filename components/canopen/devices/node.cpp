@@ -26,7 +26,9 @@ Node::Node(Program& program, std::unique_ptr<can::Link> link, const DeviceSettin
 }
 
 void Node::watch_bus(Time now) noexcept {
-    const bool off = link_->state() == can::State::bus_off;
+    const auto state = link_->state();
+    const bool off = state == can::State::bus_off || state == can::State::down;
+    if (!watched_) bus_off_ = off, watched_ = true;  // a bus that was never there is no error of this device
     if (off == bus_off_) return;
     bus_off_ = off;
     if (off) device_.bus_off(now);

@@ -44,7 +44,7 @@ private:
     Faults faults_;
     FrameQueue bus_;  // behind the faults
     std::array<Frame, 64> heard_;
-    bool powered_ = true, runs_ = false, booted_once_ = false, bus_off_ = false;
+    bool powered_ = true, runs_ = false, booted_once_ = false, bus_off_ = false, watched_ = false;
 };
 
 }  // namespace hal::canopen

@@ -2,6 +2,10 @@
 #include "own_node.hpp"
 
 #include <algorithm>
+#include <iterator>
+
+#include "../302/objects.hpp"
+#include "../304/description.hpp"
 
 namespace hal::canopen {
 
@@ -35,12 +39,26 @@ public:
         set(d, 0x1029, 1, 1, 1);  // an error of the bus is the network's state, not ours
         d.add(filler, 0, Type::unsigned64, Access::read_write).mappable();
         for (std::size_t n = 0; n < config_.nodes.size(); ++n)
-            for (const config::Pdo& pdo : config_.nodes[n].pdos) pdo.to_node ? send(n, pdo) : receive(n, pdo);
+            for (const config::Pdo& pdo : config_.nodes[n].pdos) pdo.safety ? safety(n, pdo) : pdo.to_node ? send(n, pdo) : receive(n, pdo);
         for (Sent& sent : out_.sent) finish(sent);
+        add_master_objects(d, config_.setup());
+        if (config_.flying.enabled) flying(d);
+        add_srdos(d, srdos_);
         return std::move(out_);
     }
 
 private:
+    /// 1F90h, in ms.
+    void flying(Description& d) const {
+        const FlyingSetup& f = config_.flying;
+        set(d, 0x1f80, 0, startup_of(config_.setup()) | 1U << 5, 4);
+        d.add(0x1f90, 0, Type::unsigned8, Access::constant, 6, "NMT flying master timing parameters");
+        const Time times[] = {f.timeout, f.delay, f.priority * millisecond, f.priority_slot, f.device_slot, f.look_every()};
+        for (std::uint8_t n = 0; n < std::size(times); ++n)
+            d.add(0x1f90, static_cast<std::uint8_t>(n + 1), Type::unsigned16, Access::read_only,
+                  static_cast<std::uint64_t>(times[n] / millisecond));
+    }
+
     void receive(std::size_t node, const config::Pdo& pdo) {
         PdoDescription p;
         p.cob = pdo.cob;
@@ -62,6 +80,24 @@ private:
             if (!object.filler) sent->parts.push_back({place(node, true, object), static_cast<std::uint8_t>(bit), object.bits});
             bit += object.bits;
         }
+    }
+
+    /// The plain objects are ours; of the inverted frame only that it is the complement counts.
+    void safety(std::size_t node, const config::Pdo& pdo) {
+        SrdoDescription s;
+        s.direction = pdo.to_node ? SrdoDirection::sends : SrdoDirection::receives;
+        s.cycle_ms = static_cast<std::uint16_t>((pdo.to_node ? pdo.safety->refresh : pdo.safety->sct) / millisecond);
+        s.validation_ms = static_cast<std::uint8_t>(pdo.safety->srvt / millisecond);
+        s.cob = pdo.cob;
+        OwnSrdo own{node, &pdo, static_cast<unsigned>(out_.srdos.size() + 1)};
+        for (const config::Object& object : pdo.objects) {
+            own.placed.push_back(place(node, pdo.to_node, object));
+            const Placed& at = out_.placed[own.placed.back()];
+            s.mapping.push_back(map_entry(at.index, at.sub, object.bits));
+            s.mapping.push_back(map_entry(filler, 0, object.bits));
+        }
+        out_.srdos.push_back(std::move(own));
+        srdos_.push_back(std::move(s));
     }
 
     void finish(Sent& sent) {
@@ -98,7 +134,8 @@ private:
     }
 
     const config::MasterConfig& config_;
-    OwnNode                     out_;
+    OwnNode                      out_;
+    std::vector<SrdoDescription> srdos_;
     unsigned                    sent_objects_ = 0, received_objects_ = 0;
 };
 

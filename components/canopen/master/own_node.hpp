@@ -37,11 +37,20 @@ struct Sent {
     std::vector<Part>  parts{};         ///< by their first bit; what lies between them is zero
 };
 
+/// Which SRDO of ours takes or makes which one of a node.
+struct OwnSrdo {
+    std::size_t              node = 0;
+    const config::Pdo*       pdo = nullptr;
+    unsigned                 number = 0;
+    std::vector<std::size_t> placed{};  ///< its objects
+};
+
 struct OwnNode {
     Description           description;
     std::vector<Placed>   placed;   ///< one for each object and node, however many PDOs carry it; fillers are not among them
     std::vector<Received> received;
     std::vector<Sent>     sent;
+    std::vector<OwnSrdo>  srdos;
 };
 
 /// [setup]

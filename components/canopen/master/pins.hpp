@@ -223,6 +223,27 @@ struct NodePins {
     }
 };
 
+/// Which of several flying masters leads.
+struct FlyingPins {
+    hal::Out<bool>          active;
+    hal::Out<std::uint32_t> state, master, negotiations;
+
+    FlyingPins(Component& c, const Function& f)
+        : active(c, f, "active", "this one is the NMT master"),
+          state(c, f, "flying-state", "0 off, 1 waiting, 2 asking, 3 negotiating, 4 passive, 5 active"),
+          master(c, f, "active-master", "node-id of the NMT master; 0: there is none now"),
+          negotiations(c, f, "negotiations", "which of the masters is it was negotiated so often") {}
+
+    /// [realtime]
+    void show(const Runner& runner) noexcept {
+        const FlyingMaster& flying = runner.flying();
+        active = flying.active();
+        state = static_cast<std::uint32_t>(flying.state());
+        master = flying.master();
+        negotiations = static_cast<std::uint32_t>(flying.negotiations());
+    }
+};
+
 /// What is known of the bus and the network on it.
 struct BusPins {
     hal::Out<bool>          operational, bus_off;
@@ -254,7 +275,7 @@ struct BusPins {
         bus_off = s.state == can::State::bus_off || s.state == can::State::down;
         tx_errors = s.send_errors;
         rx_errors = s.receive_errors;
-        frames_lost = static_cast<std::uint32_t>(s.lost + s.dropped);
+        frames_lost = static_cast<std::uint32_t>(s.lost + s.dropped + runner.withheld());
         sync_count = static_cast<std::uint32_t>(runner.syncs());
         sync_overruns = static_cast<std::uint32_t>(runner.sync_overruns());
         load = 100.0 * s.load;

@@ -9,9 +9,10 @@
 #include <string>
 #include <thread>
 
-#include "../301/emcy.hpp"
+#include "../302/flying.hpp"
 #include "../302/status.hpp"
 #include "../config/schedule.hpp"
+#include "emergency_words.hpp"
 #include "hal/queue.hpp"
 #include "link/can.hpp"
 
@@ -39,15 +40,19 @@ public:
     void emergency(const NodeStatus& s, const Emergency& e) noexcept { events_.push({Event::emergency, s, {}, e, {}, 0}); }
     void bus(can::State state) noexcept { events_.push({Event::bus, {}, {}, {}, state, 0}); }
     void cycle(Time period) noexcept { events_.push({Event::cycle, {}, {}, {}, {}, period}); }
+    void flying(const FlyingMaster& f) noexcept {
+        if (f.master() != 0) events_.push({Event::flying, {}, {}, {}, {}, 0, f.master()});
+    }
 
 private:
     struct Event {
-        enum Kind : std::uint8_t { node, network, emergency, bus, cycle } kind = node;
+        enum Kind : std::uint8_t { node, network, emergency, bus, cycle, flying } kind = node;
         NodeStatus    of_node{};
         NetworkStatus of_network{};
         Emergency     of_emergency{};
         can::State    of_bus{};
         Time          period = 0;
+        std::uint8_t  master = 0;
     };
 
     void run() {
@@ -73,7 +78,7 @@ private:
             break;
         case Event::network: {
             const NetworkStatus& n = e.of_network;
-            if (n.state == NetworkState::booting && n.node == 0) return {};
+            if ((n.state == NetworkState::booting && n.node == 0) || n.state == NetworkState::off) return {};
             if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
             char text[120];
             const double after = static_cast<double>(n.operational_since - n.begun) * 1e-9;
@@ -85,14 +90,18 @@ private:
             return text;
         }
         case Event::emergency: {
-            char text[120];
-            std::snprintf(text, sizeof text, "%s: emergency 0x%04X (%s), error register 0x%02X", called(e.of_node.id).c_str(),
-                          e.of_emergency.code, emergency_word(e.of_emergency.code), e.of_emergency.error_register);
+            char       text[160];
+            const auto code = e.of_emergency.code;
+            std::snprintf(text, sizeof text, "%s: emergency 0x%04X (%s), error register 0x%02X", called(e.of_node.id).c_str(), code,
+                          emergency_word(config_, e.of_node.id, code), e.of_emergency.error_register);
             return text;
         }
         case Event::bus:
             return std::string("the bus is ") + can::word(e.of_bus) +
                    (e.of_bus == can::State::bus_off ? "; it is tried again by itself" : "");
+        case Event::flying:
+            return e.master == config_.node_id ? "is the NMT master now"
+                                               : "node " + std::to_string(e.master) + " is the NMT master; this one is ready to take over";
         case Event::cycle:
             for (const config::Message& m : config::load_messages(config_, e.period, file_)) return m.sentence + "; " + m.help;
             break;

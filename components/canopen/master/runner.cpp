@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "runner.hpp"
 
+#include <algorithm>
 #include <time.h>
 
 namespace hal::canopen {
@@ -28,7 +29,9 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
       events_(events),
       own_(own_node(config)),
       device_(own_.description, device_settings(config), *this),
-      master_(config.setup(), device_.out(), *this) {
+      master_(config.setup(), device_.out(), *this),
+      master_objects_(device_.dictionary(), master_),
+      flying_(config.flying, device_.out()) {
     place_.fill(255);
     for (std::size_t n = 0; n < config.nodes.size(); ++n) {
         const std::uint8_t id = config.nodes[n].setup.id;
@@ -52,7 +55,11 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
         if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) device_.pdos().send_on_change(sent.number);
         outputs_.push_back({&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
     }
+    device_.srdos().listen(*this);
+    for (const OwnSrdo& s : own_.srdos)
+        if (s.pdo->to_node) device_.srdos().invert_here(s.number);
     was_operational_.assign(statuses_.size(), 0);
+    ever_operational_.assign(statuses_.size(), 0);
     produces_ = config.sync == config::SyncMode::cycle || config.sync == config::SyncMode::timed;
     sync_frame_ = make_frame(config.sync_cob, config.sync_counter != 0 ? 1 : 0);
 }
@@ -63,26 +70,62 @@ void Runner::open(can::Link& link) noexcept {
     boots_.store(true);
 }
 
-void Runner::boot(Time now) noexcept {
+/// From nothing: a flying master finds out first whether it is the one.
+void Runner::begin(Time now) noexcept {
+    was_active_ = false;
+    if (!config_.flying.enabled) return boot(now);
     device_.out().clear();
     device_.start(now);
+    master_.stand_by(now);
+    flying_.start(now);
+}
+
+void Runner::boot(Time now) noexcept {
+    if (!config_.flying.enabled) {
+        device_.out().clear();
+        device_.start(now);
+    }
     device_.command(NmtCommand::start, now);
     master_.start(now);
+    std::fill(ever_operational_.begin(), ever_operational_.end(), std::uint8_t{0});
     sync_begun_ = time_begun_ = false;
+}
+
+/// The network goes over to this master or to another one.
+void Runner::fly(Time now) noexcept {
+    flying_.poll(now);
+    if (flying_.state() != flying_state_) {
+        flying_state_ = flying_.state();
+        events_.on_flying();
+    }
+    if (flying_.active() == was_active_) return;
+    was_active_ = flying_.active();
+    if (was_active_) return boot(now);
+    master_.stand_by(now);  // the nodes are the other one's: nothing is said to them
+    device_.command(NmtCommand::enter_pre_operational, now);
+}
+
+void Runner::note_sync(const can::Frame& f, Time now) noexcept {
+    if (f.id != config_.sync_cob || f.extended || f.remote || config_.sync != config::SyncMode::follow) return;
+    ++syncs_heard_;
+    sync_came_ = f.time_ns != 0 ? f.time_ns : now;
+    sync_ours_ = f.own;
 }
 
 void Runner::receive(Time now) noexcept {
     if (link_ == nullptr) return;
     now_ = now;
-    if (boots_.exchange(false)) boot(now);
+    if (boots_.exchange(false)) begin(now);
     std::array<can::Frame, 32> frames;
     for (std::size_t taken = 0; taken < most_frames;) {
         const std::size_t count = link_->receive(frames, now);
         for (std::size_t i = 0; i < count; ++i) {
             // Another master of this process makes our heartbeat, and its NMT commands are no stranger's.
             if (!leads_ && (frames[i].id == 0x700U + config_.node_id || frames[i].id == 0)) continue;
+            note_sync(frames[i], now);
+            if (config_.flying.enabled && flying_.handle(frames[i], now)) continue;
             device_.handle(frames[i], now);
-            master_.handle(frames[i], now);
+            if (active()) master_.handle(frames[i], now);
         }
         taken += count;
         if (count < frames.size()) break;
@@ -95,7 +138,9 @@ void Runner::receive(Time now) noexcept {
         bus_state_ = statistics_.state;
         events_.on_bus_state(bus_state_);
     }
-    master_.poll(now);
+    if (config_.flying.enabled) fly(now);
+    if (active()) master_.poll(now);
+    watch_srdos(now);
     if (config_.sync == config::SyncMode::follow) send(now);  // what a SYNC asked for does not wait for transmit()
 }
 
@@ -107,11 +152,26 @@ void Runner::take_wishes() noexcept {
                 for (const Sent::Part& part : out.sent->parts)
                     if (slots_[part.placed].node == n) device_.pdos().trigger(out.sent->number);
         was_operational_[n] = now ? 1 : 0;
+        if (now) ever_operational_[n] = 1;
     }
     for (Slot& s : slots_) {
         if (!s.to_node) continue;
-        if (statuses_[s.node]->operational) set_value(*s.entry, s.wish);
+        // One that is kept alive may be operational before we know: it gets what it is to have, not what we would have it held at.
+        const bool kept = config_.nodes[s.node].setup.keep_alive && ever_operational_[s.node] == 0;
+        if (statuses_[s.node]->operational || kept) set_value(*s.entry, s.wish);
         else if (s.has_safe) set_value(*s.entry, s.safe);
+    }
+}
+
+/// Of a node that works every SRDO is expected; what is not believed shows its safe values in this very cycle.
+void Runner::watch_srdos(Time now) noexcept {
+    if (own_.srdos.empty()) return;
+    for (const OwnSrdo& s : own_.srdos) device_.srdos().expect(s.number, statuses_[s.node]->operational, now);
+    device_.srdos().poll(now);
+    for (const OwnSrdo& s : own_.srdos) {
+        if (s.pdo->to_node || device_.srdos().status(s.number).believed) continue;
+        for (const std::size_t n : s.placed)
+            if (slots_[n].has_safe) set_value(*slots_[n].entry, slots_[n].safe);
     }
 }
 
@@ -119,8 +179,8 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
     if (link_ == nullptr || boots_.load()) return;
     now_ = now;
     take_wishes();
-    if (produces_ && leads) produce_sync(now, period);
-    if (config_.time_period > 0 && leads) produce_time(now);
+    if (produces_ && leads && active()) produce_sync(now, period);
+    if (config_.time_period > 0 && leads && active()) produce_time(now);
     device_.poll(now);
     leads_ = leads;
     send(now);
@@ -160,8 +220,14 @@ void Runner::produce_time(Time now) noexcept {
 }
 
 void Runner::send(Time now) noexcept {
+    const bool stuck = is_stuck(now);
     while (const Frame* f = device_.out().front()) {
         const bool heartbeat = f->id == 0x700U + config_.node_id && !f->extended;
+        if (stuck && is_process_data(*f)) {
+            ++withheld_;
+            device_.out().drop();
+            continue;
+        }
         const can::Sent sent = heartbeat && !leads_ ? can::Sent::queued : link_->send(*f, now);
         if (sent == can::Sent::full) break;  // it stays, and goes first in the next cycle
         device_.out().drop();
@@ -169,8 +235,25 @@ void Runner::send(Time now) noexcept {
     link_->flush(now);
 }
 
+/// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would wait in the queue, and move the
+/// machine by what was wanted long ago when the cable is back.
+bool Runner::is_stuck(Time now) noexcept {
+    constexpr Time longest_wait = 20 * millisecond;
+    constexpr Time longest_frame_bits = 160;  // 29-bit identifier, eight bytes, all stuff bits
+    const can::Statistics s = link_->statistics();
+    if (moved_ == 0 || s.queued == 0 || s.sent != sent_before_) moved_ = now;
+    sent_before_ = s.sent;
+    return now - moved_ > std::max(longest_wait, 100 * longest_frame_bits * second / std::max<Time>(config_.bit_rate, 1));
+}
+
+bool Runner::is_process_data(const can::Frame& f) const noexcept {
+    const auto same = [&](const can::Frame& other) { return f.id == other.id && f.extended == other.extended; };
+    return same(sync_frame_) || std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& o) { return same(o.frame); });
+}
+
 void Runner::make_safe() noexcept {
     if (link_ == nullptr || boots_.exchange(true)) return;  // nothing was started
+    if (!active()) return;                                  // the network is another one's
     bool synchronous = false;
     for (Output& out : outputs_) {
         std::uint64_t image = 0;
@@ -184,6 +267,24 @@ void Runner::make_safe() noexcept {
         synchronous = synchronous || out.sent->pdo->synchronous();
     }
     if (synchronous && produces_) link_->send(sync_frame_, now_);
+    for (const OwnSrdo& srdo : own_.srdos) {  // silence alone would take the node its SCT
+        if (!srdo.pdo->to_node) continue;
+        std::uint64_t image = 0;
+        unsigned      bit = 0;
+        for (const std::size_t n : srdo.placed) {
+            const Slot&         s = slots_[n];
+            const unsigned      bits = s.object->bits;
+            const std::uint64_t value = s.has_safe ? s.safe : value_of(*s.entry);
+            image |= (bits >= 64 ? value : value & ((std::uint64_t{1} << bits) - 1)) << bit;
+            bit += bits;
+        }
+        can::Frame f = make_frame(srdo.pdo->cob, static_cast<std::uint8_t>(srdo.pdo->bytes()));
+        store(f.data.data(), image);
+        link_->send(f, now_);
+        f.id = srdo.pdo->cob + 1;
+        store(f.data.data(), ~image);
+        link_->send(f, now_);
+    }
     for (const can::Frame& f : farewell_) link_->send(f, now_);
     link_->flush(now_);
 }

@@ -15,7 +15,9 @@
 #include <span>
 #include <vector>
 
+#include "../302/flying.hpp"
 #include "../302/master.hpp"
+#include "../302/objects.hpp"
 #include "../device.hpp"
 #include "link/can.hpp"
 #include "own_node.hpp"
@@ -41,12 +43,16 @@ public:
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
     /// It did not come for its time-out.
     virtual void on_late(const Received& pdo) noexcept { (void)pdo; }
+    /// An SRDO is not to be believed (any more); its objects have their safe values. `place` is that in OwnNode::srdos.
+    virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
     virtual void on_bus_state(can::State) noexcept {}
+    /// Another of the flying masters' states; Runner::flying() has it.
+    virtual void on_flying() noexcept {}
     /// What belongs to one SYNC was not all sent when the next was due.
     virtual void on_sync_overrun() noexcept {}
 };
 
-class Runner final : private MasterEvents {
+class Runner final : private MasterEvents, private SafetyEvents {
 public:
     Runner(const config::MasterConfig&, RunnerEvents&);  // [setup] the configuration outlives it
 
@@ -68,15 +74,31 @@ public:
     const NodeStatus&           status(std::size_t node) const noexcept { return *statuses_[node]; }
     const NetworkStatus&        network() const noexcept { return master_.status(); }
     const can::Statistics&      link_statistics() const noexcept { return statistics_; }
+    /// Process data and SYNCs that were not sent because the bus took nothing: what they said would have come too late.
+    std::uint64_t               withheld() const noexcept { return withheld_; }
     std::uint64_t               syncs() const noexcept { return syncs_; }
     std::uint64_t               sync_overruns() const noexcept { return overruns_; }
+    // The newest SYNC of another node.
+    std::uint64_t               syncs_heard() const noexcept { return syncs_heard_; }
+    Time                        sync_came() const noexcept { return sync_came_; }
+    bool                        sync_is_ours() const noexcept { return sync_ours_; }  ///< it was made by another master of this process
+    const FlyingMaster&         flying() const noexcept { return flying_; }
+    /// It is the NMT master: the only one, or the active one of several.
+    bool                        active() const noexcept { return !config_.flying.enabled || flying_.active(); }
     const OwnNode&              own() const noexcept { return own_; }
     Master&                     master() noexcept { return master_; }
     Device&                     device() noexcept { return device_; }
     const config::MasterConfig& config() const noexcept { return config_; }
     /// [realtime]
     void restart_node(std::size_t node, Time now) noexcept { master_.restart(config_.nodes[node].setup.id, now); }
-    void restart(Time now) noexcept { boot(now); }
+    void restart(Time now) noexcept {
+        if (active()) boot(now);
+    }
+    Srdos::Status               srdo(std::size_t place) const noexcept { return device_.srdos().status(own_.srdos[place].number); }
+    /// Its fault is seen to: it is believed from the next good one on. [realtime]
+    void acknowledge_srdo(std::size_t place, Time now) noexcept { device_.srdos().acknowledge(own_.srdos[place].number, now); }
+    /// The global fail-safe command goes out with the next transmit(). [realtime]
+    bool send_fail_safe() noexcept { return device_.srdos().send_fail_safe(); }
 
 private:
     /// A PDO for when things go wrong.
@@ -84,34 +106,48 @@ private:
         const Sent* sent;
         can::Frame  frame;
     };
+    void begin(Time now) noexcept;
     void boot(Time now) noexcept;
+    void fly(Time now) noexcept;
+    void note_sync(const can::Frame&, Time now) noexcept;
     void send(Time now) noexcept;
+    bool is_stuck(Time now) noexcept;
+    bool is_process_data(const can::Frame&) const noexcept;
     void produce_sync(Time now, Time period) noexcept;
     void produce_time(Time now) noexcept;
     void take_wishes() noexcept;
+    void watch_srdos(Time now) noexcept;
 
     void on_step(const NodeStatus&) noexcept override;
     void on_network(const NetworkStatus&) noexcept override;
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
     void on_rpdo_late(unsigned number, Time) noexcept override;
+    void on_srdo_fault(unsigned number, SrdoFault fault, Time) noexcept override { events_.on_srdo_fault(number - 1, fault); }
 
     const config::MasterConfig&    config_;
     RunnerEvents&                  events_;
     const OwnNode                  own_;
     Device                         device_;
     Master                         master_;
+    MasterObjects                  master_objects_;
+    FlyingMaster                   flying_;
     can::Link*                     link_ = nullptr;
     std::vector<Slot>              slots_;
     std::vector<const NodeStatus*> statuses_;
     std::array<std::uint8_t, 128>  place_{};     // node-id to place in the configuration; 255: none
-    std::vector<std::uint8_t> was_operational_;  // by node
+    std::vector<std::uint8_t> was_operational_, ever_operational_;  // by node; ever: since the network was booted
     std::vector<Output>            outputs_;
     std::vector<can::Frame>        farewell_;          // NMT commands for make_safe()
     can::Frame                     sync_frame_;
     can::Statistics                statistics_{};
     can::State                     bus_state_ = can::State::active;
     Time                           now_ = 0, next_sync_ = 0, next_time_ = 0;
-    std::uint64_t                  syncs_ = 0, overruns_ = 0;
+    std::uint64_t                  syncs_ = 0, overruns_ = 0, syncs_heard_ = 0;
+    Time                           sync_came_ = 0;
+    std::uint64_t                  sent_before_ = 0, withheld_ = 0;  // for is_stuck()
+    Time                           moved_ = 0;
+    bool                           sync_ours_ = false, was_active_ = false;
+    FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
     bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
     std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
 };

@@ -96,6 +96,7 @@ can::Sent SharedLink::send(const can::Frame& frame, std::int64_t now_ns) noexcep
     if (sent == can::Sent::queued && bus_->count > 1) {
         can::Frame copy = frame;
         copy.time_ns = now_ns;
+        copy.own = true;
         bus_->deliver(copy, this);
     }
     return sent;

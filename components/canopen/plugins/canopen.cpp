@@ -9,7 +9,9 @@
 #include "canopen/master/pins.hpp"
 #include "canopen/master/reporter.hpp"
 #include "canopen/master/runner.hpp"
+#include "canopen/master/safety_pins.hpp"
 #include "canopen/master/shared_link.hpp"
+#include "canopen/master/sync_follower.hpp"
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
@@ -26,7 +28,7 @@ std::string seconds_text(Time t) {
 
 /// A node's faults in words, made before the first cycle.
 struct FaultWords {
-    std::string                 silent, guarding, rebooted, left, not_started, doubled;
+    std::string                 silent, guarding, toggle, rebooted, left, not_started, doubled;
     std::array<std::string, 16> boot;  // by the letter of CiA 302
 
     FaultWords(const config::Node& n) {
@@ -35,6 +37,7 @@ struct FaultWords {
         const Time        limit = n.setup.heartbeat_limit > 0 ? n.setup.heartbeat_limit : n.setup.heartbeat_ms * millisecond * 5 / 2;
         silent = who + " silent for {} s (limit " + seconds_text(limit) + " s)" + safe;
         guarding = who + " did not answer its guarding for {} s" + safe;
+        toggle = who + " answers its guarding with a toggle bit that does not change" + safe;
         rebooted = who + " restarted by itself" + safe;
         left = who + " left the operational state by itself" + safe;
         not_started = who + " was started and did not become operational" + safe;
@@ -59,12 +62,15 @@ public:
         runner_ = std::make_unique<Runner>(config_, static_cast<RunnerEvents&>(*this));
         const hal::Function& shows = by_index() ? *update_ : *receive_;
         bus_.emplace(*this, shows);
+        if (config_.flying.enabled) flying_.emplace(*this, shows);
+        if (config_.sync == config::SyncMode::follow && config_.sync_clock) follower_.emplace(*this, shows, config_);
         objects_.emplace(shows, by_index() ? *update_ : *transmit_);
         for (const config::Node& n : config_.nodes) nodes_.emplace_back(*this, shows, n.name), words_.emplace_back(n);
         for (std::size_t i = 0; i < runner_->slots().size(); ++i) {
             const Slot& s = runner_->slots()[i];
             objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
         }
+        safety_.emplace(*this, shows, *runner_);
         reporter_ = std::make_unique<Reporter>(name_, config_, file_);
     }
 
@@ -82,6 +88,7 @@ public:
                                      std::to_string(config_.bit_rate) +
                                      "; change one of them: bitrate = " + std::to_string(description.bit_rate) +
                                      ", or ip link set … type can bitrate " + std::to_string(config_.bit_rate));
+        if (follower_) follower_->start();
         link_ = std::move(opened);
         period_ = 0;
         reporter_->start();
@@ -104,9 +111,12 @@ public:
         }
         now_ = now;
         runner_->receive(now);
+        if (follower_) follow(now);
+        if (flying_) flying_->show(*runner_);
         bus_->show(*runner_, now);
         for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n].show(*runner_, n, now);
         objects_->show(*runner_);
+        safety_->show(*runner_, now);
     }
 
     void transmit(hal::Cycle cycle) noexcept {
@@ -174,6 +184,24 @@ private:
         return {};
     }
 
+    void follow(Time now) noexcept {
+        switch (follower_->cycle(*runner_, now, period_)) {
+        case SyncFollower::Said::lost:
+            raise("the SYNC that is followed did not come for {} s; the threads run by their own clock until it comes",
+                  follower_->silence(now));
+            break;
+        case SyncFollower::Said::in_vain:
+            raise("the SYNC moves with the threads that follow it: they make it; write clock = own in the configuration",
+                  not_a_number);
+            break;
+        case SyncFollower::Said::unequal:
+            raise("the period of the SYNC is no multiple of the thread's: the threads do not follow it; choose another, or write clock = own",
+                  not_a_number);
+            break;
+        case SyncFollower::Said::nothing: break;
+        }
+    }
+
     void raise(const char* reason, double detail) noexcept {
         if (faults_ != nullptr) faults_->raise(faults_, this, reason, detail);
     }
@@ -188,6 +216,7 @@ private:
             pins.is_faulty = true;
             switch (s.cause) {
             case Cause::guarding: raise(w.guarding.c_str(), silence); break;
+            case Cause::guard_toggle: raise(w.toggle.c_str(), not_a_number); break;
             case Cause::boot_up: raise(w.rebooted.c_str(), not_a_number); break;
             case Cause::left_operational: raise(w.left.c_str(), not_a_number); break;
             case Cause::not_started: raise(w.not_started.c_str(), not_a_number); break;
@@ -201,7 +230,7 @@ private:
         if (failed && !pins.is_faulty) {
             const NodeSetup& setup = config_.nodes[place].setup;
             // One that is not there yet may still be powered up.
-            const bool absent = s.result == BootResult::no_answer && s.cause == Cause::silent;
+            const bool absent = s.result == BootResult::no_answer && (s.cause == Cause::silent || s.cause == Cause::unsent);
             if (absent && (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) return;
             pins.is_faulty = true;
             raise(w.boot[static_cast<std::size_t>((static_cast<unsigned>(s.result) - 'A') & 15)].c_str(), not_a_number);
@@ -221,6 +250,7 @@ private:
     void on_late(const Received& late) noexcept override {
         raise("a PDO of a node did not come for {} s", static_cast<double>(late.pdo->limit) * 1e-9);
     }
+    void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override { raise(safety_->words(place, fault), not_a_number); }
     void on_bus_state(hal::can::State state) noexcept override {
         if (state == hal::can::State::bus_off)
             raise("the controller is off the bus: too many errors; it is tried again by itself", not_a_number);
@@ -228,6 +258,7 @@ private:
             raise("the bus is down: the interface is off or was taken away; it is tried again by itself", not_a_number);
         reporter_->bus(state);
     }
+    void on_flying() noexcept override { reporter_->flying(runner_->flying()); }
     void on_sync_overrun() noexcept override {
         if (!overran_) {
             overran_ = true;
@@ -254,9 +285,12 @@ private:
     hal::Emergency               emergency_{*this, &Canopen::make_safe, "outputs to their safe values, nodes out of the operational state"};
     std::unique_ptr<Runner>      runner_;
     std::optional<BusPins>       bus_;
+    std::optional<FlyingPins>    flying_;
+    std::optional<SyncFollower>  follower_;
     std::deque<NodePins>         nodes_;
     std::deque<FaultWords>       words_;
     std::optional<ObjectPins>    objects_;
+    std::optional<SafetyPins>    safety_;
     std::unique_ptr<Reporter>    reporter_;
     std::unique_ptr<SharedLink>  link_;
     const hal_faults*            faults_ = nullptr;
@@ -297,6 +331,9 @@ output, what it receives an input. `receive` at the beginning of the cycle shows
 the SYNC and all outputs of this cycle. While a node is not operational its outputs are held at their safe values: controlwords at quick
 stop, speeds, torques and digital outputs at 0, others at their last value. On `stop`, `unload`, a fault of the thread or the end of the
 process the safe values are sent at once and the nodes are told to leave the operational state.
+
+With `sync = follow` the SYNC of another node leads all threads of the machine (`show thread` says so); with `flying-master = medium`
+several masters share a network, of which one is active. docs/canopen-configuration.md has all of it.
 
 A node that is lost is a fault (`show fault`), sets its pin `fault`, and is booted again when it comes back, while the others run on.
 

@@ -161,7 +161,7 @@ TEST(AxisWalk, Stops_at_a_fault_and_says_which_step_led_there) {
     drive.fail(error::position_sensor);
     drive.tell();
     EXPECT_EQ(0, walk.step(drive.out.statusword, drive.out.error_code, millisecond, {}));
-    EXPECT_EQ(R"(enable: drive went into fault after "enable operation" (statusword 0x0238, error 0x7305: position sensor))", text(walk.failure()));
+    EXPECT_EQ(R"(enable: drive went into fault after "enable operation" (statusword 0x0238, error 0x7305: incremental sensor 1))", text(walk.failure()));
     walk.want(switch_on_disabled, Request::disable);
     walk.step(drive.out.statusword, drive.out.error_code, 2 * millisecond, {});
     EXPECT_TRUE(walk.reached());

@@ -246,6 +246,27 @@ TEST(Configure, Guards_where_it_is_told_to_and_the_node_watches_the_master) {
     EXPECT_EQ(b.state(0), NmtState::pre_operational);
 }
 
+TEST(Configure, Loses_a_guarded_node_whose_toggle_bit_never_changes) {
+    Configured b([](NodeSetup& n) { n.guard_ms = 20, n.guard_factor = 3; });
+    b.start();
+    ASSERT_TRUE(b.operational());
+    b.station.tamper = [](Frame& f) {
+        if (f.id == 0x705) f.data[0] &= 0x7f;
+        return true;
+    };
+    const Time stuck = b.now;
+    ASSERT_TRUE(b.until([&] { return b.status(5).losses == 1; }, second));
+    EXPECT_LE(b.now - stuck, 80 * millisecond + b.dt);  // its life time and the answer before
+    EXPECT_EQ(b.status(5).cause, Cause::guard_toggle);
+    EXPECT_EQ(b.master->sentence(5),
+              "node 5 answered guarding with a toggle bit that did not change for its limit: its answers do not count; watch it by "
+              "heartbeat, or look for two devices with this id");
+    b.run(10 * second);
+    EXPECT_NE(b.master->status().state, NetworkState::operational);
+    b.station.tamper = nullptr;
+    EXPECT_TRUE(b.operational());
+}
+
 TEST(Configure, Lets_devices_fall_to_their_safe_state_when_the_master_dies) {
     auto d = example();
     d.add(0x1016, 1, Type::unsigned32, Access::read_write, 0x00210100);  // watches another node already: the next entry is taken

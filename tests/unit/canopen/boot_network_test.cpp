@@ -297,11 +297,12 @@ TEST(BootNetwork, Survives_late_answers_and_stale_aborts) {
 
 TEST(BootNetwork, Survives_wrong_toggle_bits) {
     Three b([](std::uint8_t id, NodeSetup& n) {
-        if (id == 5) n.guard_ms = 20;
+        if (id == 5) n.guard_ms = 20, n.guard_factor = 4;
         n.writes = {ObjectWrite{{0x2005, 0, std::vector<std::uint8_t>(30, 'x')}}};
     });
-    b.stations[0]->tamper = [](Frame& f) {  // never toggles: every second answer counts
-        if (f.id == 0x705) f.data[0] &= 0x7f;
+    int answers = 0;
+    b.stations[0]->tamper = [&](Frame& f) {  // now and then an answer does not toggle
+        if (f.id == 0x705 && ++answers % 9 == 0) f.data[0] ^= 0x80;
         return true;
     };
     int segments = 0;
@@ -530,6 +531,21 @@ TEST(MasterObjects, Say_what_the_master_was_told_and_take_commands) {
     for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(b.state(n), NmtState::pre_operational);
     EXPECT_EQ(request(6, 3), Abort::value);
     EXPECT_EQ(request(9, 5), Abort::no_sub);
+}
+
+TEST(BootNetwork, Says_that_the_bus_takes_nothing_and_boots_when_it_does_again) {
+    Three b;
+    b.power();
+    b.master->start(b.now);
+    while (b.own->out().push(make_frame(0x7f0, 0))) {}  // the cable is out: what is queued stays
+    const Time out = b.now;
+    while (b.status(6).result == BootResult::none && b.now < out + 10 * second) b.now += b.dt, b.master->poll(b.now);
+    EXPECT_EQ(b.status(6).cause, Cause::unsent);
+    EXPECT_EQ(b.master->sentence(6),
+              "node 6 could not be asked for 1000:0 while it was identified: the bus takes no frames from the master; check the master's "
+              "cable, the bit rate, and that some node is there [result B, no answer]");
+    b.own->out().clear();
+    EXPECT_TRUE(b.operational());
 }
 
 TEST(BootNetwork, Tells_emergencies_and_keeps_the_newest) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "canopen/401/io.hpp"
 #include "device_bench.hpp"
+#include "link/simulation.hpp"
 
 namespace hal::canopen::test {
 namespace {
@@ -171,13 +172,39 @@ TEST_F(FaultyDevice, has_trouble_with_its_heartbeat) {
 }
 
 TEST_F(FaultyDevice, guards_with_a_wrong_toggle_bit) {
-    bench.remote().guard(10 * millisecond, 3, bench.now);
+    bench.remote().guard(10 * millisecond, 4, bench.now);
     bench.run(100 * millisecond);
     EXPECT_EQ(bench.remote().wrong_toggles(), 0U);
     EXPECT_FALSE(bench.remote().lost());
-    set("guard-toggle:every=2");
-    bench.run(200 * millisecond);
+    set("guard-toggle:every=8");  // twice in a row the same now and then
+    bench.run(400 * millisecond);
     EXPECT_GT(bench.remote().wrong_toggles(), 2U);
+    EXPECT_FALSE(bench.remote().lost());
+    end(Fault::guard_toggle);
+    bench.run(100 * millisecond);
+    const auto wrong = bench.remote().wrong_toggles();
+    set("no-heartbeat:every=8");  // an answer is lost: the next one has the toggle bit of the last that came
+    bench.run(400 * millisecond);
+    EXPECT_EQ(bench.remote().wrong_toggles(), wrong);
+    EXPECT_FALSE(bench.remote().lost());
+}
+
+TEST_F(FaultyDevice, is_lost_when_its_toggle_bit_never_changes) {
+    bench.remote().guard(10 * millisecond, 3, bench.now);
+    bench.run(100 * millisecond);
+    set("guard-toggle:every=2");
+    bench.run(20 * millisecond);
+    EXPECT_FALSE(bench.remote().lost());
+    bench.run(30 * millisecond);
+    EXPECT_TRUE(bench.remote().lost());
+    EXPECT_TRUE(bench.remote().toggle_stuck());
+    end(Fault::guard_toggle);
+    bench.run(30 * millisecond);
+    EXPECT_FALSE(bench.remote().lost());
+    set("no-heartbeat");  // silence is another reason
+    bench.run(50 * millisecond);
+    EXPECT_TRUE(bench.remote().lost());
+    EXPECT_FALSE(bench.remote().toggle_stuck());
 }
 
 TEST_F(FaultyDevice, loses_its_power_again_and_again) {
@@ -211,6 +238,44 @@ TEST_F(FaultyDevice, can_be_powered_without_saying_so) {
     EXPECT_EQ(bench.node.device().state(), NmtState::pre_operational);
 }
 
+TEST(BusOff, is_told_by_every_device_when_the_bus_is_back) {
+    IoSettings settings;
+    settings.heartbeat_ms = 10;
+    Io io{settings};
+    Node node(io, can::open("sim:bus-off?bitrate=1M").link, {.node_id = 5});
+    const auto master = can::open("sim:bus-off").link;
+    std::vector<Frame> told;
+    Time now = second;
+    const auto run = [&](Time time) {
+        for (const Time end = now + time; now < end;) {
+            node.turn(now += millisecond);
+            for (Frame f; master->receive(f, now);)
+                if (f.id == 0x85 && !f.error) told.push_back(f);
+        }
+    };
+    run(5 * millisecond);
+    master->send({0, {1, 5}}, now), master->flush(now);
+    run(5 * millisecond);
+    ASSERT_EQ(node.device().state(), NmtState::operational);
+    auto* wire = node.link().simulation();
+    can::Disturbance broken;
+    broken.fault = can::Fault::error, broken.every = 1, broken.node = wire->node(), broken.count = 32;  // 32 errors of 8 are 256
+    wire->disturb(broken);
+    run(30 * millisecond);
+    ASSERT_EQ(node.link().state(), can::State::bus_off);
+    EXPECT_EQ(node.device().emcy().error_register(), error_generic | error_communication);
+    EXPECT_EQ(node.device().state(), NmtState::pre_operational);  // as 1029h says
+    EXPECT_TRUE(told.empty());
+    run(200 * millisecond);
+    ASSERT_EQ(node.link().state(), can::State::active);
+    ASSERT_EQ(told.size(), 2U);
+    EXPECT_EQ(load<std::uint16_t>(told[0].data.data()), 0x8140);
+    EXPECT_EQ(told[0].data[2], error_generic | error_communication);
+    EXPECT_EQ(load<std::uint16_t>(told[1].data.data()), 0);
+    EXPECT_EQ(told[1].data[2], 0);
+    EXPECT_EQ(node.device().emcy().error_register(), 0);
+}
+
 TEST(Faults, are_read_and_refused_with_what_to_type) {
     Fault fault{};
     FaultSetting s;
@@ -235,7 +300,8 @@ TEST(Faults, are_read_and_refused_with_what_to_type) {
     EXPECT_EQ(problem,
               "there is no fault ''; there are mute, deaf, twice, late-sdo, late-pdo, no-boot-up, boot-storm, reboot, no-heartbeat, "
               "wrong-state, guard-toggle, no-sdo, abort, stale-abort, toggle, block-gap, block-crc, short-pdo, long-pdo, wrong-type, "
-              "wrong-vendor, wrong-product, wrong-revision, wrong-serial, wrong-software, babble, emcy-storm");
+              "wrong-vendor, wrong-product, wrong-revision, wrong-serial, wrong-software, babble, emcy-storm, "
+              "no-srdo, srdo-half, srdo-wrong, srdo-order, late-srdo");
 }
 
 }  // namespace

@@ -211,6 +211,61 @@ TEST(SdoClient, Does_not_write_beyond_its_room) {
     }
 }
 
+TEST(SdoClient, Gives_up_when_nothing_leaves_for_as_long_as_it_would_wait_for_an_answer) {
+    const auto data = bytes(5000, 7);
+    for (const bool block : {false, true}) {
+        FrameQueue out(64);
+        while (out.push(make_frame(0x123, 0))) {}
+        SdoClient client(out, {.timeout = 10 * millisecond, .resends = 2, .restarts = 5});
+        client.configure(9);
+        SdoRequest r{.index = 0x2006, .mode = block ? SdoMode::block : SdoMode::segmented, .data = data};
+        client.submit(r);
+        Time t = 0;
+        if (block) {  // it gets as far as the middle of a block
+            out.clear();
+            client.poll(t);
+            for (Frame f; out.pop(f);) {}
+            client.handle({0x589, {0xa4, 0x06, 0x20, 0, 127, 0, 0, 0}}, t);
+        }
+        const auto waiting = out.size();
+        for (; t < second && !r.done(); t += millisecond) client.poll(t);
+        ASSERT_TRUE(r.done());
+        EXPECT_EQ(t, 32 * millisecond) << block;
+        EXPECT_EQ(r.abort, Abort::timeout);
+        EXPECT_TRUE(r.unsent);
+        EXPECT_FALSE(r.aborted_there);
+        EXPECT_EQ(out.size(), waiting);  // no abort behind all that
+        out.clear();
+        std::uint8_t room[4];
+        SdoRequest next{.index = 0x1000, .upload = true, .room = room};
+        client.submit(next);
+        client.poll(t);
+        ASSERT_EQ(out.size(), 1U);
+        client.handle({0x589, {0x43, 0, 0x10, 0, 1, 2, 3, 4}}, t);
+        EXPECT_TRUE(next.ok());
+        EXPECT_FALSE(next.unsent);
+    }
+}
+
+TEST(SdoClient, Waits_for_room_as_long_as_others_are_served) {
+    FrameQueue out(64);
+    SdoClient client(out, {.timeout = 10 * millisecond, .resends = 2, .restarts = 0});
+    client.configure(9);
+    const auto data = bytes(5000, 8);
+    SdoRequest r{.index = 0x2006, .mode = SdoMode::block, .data = data};
+    client.submit(r);
+    client.poll(0);
+    for (Frame f; out.pop(f);) {}
+    client.handle({0x589, {0xa4, 0x06, 0x20, 0, 127, 0, 0, 0}}, 0);
+    while (out.push(make_frame(0x123, 0))) {}
+    for (Time t = 0; t < second; t += millisecond) {  // a frame leaves, and somebody else was quicker
+        Frame f;
+        out.pop(f), out.push(make_frame(0x123, 0));
+        client.poll(t);
+    }
+    EXPECT_FALSE(r.done());
+}
+
 TEST(SdoClient, Serves_many_nodes_at_once) {
     Bus bus;
     Recorder events;
