@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// A schedule worked out: what is on the wire when, how full it is, how long an input takes to become an output. All of it [setup].
+#pragma once
+
+#include "config.hpp"
+
+namespace hal::tdma::plan {
+
+/// A frame's time on its sender's line, from the sync.
+struct Entry {
+    enum class What : std::uint8_t { sync, backup_sync, slot };
+    What          what = What::slot;
+    std::size_t   station = 0;
+    unsigned      id = 0;         ///< of the slot
+    Time          at = 0, until = 0;
+    std::size_t   bytes = 60;     ///< of the longest frame, without check sequence
+    std::uint32_t period = 1, phasing = 0;
+    config::Place place{};
+};
+
+/// By their times.
+std::vector<Entry> entries_of(const config::Schedule&);
+/// There is a cycle in which both are used.
+bool meet(const Entry&, const Entry&);
+
+/// From an input of a station by way of the master to an output of the same station. Times from the sync of the cycle in which the
+/// station's thread read the input.
+struct RoundTrip {
+    std::size_t station = 0;
+    Time read = 0;         ///< the station's thread reads its inputs
+    Time up = 0;           ///< its frame leaves, in its first slot, at worst
+    Time up_arrives = 0;
+    Time master = 0;       ///< the master's thread takes it and computes
+    Time down = 0;         ///< the master's frame leaves, in its first slot, at worst
+    Time down_arrives = 0;
+    Time output = 0;       ///< the station's thread takes it
+    Time worst = 0;        ///< of an input that changed just after it was read: a cycle more
+    std::uint32_t cycles = 0;  ///< between reading and output
+};
+
+struct Plan {
+    std::vector<Entry>     entries;
+    double                 load = 0.0;  ///< share of the time that frames take, all of their full length, slots by their period
+    std::vector<RoundTrip> trips;       ///< of the stations that have a slot, when the master has one
+};
+Plan plan_of(const config::Schedule&);
+
+}  // namespace hal::tdma::plan

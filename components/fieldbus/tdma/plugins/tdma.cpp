@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <atomic>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "fieldbus/tdma/config.hpp"
+#include "fieldbus/tdma/reporter.hpp"
+#include "fieldbus/tdma/station.hpp"
+#include "hal/component.hpp"
+#include "hal/discipline.hpp"
+#include "hal/naming.hpp"
+#include "hal/texts.hpp"
+
+namespace {
+
+using namespace hal::tdma;
+namespace ethernet = hal::ethernet;
+
+/// The first instance of the process disciplines its threads' clock; the others, if there are any, share these threads.
+std::atomic<const void*> leading_instance{nullptr};  // written in start and stop
+
+/// Faults in words, made before the first cycle.
+struct FaultWords {
+    std::string                                   sync_lost, other_master, withdrew, babbling, uncalibrated, period;
+    std::vector<std::pair<unsigned, std::string>> foreign;  // by slot
+
+    explicit FaultWords(const StationSetup& s) {
+        const std::string limit = std::to_string(s.lost_limit) + (s.lost_limit == 1 ? " cycle" : " cycles");
+        sync_lost = "no sync for {} s (limit " + limit + "); the station is silent and its slots are empty";
+        other_master = "there is a second master on the segment with a schedule of its own";
+        withdrew = "this master found another with a smaller address; it is silent until its pin reset is set";
+        babbling = "a station sends {} frames in one cycle";
+        uncalibrated = "{} calibration requests were not answered; they are repeated";
+        period = "the thread's period is {} us, the configuration's cycle is " + config::microseconds(s.cycle) +
+                 "; nothing is sent: make them equal";
+        for (const SlotSetup& slot : s.slots)
+            foreign.emplace_back(slot.id, "another station sends in slot " + std::to_string(slot.id) + " of this one");
+    }
+};
+
+class Tdma : public hal::Component, private Events {
+public:
+    explicit Tdma(const hal_host* host) : Component(host), name_(name_of(host)) {
+        load();
+        station_ = std::make_unique<Station>(setup_, static_cast<Events*>(this));
+        words_ = std::make_unique<FaultWords>(setup_);
+        waiting_.emplace(*this, transmit_, "slot-#.waiting", static_cast<std::int64_t>(setup_.slots.size()),
+                         "frames that wait for the #th slot of the configuration");
+        reporter_ = std::make_unique<Reporter>(name_, schedule_);
+    }
+
+    void start() {
+        faults_ = hal::extension<hal_faults>("hal.faults/1");
+        ethernet::Options options;
+        options.types.assign(Station::types.begin(), Station::types.end());
+        options.pacer = link_.get().starts_with("eth:");
+        if (entry_ && entry_->mac && link_.get().starts_with("sim:")) options.address = *entry_->mac;
+        auto opened = ethernet::open(link_.get(), options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        if (entry_ && entry_->mac && opened.port->address() != *entry_->mac)
+            throw std::runtime_error(link_.get() + " has the address " + ethernet::to_string(opened.port->address()) +
+                                     ", the configuration gives " + entry_->name + " " + ethernet::to_string(*entry_->mac) +
+                                     "; mend the line 'mac' of its block");
+        const std::string key = link_.get().substr(0, link_.get().find('?'));
+        if (!ethernet::offer_discipline(key, station_.get()))
+            throw std::runtime_error(
+                key + " has a station of this process already; give this one a line of its own, as in sim:" + "NAME/STATION");
+        const void* nobody = nullptr;
+        leads_ = leading_instance.compare_exchange_strong(nobody, this);
+        try {
+            if (leads_) clock_.claim();
+        } catch (...) {
+            ethernet::withdraw_discipline(station_.get());
+            if (leads_) leading_instance.store(nullptr);
+            throw;
+        }
+        port_ = std::move(opened.port);
+        const std::string& remark = port_->description().remark;
+        if (!remark.empty()) std::fputs((name_ + ": " + remark + "\n").c_str(), stderr);
+        beat_.lose();
+        told_period_ = was_reset_ = false;
+        reporter_->start();
+        station_->attach(*port_);
+    }
+
+    void stop() noexcept {
+        ethernet::withdraw_discipline(station_.get());
+        station_->detach();
+        if (leads_) leading_instance.store(nullptr);
+        leads_ = false;
+        reporter_->stop();
+        port_.reset();
+    }
+
+    void receive(hal::Cycle cycle) noexcept {
+        const bool fits = cycle.period_ns() == setup_.cycle;
+        if (!fits && !told_period_) {
+            told_period_ = true;
+            fault = true;
+            raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
+        }
+        if (fits) {
+            if (reset && !was_reset_) {
+                station_->reset();
+                fault = false;
+            }
+            was_reset_ = reset;
+            station_->receive(cycle.start_ns());
+            follow(cycle.period_ns());
+        }
+        show();
+    }
+
+    void transmit(hal::Cycle cycle) noexcept {
+        if (cycle.period_ns() == setup_.cycle) station_->transmit(cycle.start_ns());
+        for (std::size_t i = 0; i < waiting_->size(); ++i)
+            (*waiting_)[i] = static_cast<std::uint32_t>(station_->waiting(setup_.slots[i].id));
+    }
+
+private:
+    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+    static std::string name_of(const hal_host* host) {
+        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
+        return naming != nullptr ? naming->name(host) : "tdma.0";
+    }
+
+    void load() {
+        const hal::Texts texts(*this);
+        std::string      file = "schedule=", text = inline_argument_.get();
+        if (file_argument_.get().empty() && text.empty()) {
+            if (!texts.offered()) return;
+            throw std::invalid_argument("it needs a schedule: loadrt tdma link=eth:enp3s0 config=FILE.tdma station=NAME");
+        }
+        if (!file_argument_.get().empty() && !text.empty())
+            throw std::invalid_argument("config= and schedule= are both given; one of them says who sends when");
+        std::replace(text.begin(), text.end(), ';', '\n');  // of one that stands in the netlist; in a file it may be in a comment
+        if (text.empty()) {
+            file = texts.find(file_argument_.get());
+            if (!config::read_from_disk(file, text))
+                throw std::invalid_argument("config=" + file_argument_.get() + ": the file '" + file + "' cannot be read: " + text);
+        }
+        config::Reading reading = config::read(text);
+        if (!texts.offered() && !reading.good()) throw std::invalid_argument(config::to_string(reading, file));
+        texts.begin(file, text);
+        for (const config::Message& m : reading.messages)
+            texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length, m.sentence,
+                      m.label, m.help);
+        if (!reading.good()) hal::Texts::refuse();
+        schedule_ = std::move(reading.schedule);
+        if (station_argument_.get().empty())
+            throw std::invalid_argument("which station is this? write station=NAME; " + file + " has " + config::names(schedule_));
+        const auto which = config::find(schedule_, station_argument_.get());
+        if (!which)
+            throw std::invalid_argument("there is no station '" + station_argument_.get() + "' in " + file + "; it has " +
+                                        config::names(schedule_));
+        if (link_.get().empty())
+            throw std::invalid_argument("on which segment? write link=eth:enp3s0 or link=sim:NAME/" + station_argument_.get());
+        entry_ = schedule_.stations[*which];
+        setup_ = config::setup_of(schedule_, *which);
+    }
+
+    /// The threads of this process come to the schedule. [realtime]
+    void follow(std::int64_t period) noexcept {
+        const Status& s = station_->status();
+        if (!leads_) return;
+        const bool beat = s.state != State::listening && s.state != State::withdrawn;
+        if (!beat) {
+            if (was_beat_) beat_.lose();
+        } else {
+            clock_.step(beat_.follow(s.error, period, clock_.limit_ns()));
+        }
+        was_beat_ = beat;
+    }
+
+    void show() noexcept {
+        const Status&              s = station_->status();
+        const ethernet::Statistics port = port_ ? port_->statistics() : ethernet::Statistics{};
+        state = static_cast<std::int32_t>(s.state);
+        synchronous = s.synchronous;
+        calibrated = s.calibrated;
+        running = station_->ready();
+        leading = s.leading;
+        master_active = s.master_active;
+        link_up = port.up;
+        cycle_number = s.cycle;
+        global_time = s.global;
+        offset = s.offset;
+        drift = s.drift * 1e6;
+        delay = static_cast<double>(s.delay) * 1e-3;
+        jitter = s.jitter * 1e-3;
+        error = static_cast<double>(s.error) * 1e-3;
+        syncs = s.count.syncs + s.count.syncs_sent;
+        syncs_lost = s.count.syncs_lost;
+        sent = s.count.sent;
+        dropped = s.count.dropped;
+        late = s.count.late + port.late;
+        foreign = s.count.foreign;
+        intruders = s.count.intruders;
+        losses = s.count.losses;
+    }
+
+    void raise(const std::string& reason, double detail) noexcept {
+        if (faults_ != nullptr) faults_->raise(faults_, this, reason.c_str(), detail);
+    }
+
+    // What the station noticed. [realtime]
+    void on_event(Event e, const Address& who, Time value) noexcept override {
+        switch (e) {
+        case Event::sync_lost:
+            fault = true;
+            raise(words_->sync_lost, static_cast<double>(value) * 1e-9);
+            break;
+        case Event::other_master:
+            fault = true;
+            raise(words_->other_master, not_a_number);
+            break;
+        case Event::withdrew:
+            fault = true;
+            raise(words_->withdrew, not_a_number);
+            break;
+        case Event::foreign_frame:
+            fault = true;
+            for (const auto& [id, words] : words_->foreign)
+                if (static_cast<Time>(id) == value) raise(words, not_a_number);
+            break;
+        case Event::babbling:
+            fault = true;
+            raise(words_->babbling, static_cast<double>(value));
+            break;
+        case Event::uncalibrated:
+            fault = true;
+            raise(words_->uncalibrated, static_cast<double>(value));
+            break;
+        case Event::running:
+            if (!station_->status().count.losses) break;
+            fault = false;  // it recovered by itself
+            break;
+        default: break;
+        }
+        reporter_->event(e, who, value);
+    }
+
+    const std::string name_;
+    hal::TextArgument link_{*this, "link", "", "the segment: eth:enp3s0, or in memory sim:NAME/STATION", {.per_instance = true}};
+    hal::TextArgument file_argument_{*this, "config", "", "the schedule of the segment: RTnet's tdma.conf and a few keys more"};
+    hal::TextArgument inline_argument_{*this, "schedule", "", "the same as a text, with ; at the ends of its lines"};
+    hal::TextArgument station_argument_{*this, "station", "", "which block of it this is: by name, ip or mac", {.per_instance = true}};
+
+    hal::Function receive_{*this, "receive", &Tdma::receive,
+                           "takes what came, keeps the clock; first in the thread, whose period is the cycle"};
+    hal::Function transmit_{*this, "transmit", &Tdma::transmit,
+                            "sends what waits for the slots of this cycle, and the master's sync; last in the thread"};
+
+    hal::In<bool>           reset{*this, receive_, "reset", "rising: a master that withdrew begins anew; fault is acknowledged"};
+    hal::Out<std::int32_t>  state{*this, receive_, "state", "0 listening, 1 synchronising, 2 calibrating, 3 running, 4 withdrawn"};
+    hal::Out<bool>          synchronous{*this, receive_, "synchronous", "the sync is there, or was a few cycles ago", {.safe = false}};
+    hal::Out<bool>          calibrated{*this, receive_, "calibrated", "the way to the master is measured"};
+    hal::Out<bool>          running{*this, receive_, "running", "the slots may be used", {.safe = false}};
+    hal::Out<bool>          leading{*this, receive_, "leading", "this station sends the syncs"};
+    hal::Out<bool>          master_active{*this, receive_, "master-active", "somebody sends them"};
+    hal::Out<bool>          link_up{*this, receive_, "link-up", "the line has a carrier"};
+    hal::Out<bool>          fault{*this, receive_, "fault", "see show fault; ends when it recovered by itself, or by reset"};
+    hal::Out<std::uint32_t> cycle_number{*this, receive_, "cycle", "number of this cycle, the same in all stations"};
+    hal::Out<std::int64_t>  global_time{
+        *this, receive_, "global-time", "at the beginning of this cycle, the same in all stations", {.unit = "ns"}};
+    hal::Out<std::int64_t>  offset{*this, receive_, "offset", "global time less this machine's clock", {.unit = "ns"}};
+    hal::Out<double>        drift{*this, receive_, "drift", "the master's clock gains that much on this machine's", {.unit = "ppm"}};
+    hal::Out<double>        delay{*this, receive_, "delay", "of a frame from or to the master", {.unit = "us"}};
+    hal::Out<double>        jitter{*this, receive_, "jitter", "of the syncs as they were received, rms", {.unit = "us"}};
+    hal::Out<double>        error{*this, receive_, "error", "how much later this cycle should have begun", {.unit = "us"}};
+    hal::Out<std::uint64_t> syncs{*this, receive_, "syncs", "sent or received"};
+    hal::Out<std::uint64_t> syncs_lost{*this, receive_, "syncs-lost", "cycles in which none came"};
+    hal::Out<std::uint64_t> sent{*this, receive_, "frames-sent", "in slots"};
+    hal::Out<std::uint64_t> dropped{*this, receive_, "frames-dropped", "found no room in their slot's queue, or no link"};
+    hal::Out<std::uint64_t> late{*this, receive_, "frames-late", "not sent, as their slot had passed"};
+    hal::Out<std::uint64_t> foreign{*this, receive_, "frames-foreign", "cut, of another version, syncs of another schedule: not acted on"};
+    hal::Out<std::uint64_t> intruders{*this, receive_, "frames-intruding", "of other stations in slots of this one"};
+    hal::Out<std::uint64_t> losses{*this, receive_, "losses", "times the sync was lost"};
+
+    config::Schedule                        schedule_;
+    std::optional<config::StationEntry>     entry_;
+    StationSetup                            setup_;
+    std::optional<hal::Outs<std::uint32_t>> waiting_;
+    std::unique_ptr<FaultWords>             words_;
+    std::unique_ptr<Station>                station_;
+    std::unique_ptr<Reporter>               reporter_;
+    std::unique_ptr<ethernet::Port>         port_;
+    hal::DisciplinedClock                   clock_;
+    hal::Discipline                         beat_;
+    const hal_faults*                       faults_ = nullptr;
+    bool                                    leads_ = false, told_period_ = false, was_reset_ = false, was_beat_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Tdma, "tdma", "Station of an Ethernet segment with time slots (RTnet's TDMA)", R"(
+Shares an Ethernet segment by time: a master sends a sync at the beginning of each cycle, every station sends in its own slots only, so that
+no frame ever waits for another. The frames are RTnet's (RTmac 2.0, TDMA 2.1a). Who sends when is said in a file that all stations have,
+`cell.tdma`, RTnet's `tdma.conf`:
+
+```
+master:
+cycle 1000             # microseconds
+slot 0 100
+
+slave:
+name x
+slot 0 200
+```
+
+and in the netlist:
+
+```
+loadrt threads name1=servo-thread period1=1000000
+loadrt tdma link=sim:cell/master,sim:cell/x config=cell.tdma station=master,x
+addf tdma.0.receive  servo-thread 1
+addf tdma.1.receive  servo-thread 2
+addf tdma.0.transmit servo-thread -1
+addf tdma.1.transmit servo-thread -1
+```
+
+A short schedule may stand in the netlist itself. This is a whole cell in memory, on the virtual clock too:
+
+    loadrt tdma link=sim:cell/master,sim:cell/x station=master,x schedule="master:; cycle 1000; slot 0 100; slave:; name x; slot 0 200"
+    addf tdma.0.receive  servo-thread
+    addf tdma.1.receive  servo-thread
+    addf tdma.0.transmit servo-thread
+    addf tdma.1.transmit servo-thread
+
+On a machine there is one station, `loadrt tdma link=eth:enp3s0 config=cell.tdma station=master`. The thread's period must be the cycle.
+`receive` stands first in the thread, `transmit` last; between them other components hand their frames to the station: a CANopen master
+with `link = cane:enp3s0?slot=2` sends in slot 2. Where the station is not the master, all threads of the process follow the sync.
+
+When no sync comes for as many cycles as `lost` says, the station is silent, `synchronous` and `running` become false and a fault is
+recorded. It returns by itself when there is a sync again. A master that finds a second one with a smaller address withdraws until `reset`.
+
+`hal tdma plan cell.tdma` shows what a schedule comes to; docs/tdma.md is the whole story.
+)")

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+#include "rtcfg_client.hpp"
+
+#include <algorithm>
+
+namespace hal::tdma::rtcfg {
+
+Client::Client(Station& station, Logical own, ClientEvents& events, std::size_t most)
+    : station_(station), own_(own), events_(events), file_(most) {}
+
+void Client::begin() noexcept {
+    step_ = Step::waiting;
+    acknowledge_ = reply_ = false;
+    said_ = INT64_MIN / 2;
+}
+
+bool Client::send(Message& m) noexcept {
+    m.from = station_.address();
+    m.client = own_;
+    const std::size_t length = encode(m, frame_);
+    return length != 0 && station_.send(std::span(frame_).first(length), default_slot, last_priority) == ethernet::Sent::queued;
+}
+
+/// A part of the file, in its order; one that was lost is asked for again by the acknowledgement of what is there.
+void Client::take(const Message& m, std::span<const std::uint8_t> data, Time now) noexcept {
+    const std::uint32_t offset = m.id == Id::stage_2 ? 0 : m.offset;
+    data = data.first(std::min<std::size_t>(data.size(), length_ - std::min(offset, length_)));  // a short frame's padding is none of it
+    if (offset == received_ && !data.empty()) {
+        std::copy(data.begin(), data.end(), file_.begin() + offset);
+        received_ += static_cast<std::uint32_t>(data.size());
+    }
+    said_ = now;
+    if (++since_ >= burst_ || received_ == length_ || m.id == Id::stage_2) acknowledge_ = true;
+    if (received_ == length_) {
+        step_ = Step::finished;
+        events_.on_stage_2(std::span(file_).first(received_));
+    }
+}
+
+void Client::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
+    Message m;
+    if (!decode(frame, m)) return;
+    switch (m.id) {
+    case Id::stage_1:
+        if (m.client.by_ip ? m.client != own_ : m.to != station_.address()) return;
+        if (step_ != Step::waiting && m.from != server_) return;  // two servers: the first has it
+        server_ = m.from;
+        burst_ = static_cast<std::uint8_t>(std::clamp<unsigned>(m.burst, 1, 4));
+        step_ = Step::announcing;  // a server that restarted invites again
+        said_ = INT64_MIN / 2;
+        events_.on_stage_1(m.data);
+        break;
+    case Id::stage_2:
+        if (step_ != Step::announcing || m.from != server_ || m.to != station_.address() || m.length > file_.size()) return;
+        length_ = m.length, received_ = 0, since_ = 0;
+        heartbeat_ms_ = m.heartbeat_ms;
+        step_ = Step::receiving;
+        take(m, m.data, now);
+        break;
+    case Id::stage_2_fragment:
+        if (step_ != Step::receiving || m.from != server_) return;
+        take(m, m.data, now);
+        break;
+    case Id::announce_new: reply_to_ = m.from, reply_ = true; break;
+    case Id::dead_station: events_.on_dead_station(m.dead); break;
+    default: break;
+    }
+}
+
+void Client::before_slots(Time now) noexcept {
+    Message m;
+    if (reply_) {
+        m.id = Id::announce_reply, m.to = reply_to_;
+        reply_ = !send(m);
+    }
+    const bool late = now - said_ >= patience;
+    switch (step_) {
+    case Step::waiting: break;
+    case Step::announcing:
+        if (!late) break;
+        m.id = Id::announce_new, m.to = ethernet::broadcast, m.flags = wants_stage_2, m.burst = burst_;
+        if (send(m)) said_ = now;
+        break;
+    case Step::receiving:
+    case Step::finished:
+        if (acknowledge_ || (late && step_ == Step::receiving)) {
+            m.id = Id::acknowledge, m.to = server_, m.length = received_;
+            if (!send(m)) break;
+            acknowledge_ = false, since_ = 0, said_ = now;
+        }
+        if (step_ == Step::receiving) break;
+        m = {};
+        m.id = Id::ready, m.to = ethernet::broadcast;
+        if (send(m)) step_ = Step::ready, said_ = now;
+        break;
+    case Step::ready:
+        if (heartbeat_ms_ == 0 || now - said_ < static_cast<Time>(heartbeat_ms_) * 1'000'000) break;
+        m.id = Id::heartbeat, m.to = server_;
+        if (send(m)) said_ = now;
+        break;
+    }
+}
+
+}  // namespace hal::tdma::rtcfg

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// One station on a segment with TDMA discipline: master, backup master or slave. It has no thread: receive() at the beginning of the
+// caller's cycle takes what came and keeps the clock, transmit() at its end hands the port every frame whose time is between now and the
+// same moment of the next cycle. The caller's thread has the period of the TDMA cycle and follows error().
+//
+//     hal::tdma::Station station(setup, &events);   // [setup]
+//     station.attach(port);                          // [setup] one with Ethertypes Station::types
+//     each cycle: station.receive(now); … station.send(frame, slot, priority); … station.transmit(now);
+//                 next deadline = now + cycle + what a controller makes of station.error()
+//
+// `now` is when the cycle was due, on the port's clock; what error() asks for moves it.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <vector>
+
+#include "calibration.hpp"
+#include "estimate.hpp"
+#include "slots.hpp"
+#include "watch.hpp"
+
+namespace hal::tdma {
+
+/// What else is on the segment: RTcfg, the tunnel.
+class Companion {
+public:
+    virtual ~Companion() = default;
+    /// A frame of Ethertype 0x9022, or a tunnelled one. Valid during the call. [realtime]
+    virtual void arrived(std::span<const std::uint8_t> frame, Time now) noexcept = 0;
+    /// Before the slots are filled: it may send(). [realtime]
+    virtual void before_slots(Time now) noexcept = 0;
+};
+
+class Station final : public ethernet::Discipline {
+public:
+    static constexpr std::array<std::uint16_t, 3> types{rtmac_type, rtcfg_type, cane_type};  ///< 0x9023 to see who is in our slots
+
+    /// [setup] Throws std::invalid_argument when the setup cannot be. `events` outlives it.
+    explicit Station(const StationSetup& setup, Events* events = nullptr);
+
+    void attach(ethernet::Port& port);  ///< [setup] begins anew; the port outlives it or detach()
+    void detach() noexcept { port_ = nullptr; }
+    /// Given frames of their Ethertype; nullptr: nobody. [setup]
+    void accompany(Companion* rtcfg, Companion* tunnel) noexcept { rtcfg_ = rtcfg, tunnel_ = tunnel; }
+    /// Another schedule, with as many slots as there was room for at most: what RTcfg brought. Begins anew. [realtime]
+    bool reconfigure(const StationSetup&) noexcept;
+
+    void receive(Time now) noexcept;   ///< [realtime]
+    void transmit(Time now) noexcept;  ///< [realtime] the same `now`, behind receive()
+    void reset() noexcept;             ///< [realtime] a withdrawn master begins anew
+
+    const Status&       status() const noexcept { return status_; }
+    const StationSetup& setup() const noexcept { return setup_; }
+    /// How much later (negative: earlier) this cycle should have begun; 0 while that is not known. [realtime]
+    Time error() const noexcept { return status_.error; }
+    Time global(Time local) const noexcept { return clock_.global(local); }  ///< [realtime]
+    Time local(Time global) const noexcept { return clock_.local(global); }  ///< [realtime]
+    /// Beginning (the scheduled sync) of a cycle near this one on the port's clock. [realtime]
+    Time        cycle_start(std::uint32_t cycle) const noexcept { return clock_.local(start_of(cycle)); }
+    std::size_t waiting(unsigned slot) const noexcept;  ///< frames in its queue. [realtime]
+
+    // hal::ethernet::Discipline
+    ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority) noexcept override;
+    std::size_t    room(unsigned slot) const noexcept override;
+    bool           ready() const noexcept override { return ready_.load(std::memory_order_relaxed); }
+    const Address& address() const noexcept override { return address_; }
+
+private:
+    static constexpr std::size_t most_pending = 64;  // as RTnet's master
+    struct Pending {
+        Address       to{};
+        Time          stamp = 0, received = 0, offset = 0;
+        std::uint32_t cycle = 0;
+        bool          used = false;
+    };
+
+    void        begin() noexcept;
+    const Slot* find(unsigned id) const noexcept;
+    void        become(State, Time now) noexcept;
+    void        say(Event event, const Address& who = {}, Time value = 0) noexcept {
+        if (events_ != nullptr) events_->on_event(event, who, value);
+    }
+
+    // station_receive.cpp
+    void take(const ethernet::Arrival&, Time now) noexcept;
+    void take_sync(const Decoded&, Time arrived, Time now) noexcept;
+    void take_foreign_sync(const Decoded&) noexcept;
+    void take_request(const Decoded&, Time arrived) noexcept;
+    void take_reply(const Decoded&, Time arrived, Time now) noexcept;
+    void look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
+    void advance(Time now) noexcept;
+    void count_silence(Time now) noexcept;
+    void start_leading(Time now) noexcept;
+    bool may_lead() const noexcept;
+
+    // station_transmit.cpp
+    void send_sync(std::uint32_t cycle, Time global_at) noexcept;
+    void send_replies() noexcept;
+    void send_slot(std::size_t index, std::uint32_t cycle) noexcept;
+    bool send_request(const Slot&, std::uint32_t cycle, Time local_at) noexcept;
+    bool launch(std::span<const std::uint8_t> frame, const ethernet::Launch&) noexcept;
+
+    /// How far ahead transmit() sends. More than a cycle: the next sync is just a cycle away, and the thread is never quite in step.
+    Time reach() const noexcept { return setup_.lead + setup_.cycle + setup_.cycle / 32; }
+    Time start_of(std::uint32_t cycle) const noexcept {  // global; numbers wrap
+        return start_ + static_cast<Time>(static_cast<std::int32_t>(cycle - number_)) * setup_.cycle;
+    }
+    Time wire(std::size_t length) const noexcept {
+        return static_cast<Time>(ethernet::wire_bytes(length)) * 8000 / static_cast<Time>(setup_.speed == 0 ? 100 : setup_.speed);
+    }
+
+    StationSetup                      setup_;
+    std::vector<Slot>                 slots_;  // as the setup names them: calibration uses the first
+    Events*                           events_;
+    ethernet::Port*                   port_ = nullptr;
+    Companion *                       rtcfg_ = nullptr, *tunnel_ = nullptr;
+    Address                           address_{};
+    ClockEstimate                     clock_;
+    Calibration                       calibration_;
+    Watch                             watch_;
+    Status                            status_;
+    std::atomic<bool>                 ready_{false};
+    std::array<Pending, most_pending> pending_{};
+
+    bool          based_ = false;  // number_ and start_ are known
+    std::uint32_t number_ = 0;  // of a cycle …
+    Time          start_ = 0;  // … and its scheduled sync, global
+    bool          heard_ = false;  // a sync of this schedule since the last receive()
+    std::uint32_t heard_cycle_ = 0;  // the number of the newest
+    bool          heard_ever_ = false;
+    Time          last_sync_ = 0;  // local
+    Time          began_ = 0;  // local; 0: before the first cycle
+    Time          sent_until_ = 0;  // global; slots up to here have had their turn
+    bool          sent_any_ = false;
+    std::uint32_t lead_wait_ = 0;  // cycles before a returning master leads again
+    bool          own_schedule_ = false;  // nobody else's time is kept: this master was the first
+    std::uint32_t good_row_ = 0;  // syncs of one schedule in a row
+    std::uint32_t foreign_row_ = 0;  // syncs of another schedule since the last of this one
+    std::uint32_t intruder_row_ = 0;
+    std::uint32_t foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the same is said again
+    std::uint32_t recalibration_ = 0;  // requests only in each so-manieth cycle, beside frames; 0: in each
+    bool          told_uncalibrated_ = false;
+    std::uint32_t limit_ = 32;  // frames of one station in a cycle
+};
+
+}  // namespace hal::tdma

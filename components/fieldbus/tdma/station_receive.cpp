@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: MIT
+// What a station makes of the frames that come, and of those that do not.
+#include <cstdlib>
+
+#include "station.hpp"
+
+namespace hal::tdma {
+
+namespace {
+
+constexpr std::size_t   most_arrivals = 1024;  // in a cycle: a babbling station must not hold the thread
+constexpr std::uint32_t rows = 3;              // that often in a row makes it a fact
+constexpr std::uint32_t silence_after = 1000;  // cycles until the same complaint is repeated
+
+}  // namespace
+
+void Station::receive(Time now) noexcept {
+    if (port_ == nullptr) return;
+    if (began_ == 0) began_ = now;
+    heard_ = false;
+    for (std::size_t i = 0; i < most_arrivals; ++i) {
+        const auto arrival = port_->receive(now);
+        if (!arrival) break;
+        take(*arrival, now);
+    }
+    for (std::uint32_t* gap : {&foreign_gap_, &intruder_gap_, &babble_gap_})
+        if (*gap != 0) --*gap;
+    std::uint32_t frames = 0;
+    if (const Address* who = watch_.babbler(limit_, frames); who != nullptr && babble_gap_ == 0) {
+        babble_gap_ = silence_after;
+        say(Event::babbling, *who, frames);
+    }
+    advance(now);
+    count_silence(now);
+}
+
+void Station::take(const ethernet::Arrival& arrival, Time now) noexcept {
+    const auto frame = arrival.bytes;
+    if (frame.size() < ethernet::header_bytes) {
+        ++status_.count.foreign;
+        return;
+    }
+    Decoded d = decode(frame);
+    if (d.from == address_) return;
+    watch_.heard(d.from);
+    switch (d.kind) {
+    case Kind::sync: take_sync(d, arrival.time_ns, now); return;
+    case Kind::request:
+        look_at(frame, d.from, arrival.time_ns);
+        if (d.to == address_) take_request(d, arrival.time_ns);
+        return;
+    case Kind::reply:  // in the slot of the one that asked
+        if (d.to == address_) take_reply(d, arrival.time_ns, now);
+        return;
+    case Kind::tunnelled:
+        look_at(frame, d.from, arrival.time_ns);
+        if (tunnel_ != nullptr) tunnel_->arrived(frame, now);
+        return;
+    case Kind::none: break;
+    }
+    if (d.defect != Defect::ethertype) {
+        ++status_.count.foreign;
+        return;
+    }
+    look_at(frame, d.from, arrival.time_ns);
+    if (rtcfg_ != nullptr && frame[12] == rtcfg_type >> 8 && frame[13] == (rtcfg_type & 0xff)) rtcfg_->arrived(frame, now);
+}
+
+void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
+    const Sync& s = d.sync;
+    const Time  lateness = static_cast<Time>(static_cast<std::uint64_t>(s.stamp) - static_cast<std::uint64_t>(s.scheduled));
+    // Times that a clock of nanoseconds does not have in a hundred years, or a sync sent in another cycle than its own, are no sync.
+    constexpr Time century = 3'155'760'000'000'000'000;
+    if (s.scheduled < -century || s.scheduled > century || lateness <= -setup_.cycle || lateness >= setup_.cycle) {
+        ++status_.count.foreign;
+        return;
+    }
+    if (status_.state == State::withdrawn) {
+        status_.master = d.from;
+        return;
+    }
+    const bool fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
+    if (status_.state == State::listening) {
+        // Three of one schedule in a row: a single frame may be anything.
+        good_row_ = fits && s.cycle != heard_cycle_ ? good_row_ + 1 : 1;
+        if (!fits) clock_.clear();
+        number_ = s.cycle, start_ = s.scheduled, based_ = true;
+        clock_.take(s.stamp, arrived, status_.delay);
+        heard_cycle_ = s.cycle, heard_ever_ = heard_ = true;
+        last_sync_ = now;
+        status_.master = d.from;
+        ++status_.count.syncs;
+        if (good_row_ >= rows) become(State::synchronising, now);
+        return;
+    }
+    if (!fits) return take_foreign_sync(d);
+    if (heard_ever_ && static_cast<std::int32_t>(s.cycle - heard_cycle_) <= 0 && !(status_.leading && setup_.role == Role::master)) return;
+    if (status_.leading) {
+        const Time own = setup_.role == Role::backup ? setup_.backup_offset : 0;
+        if (setup_.role == Role::master) {
+            // A backup that missed one of ours does no harm; a second master as punctual as this one does.
+            if (std::abs(lateness) > setup_.guard) return;
+            return take_foreign_sync(d);
+        }
+        if (lateness >= own - setup_.guard / 2) return;  // another backup, behind this one
+        status_.leading = false;
+        say(Event::yielded, d.from);
+    }
+    foreign_row_ = 0;
+    if (heard_ever_) status_.count.syncs_lost += s.cycle - heard_cycle_ - 1;
+    if (d.from != status_.master) {
+        status_.master = d.from;
+        calibration_.forget();
+        say(Event::master_changed, d.from);
+        if (status_.calibrated && !setup_.slots.empty()) calibration_.begin(setup_.rounds), recalibration_ = 8;
+    }
+    heard_cycle_ = s.cycle, heard_ = heard_ever_ = true;
+    last_sync_ = now;
+    ++status_.count.syncs;
+    number_ = s.cycle, start_ = s.scheduled;
+    clock_.take(s.stamp, arrived, status_.delay);
+}
+
+/// A sync of a schedule that is not the one this station keeps.
+void Station::take_foreign_sync(const Decoded& d) noexcept {
+    ++status_.count.foreign;
+    if (++foreign_row_ < rows) return;
+    if (!status_.leading && d.from == status_.master) {  // it restarted: its old schedule is gone
+        say(Event::sync_lost, d.from, 0);
+        ++status_.count.losses;
+        foreign_row_ = 0;
+        return begin();
+    }
+    if (foreign_gap_ == 0) {
+        foreign_gap_ = silence_after;
+        say(Event::other_master, d.from);
+    }
+    if (status_.leading && setup_.role == Role::master && d.from < address_) {
+        status_.leading = status_.synchronous = false;
+        status_.master = d.from;
+        become(State::withdrawn, 0);
+        say(Event::withdrew, d.from);
+    }
+}
+
+void Station::take_request(const Decoded& d, Time arrived) noexcept {
+    if (!status_.leading) return;
+    const Request& r = d.request;
+    const auto     ahead = static_cast<std::int32_t>(r.reply_cycle - number_);
+    if (r.reply_offset < 0 || r.reply_offset >= setup_.cycle || ahead < 0 || ahead > 100'000) {
+        ++status_.count.too_late;
+        return;
+    }
+    Pending* place = nullptr;
+    for (Pending& p : pending_) {  // one per station
+        if (p.used && p.to == d.from) {
+            place = &p;
+            break;
+        }
+        if (!p.used && place == nullptr) place = &p;
+    }
+    if (place == nullptr) {
+        ++status_.count.too_late;
+        return;
+    }
+    *place = {d.from, r.stamp, clock_.global(arrived), r.reply_offset, r.reply_cycle, true};
+}
+
+void Station::take_reply(const Decoded& d, Time arrived, Time now) noexcept {
+    if (d.from != status_.master) {
+        ++status_.count.foreign;
+        return;
+    }
+    const std::uint32_t before = calibration_.done();
+    const bool          complete = calibration_.take(d.reply, arrived, clock_.drift(), setup_.cycle / 4);
+    if (complete || calibration_.done() != before) ++status_.count.replies;
+    if (!complete) return;
+    told_uncalibrated_ = false;
+    recalibration_ = 0;
+    clock_.delay_changed(calibration_.delay() - status_.delay);
+    status_.delay = calibration_.delay();
+    status_.calibrated = true;
+    say(Event::calibrated, d.from, status_.delay);
+    if (status_.state == State::calibrating) {
+        if (setup_.role == Role::master) lead_wait_ = 2;
+        become(State::running, now);
+    }
+}
+
+/// Does somebody else use a slot of ours? Only a station that knows how long frames are on their way can tell.
+void Station::look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
+    if (status_.state != State::running || !status_.calibrated || own_schedule_) return;
+    constexpr Time tolerance = 2'000;
+    const Time longer = 2 * (wire(frame.size()) - wire(0));  // stored and forwarded once
+    const Time into = clock_.global(arrived) - status_.delay - longer - start_;
+    const Time cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
+    const auto cycle = number_ + static_cast<std::uint32_t>(cycles);
+    const Time at = into - cycles * setup_.cycle;
+    for (const Slot& s : slots_) {
+        const SlotSetup& slot = s.setup();
+        if (!s.used_in(cycle) || at < slot.offset - tolerance || at > slot.offset + wire(ethernet::header_bytes + slot.size) + tolerance)
+            continue;
+        ++status_.count.intruders;
+        if (++intruder_row_ >= rows && intruder_gap_ == 0) {
+            intruder_gap_ = silence_after;
+            intruder_row_ = 0;
+            say(Event::foreign_frame, from, slot.id);
+        }
+    }
+}
+
+/// Which cycle is it, and how far is the thread from where it should be?
+void Station::advance(Time now) noexcept {
+    status_.drift = clock_.drift();
+    status_.jitter = clock_.jitter();
+    if (!based_ || !clock_.known()) {
+        status_.error = 0;
+        return;
+    }
+    status_.global = clock_.global(now);
+    status_.offset = status_.global - now;
+    const Time into = status_.global - setup_.phase - start_ + setup_.cycle / 2;
+    const Time cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
+    number_ += static_cast<std::uint32_t>(cycles);
+    start_ += cycles * setup_.cycle;
+    if (own_schedule_) start_ = status_.global - setup_.phase;  // its thread's grid is the schedule
+    status_.cycle = number_;
+    status_.error = clock_.local(start_ + setup_.phase) - now;
+}
+
+void Station::start_leading(Time now) noexcept {
+    if (!clock_.known()) {
+        clock_.lead(now);
+        own_schedule_ = based_ = true;
+        number_ = 0;
+        start_ = now - setup_.phase;
+        status_.calibrated = true;  // it is the clock
+    }
+    status_.leading = status_.synchronous = true;
+    status_.master = address_;
+    ++status_.count.take_overs;
+    say(Event::leading, address_);
+    if (status_.state != State::running) become(State::running, now);
+}
+
+bool Station::may_lead() const noexcept {
+    if (setup_.role != Role::backup || status_.state != State::running || !heard_ever_) return false;
+    // With a phase the thread looks after the sync of its cycle was due; without one the newest that can be here is the last cycle's.
+    const std::uint32_t newest = setup_.phase > 0 ? number_ : number_ - 1;
+    return static_cast<std::int32_t>(newest - heard_cycle_) > 0;
+}
+
+void Station::count_silence(Time now) noexcept {
+    const auto unheard = heard_ever_ ? static_cast<std::int32_t>(number_ - 1 - heard_cycle_) : 0;
+    status_.silent_cycles = status_.leading || unheard < 0 ? 0 : static_cast<std::uint32_t>(unheard);
+    status_.master_active = status_.leading || (heard_ever_ && status_.silent_cycles == 0);
+    switch (status_.state) {
+    case State::listening:
+        if (setup_.role == Role::master && !heard_ && now - began_ >= std::max<Time>(setup_.listen_cycles * setup_.cycle, 3'000'000) &&
+            (!heard_ever_ || now - last_sync_ > setup_.listen_cycles * setup_.cycle)) {
+            clock_.clear();
+            based_ = false;
+            start_leading(now);
+            advance(now);
+        }
+        return;
+    case State::withdrawn: return;
+    case State::synchronising:
+        if (clock_.settled() && std::abs(status_.error) < setup_.cycle / 16) {
+            status_.synchronous = true;
+            say(Event::synchronised, status_.master);
+            become(setup_.slots.empty() ? State::running : State::calibrating, now);
+        }
+        break;
+    case State::calibrating:
+        if (calibration_.unanswered_row() >= 20 && !told_uncalibrated_) {
+            told_uncalibrated_ = true;
+            say(Event::uncalibrated, status_.master, calibration_.unanswered_row());
+        }
+        break;
+    case State::running:
+        if (lead_wait_ != 0) --lead_wait_;
+        if (setup_.role == Role::master && !status_.leading && lead_wait_ == 0) start_leading(now);
+        if (may_lead() && !status_.leading) start_leading(now);
+        break;
+    }
+    status_.count.unanswered = calibration_.unanswered();
+    if (!status_.leading && status_.silent_cycles >= setup_.lost_limit) {
+        ++status_.count.losses;
+        status_.count.syncs_lost += status_.silent_cycles;
+        const Address master = status_.master;
+        const Time    since = now - last_sync_;
+        for (Slot& s : slots_) s.clear();
+        begin();
+        began_ = now;
+        say(Event::sync_lost, master, since);
+    }
+}
+
+}  // namespace hal::tdma

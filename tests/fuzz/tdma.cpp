@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// TDMA: whatever comes from the wire is read or refused within its bytes, and what was read is written the same again; whatever is in a
+// schedule, it is read or refused with a place, and what is accepted can be used.
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include "components/fieldbus/tdma/frames.hpp"
+#include "components/fieldbus/tdma/plan.hpp"
+#include "components/fieldbus/tdma/rtcfg_frames.hpp"
+#include "components/fieldbus/tdma/station.hpp"
+
+namespace {
+
+using namespace hal::tdma;
+
+void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "broken: %s\n", what);
+    std::abort();
+}
+
+void frames(std::span<const std::uint8_t> given) {
+    const std::vector<std::uint8_t> frame(given.begin(), given.end());  // so that a byte too far is seen
+    const Decoded d = decode(frame);
+    require((d.kind == Kind::none) == (d.defect != Defect::none), "a frame is something, or there is a reason");
+    if (d.kind == Kind::sync) require(decode(encode(d.from, d.sync)).sync.stamp == d.sync.stamp, "a sync is written as it was read");
+    if (d.kind == Kind::request)
+        require(decode(encode(d.to, d.from, d.request)).request.reply_offset == d.request.reply_offset, "a request too");
+    if (d.kind == Kind::reply) require(decode(encode(d.to, d.from, d.reply)).reply.received == d.reply.received, "a reply too");
+    std::array<std::uint8_t, 1514> out{}, back{};
+    if (const std::size_t n = tunnel(frame, out); n != 0) {
+        require(untunnel(std::span(out).first(n), back) == frame.size(), "what went into the tunnel comes out");
+        require(std::memcmp(back.data(), frame.data(), frame.size()) == 0, "as it was");
+    }
+    untunnel(frame, out);
+    rtcfg::Message m;
+    if (!rtcfg::decode(frame, m)) return;
+    const std::size_t n = rtcfg::encode(m, out);
+    rtcfg::Message again;
+    require(n == 0 || (rtcfg::decode(std::span(out).first(n), again) && again.id == m.id && again.from == m.from),
+            "RTcfg is written as it was read");
+}
+
+void schedule(std::string_view text) {
+    const config::Reading reading = config::read(text);
+    for (const config::Message& m : reading.messages) {
+        require(m.at.offset + std::size_t{m.at.length} <= text.size(), "a place lies in the text");
+        require(!m.sentence.empty(), "a message says something");
+    }
+    if (!reading.good()) return;
+    const plan::Plan p = plan::plan_of(reading.schedule);
+    require(p.load >= 0 && p.load <= 1.0001, "what fits is not more than the line");
+    for (std::size_t i = 0; i < reading.schedule.stations.size(); ++i) {
+        StationSetup setup = config::setup_of(reading.schedule, i);
+        setup.queue = 1;
+        const Station station(setup);
+        require(config::read(config::block_of(reading.schedule, i)).schedule.stations.size() == 1, "a station's block is a schedule");
+    }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    if (size != 0 && data[0] < 0x20 && data[0] != '\n') frames({data, size});
+    else schedule({reinterpret_cast<const char*>(data), size});
+    return 0;
+}

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+// Sync, calibration, clocks, slots.
+#include <gtest/gtest.h>
+
+#include "wire.hpp"
+
+namespace tdma_tests {
+namespace {
+
+constexpr Time ms = 1'000'000;
+
+/// A frame that says nothing, to everybody.
+std::vector<std::uint8_t> some_frame(int from, std::size_t length = 60, std::uint8_t content = 0) {
+    std::vector<std::uint8_t> frame(length, content);
+    std::fill_n(frame.begin(), 6, std::uint8_t{0xff});
+    const Address a = mac(from);
+    std::copy(a.begin(), a.end(), frame.begin() + 6);
+    frame[12] = 0x90, frame[13] = 0x23;
+    return frame;
+}
+
+TEST(Station_begins_as_master, when_nobody_else_sends_a_sync) {
+    Bed bed;
+    Machine& m = bed.add(1, master());
+    bed.run(3 * ms);
+    EXPECT_EQ(0, m.events[Event::leading]) << "it listens for three cycles";
+    bed.run(5 * ms);
+    EXPECT_EQ(1, m.events[Event::leading]);
+    EXPECT_TRUE(m.status().synchronous && m.status().calibrated && m.status().leading && m.station.ready());
+    EXPECT_GE(m.status().count.syncs_sent, 3U);
+}
+
+TEST(Station_synchronises_and_calibrates, with_clocks_that_differ_by_200_ppm) {
+    for (const double skew : {-200e-6, 0.0, 200e-6}) {
+        Bed bed;
+        bed.wire.noise_ns = 300;
+        Machine& m = bed.add(1, master());
+        Machine& s = bed.add(2, slave(300'000), {skew, 77'000'000'000});
+        bed.run(600 * ms);
+        ASSERT_EQ(State::running, s.status().state) << skew;
+        EXPECT_EQ(1, s.events[Event::calibrated]);
+        EXPECT_NEAR(static_cast<double>(Wire::path), static_cast<double>(s.status().delay), 200) << skew;
+        EXPECT_NEAR(-skew, s.status().drift, 2e-6);
+        // Global time is the master's: both machines at one true moment.
+        const Time t = bed.now;
+        EXPECT_NEAR(static_cast<double>(m.station.global(m.port.clock().local(t))),
+                    static_cast<double>(s.station.global(s.port.clock().local(t))), 300);
+        EXPECT_LT(std::abs(s.status().error), 2'000) << "its thread is in step with the master's";
+        EXPECT_EQ(100U, s.status().count.replies);
+    }
+}
+
+TEST(Station_sends_in_its_slot, and_the_jitter_is_below_that_of_the_stamps) {
+    for (const double skew : {-200e-6, 200e-6}) {
+        Bed bed;
+        bed.wire.noise_ns = 1'500;  // as a kernel's stamps scatter
+        bed.add(1, master());
+        Machine& s = bed.add(2, slave(300'000), {skew, 1'000'000'000});
+        bed.run(800 * ms);
+        ASSERT_EQ(State::running, s.status().state);
+        s.in_cycle = [](Machine& machine) { machine.station.send(some_frame(2), 0, 0); };
+        bed.wire.watching = true;
+        bed.run(2000 * ms);
+        std::vector<double> errors;
+        Time sync = 0;
+        for (const Wire::Frame& f : bed.wire.seen) {
+            if (f.from == 1) sync = f.left;
+            else if (sync != 0) errors.push_back(static_cast<double>(f.left - sync - 300'000));
+        }
+        ASSERT_GT(errors.size(), 1900U);
+        const double mean = std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+        for (double& e : errors) e -= mean;
+        std::sort(errors.begin(), errors.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+        errors.resize(errors.size() * 99 / 100);
+        const double rms =
+            std::sqrt(std::inner_product(errors.begin(), errors.end(), errors.begin(), 0.0) / static_cast<double>(errors.size()));
+        RecordProperty("slot_jitter_rms_ns", static_cast<int>(rms));
+        EXPECT_LT(rms, 1'400.0) << "1 %-trimmed rms, ns";
+        EXPECT_LT(std::abs(mean), 1'000.0);
+    }
+}
+
+TEST(Station_repeats_a_calibration_round, when_a_request_or_a_reply_is_lost) {
+    for (const int lost : {0x10, 0x11}) {
+        Bed bed;
+        bed.add(1, master());
+        Machine& s = bed.add(2, slave(300'000));
+        int n = 0;
+        bed.wire.fault = [&](Wire::Frame& f) { return f.bytes[21] != lost || f.bytes[12] != 0x90 || ++n % 5 != 0; };
+        bed.run(1000 * ms);
+        EXPECT_EQ(State::running, s.status().state);
+        EXPECT_GE(s.status().count.unanswered, 20U);
+        EXPECT_EQ(100U, s.status().count.replies);
+    }
+}
+
+TEST(Station_says_it, when_no_reply_comes_at_all) {
+    Bed bed;
+    bed.add(1, master());
+    Machine& s = bed.add(2, slave(300'000));
+    bed.wire.fault = [&](Wire::Frame& f) { return f.bytes[21] != 0x11; };
+    bed.run(1000 * ms);
+    EXPECT_EQ(State::calibrating, s.status().state);
+    EXPECT_EQ(1, s.events[Event::uncalibrated]);
+    EXPECT_FALSE(s.station.ready());
+    bed.wire.fault = nullptr;
+    bed.run(1000 * ms);
+    EXPECT_TRUE(s.station.ready());
+}
+
+TEST(Station_keeps_on, when_the_cycle_number_wraps) {
+    Bed bed;
+    Machine& s = bed.add(2, slave(300'000));
+    const auto sync = [&](std::uint32_t cycle, Time at) {
+        const auto f = encode(mac(1), Sync{cycle, at, at});
+        bed.wire.inject({f.begin(), f.end()}, 1, at);
+    };
+    std::uint32_t cycle = 0xffffffc0;
+    for (Time at = 2 * ms; at < 200 * ms; at += ms) sync(cycle++, at);
+    bed.run(150 * ms);
+    EXPECT_EQ(0, s.events[Event::sync_lost]);
+    EXPECT_TRUE(s.status().synchronous);
+    EXPECT_LT(s.status().cycle, 200U);
+    EXPECT_GT(s.status().cycle, 50U);
+}
+
+TEST(Station_uses_a_slot, only_in_the_cycles_of_its_phasing) {
+    Bed bed;
+    StationSetup setup = slave(300'000);
+    setup.slots.push_back({.id = 3, .offset = 500'000, .period = 4, .phasing = 2, .size = 60});
+    bed.add(1, master());
+    Machine& s = bed.add(2, setup);
+    bed.run(600 * ms);
+    ASSERT_TRUE(s.station.ready());
+    s.in_cycle = [](Machine& m) { m.station.send(some_frame(2), 3, 0); };
+    bed.wire.watching = true;
+    bed.run(400 * ms);
+    std::uint32_t cycle = 0;
+    int frames = 0;
+    for (const Wire::Frame& f : bed.wire.seen) {
+        if (f.from == 1 && f.bytes[13] == 0x21) cycle = decode(f.bytes).sync.cycle;
+        if (f.from != 2) continue;
+        EXPECT_EQ(2U, cycle % 4);
+        ++frames;
+    }
+    EXPECT_NEAR(100, frames, 2);
+}
+
+TEST(Station_fills_a_slot, with_several_frames_of_its_time_most_urgent_first) {
+    Bed bed;
+    StationSetup setup = slave(300'000);
+    setup.slots = {{.id = 0, .offset = 300'000, .size = 200}};  // 238 bytes of the wire: two frames of 84, not three
+    bed.add(1, master());
+    Machine& s = bed.add(2, setup);
+    bed.run(600 * ms);
+    ASSERT_TRUE(s.station.ready());
+    int turn = 0;
+    s.in_cycle = [&turn](Machine& m) {
+        if (turn++ != 0) return;
+        m.station.send(some_frame(2, 60, 1), 0, 7);
+        m.station.send(some_frame(2, 60, 2), 0, 7);
+        m.station.send(some_frame(2, 60, 3), 0, 0);
+        EXPECT_EQ(ethernet::Sent::refused, m.station.send(some_frame(2, 215, 4), 0, 0)) << "longer than the slot";
+        EXPECT_EQ(ethernet::Sent::refused, m.station.send(some_frame(2, 60, 4), 5, 0)) << "there is no such slot";
+    };
+    bed.wire.watching = true;
+    bed.run(10 * ms);
+    std::vector<int> order;
+    std::vector<Time> times;
+    for (const Wire::Frame& f : bed.wire.seen)
+        if (f.from == 2) order.push_back(f.bytes[20]), times.push_back(f.left);
+    ASSERT_EQ((std::vector<int>{3, 1, 2}), order);
+    EXPECT_NEAR(6'720, static_cast<double>(times[1] - times[0]), 5) << "one behind the other on the line";
+    EXPECT_NEAR(ms, static_cast<double>(times[2] - times[0]), 2'000) << "the third in the next cycle";
+}
+
+TEST(Station_drops_frames, that_find_no_room_or_no_sync) {
+    Bed bed;
+    StationSetup setup = slave(300'000);
+    setup.queue = 4;
+    Machine& m = bed.add(1, master());
+    Machine& s = bed.add(2, setup);
+    EXPECT_EQ(ethernet::Sent::down, s.station.send(some_frame(2), 0, 0));
+    bed.run(600 * ms);
+    int full = 0;
+    s.in_cycle = [&full](Machine& machine) {
+        for (int i = 0; i < 3; ++i) full += machine.station.send(some_frame(2), 0, 0) == ethernet::Sent::full;
+    };
+    bed.run(10 * ms);
+    EXPECT_GT(full, 10);
+    m.off = true;
+    bed.run(20 * ms);
+    EXPECT_EQ(0U, s.station.waiting(0)) << "what waited for a cycle long past is not sent when the sync is back";
+}
+
+}  // namespace
+}  // namespace tdma_tests
