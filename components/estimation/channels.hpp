@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+// The measurements of a filter: pins, ages, and what is done with bad ones.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "estimation/past.hpp"
+#include "hal/component.hpp"
+
+namespace hal::estimation {
+
+class Channels {
+public:
+    /// `z-N`, `age-N`, `new-N`; with names NAME, `NAME-age`, `NAME-new`. In a component's constructor.
+    Channels(hal::Component& component, Eigen::Index count, const std::vector<std::string>& names = {})
+        : gate(component, "gate", "a measurement farther off than so many standard deviations is left out; 0: none is"),
+          timeout(component, "timeout", "valid falls when no measurement was used for so long; 0: never", {.unit = "s"}),
+          valid(component, "valid", "a measurement was used, and within timeout"),
+          skipped(component, "skipped", "measurements that were no number"),
+          late(component, "late", "measurements older than the history"),
+          outliers(component, "outliers", "measurements beyond the gate"),
+          renewals(component, "renewals", "times the covariance was lost and started again") {
+        for (Eigen::Index i = 0; i < count; ++i) {
+            const std::string number = std::to_string(i),
+                              what = names.empty() ? "measurement " + number : names[static_cast<std::size_t>(i)];
+            const auto name = [&](const char* kind) {
+                return names.empty() ? std::string(kind) + "-" + number : what + (*kind == 'z' ? "" : std::string("-") + kind);
+            };
+            rows_.emplace_back(std::make_unique<Row>(component, name("z"), name("age"), name("new"), what));
+        }
+        told_ = Vector::Zero(count);
+    }
+
+    /// Gives `past` what there is in this cycle. [realtime]
+    template <class Filter>
+    void tell(Filter& past, hal::Cycle cycle) noexcept {
+        for (std::size_t i = 0; i < rows_.size(); ++i) {
+            if (!rows_[i]->fresh) continue;
+            const double z = rows_[i]->z;
+            if (!std::isfinite(z)) skipped = skipped + 1;
+            else if (!past.tell(static_cast<Eigen::Index>(i), z, cycles(*rows_[i], cycle))) late = late + 1;
+        }
+    }
+    /// The same for measurements that make sense together only: `mix` times all of them. [realtime]
+    template <class Filter>
+    void tell_whole(Filter& past, hal::Cycle cycle, const Matrix& mix) noexcept {
+        bool all = true, any = false, numbers = true;
+        for (std::size_t i = 0; i < rows_.size(); ++i) {
+            const bool fresh = rows_[i]->fresh;
+            all = all && fresh, any = any || fresh;
+            told_(static_cast<Eigen::Index>(i)) = rows_[i]->z;
+            numbers = numbers && std::isfinite(rows_[i]->z);
+        }
+        if (!any) return;
+        if (!all || !numbers) {
+            skipped = skipped + 1;
+            return;
+        }
+        Vector mixed;
+        multiply(mixed, mix, told_);
+        bool known = true;
+        for (Eigen::Index i = 0; i < mixed.size(); ++i) known = past.tell(i, mixed(i), cycles(*rows_[0], cycle)) && known;
+        if (!known) late = late + 1;
+    }
+    /// Shows what became of it. [realtime]
+    template <class Filter>
+    void count(const Filter& past, hal::Cycle cycle) noexcept {
+        outliers = past.outliers;
+        renewals = past.renewals;
+        silent_s_ = past.used != used_ ? 0.0 : silent_s_ + cycle.seconds();
+        ever_ = ever_ || past.used != used_;
+        used_ = past.used;
+        valid = ever_ && !(timeout > 0.0 && silent_s_ > timeout);
+    }
+
+private:
+    struct Row {
+        Row(hal::Component& component, const std::string& z_name, const std::string& age_name, const std::string& new_name,
+            const std::string& what)
+            : z(component, z_name.c_str(), what.c_str()),
+              age(component, age_name.c_str(), ("how old " + what + " is").c_str(), {.unit = "s"}),
+              fresh(component, new_name.c_str(), ("TRUE: there is a " + what + " in this cycle").c_str(), {.initial = true}) {}
+        hal::In<double> z, age;
+        hal::In<bool>   fresh;
+    };
+    static std::int64_t cycles(const Row& row, hal::Cycle cycle) noexcept {
+        const double count = row.age / cycle.seconds();
+        return count > 0.5 ? (count < 1e9 ? static_cast<std::int64_t>(count + 0.5) : 1'000'000'000) : 0;
+    }
+
+    std::vector<std::unique_ptr<Row>> rows_;
+    Vector                            told_;
+    double                            silent_s_ = 0.0;
+    std::uint32_t                     used_ = 0;
+    bool                              ever_ = false;
+
+public:
+    hal::In<double>         gate;
+    hal::In<double>         timeout;
+    hal::Out<bool>          valid;
+    hal::Out<std::uint32_t> skipped, late, outliers, renewals;
+};
+
+}  // namespace hal::estimation

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Linear plants outside of the cycle: sampling, and which of their modes can be steered or seen.
+#pragma once
+
+#include <Eigen/Core>
+#include <complex>
+#include <optional>
+#include <string>
+
+namespace hal::estimation {
+
+using Dense = Eigen::MatrixXd;
+
+/// e to the power of a square matrix: scaled to a norm below 1/4, Taylor's series, squared back (N. Higham, *Functions of
+/// Matrices*, 10.3). [setup]
+Dense exponential(const Dense& a);
+
+struct Discrete {
+    Dense a, b;
+};
+
+/// What x' = Ax + Bu does over `period` seconds while u is held. [setup]
+Discrete hold(const Dense& a, const Dense& b, double period);
+
+/// What the costs of x' = Ax + Bu, integral of x'Qx + u'Ru, sum up to over a period in which u is held: per sample x'Qx + 2x'Nu + u'Ru
+/// (C. Van Loan, *Computing Integrals Involving the Matrix Exponential*, IEEE Trans. AC 23, 1978). [setup]
+struct Sampled {
+    Dense a, b, q, r, n;
+};
+Sampled sample(const Dense& a, const Dense& b, const Dense& q, const Dense& r, double period);
+
+enum class Time { continuous, discrete };
+
+/// A mode of a plant, and the state in which it is strongest.
+struct Mode {
+    std::complex<double> value;
+    Eigen::Index         state;
+};
+
+/// A mode that does not die out by itself and that no column of `b` reaches, if there is one (the test of Popov, Belevitch and
+/// Hautus). [setup]
+std::optional<Mode> unreachable(const Dense& a, const Dense& b, Time time);
+
+/// A mode that does not die out by itself and that no row of `c` shows. [setup]
+std::optional<Mode> unseen(const Dense& a, const Dense& c, Time time);
+
+/// "0.5", "-1 + 2i". [setup]
+std::string text(std::complex<double> value);
+
+/// The largest |eigenvalue|. [setup]
+double spectral_radius(const Dense& a);
+
+/// L so that A - LC has these eigenvalues: with a vector per pole, A'X - XP = C'G for a full G, and L' = G X^-1 (S. Bhattacharyya,
+/// E. de Souza, *Pole assignment via Sylvester's equation*, Systems & Control Letters 1, 1982). None: the plant is not observable, a
+/// pole is A's own, or one without its conjugate. [setup]
+std::optional<Dense> place_observer(const Dense& a, const Dense& c, const Eigen::VectorXcd& poles);
+
+/// True when all eigenvalues of a symmetric matrix are above (or, with `semi`, not below) 0. [setup]
+bool positive(const Dense& a, bool semi = false);
+
+}  // namespace hal::estimation

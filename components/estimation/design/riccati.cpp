@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#include "estimation/design/riccati.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace hal::estimation {
+namespace {
+
+/// E. Chu, H. Fan, W. Lin, C. Wang, *Structure-Preserving Algorithms for Periodic Discrete-Time Algebraic Riccati Equations*,
+/// International Journal of Control 77, 2004: with W = I + GH
+///     A <- A W^-1 A,   G <- G + A W^-1 G A',   H <- H + A' H W^-1 A
+/// H tends to X, squaring the remaining error each time.
+struct Doubling {
+    Dense a, g, h;
+
+    /// How many doublings it took; -1: it does not settle.
+    int run() {
+        for (int k = 1; k <= 80; ++k) {
+            const Eigen::PartialPivLU<Dense> w(Dense::Identity(a.rows(), a.cols()) + g * h);
+            const Dense                      wa = w.solve(a), wg = w.solve(g);
+            const Dense                      more_h = a.transpose() * h * wa, more_g = a * wg * a.transpose();
+            a = (a * wa).eval();
+            g += 0.5 * (more_g + more_g.transpose());
+            h += 0.5 * (more_h + more_h.transpose());
+            if (!a.allFinite() || !g.allFinite() || !h.allFinite()) return -1;
+            if (more_h.norm() <= 1e-16 * h.norm() || h.norm() == 0.0) return k;
+        }
+        return -1;
+    }
+};
+
+}  // namespace
+
+std::optional<Riccati> discrete_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r, const Dense& n) {
+    const Eigen::PartialPivLU<Dense> over_r(r);
+    const Dense                      across = over_r.solve(n.transpose());  // u = v - R^-1 N'x takes the mixed cost away
+    Doubling                         doubling{a - b * across, b * over_r.solve(b.transpose()), q - n * across};
+    doubling.h = (0.5 * (doubling.h + doubling.h.transpose())).eval();
+    const int doublings = doubling.run();
+    if (doublings < 0) return {};
+    Riccati result{doubling.h, {}, doublings};
+    result.gain = (r + b.transpose() * result.x * b).partialPivLu().solve(b.transpose() * result.x * a + n.transpose());
+    if (!result.gain.allFinite() || !(spectral_radius(a - b * result.gain) < 1.0)) return {};
+    return result;
+}
+
+std::optional<Riccati> discrete_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r) {
+    return discrete_riccati(a, b, q, r, Dense::Zero(a.rows(), b.cols()));
+}
+
+// E. Chu, H. Fan, W. Lin, *A structure-preserving doubling algorithm for continuous-time algebraic Riccati equations*, Linear Algebra and its
+// Applications 396, 2005: Cayley's transform with a shift s makes it a discrete one. With S = A - sI and W = S' + HS^-1G:
+//     A0 = I + 2s W^-T,   G0 = 2s S^-1 G W^-1,   H0 = 2s W^-1 H S^-1
+std::optional<Riccati> continuous_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r) {
+    const Eigen::Index n = a.rows();
+    const Dense        unit = Dense::Identity(n, n), g = b * r.partialPivLu().solve(b.transpose()), h = 0.5 * (q + q.transpose());
+    const double       size = std::max({a.norm(), std::sqrt(g.norm() * h.norm()), 1e-3});
+    for (const double part : {0.3, 1.0, 3.0, 0.05, 10.0}) {  // a shift that is an eigenvalue makes S or W singular: then another
+        const double                  shift = part * size;
+        const Eigen::FullPivLU<Dense> s(a - shift * unit);
+        if (s.rcond() < 1e-14) continue;
+        const Dense                   sg = s.solve(g), s_inverse = s.inverse();
+        const Eigen::FullPivLU<Dense> w((a - shift * unit).transpose() + h * sg);
+        if (w.rcond() < 1e-14) continue;
+        const Dense w_inverse = w.inverse();
+        Doubling    doubling{unit + 2.0 * shift * w_inverse.transpose(), 2.0 * shift * sg * w_inverse,
+                          2.0 * shift * w_inverse * h * s_inverse};
+        doubling.g = (0.5 * (doubling.g + doubling.g.transpose())).eval();
+        doubling.h = (0.5 * (doubling.h + doubling.h.transpose())).eval();
+        const int doublings = doubling.run();
+        if (doublings < 0) continue;
+        Riccati result{doubling.h, r.partialPivLu().solve(b.transpose() * doubling.h), doublings};
+        if (!result.gain.allFinite()) continue;
+        const Dense closed = a - b * result.gain;
+        if (spectral_radius(exponential(closed / std::max(closed.norm(), 1e-300))) < 1.0) return result;  // |e^z| < 1 where Re z < 0
+    }
+    return {};
+}
+
+}  // namespace hal::estimation

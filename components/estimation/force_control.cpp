@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct ForceControl : hal::Component {
+    using Component::Component;
+
+    hal::In<bool>          enable{*this, "enable", "FALSE: effort 0, position-out is position-command, all memories empty"};
+    hal::In<std::uint32_t> mode{*this, "mode",
+                                "0 direct: a PID on the force; 1 indirect: an admittance in front of a position loop; 2 impedance"};
+    hal::In<double>        command{*this, "force-command", "force wanted on the surroundings", {.unit = "N"}};
+    hal::In<double>        force{*this, "force", "force measured on the surroundings", {.unit = "N"}};
+    hal::In<double>        position_command{*this, "position-command", "where the path is", {.unit = "m"}};
+    hal::In<double>        position{*this, "position", "measured, for impedance", {.unit = "m"}};
+    hal::In<double>        velocity{*this, "velocity", "measured, for direct and impedance", {.unit = "m/s"}};
+
+    hal::In<double> pgain{*this, "Pgain", "direct: effort per error", {.initial = 0.5}};
+    hal::In<double> igain{*this, "Igain", "direct: effort per error and second", {.initial = 20.0, .unit = "1/s"}};
+    hal::In<double> dgain{*this, "Dgain", "direct: effort per rate of the error", {.unit = "s"}};
+    hal::In<double> feed{*this, "FF0", "direct: effort per force-command", {.initial = 1.0}};
+    hal::In<double> brake{
+        *this, "velocity-damping", "direct: effort against the velocity; limits the speed before the contact", {.unit = "N*s/m"}};
+    hal::In<double> mass{*this, "m", "admittance: the mass it moves like", {.initial = 1.0, .unit = "kg"}};
+    hal::In<double> damping{*this, "c", "admittance and impedance: damping", {.initial = 200.0, .unit = "N*s/m"}};
+    hal::In<double> stiffness{
+        *this, "k", "admittance and impedance: spring to the path; 0 in an admittance leaves no error of the force", {.unit = "N/m"}};
+
+    hal::In<double> max_effort{*this, "max-effort", "limit of effort; 0: none", {.unit = "N"}};
+    hal::In<double> max_offset{*this, "max-offset", "admittance: limit of the way from the path; 0: none", {.unit = "m"}};
+
+    hal::Out<double>        effort{*this, "effort", "for the actuator; direct and impedance", {.unit = "N", .safe = 0.0, .finite = true}};
+    hal::Out<double>        position_out{*this, "position-out", "for the position loop; admittance", {.unit = "m", .finite = true}};
+    hal::Out<double>        velocity_out{*this, "velocity-out", "its derivative", {.unit = "m/s", .finite = true}};
+    hal::Out<double>        error{*this, "error", "force-command - force", {.unit = "N"}};
+    hal::Out<bool>          saturated{*this, "saturated", "effort or offset is at its limit"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles with an input that was no number: nothing moves on"};
+
+    hal::Function run{*this, "update", &ForceControl::update, "one step of the loop"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double dt = cycle.seconds(), path = position_command, e = command - force;
+        if (!std::isfinite(e + path + velocity + position)) {
+            bad_inputs = bad_inputs + 1;
+            effort = 0.0;
+            return;
+        }
+        error = e;
+        const double path_speed = started_ ? (path - path_) / dt : 0.0, rate = started_ ? (e - error_) / dt : 0.0;
+        path_ = path, error_ = e, started_ = true;
+        if (!enable) return rest(path);
+        if (mode != mode_) rest(path), mode_ = mode;
+        switch (mode) {
+        case 0: return direct(e, rate, path, dt);
+        case 1: return comply(e, path, path_speed, dt);
+        case 2: return impede(path, path_speed);
+        default: return rest(path);
+        }
+    }
+
+private:
+    static double within(double value, double limit) noexcept { return limit > 0.0 ? std::clamp(value, -limit, limit) : value; }
+
+    void direct(double e, double rate, double path, double dt) noexcept {
+        const double next = integral_ + e * dt;
+        const double wanted = feed * command + pgain * e + igain * next + dgain * rate - brake * velocity;
+        const double given = within(wanted, max_effort);
+        // while it is at the limit it integrates only what leads back
+        if (std::isfinite(next) && (given == wanted || (wanted - given) * igain * e < 0.0)) integral_ = next;
+        give(given, path, 0.0, given != wanted);
+    }
+
+    /// m x" + c x' + k x = e, solved by one implicit step (backward Euler): stable for any m, c, k that are not negative.
+    void comply(double e, double path, double path_speed, double dt) noexcept {
+        const double m = std::fmax(mass, 0.0), c = std::fmax(damping, 0.0), k = std::fmax(stiffness, 0.0);
+        const double weight = m / dt + c + k * dt;
+        const double speed = weight > 0.0 ? (m / dt * speed_ + e - k * offset_) / weight : 0.0, moved = offset_ + speed * dt;
+        const double kept = within(moved, max_offset);
+        if (std::isfinite(moved)) offset_ = kept, speed_ = kept == moved ? speed : 0.0;
+        give(0.0, path + offset_, path_speed + speed_, kept != moved);
+    }
+
+    void impede(double path, double path_speed) noexcept {
+        const double wanted = stiffness * (path - position) + damping * (path_speed - velocity) + command;
+        const double given = within(wanted, max_effort);
+        give(given, path, path_speed, given != wanted);
+    }
+
+    void rest(double path) noexcept {
+        integral_ = offset_ = speed_ = 0.0;
+        give(0.0, path, 0.0, false);
+    }
+    void give(double push, double place, double speed, bool at_limit) noexcept {
+        effort = std::isfinite(push) ? push : 0.0;
+        position_out = std::isfinite(place) ? place : path_;
+        velocity_out = std::isfinite(speed) ? speed : 0.0;
+        saturated = at_limit;
+    }
+
+    double        integral_ = 0.0, offset_ = 0.0, speed_ = 0.0, path_ = 0.0, error_ = 0.0;
+    std::uint32_t mode_ = 0;
+    bool          started_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(ForceControl, "force_control", "Force control of one axis: direct, by an admittance, or as an impedance", R"(
+**0, explicit direct.** effort = FF0 command + PID(command - force) - velocity-damping velocity. The fastest; needs an actuator that takes a force.
+
+**1, explicit indirect.** The error of the force moves the position that an inner loop follows: offset = A(s) (command - force) with the admittance
+
+    A(s) = 1 / (m s² + c s + k)
+
+and `position-out` = position-command + offset. Works with any position-controlled drive. With `k` 0 the admittance integrates and no error
+remains; with `k` the error is shared with the spring. It is stable against a wall of stiffness K when the inner loop is fast
+against K / c.
+
+**2, impedance.** effort = k (path - position) + c (path' - velocity) + command: the axis is a spring about the path; force follows from how far the
+path lies inside the wall, and is as good as that is known. Needs no force sensor.
+
+(N. Hogan, *Impedance Control*, ASME J. Dynamic Systems 107, 1985; B. Siciliano, L. Villani, *Robot Force Control*, 1999.) While effort or offset are at
+their limits the integrators stand still. A change of `mode` starts with empty memories. An input that is no number takes the effort
+away.
+
+    loadrt force_control names=finger
+    addf finger.update servo
+    setp finger.mode 1
+    setp finger.c 400
+    net push-wanted => finger.force-command
+    net push        => finger.force
+    net place       <= finger.position-out
+)")

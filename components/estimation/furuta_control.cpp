@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "hal/component.hpp"
+
+namespace {
+
+enum class Phase : std::uint32_t { off, swing_up, balance };
+
+struct FurutaControl : hal::Component {
+    using Component::Component;
+
+    hal::In<bool>   enable{*this, "enable", "FALSE: no torque"};
+    hal::In<bool>   gains_valid{*this, "gains-valid", "TRUE: the gains may be used; without that it never balances", {.initial = true}};
+    hal::In<double> arm_angle{*this, "arm-angle", "of the arm", {.unit = "rad"}};
+    hal::In<double> arm_velocity{*this, "arm-velocity", "of the arm", {.unit = "rad/s"}};
+    hal::In<double> pendulum_angle{*this, "pendulum-angle", "of the pendulum; 0 hangs", {.unit = "rad"}};
+    hal::In<double> pendulum_velocity{*this, "pendulum-velocity", "of the pendulum", {.unit = "rad/s"}};
+    hal::In<double> pendulum_age{*this, "pendulum-age", "how old the pendulum's values are; they are led on by so much", {.unit = "s"}};
+    hal::In<double> arm_command{*this, "arm-command", "where the arm is wanted", {.unit = "rad"}};
+
+    hal::In<double> gain_arm{*this, "gain-arm", "balance: torque per angle of the arm", {.unit = "N*m/rad"}};
+    hal::In<double> gain_pendulum{*this, "gain-pendulum", "balance: torque per angle of the pendulum from upright", {.unit = "N*m/rad"}};
+    hal::In<double> gain_arm_velocity{*this, "gain-arm-velocity", "balance: torque per speed of the arm", {.unit = "N*m*s/rad"}};
+    hal::In<double> gain_pendulum_velocity{
+        *this, "gain-pendulum-velocity", "balance: torque per speed of the pendulum", {.unit = "N*m*s/rad"}};
+
+    hal::Out<double> voltage{*this, "voltage", "for the motor", {.unit = "V", .safe = 0.0, .finite = true}};
+    hal::Out<double> torque{*this, "torque", "that the voltage is to make", {.unit = "N*m", .safe = 0.0, .finite = true}};
+    hal::Out<double> from_upright{
+        *this, "from-upright", "angle of the pendulum from upright, -pi to pi, led on", {.unit = "rad", .finite = true}};
+    hal::Out<double>        energy{*this, "energy", "of the pendulum, as a part of what it has upright at rest", {.finite = true}};
+    hal::Out<std::uint32_t> phase{*this, "phase", "0 off, 1 swinging up, 2 balancing"};
+    hal::Out<bool>          balanced{*this, "balanced", "upright within upright-angle for upright-time"};
+    hal::Out<std::uint32_t> catches{*this, "catches", "how often it went from swinging up to balancing"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles in which an angle or a speed was no number; the torque is 0 then"};
+
+    hal::Param<double> max_acceleration{*this, "max-acceleration", "swing-up: of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
+    hal::Param<double> energy_gain{
+        *this, "energy-gain", "swing-up: how many times max-acceleration is asked for when all the energy is missing", {.initial = 20.0}};
+    hal::Param<double> energy_target{
+        *this, "energy-target", "swing-up: of energy; above 1, so that it arrives in spite of friction", {.initial = 1.1}};
+    hal::Param<double> centre_gain{
+        *this, "centre-gain", "swing-up: acceleration per angle of the arm from arm-command", {.initial = 10.0, .unit = "1/s^2"}};
+    hal::Param<double> centre_damping{
+        *this, "centre-damping", "swing-up: acceleration per speed of the arm", {.initial = 0.0, .unit = "1/s"}};
+    hal::Param<double> max_velocity{
+        *this,
+        "max-arm-velocity",
+        "swing-up: an arm that turns faster is braked before anything else; one and a half times as fast ends a balance",
+        {.initial = 5.0, .unit = "rad/s"}};
+    hal::Param<double> catch_angle{*this, "catch-angle", "nearer to upright than this it may balance", {.initial = 0.4, .unit = "rad"}};
+    hal::Param<double> catch_torque{
+        *this, "catch-torque", "and when pendulum and its speed ask for less than this many times the torque there is", {.initial = 2.5}};
+    hal::Param<double> lose_angle{
+        *this, "lose-angle", "farther from upright than this it swings up again", {.initial = 0.6, .unit = "rad"}};
+    hal::Param<double> arm_reach{
+        *this, "arm-reach", "balance: an arm farther off than this counts as so far", {.initial = 1.0, .unit = "rad"}};
+    hal::Param<double> upright_angle{*this, "upright-angle", "of balanced", {.initial = 0.1, .unit = "rad"}};
+    hal::Param<double> upright_time{*this, "upright-time", "of balanced", {.initial = 0.5, .unit = "s"}};
+
+    hal::Param<double> max_torque{
+        *this, "max-torque", "of motor and amplifier: torque constant times current limit", {.initial = 0.2708, .unit = "N*m"}};
+    hal::Param<double> torque_constant{
+        *this, "torque-constant", "motor: torque per current, and voltage per speed", {.initial = 0.0677, .unit = "N*m/A"}};
+    hal::Param<double> resistance{*this, "resistance", "motor: of the winding", {.initial = 0.68, .unit = "Ohm"}};
+    hal::Param<double> friction{
+        *this, "friction", "Coulomb friction of the arm that is pushed against while swinging up", {.initial = 0.008, .unit = "N*m"}};
+    hal::Param<double> arm_inertia{*this,
+                                   "arm-inertia",
+                                   "of arm, rotor and the pendulum's mass at the arm's end, about the motor's axis",
+                                   {.initial = 6.7417e-3, .unit = "kg*m^2"}};
+    hal::Param<double> swing_inertia{*this, "pendulum-inertia", "of the pendulum about its pivot", {.initial = 3e-3, .unit = "kg*m^2"}};
+    hal::Param<double> coupling{
+        *this, "coupling", "mass of the pendulum times arm length times pivot to centre of mass", {.initial = 3e-3, .unit = "kg*m^2"}};
+    hal::Param<double> weight_moment{
+        *this, "weight-moment", "weight of the pendulum times pivot to centre of mass", {.initial = 0.147099750, .unit = "N*m"}};
+
+    hal::Function run{*this, "update", &FurutaControl::update, "one step of swing-up or balance"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double dt = cycle.seconds();
+        State        s{arm_angle - arm_command, pendulum_angle, arm_velocity, pendulum_velocity};
+        const bool   sane = std::isfinite(s.arm + s.pendulum + s.arm_speed + s.pendulum_speed) && std::fabs(s.pendulum) < 1e6;
+        if (!sane) {
+            bad_inputs = bad_inputs + 1;
+            return give(0.0, 0.0);
+        }
+        lead(s);
+        const double tilt = std::remainder(s.pendulum - std::numbers::pi, 2.0 * std::numbers::pi);
+        // seen from the turning arm: what the pendulum would have upright if the arm went on at this speed
+        const double spread = s.arm_speed * std::sin(tilt),
+                     kinetic = 0.5 * swing_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
+        const double part = weight_moment > 0.0 ? (kinetic + weight_moment * (1.0 + std::cos(tilt))) / (2.0 * weight_moment) : 0.0;
+        const double known = std::isfinite(part) ? part : 0.0;
+        from_upright = tilt;
+        energy = known;
+
+        choose(tilt, s);
+        upright_s_ = std::fabs(tilt) < upright_angle ? upright_s_ + dt : 0.0;
+        balanced = now_ == Phase::balance && upright_s_ >= upright_time;
+        switch (now_) {
+        case Phase::off: return give(0.0, 0.0);
+        case Phase::balance: return give(held(tilt, s), s.arm_speed);
+        case Phase::swing_up: return give(pumped(known, s), s.arm_speed);
+        }
+    }
+
+private:
+    struct State {
+        double arm, pendulum, arm_speed, pendulum_speed;
+    };
+
+    void choose(double tilt, const State& s) noexcept {
+        if (!enable) now_ = Phase::off;
+        else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle || std::fabs(s.arm_speed) >= 1.5 * max_velocity || !gains_valid) {
+            const double asks =
+                std::fabs(gain_pendulum * tilt + gain_pendulum_velocity * s.pendulum_speed + gain_arm_velocity * s.arm_speed);
+            const bool can = gains_valid && std::fabs(tilt) < catch_angle && asks < catch_torque * max_torque &&
+                             std::fabs(s.arm_speed) < 1.5 * max_velocity;
+            now_ = can ? Phase::balance : Phase::swing_up;
+            if (can) catches = catches + 1;
+        }
+        phase = static_cast<std::uint32_t>(now_);
+    }
+
+    double held(double tilt, const State& s) const noexcept {
+        const double reach = std::fabs(arm_reach);
+        return -(gain_arm * std::clamp(s.arm, -reach, reach) + gain_pendulum * tilt + gain_arm_velocity * s.arm_speed +
+                 gain_pendulum_velocity * s.pendulum_speed);
+    }
+
+    /// Energy flows into the pendulum as -(c cos a a' + K sin²a q') q" (K. Åström, K. Furuta, *Swinging up a pendulum by energy control*,
+    /// Automatica 36, 2000, and the centrifugal part), so the arm is accelerated against the sign of that; from rest either way does.
+    double pumped(double part, const State& s) const noexcept {
+        const double limit = std::fabs(max_acceleration), sin = std::sin(s.pendulum), cos = std::cos(s.pendulum);
+        const double wanted = std::clamp(energy_gain * (energy_target - part), -1.0, 1.0) * limit;
+        const double flow = coupling * cos * s.pendulum_speed + swing_inertia * sin * sin * s.arm_speed;
+        const double sign = part < 0.01 && flow == 0.0 ? 1.0 : std::clamp(flow / (0.1 * coupling), -1.0, 1.0);
+        const double centring = -centre_gain * s.arm - centre_damping * s.arm_speed;
+        const bool   fast = std::fabs(s.arm_speed) > max_velocity;
+        const double acceleration = fast ? std::copysign(limit, -s.arm_speed) : std::clamp(-wanted * sign + centring, -limit, limit);
+        // the torque for this acceleration, from the rig's two equations with a" put in from the second
+        const double K = swing_inertia, c = coupling * cos;
+        if (!(K > 0.0)) return 0.0;
+        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - weight_moment * sin;
+        return (arm_inertia + K * sin * sin - c * c / K) * acceleration + c / K * on_pendulum +
+               2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed - coupling * sin * s.pendulum_speed * s.pendulum_speed +
+               friction * std::tanh(s.arm_speed / 0.05);
+    }
+
+    /// Leads the pendulum on by its age: on the second equation, with the arm's acceleration of the last torque.
+    void lead(State& s) const noexcept {
+        const double age = std::clamp(pendulum_age.get(), 0.0, 0.05), K = swing_inertia;
+        const double sin = std::sin(s.pendulum), cos = std::cos(s.pendulum), c = coupling * cos;
+        const double determinant = (arm_inertia + K * sin * sin) * K - c * c;
+        if (!(age > 0.0) || !(determinant > 0.0)) return;
+        const double on_arm =
+            torque - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed + coupling * sin * s.pendulum_speed * s.pendulum_speed;
+        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - weight_moment * sin;
+        const double acceleration = ((arm_inertia + K * sin * sin) * on_pendulum - c * on_arm) / determinant;
+        s.pendulum += age * (s.pendulum_speed + 0.5 * age * acceleration);
+        s.pendulum_speed += age * acceleration;
+    }
+
+    void give(double wanted, double arm_speed) noexcept {
+        const double limit = std::fabs(max_torque), given = std::isfinite(wanted) ? std::clamp(wanted, -limit, limit) : 0.0;
+        torque = given;
+        const double volts =
+            torque_constant > 0.0 && now_ != Phase::off ? resistance / torque_constant * given + torque_constant * arm_speed : 0.0;
+        voltage = std::isfinite(volts) ? volts : 0.0;
+    }
+
+    Phase  now_ = Phase::off;
+    double upright_s_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(FurutaControl, "furuta_control", "Swings a Furuta pendulum up, catches it and balances it", R"(
+**Swinging up.** The arm is accelerated so that energy flows into the pendulum until it has what it needs upright (K. Åström, K. Furuta, *Swinging
+up a pendulum by energy control*, Automatica 36, 2000), while weak springs hold the arm about `arm-command`. The torque for the
+acceleration comes from the rig's equations (see the manual of furuta), so the parameters are those of the rig.
+
+**Catching.** Within `catch-angle` of upright, and when the state feedback asks for no more than `catch-torque` times what the motor can give.
+
+**Balancing.** torque = -(gain-arm arm + gain-pendulum tilt + gain-arm-velocity arm' + gain-pendulum-velocity tilt'); link the gains to an lqr with these
+states and the torque as input. Beyond `lose-angle` it swings up again. A step of `arm-command` farther than `arm-reach` is taken at the speed of
+one of `arm-reach`.
+
+`pendulum-age` is the delay of the pendulum's encoder: angle and speed are led on by so much with the rig's equations. The voltage makes up
+for the winding and the speed of the motor; the amplifier may limit it further. A measurement that is no number takes the
+torque away for that cycle.
+
+    loadrt furuta_control names=swing
+    addf swing.update servo
+    net arm       => swing.arm-angle
+    net pendulum  => swing.pendulum-angle
+    net gain-0    => swing.gain-arm
+    net motor     <= swing.voltage
+)")

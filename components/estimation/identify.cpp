@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "hal/component.hpp"
+
+namespace {
+
+enum class Phase : std::uint32_t { idle, settling, step, relay, done, failed };
+enum class Trouble : std::uint32_t { none, not_a_number, no_answer, noisy, too_long, no_oscillation };
+
+struct Identify : hal::Component {
+    explicit Identify(const hal_host* host)
+        : Component(host),
+          samples(*this, "samples", 4000, "cycles of the step that are kept; a longer one is thinned", {.min = 100, .max = 1'000'000}) {
+        kept_.assign(static_cast<std::size_t>(samples), 0.0);
+    }
+
+    hal::Argument   samples;
+    hal::In<bool>   step{*this, "step", "rising edge: starts a step experiment"};
+    hal::In<bool>   relay{*this, "relay", "rising edge: starts a relay experiment"};
+    hal::In<bool>   cancel{*this, "cancel", "TRUE: ends an experiment, output back to bias"};
+    hal::In<double> value{*this, "value", "what the plant does"};
+    hal::In<double> setpoint{*this, "setpoint", "relay: about where it is to swing"};
+    hal::In<double> bias{*this, "bias", "output while nothing is going on, and the middle of the relay"};
+    hal::In<double> amplitude{*this, "amplitude", "height of the step; the relay goes so far to both sides", {.initial = 1.0}};
+    hal::In<double> hysteresis{*this, "hysteresis", "relay: must be above the noise"};
+    hal::In<double> settle_time{
+        *this, "settle-time", "before a step, output at bias: how long the plant needs to come to rest", {.initial = 1.0, .unit = "s"}};
+    hal::In<double> step_time{
+        *this, "step-time", "how long a step is watched; the plant must be at rest again", {.initial = 10.0, .unit = "s"}};
+    hal::In<double> closed_loop{*this, "closed-loop-time", "of the proposal: time constant wanted; 0: the dead time", {.unit = "s"}};
+
+    hal::Out<double>        output{*this, "output", "for the plant", {.finite = true}};
+    hal::Out<std::uint32_t> phase{*this, "phase", "0 idle, 1 settling, 2 step, 3 relay, 4 done, 5 failed"};
+    hal::Out<std::uint32_t> trouble{
+        *this, "trouble",
+        "why it failed: 1 value is no number, 2 no answer, 3 answer not above the noise, 4 the step was still going on, 5 no oscillation"};
+    hal::Out<double> gain{*this, "gain", "of K e^(-L s) / (T s + 1)"};
+    hal::Out<double> time_constant{*this, "time-constant", "T of it", {.unit = "s"}};
+    hal::Out<double> dead_time{*this, "dead-time", "L of it", {.unit = "s"}};
+    hal::Out<double> fit{*this, "fit", "step: how much of the answer the model explains; 1 is all"};
+    hal::Out<double> ultimate_gain{*this, "ultimate-gain", "relay: gain of the loop at which it swings for ever"};
+    hal::Out<double> ultimate_period{*this, "ultimate-period", "relay: period of that", {.unit = "s"}};
+    hal::Out<double> pgain{*this, "Pgain", "proposed for pid"};
+    hal::Out<double> igain{*this, "Igain", "proposed for pid"};
+    hal::Out<double> dgain{*this, "Dgain", "proposed for pid"};
+
+    hal::Function run{*this, "update", &Identify::update, "carries the experiment on by one period"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double dt = cycle.seconds(), y = value;
+        const bool   step_asked = step && !step_was_, relay_asked = relay && !relay_was_;
+        step_was_ = step, relay_was_ = relay;
+        if (cancel) enter(Phase::idle);
+        else if (step_asked) enter(Phase::settling);
+        else if (relay_asked) enter(Phase::relay), high_ = y < setpoint, last_switch_ = -1.0, swings_ = 0, top_ = bottom_ = y, sums_ = {};
+        const bool active = now_ == Phase::settling || now_ == Phase::step || now_ == Phase::relay;
+        if (active && !std::isfinite(y)) fail(Trouble::not_a_number);
+        time_ += dt;
+        switch (now_) {
+        case Phase::settling: rest(y); break;
+        case Phase::step: watch(y, dt); break;
+        case Phase::relay: swing(y); break;
+        default: break;
+        }
+        const double side = now_ == Phase::step ? amplitude.get() : now_ == Phase::relay ? (high_ ? amplitude : -amplitude) : 0.0;
+        const double given = bias + side;
+        output = std::isfinite(given) ? given : 0.0;
+        phase = static_cast<std::uint32_t>(now_);
+    }
+
+private:
+    struct Sums {
+        double period = 0.0, height = 0.0;
+        double low = 0.0, high = 0.0;  // shortest and longest period
+    };
+
+    void enter(Phase next) noexcept {
+        now_ = next;
+        time_ = 0.0;
+        count_ = 0, thin_ = 1, skip_ = 0;
+        quiet_sum_ = quiet_square_ = 0.0, quiet_count_ = 0.0;
+        if (next != Phase::done && next != Phase::failed) trouble = 0;
+    }
+    void fail(Trouble why) noexcept {
+        enter(Phase::failed);
+        trouble = static_cast<std::uint32_t>(why);
+    }
+    /// The second half of the settling time says where the plant rests, and its noise.
+    void rest(double y) noexcept {
+        if (time_ > 0.5 * settle_time) quiet_sum_ += y - first_, quiet_square_ += (y - first_) * (y - first_), quiet_count_ += 1.0;
+        else first_ = y;
+        if (time_ < settle_time) return;
+        const double mean = quiet_count_ > 0.0 ? quiet_sum_ / quiet_count_ : 0.0;
+        start_ = first_ + mean;
+        noise_ = quiet_count_ > 0.0 ? std::sqrt(std::fmax(quiet_square_ / quiet_count_ - mean * mean, 0.0)) : 0.0;
+        enter(Phase::step);
+    }
+    void watch(double y, double dt) noexcept {
+        if (skip_++ % thin_ == 0) {
+            if (count_ == kept_.size()) {  // full: every second one is kept, and from now on half as many are taken
+                for (std::size_t i = 0; 2 * i < count_; ++i) kept_[i] = kept_[2 * i];
+                count_ = (count_ + 1) / 2;
+                thin_ *= 2;
+            }
+            if ((skip_ - 1) % thin_ == 0) kept_[count_++] = y - start_;
+        }
+        if (time_ >= step_time) judge(dt * static_cast<double>(thin_));
+    }
+    /// Areas of the step response (K. Åström, T. Hägglund, *PID Controllers: Theory, Design, and Tuning*, 2.4): with the end value y1,
+    ///     A0 = integral of y1 - y = y1 (T + L),   A1 = integral of y up to T + L = y1 T / e
+    void judge(double h) noexcept {
+        const std::size_t n = count_, tail = std::max<std::size_t>(n / 10, 1);
+        if (n < 20 || amplitude == 0.0) return fail(Trouble::no_answer);
+        double end = 0.0, before = 0.0;
+        for (std::size_t i = n - tail; i < n; ++i) end += kept_[i] / static_cast<double>(tail);
+        for (std::size_t i = n - 2 * tail; i < n - tail; ++i) before += kept_[i] / static_cast<double>(tail);
+        if (!(std::fabs(end) > 4.0 * noise_) || end == 0.0) return fail(end == 0.0 ? Trouble::no_answer : Trouble::noisy);
+        if (std::fabs(end - before) > 0.02 * std::fabs(end) + 3.0 * noise_) return fail(Trouble::too_long);
+        double a0 = 0.0, a1 = 0.0, at = 0.0;
+        for (std::size_t i = 0; i < n; ++i) a0 += (end - kept_[i]) * h;
+        const double both = a0 / end;
+        for (std::size_t i = 0; i < n && at < both; ++i, at += h) a1 += kept_[i] * std::fmin(h, both - at);
+        const double t = std::fmax(std::numbers::e * a1 / end, h), dead = std::fmax(both - t, 0.0), k = end / amplitude;
+        double       off = 0.0, all = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double since = static_cast<double>(i) * h - dead, model = since > 0.0 ? -end * std::expm1(-since / t) : 0.0;
+            off += (kept_[i] - model) * (kept_[i] - model), all += (kept_[i] - end) * (kept_[i] - end);
+        }
+        gain = k, time_constant = t, dead_time = dead;
+        fit = all > 0.0 ? 1.0 - std::sqrt(off / all) : 0.0;
+        propose(k, t, std::fmax(dead, h));
+    }
+    /// S. Skogestad, *Simple analytic rules for model reduction and PID controller tuning*, J. Process Control 13, 2003 (SIMC).
+    void propose(double k, double t, double dead) noexcept {
+        const double wanted = closed_loop > 0.0 ? closed_loop.get() : dead;
+        const double p = t / (k * (wanted + dead)), integral = std::fmin(t, 4.0 * (wanted + dead));
+        pgain = std::isfinite(p) ? p : 0.0;
+        igain = std::isfinite(p / integral) ? p / integral : 0.0;
+        dgain = 0.0;
+        enter(Phase::done);
+    }
+    /// The relay makes the loop swing at the frequency where the plant turns the phase by half a turn (K. Åström, T. Hägglund, *Automatic Tuning of
+    /// Simple Regulators with Specifications on Phase and Amplitude Margins*, Automatica 20, 1984): Ku = 4 d / (pi sqrt(a² - hysteresis²)).
+    void swing(double y) noexcept {
+        top_ = std::fmax(top_, y), bottom_ = std::fmin(bottom_, y);
+        const double band = std::fabs(hysteresis);
+        const bool   up = high_ ? y < setpoint + band : y < setpoint - band;
+        if (up && !high_) turned(y);
+        high_ = up;
+        if (time_ > std::fmax(step_time, 0.0)) fail(Trouble::no_oscillation);
+    }
+    /// Once a period; the first three are left out, four that agree within 10 % make the result.
+    void turned(double y) noexcept {
+        const double period = time_ - last_switch_, height = 0.5 * (top_ - bottom_);
+        const bool   first = last_switch_ < 0.0;
+        last_switch_ = time_;
+        top_ = bottom_ = y;
+        if (first || ++swings_ <= 3) return;
+        if (swings_ == 4) sums_ = {0.0, 0.0, period, period};
+        sums_.period += period, sums_.height += height;
+        sums_.low = std::fmin(sums_.low, period), sums_.high = std::fmax(sums_.high, period);
+        if (swings_ < 7) return;
+        if (sums_.high > 1.1 * sums_.low) {
+            swings_ = 3;
+            return;
+        }
+        const double tu = sums_.period / 4.0, a = sums_.height / 4.0, band = std::fabs(hysteresis);
+        if (!(a > band)) return fail(Trouble::noisy);
+        const double ku = 4.0 * std::fabs(amplitude) / (std::numbers::pi * std::sqrt(a * a - band * band));
+        ultimate_gain = ku, ultimate_period = tu;
+        // B. Tyreus, W. Luyben, 1992: calmer than Ziegler's and Nichols' rule
+        pgain = ku / 3.2, igain = pgain / (2.2 * tu), dgain = 0.0;
+        enter(Phase::done);
+    }
+
+    Phase               now_ = Phase::idle;
+    double              time_ = 0.0, first_ = 0.0, start_ = 0.0, noise_ = 0.0, quiet_sum_ = 0.0, quiet_square_ = 0.0, quiet_count_ = 0.0;
+    std::vector<double> kept_;  // the answer, from where it rested
+    std::size_t         count_ = 0, thin_ = 1, skip_ = 0;
+    bool                step_was_ = false, relay_was_ = false, high_ = false;
+    double              last_switch_ = -1.0, top_ = 0.0, bottom_ = 0.0;
+    int                 swings_ = 0;
+    Sums                sums_;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Identify, "identify", "Finds a plant's gain, time constant and dead time by experiment, and proposes PID gains", R"(
+The plant is taken for K e^(-L s) / (T s + 1), a first order with a dead time.
+
+**Step.** The output rests at `bias` for `settle-time`, then steps by `amplitude` for `step-time`. K, T and L follow from the areas under the answer,
+which forgive noise; `fit` says how well the model explains the answer. The proposal is Skogestad's SIMC rule: a PI with the closed loop's time constant
+`closed-loop-time`, or the dead time.
+
+**Relay.** The output switches between bias + amplitude and bias - amplitude whenever `value` passes `setpoint`; the plant swings, four even periods
+give `ultimate-gain` and `ultimate-period`, and Tyreus' and Luyben's rule the proposal. It ends with failure when nothing swings within `step-time`.
+
+Nothing is changed but `output`: put a mux2 before the plant, and set the gains by hand. `trouble` says why an experiment failed.
+
+    loadrt identify names=oven
+    addf oven.update servo
+    setp oven.amplitude 20
+    setp oven.step-time 600
+    net heat        <= oven.output
+    net temperature => oven.value
+    setp oven.step TRUE
+)")

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+
+#include "estimation/design/riccati.hpp"
+#include "estimation/matrices.hpp"
+#include "hal/component.hpp"
+#include "hal/queue.hpp"
+
+namespace {
+
+using namespace hal::estimation;
+
+enum class Plant { continuous, discrete, sampled };
+
+struct Problem {
+    Plant  plant = Plant::continuous;
+    Dense  a, b, q, r;
+    double period = 0.001;
+
+    std::optional<Riccati> solve() const {
+        if (plant == Plant::continuous) return continuous_riccati(a, b, q, r);
+        if (plant == Plant::discrete) return discrete_riccati(a, b, q, r);
+        const Sampled s = sample(a, b, q, r, period);
+        return discrete_riccati(s.a, s.b, s.q, s.r, s.n);
+    }
+};
+
+/// The weights of now, from the cycle to the helper thread, and what came of them.
+struct Order {
+    Vector        q, r;
+    std::int64_t  period_ns = 0;
+    std::uint32_t number = 0;
+};
+struct Delivery {
+    Matrix        gain;
+    bool          good = false;
+    std::uint32_t number = 0;
+};
+
+/// Solves Riccati's equation outside of the cycle. The cycle is the one writer of the orders and the one reader of the deliveries.
+class Designer {
+public:
+    explicit Designer(Problem problem) : problem_(std::move(problem)) {}
+    ~Designer() { stop(); }
+    /// [setup]
+    void start() {
+        ending_ = false;
+        thread_ = std::thread([this] { work(); });
+    }
+    /// [setup]
+    void stop() noexcept {
+        if (!thread_.joinable()) return;
+        {
+            const std::lock_guard lock(mutex_);
+            ending_ = true;
+        }
+        wake_.notify_all();
+        thread_.join();
+    }
+    hal::Mailbox<Order>    orders;
+    hal::Mailbox<Delivery> deliveries;
+
+private:
+    static constexpr auto look_every = std::chrono::milliseconds(2);  // a cycle may not wake a thread, so this one looks
+
+    void work() {
+        for (std::unique_lock lock(mutex_); !ending_; wake_.wait_for(lock, look_every, [this] { return ending_; })) {
+            bool        fresh = false;
+            const Order order = orders.get(&fresh);
+            if (!fresh) continue;
+            Problem problem = problem_;
+            problem.q.diagonal() = order.q;
+            problem.r.diagonal() = order.r;
+            problem.period = static_cast<double>(order.period_ns) * 1e-9;
+            Delivery delivery;
+            delivery.number = order.number;
+            if (finite(order.q) && finite(order.r) && positive(problem.q, true) && positive(problem.r))
+                if (const auto solved = problem.solve()) delivery.gain = solved->gain, delivery.good = finite(delivery.gain);
+            deliveries.put(delivery);
+        }
+    }
+    const Problem           problem_;
+    std::thread             thread_;
+    std::mutex              mutex_;  // of ending_; never taken in a cycle
+    std::condition_variable wake_;
+    bool                    ending_ = false;
+};
+
+class Lqr : public hal::Component {
+public:
+    explicit Lqr(const hal_host* host)
+        : Component(host),
+          plant_(*this, "plant", "continuous",
+                 "continuous: x' = Ax + Bu, the gain of a continuous controller; sampled: the same plant, the gain for a u that is held "
+                 "over a "
+                 "period; discrete: x(k+1) = Ax + Bu"),
+          period_(*this, "period", 0.001, "sampled: the thread's period in s, so that the gain is there before the first cycle"),
+          problem_(read()),
+          x(*this, "x-#", problem_.a.rows(), "state #"),
+          target(*this, "target-#", problem_.a.rows(), "where state # is wanted"),
+          u(*this, "u-#", problem_.b.cols(), "what the gain makes of it for input #", {.safe = 0.0, .finite = true}),
+          designer_(problem_) {
+        for (Eigen::Index i = 0; i < problem_.a.rows(); ++i)
+            q_.emplace_back(*this, name("q", i).c_str(),
+                            ("weight of state " + std::to_string(i) + " squared; a change starts a new design").c_str(),
+                            hal::PinOptions<double>{.initial = problem_.q(i, i)});
+        for (Eigen::Index i = 0; i < problem_.b.cols(); ++i)
+            r_.emplace_back(*this, name("r", i).c_str(),
+                            ("weight of input " + std::to_string(i) + " squared; a change starts a new design").c_str(),
+                            hal::PinOptions<double>{.initial = problem_.r(i, i)});
+        const auto solved = problem_.solve();
+        if (!solved)
+            throw std::runtime_error(
+                "no gain was found for these matrices; the plant can be steered, but only with numbers beyond what a double holds");
+        gain_ = solved->gain;
+        order_.q = problem_.q.diagonal();
+        order_.r = problem_.r.diagonal();
+        order_.period_ns = std::llround(problem_.period * 1e9);
+        state_ = Vector::Zero(problem_.a.rows());
+        for (Eigen::Index i = 0; i < gain_.rows(); ++i)
+            for (Eigen::Index j = 0; j < gain_.cols(); ++j)
+                gains_.emplace_back(
+                    *this, (name("gain", i) + "-" + std::to_string(j)).c_str(),
+                    ("effect of state " + std::to_string(j) + " on input " + std::to_string(i) + ": u = -gain (x - target)").c_str(),
+                    hal::PinOptions<double>{.initial = gain_(i, j)});
+        show();
+    }
+
+    void start() { designer_.start(); }
+    void stop() noexcept { designer_.stop(); }
+
+    void update(hal::Cycle cycle) noexcept {
+        order(cycle);
+        bool fresh = false;
+        if (const Delivery& delivery = designer_.deliveries.get(&fresh); fresh) {
+            refused = !delivery.good;
+            designing = delivery.number != order_.number;
+            if (delivery.good) {
+                gain_ = delivery.gain;
+                designs = designs + 1;
+                show();
+            }
+        }
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            const double off = x[i] - target[i];
+            if (std::isfinite(off)) state_(static_cast<Eigen::Index>(i)) = off;
+            else bad_inputs = bad_inputs + 1;
+        }
+        Vector out;
+        multiply(out, gain_, state_);
+        bool full = false;
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            const double wanted = -out(static_cast<Eigen::Index>(i)), limit = std::fabs(max_output);
+            const double given = limit > 0.0 ? std::clamp(wanted, -limit, limit) : wanted;
+            full = full || given != wanted;
+            u[i] = enable && std::isfinite(given) ? given : 0.0;
+        }
+        saturated = full;
+    }
+
+private:
+    static std::string name(const char* what, Eigen::Index i) { return std::string(what) + "-" + std::to_string(i); }
+
+    Problem read() {
+        Problem p;
+        if (plant_.get() == "discrete") p.plant = Plant::discrete;
+        else if (plant_.get() == "sampled") p.plant = Plant::sampled;
+        else if (plant_.get() != "continuous")
+            throw std::invalid_argument("plant=" + plant_.get() + " is not continuous, sampled or discrete");
+        p.period = period_;
+        if (!(p.period > 0.0 && p.period <= 3600.0))
+            throw std::invalid_argument("period=" + std::to_string(p.period) + " is not between 0 and 3600 s");
+        const Matrices given(*this, {{"A", "0,1;0,0", "n x n: how the states drive each other"},
+                                     {"B", "0;1", "n x m: how the inputs drive the states"},
+                                     {"Q", "1,0;0,1", "n x n: what states cost; symmetric, not negative"},
+                                     {"R", "1", "m x m: what inputs cost; symmetric, positive"}});
+        p.a = given.square("A");
+        const Eigen::Index n = p.a.rows();
+        p.b = given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has");
+        p.q = given.at("Q", n, n, "it has a row and a column per state");
+        p.r = given.at("R", p.b.cols(), p.b.cols(), "it has a row and a column per input, as B has columns");
+        for (const char* symmetric : {"Q", "R"})
+            if (const Dense& m = given.at(symmetric).value; (m - m.transpose()).norm() > 1e-12 * m.norm())
+                given.refuse(symmetric, std::string(symmetric) + " is not symmetric",
+                             "what two states cost together is the same both ways round");
+        if (!positive(p.q, true))
+            given.refuse("Q", "Q has a negative eigenvalue", "states cost something or nothing: as a start, diag with a number per state");
+        if (!positive(p.r)) given.refuse("R", "R is not positive", "each input costs something: as a start, diag with 1 per input");
+        const Time time = p.plant == Plant::discrete ? Time::discrete : Time::continuous;
+        if (const auto mode = unreachable(p.a, p.b, time))
+            given.refuse("B",
+                         "the plant is uncontrollable: no input reaches its mode at " + text(mode->value) + ", strongest in state " +
+                             std::to_string(mode->state),
+                         "that mode does not die out by itself; look at row " + std::to_string(mode->state + 1) + " of A and B");
+        if (const auto mode = unseen(p.a, p.q, time))
+            given.refuse(
+                "Q",
+                "the cost does not see the plant's mode at " + text(mode->value) + ", strongest in state " + std::to_string(mode->state),
+                "give that state a weight in Q, or nothing will hold it");
+        return p;
+    }
+    void order(hal::Cycle cycle) noexcept {
+        bool changed = problem_.plant == Plant::sampled && cycle.period_ns() != order_.period_ns;
+        for (std::size_t i = 0; i < q_.size(); ++i) changed = take(order_.q(static_cast<Eigen::Index>(i)), q_[i]) || changed;
+        for (std::size_t i = 0; i < r_.size(); ++i) changed = take(order_.r(static_cast<Eigen::Index>(i)), r_[i]) || changed;
+        if (!changed) return;
+        order_.period_ns = cycle.period_ns();
+        ++order_.number;
+        designer_.orders.put(order_);
+        designing = true;
+    }
+    /// True when it is another; NaN is one value.
+    static bool take(double& last, double now) noexcept {
+        const bool other = std::isnan(now) ? !std::isnan(last) : last != now;
+        last = now;
+        return other;
+    }
+    void show() noexcept {
+        for (Eigen::Index i = 0, k = 0; i < gain_.rows(); ++i)
+            for (Eigen::Index j = 0; j < gain_.cols(); ++j, ++k) gains_[static_cast<std::size_t>(k)] = gain_(i, j);
+    }
+
+    hal::TextArgument plant_;
+    hal::RealArgument period_;
+    Problem           problem_;
+
+public:
+    hal::Ins<double>  x, target;
+    hal::Outs<double> u;
+    hal::In<bool>     enable{*this, "enable", "FALSE: all u are 0", {.initial = true}};
+    hal::In<double>   max_output{*this, "max-output", "limit of each u; 0: none"};
+    hal::Out<bool>    saturated{*this, "saturated", "a u is at its limit"};
+    hal::Out<bool>    designing{*this, "designing", "a new gain is being computed; the old one is at work"};
+    hal::Out<bool>    refused{*this, "refused", "the weights of now make no gain: negative, or no number; the last good one is at work"};
+    hal::Out<std::uint32_t> designs{*this, "designs", "gains swapped in since the start"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "states that were no number: the one of the cycle before was taken"};
+    hal::Function           run{*this, "update", &Lqr::update, "takes a new gain, if there is one, and applies it"};
+
+private:
+    std::deque<hal::In<double>>  q_, r_;
+    std::deque<hal::Out<double>> gains_;
+    Matrix                       gain_;
+    Vector                       state_;
+    Order                        order_;
+    Designer                     designer_;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Lqr, "lqr", "Linear-quadratic regulator: plant and weights in, gain and control out", R"(
+    u = -K (x - target),  K minimises the sum of x'Qx + u'Ru for
+    plant=continuous   x' = Ax + Bu
+    plant=sampled      x' = Ax + Bu with u held over a period; the cost is integrated, not summed (C. Van Loan, 1978)
+    plant=discrete     x(k+1) = Ax + Bu
+
+`sampled` is what a thread is: the gain suits its period, and is made anew when the thread has another one than `period=` says. Matrices are load
+arguments, a comma between numbers and a `;` between rows, or stand in a `file=` (see state_space). Riccati's equation is solved by
+structure-preserving doubling (E. Chu, H. Fan, W. Lin, 2004 and 2005) when the component is loaded, and later in a thread of its own: a change of
+the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the cycle swaps the gain in when it is done. Under `hal sim` cycles
+take no time, so how many of them a new design takes is not fixed there.
+
+A plant with an unstable mode that no input reaches, or that Q does not see, is refused with its name. A state that is no number is left
+out: the one of the cycle before stays. `gain-I-J` can be linked to a component with a control law of its own, such as furuta_control.
+
+    loadrt lqr names=sled plant=sampled a=0,1;0,0 b=0;0.5 q=100,0;0,1 r=0.01
+    addf sled.update servo
+    setp sled.max-output 40
+    net place => sled.x-0
+    net speed => sled.x-1
+    net force <= sled.u-0
+)")

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <complex>
+
+#include "estimation/design/plant.hpp"
+#include "estimation/matrices.hpp"
+#include "hal/component.hpp"
+
+namespace {
+
+using namespace hal::estimation;
+
+class Luenberger : public hal::Component {
+public:
+    explicit Luenberger(const hal_host* host)
+        : Component(host),
+          model_(read()),
+          u(*this, "u-#", model_.b.cols(), "input # of the plant since the cycle before"),
+          z(*this, "z-#", model_.c.rows(), "measurement #"),
+          x(*this, "x-#", model_.a.rows(), "state #, observed", {.finite = true}),
+          innovation(*this, "innovation-#", model_.c.rows(), "measurement # less what was expected") {
+        state_ = start_;
+    }
+
+    void update(hal::Cycle) noexcept {
+        Vector next, pushed, expected, corrected, input(static_cast<Eigen::Index>(u.size())), off(static_cast<Eigen::Index>(z.size()));
+        for (std::size_t i = 0; i < u.size(); ++i) input(static_cast<Eigen::Index>(i)) = std::isfinite(u[i]) ? u[i].get() : 0.0;
+        multiply(next, model_.a, state_);
+        multiply(pushed, model_.b, input);
+        next += pushed;
+        multiply(expected, model_.c, next);
+        for (std::size_t i = 0; i < z.size(); ++i) {
+            const auto   at = static_cast<Eigen::Index>(i);
+            const double value = z[i];
+            if (!std::isfinite(value)) skipped = skipped + 1;
+            off(at) = std::isfinite(value) ? value - expected(at) : 0.0;
+            innovation[i] = off(at);
+        }
+        multiply(corrected, model_.l, off);
+        next += corrected;
+        if (reset) next = start_;
+        if (finite(next)) state_ = next;
+        else {
+            state_ = start_;
+            restarts = restarts + 1;
+        }
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] = state_(static_cast<Eigen::Index>(i));
+    }
+
+private:
+    struct Model {
+        Matrix a, b, c, l;
+    };
+    Model read() {
+        const Matrices given(
+            *this,
+            {{"A", "1,0.001;0,1", "n x n: x(k+1) = Ax + Bu"},
+             {"B", "0;0.001", "n x m; without it there are no inputs"},
+             {"C", "1,0", "p x n: z = Cx"},
+             {"L", "", "n x p: the gain; or poles"},
+             {"poles", "0.95,0.9",
+              "n: where the poles of the error are to lie; real, inside of the unit circle; none twice when one measurement is there"},
+             {"x0", "", "n: the states at the start; 0 without it"}});
+        const Dense        a = given.square("A");
+        const Eigen::Index n = a.rows();
+        const Dense        b =
+            given.has("B") ? given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has") : Dense(Dense::Zero(n, 0));
+        const Dense c = given.at("C", given.at("C").value.rows(), n, "it has a column per state, as A has");
+        start_ = given.has("x0") ? Vector(given.vector("x0", n, "it has a number per state")) : Vector(Vector::Zero(n));
+        if (given.has("L")) {
+            // the estimate is corrected behind the step: its error is multiplied by (I - LC) A
+            const Dense l = given.at("L", n, c.rows(), "it has a row per state and a column per measurement");
+            if (const double radius = spectral_radius(a - l * c * a); radius >= 1.0)
+                given.refuse("L", "with this gain the observer is unstable: its largest pole is " + std::to_string(radius),
+                             "give poles= instead of L=");
+            return {a, b, c, l};
+        }
+        const Eigen::VectorXd poles = given.vector("poles", n, "one for each state");
+        if (poles.cwiseAbs().maxCoeff() >= 1.0)
+            given.refuse("poles", "a pole lies outside of the unit circle",
+                         "poles between 0 and 1: 0 forgets at once, 0.99 in some hundred cycles");
+        const auto l = place_observer(a, c * a, poles.cast<std::complex<double>>());
+        if (!l)
+            given.refuse("C", "the plant is not observable, or a pole of the observer is one of its own",
+                         "look at C; or move the poles a little");
+        return {a, b, c, *l};
+    }
+
+    Vector start_, state_;
+    Model  model_;
+
+public:
+    hal::Ins<double>        u, z;
+    hal::Outs<double>       x, innovation;
+    hal::In<bool>           reset{*this, "reset", "while TRUE the states are those of x0"};
+    hal::Out<std::uint32_t> skipped{*this, "skipped", "measurements that were no number: the model alone was followed"};
+    hal::Out<std::uint32_t> restarts{*this, "restarts", "times the states grew beyond all numbers and went back to x0"};
+    hal::Function           run{*this, "update", &Luenberger::update, "moves the observer on by one period and corrects it"};
+};
+
+}  // namespace
+
+HAL_COMPONENT(Luenberger, "luenberger", "Observer with a gain of its own, or poles where you want them", R"(
+    xm = A x + B u,   x = xm + L (z - C xm)
+
+(D. Luenberger, *Observing the State of a Linear System*, 1964, in the form that uses the newest measurement at once.) The error of the estimate is
+multiplied by (I - LC) A in each cycle; `poles` are the eigenvalues of that, and L follows from them. A plant that cannot be observed
+with these measurements is refused, and so is an L that makes the observer unstable. Matrices as in state_space.
+
+Cheaper than a kalman, and without its noises: for when the poles are what you know. A measurement that is no number is left out.
+
+    loadrt luenberger names=sled a=1,0.001;0,1 b=0;0.001 c=1,0 poles=0.9,0.95
+    addf sled.update servo
+    net place  => sled.z-0
+    net thrust => sled.u-0
+    net speed  <= sled.x-1
+)")

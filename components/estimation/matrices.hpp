@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+// Matrices as a user gives them: as load arguments (`a=0,1;-2,-3`) or in a file (`file=rig.matrices`).
+#pragma once
+
+#include <Eigen/Core>
+#include <cctype>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimation/matrix.hpp"
+#include "hal/texts.hpp"
+
+namespace hal::estimation {
+
+/// A matrix and where it stands.
+struct Given {
+    std::string     name;
+    Eigen::MatrixXd value;
+    bool            in_file = false;
+    std::uint32_t   begin = 0, end = 0;  ///< its name in the file
+};
+
+struct TextProblem {
+    std::uint32_t begin, end;
+    std::string   sentence, help;
+};
+
+/// NAME = rows, a line or a `;` between rows, spaces or commas between numbers, `diag` before the numbers of a diagonal, `#` before a
+/// comment. Names are told apart without regard to case. [setup]
+class MatrixText {
+public:
+    std::vector<Given>       found;
+    std::vector<TextProblem> problems;
+
+    /// A whole file. [setup]
+    void read_file(std::string_view text) {
+        text_ = text;
+        for (std::size_t line = 0; line < text.size();) {
+            const std::size_t end = std::min(text.find('\n', line), text.size());
+            read_line(line, std::min(text.find('#', line), end));
+            line = end + 1;
+        }
+        finish();
+        in_files();
+    }
+    /// The rows of one matrix, as a load argument has them. [setup]
+    void read_rows(std::string name, std::string_view text) {
+        text_ = text;
+        open(std::move(name), 0, 0);
+        rows(0, text.size());
+        finish();
+    }
+
+private:
+    static bool space(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
+
+    void in_files() {
+        for (Given& given : found) given.in_file = true;
+    }
+    void read_line(std::size_t at, std::size_t end) {
+        if (const std::size_t equals = text_.substr(at, end - at).find('='); equals != std::string_view::npos) {
+            std::size_t begin = at, stop = at + equals;
+            while (begin < stop && space(text_[begin])) ++begin;
+            while (stop > begin && space(text_[stop - 1])) --stop;
+            finish();
+            const std::string name(text_.substr(begin, stop - begin));
+            bool              word = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0]));
+            for (const char c : name) word = word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
+            if (!word)
+                say(begin, std::max(stop, begin + 1), "'" + name + "' is not a name of a matrix", "write NAME = numbers, as in: A = 0 1");
+            for (const Given& other : found)
+                if (same(other.name, name)) say(begin, stop, "'" + name + "' is there twice", "delete one of them");
+            open(name, begin, stop);
+            at += equals + 1;
+        }
+        rows(at, end);
+    }
+    void rows(std::size_t at, std::size_t end) {
+        while (at < end) {
+            if (space(text_[at])) {
+                ++at;
+                continue;
+            }
+            if (text_[at] == ';') {
+                row();
+                ++at;
+                continue;
+            }
+            std::size_t stop = at;
+            while (stop < end && !space(text_[stop]) && text_[stop] != ';') ++stop;
+            word(at, stop);
+            at = stop;
+        }
+        row();
+    }
+    void word(std::size_t at, std::size_t stop) {
+        const std::string token(text_.substr(at, stop - at));
+        if (!open_) {
+            if (!lost_) say(at, stop, "'" + token + "' belongs to no matrix", "write NAME = before the numbers, as in: A = 0 1");
+            lost_ = true;
+            return;
+        }
+        if (token == "diag" && numbers_.empty() && rows_.empty() && !diagonal_) {
+            diagonal_ = true;
+            return;
+        }
+        char*        rest = nullptr;
+        const double number = std::strtod(token.c_str(), &rest);
+        if (*rest != '\0' || !(std::fabs(number) < 1e300))
+            say(at, stop, "'" + token + "' is not a number", "numbers are written as in -1.5 or 2e-3");
+        if (numbers_.empty()) row_begin_ = at;
+        row_end_ = stop;
+        numbers_.push_back(number);
+    }
+    void row() {
+        if (numbers_.empty()) return;
+        if (!rows_.empty() && rows_[0].size() != numbers_.size())
+            say(row_begin_, row_end_,
+                "row " + std::to_string(rows_.size() + 1) + " of " + current_.name + " has " + std::to_string(numbers_.size()) +
+                    (numbers_.size() == 1 ? " number" : " numbers") + ", its first has " + std::to_string(rows_[0].size()),
+                "all rows of a matrix are of one length");
+        rows_.push_back(std::move(numbers_));
+        numbers_.clear();
+    }
+    void open(std::string name, std::size_t begin, std::size_t end) {
+        current_ = {std::move(name), {}, false, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)};
+        open_ = true;
+        diagonal_ = lost_ = false;
+    }
+    void finish() {
+        if (!open_) return;
+        row();
+        open_ = false;
+        const std::size_t high = rows_.size(), wide = rows_.empty() ? 0 : rows_[0].size();
+        if (high == 0)
+            say(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
+                "write them behind the =, or in the lines below it");
+        if (diagonal_ && high > 1)
+            say(current_.begin, current_.end, "'" + current_.name + "' has rows behind diag", "diag is followed by one row: diag 1 2 3");
+        const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
+        if (problems.empty()) {
+            current_.value = Eigen::MatrixXd::Zero(index(diagonal_ ? wide : high), index(wide));
+            for (std::size_t i = 0; i < high; ++i)
+                for (std::size_t j = 0; j < wide; ++j) current_.value(index(diagonal_ ? j : i), index(j)) = rows_[i][j];
+            if (current_.value.rows() > most || current_.value.cols() > most)
+                say(current_.begin, current_.end,
+                    current_.name + " is " + std::to_string(current_.value.rows()) + " x " + std::to_string(current_.value.cols()),
+                    "matrices have at most " + std::to_string(most) + " rows and columns");
+        }
+        rows_.clear();
+        found.push_back(std::move(current_));
+    }
+    void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+        problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+    }
+
+public:
+    static bool same(std::string_view a, std::string_view b) {
+        return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                          [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+    }
+
+private:
+    std::string_view                 text_;
+    Given                            current_;
+    bool                             open_ = false, diagonal_ = false, lost_ = false;
+    std::vector<double>              numbers_;
+    std::vector<std::vector<double>> rows_;
+    std::size_t                      row_begin_ = 0, row_end_ = 0;
+};
+
+/// What a component asks for.
+struct Wanted {
+    const char* name;     ///< in a file; the load argument is the same in lower case
+    const char* example;  ///< taken when a bare `loadrt` gives nothing at all; "" for none
+    const char* doc;
+};
+
+/// The matrices of one instance. In a component's constructor only.
+class Matrices {
+public:
+    Matrices(hal::Component& component, std::initializer_list<Wanted> wanted)
+        : texts_(component), file_(component, "file", "", "file with the matrices, beside the netlist; an argument goes before it") {
+        std::vector<std::pair<const Wanted*, std::string>> arguments;
+        bool                                               any = !file_.get().empty();
+        for (const Wanted& w : wanted) {
+            arguments.emplace_back(&w, hal::Argument::ask(lower(w.name).c_str(), "", w.doc, {}));
+            any = any || !arguments.back().second.empty();
+        }
+        if (!file_.get().empty()) read_file();
+        for (const auto& [w, text] : arguments) {
+            if (text.empty() && (any || *w->example == '\0')) continue;
+            MatrixText reader;
+            reader.read_rows(w->name, text.empty() ? w->example : text);
+            if (!reader.problems.empty())
+                throw std::invalid_argument(lower(w->name) + "=" + text + ": " + reader.problems[0].sentence + "; " +
+                                            reader.problems[0].help);
+            given_[lower(w->name)] = reader.found[0];
+        }
+    }
+    bool has(const char* name) const { return given_.contains(lower(name)); }
+    /// Throws when it is not there. [setup]
+    const Given& at(const char* name) const {
+        const auto found = given_.find(lower(name));
+        if (found == given_.end())
+            throw std::invalid_argument(std::string(name) + " is missing: give it as " + lower(name) + "=1,0;0,1 or, in a file, as " +
+                                        name + " = 1 0");
+        return found->second;
+    }
+    /// The matrix, which must have this size. [setup]
+    const Eigen::MatrixXd& at(const char* name, Eigen::Index rows, Eigen::Index columns, const std::string& why) const {
+        const Given& given = at(name);
+        if (given.value.rows() != rows || given.value.cols() != columns)
+            refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not " + size(rows, columns), why);
+        return given.value;
+    }
+    /// A square one; its size is the number of states. [setup]
+    const Eigen::MatrixXd& square(const char* name) const {
+        const Given& given = at(name);
+        if (given.value.rows() != given.value.cols())
+            refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not square",
+                   "it has a row and a column per state");
+        return given.value;
+    }
+    /// As a vector of `count`, whether written as a row or as a column. [setup]
+    Eigen::VectorXd vector(const char* name, Eigen::Index count, const std::string& why) const {
+        const Given& given = at(name);
+        if (given.value.size() != count || (given.value.rows() != 1 && given.value.cols() != 1))
+            refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not a row of " + std::to_string(count),
+                   why);
+        return given.value.reshaped();
+    }
+    /// Ends the constructor: what is wrong with a matrix that was read. [setup]
+    [[noreturn]] void refuse(const Given& given, const std::string& sentence, const std::string& help) const {
+        if (given.in_file && texts_.offered()) {
+            texts_.say(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
+            hal::Texts::refuse();
+        }
+        throw std::invalid_argument(sentence + "; " + help);
+    }
+    [[noreturn]] void refuse(const char* name, const std::string& sentence, const std::string& help) const {
+        refuse(at(name), sentence, help);
+    }
+
+private:
+    static std::string lower(std::string text) {
+        for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        return text;
+    }
+    static std::string size(Eigen::Index rows, Eigen::Index columns) { return std::to_string(rows) + " x " + std::to_string(columns); }
+
+    void read_file() {
+        const std::string path = texts_.find(file_.get());
+        std::ifstream     stream(path, std::ios::binary);
+        std::string       text(65536, '\0');
+        stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+        if (!stream.eof() || stream.bad()) {
+            if (stream.gcount() == static_cast<std::streamsize>(text.size()))
+                throw std::invalid_argument(path + " is longer than 64 KiB: that is no file of matrices");
+            throw std::invalid_argument("cannot read " + path + "; file= is looked for beside the netlist");
+        }
+        text.resize(static_cast<std::size_t>(stream.gcount()));
+        texts_.begin(file_.get(), text);
+        MatrixText reader;
+        reader.read_file(text);
+        for (const TextProblem& p : reader.problems) texts_.say(HAL_SEVERITY_ERROR, "matrix-text", p.begin, p.end, p.sentence, "", p.help);
+        if (!reader.problems.empty()) {
+            if (texts_.offered()) hal::Texts::refuse();
+            throw std::invalid_argument(file_.get() + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
+        }
+        for (Given& given : reader.found) given_[lower(given.name)] = std::move(given);
+    }
+
+    hal::Texts                   texts_;
+    hal::TextArgument            file_;
+    std::map<std::string, Given> given_;
+};
+
+}  // namespace hal::estimation

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+// A nonlinear plant as a user writes it: states with their derivatives, inputs, constants and what is measured.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimation/expression.hpp"
+
+namespace hal::estimation {
+
+/// The lines of a model: `constant NAME = FORMULA`, `input NAME`, `state NAME = START sigma S noise N`, `NAME' = FORMULA`,
+/// `measure NAME = FORMULA sigma S`, with `wrap` behind an angle. [setup]
+class Model {
+public:
+    static constexpr std::size_t most_inputs = 8, most_measures = 12, most_constants = 32;
+
+    struct State {
+        std::string   name;
+        double        start, sigma, noise;
+        std::uint32_t begin, end;
+        bool          moves = false;
+        Expression    rate;
+    };
+    struct Measure {
+        std::string name;
+        double      sigma;
+        bool        wrap;
+        Expression  value;
+    };
+
+    std::vector<State>               states;
+    std::vector<std::string>         inputs;
+    std::vector<Measure>             measures;
+    std::vector<double>              constants;
+    std::vector<Expression::Problem> problems;
+
+    void read(std::string_view text) {
+        text_ = text;
+        for (std::size_t line = 0; line < text.size();) {
+            const std::size_t stop = std::min(text.find('\n', line), text.size());
+            const std::size_t end = std::min(text.find('#', line), stop);
+            read_line(line, end);
+            line = stop + 1;
+        }
+        for (const State& s : states)
+            if (!s.moves)
+                say(s.begin, s.end, "state '" + s.name + "' has no derivative",
+                    "write " + s.name + "' = and a formula; 0 for a state that only wanders");
+        if (states.empty()) say(0, 1, "the model has no states", "write state NAME = START sigma S noise N for each");
+        if (measures.empty() && problems.empty()) say(0, 1, "nothing is measured", "write measure NAME = FORMULA sigma S");
+    }
+    /// Values in the order that formulas know them: states, inputs, constants. [realtime]
+    std::size_t variables() const noexcept { return most_slopes + most_inputs + constants.size(); }
+
+private:
+    struct Words {
+        std::size_t begin, end;
+    };
+    std::string_view piece(Words w) const { return text_.substr(w.begin, w.end - w.begin); }
+    Words            trim(std::size_t begin, std::size_t end) const {
+        while (begin < end && std::isspace(static_cast<unsigned char>(text_[begin]))) ++begin;
+        while (end > begin && std::isspace(static_cast<unsigned char>(text_[end - 1]))) --end;
+        return {begin, end};
+    }
+    Words word(std::size_t begin, std::size_t end) const {
+        const Words all = trim(begin, end);
+        std::size_t stop = all.begin;
+        while (stop < all.end && (std::isalnum(static_cast<unsigned char>(text_[stop])) || text_[stop] == '_')) ++stop;
+        return {all.begin, stop};
+    }
+    void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+        problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(std::max(end, begin + 1)), std::move(sentence),
+                            std::move(help)});
+    }
+    void read_line(std::size_t begin, std::size_t end) {
+        const Words line = trim(begin, end);
+        if (line.begin == line.end) return;
+        const Words            first = word(line.begin, line.end);
+        const std::string_view what = piece(first);
+        if (what == "input") return input(first.end, line.end);
+        const std::size_t equals = text_.substr(line.begin, line.end - line.begin).find('=');
+        if (equals == std::string_view::npos)
+            return say(line.begin, line.end, "this line means nothing", "lines begin with constant, input, state, measure or NAME'");
+        const std::size_t sign = line.begin + equals;
+        if (what == "constant") return constant(first.end, sign, line.end);
+        if (what == "state") return state(first.end, sign, line.end);
+        if (what == "measure") return measure(first.end, sign, line.end);
+        if (first.end < line.end && text_[first.end] == '\'') return rate(first, sign, line.end);
+        say(first.begin, first.end, "a line cannot begin with '" + std::string(what) + "'",
+            "lines begin with constant, input, state, measure or NAME'");
+    }
+    bool fresh(Words name, std::size_t limit, std::size_t count) {
+        const std::string text(piece(name));
+        if (text.empty()) return say(name.begin, name.end, "a name is missing", "names are letters, digits and _"), false;
+        if (count >= limit)
+            return say(name.begin, name.end, "there are more than " + std::to_string(limit) + " of these", "a smaller model"), false;
+        if (index_.contains(text) || text == "pi") return say(name.begin, name.end, "'" + text + "' is there twice", "another name"), false;
+        return true;
+    }
+    void input(std::size_t begin, std::size_t end) {
+        const Words name = word(begin, end);
+        if (!fresh(name, most_inputs, inputs.size())) return;
+        index_[std::string(piece(name))] = static_cast<std::uint16_t>(static_cast<std::size_t>(most_slopes) + inputs.size());
+        inputs.emplace_back(piece(name));
+    }
+    /// A formula of constants only.
+    double fixed(Words formula) {
+        Expression e;
+        const auto constants_only = [this](std::string_view name) -> std::optional<std::uint16_t> {
+            const auto found = index_.find(std::string(name));
+            return found != index_.end() && found->second >= most_slopes + most_inputs ? std::optional(found->second) : std::nullopt;
+        };
+        if (auto problem = Expression::compile(piece(formula), static_cast<std::uint32_t>(formula.begin), constants_only, e)) {
+            problems.push_back(*problem);
+            return 1.0;
+        }
+        std::vector<Dual> values(variables() + 1);
+        for (std::size_t i = 0; i < constants.size(); ++i) values[most_slopes + most_inputs + i].value = constants[i];
+        const double v = e(values.data(), 0).value;
+        if (!std::isfinite(v)) say(formula.begin, formula.end, "this is no finite number", "");
+        return v;
+    }
+    void constant(std::size_t begin, std::size_t sign, std::size_t end) {
+        const Words name = word(begin, sign);
+        if (!fresh(name, most_constants, constants.size())) return;
+        const double v = fixed(trim(sign + 1, end));
+        index_[std::string(piece(name))] = static_cast<std::uint16_t>(most_slopes + most_inputs + constants.size());
+        constants.push_back(v);
+    }
+    /// Where a keyword begins, or `end`.
+    std::size_t keyword(std::size_t begin, std::size_t end, std::string_view key) const {
+        for (std::size_t at = begin; at + key.size() <= end; ++at) {
+            const bool before = at == begin || std::isspace(static_cast<unsigned char>(text_[at - 1]));
+            const bool after = at + key.size() == end || std::isspace(static_cast<unsigned char>(text_[at + key.size()]));
+            if (before && after && text_.substr(at, key.size()) == key) return at;
+        }
+        return end;
+    }
+    void state(std::size_t begin, std::size_t sign, std::size_t end) {
+        const Words name = word(begin, sign);
+        if (!fresh(name, most_slopes, states.size())) return;
+        const std::size_t sigma = keyword(sign + 1, end, "sigma"), noise = keyword(sign + 1, end, "noise");
+        if (sigma == end || noise == end || noise < sigma)
+            return say(name.begin, end, "a state has a start, a sigma and a noise",
+                       "write state " + std::string(piece(name)) + " = 0 sigma 1 noise 0.1");
+        const double start = fixed(trim(sign + 1, sigma)), wide = fixed(trim(sigma + 5, noise)), wanders = fixed(trim(noise + 5, end));
+        if (wide < 0.0 || wanders < 0.0) say(sigma, end, "sigma and noise are not negative", "");
+        index_[std::string(piece(name))] = static_cast<std::uint16_t>(states.size());
+        states.push_back({std::string(piece(name)),
+                          start,
+                          wide,
+                          wanders,
+                          static_cast<std::uint32_t>(name.begin),
+                          static_cast<std::uint32_t>(name.end),
+                          false,
+                          {}});
+    }
+    void formula(Words words, Expression& to) {
+        const auto any = [this](std::string_view name) -> std::optional<std::uint16_t> {
+            const auto found = index_.find(std::string(name));
+            return found != index_.end() ? std::optional(found->second) : std::nullopt;
+        };
+        if (auto problem = Expression::compile(piece(words), static_cast<std::uint32_t>(words.begin), any, to)) {
+            if (problem->begin >= text_.size())
+                problem->begin = static_cast<std::uint32_t>(text_.size() - 1), problem->end = problem->begin + 1;
+            problems.push_back(*problem);
+        }
+    }
+    void rate(Words name, std::size_t sign, std::size_t end) {
+        for (State& s : states) {
+            if (s.name != piece(name)) continue;
+            if (s.moves) return say(name.begin, name.end, "'" + s.name + "' has two derivatives", "delete one of them");
+            s.moves = true;
+            return formula(trim(sign + 1, end), s.rate);
+        }
+        say(name.begin, name.end, "there is no state '" + std::string(piece(name)) + "'",
+            "write its line state NAME = START sigma S noise N above this one");
+    }
+    void measure(std::size_t begin, std::size_t sign, std::size_t end) {
+        const Words name = word(begin, sign);
+        if (piece(name).empty()) return say(begin, sign, "a name is missing", "names are letters, digits and _");
+        if (measures.size() >= most_measures) return say(name.begin, name.end, "there are more than 12 measurements", "a smaller model");
+        const std::size_t sigma = keyword(sign + 1, end, "sigma"), wrap = keyword(sign + 1, end, "wrap");
+        if (sigma == end)
+            return say(name.begin, end, "a measurement has a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
+        Measure m{std::string(piece(name)), fixed(trim(sigma + 5, wrap)), wrap != end, {}};
+        if (!(m.sigma > 0.0)) say(sigma, end, "sigma is above 0", "each measurement has some noise");
+        formula(trim(sign + 1, sigma), m.value);
+        measures.push_back(std::move(m));
+    }
+
+    std::string_view                     text_;
+    std::map<std::string, std::uint16_t> index_;
+};
+
+}  // namespace hal::estimation

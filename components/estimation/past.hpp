@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+// A Kalman filter that remembers: a measurement that arrives late is taken where it belongs, and what came after it is done again.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "estimation/matrix.hpp"
+
+namespace hal::estimation {
+
+/// The estimate at a moment, and what is known to have happened there.
+struct Moment {
+    Vector        x;                 ///< after the measurements of this moment
+    Matrix        p;                 ///< covariance of x
+    Vector        u;                 ///< the input that acted since the moment before
+    Vector        z;                 ///< measurements of this moment, those that are in `measured`
+    std::uint32_t measured = 0;
+    std::uint32_t fresh = 0;  ///< those of `measured` that were not counted yet
+};
+
+/// What became of a measurement.
+enum class Fate { none, used, outlier, lost };
+
+/// x and P after a scalar measurement of cx with variance r, by Joseph's form (P. Joseph, in R. Bucy, *Filtering for Stochastic Processes*, 1968):
+///     k = Pc / (c'Pc + r),  x <- x + k off,  P <- (I - kc')P(I - kc')' + k r k'
+/// which stays symmetric and positive where P - kc'P does not; rounding is taken off the two halves. `gate`: beyond so many standard deviations
+/// nothing is done; 0 for none. [realtime]
+inline Fate correct(Vector& x, Matrix& p, const Vector& c, double off, double r, double gate) noexcept {
+    const Eigen::Index n = x.size();
+    Vector             pc, k, mc;
+    multiply(pc, p, c);
+    double s = r;
+    for (Eigen::Index i = 0; i < n; ++i) s += c(i) * pc(i);
+    if (!(s > 0.0) || !std::isfinite(s)) return Fate::lost;
+    if (gate > 0.0 && off * off > gate * gate * s) return Fate::outlier;
+    k = pc / s;
+    x += k * off;
+    double* const all = p.data();
+    for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index i = 0; i < n; ++i) all[i + j * n] -= k.data()[i] * pc.data()[j];
+    multiply(mc, p, c);
+    mc = r * k - mc;
+    for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index i = 0; i < n; ++i) all[i + j * n] += mc.data()[i] * k.data()[j];
+    for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index i = 0; i < j; ++i) p(i, j) = p(j, i) = 0.5 * (p(i, j) + p(j, i));
+    return Fate::used;
+}
+
+/// to = A P A' + Q for a symmetric P, symmetric to the last bit. [realtime]
+inline void spread(Matrix& to, const Matrix& a, const Matrix& p, const Matrix& q) noexcept {
+    const Eigen::Index n = a.rows();
+    Matrix             ap;
+    multiply(ap, a, p);
+    to = q;
+    const double *const left = ap.data(), *const right = a.data();
+    double* const all = to.data();
+    for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index k = 0; k < n; ++k) {
+            const double factor = right[j + k * n];
+            if (factor != 0.0)
+                for (Eigen::Index i = 0; i <= j; ++i) all[i + j * n] += left[i + k * n] * factor;
+        }
+    for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index i = 0; i < j; ++i) all[j + i * n] = all[i + j * n];
+}
+
+/// The filter over its last `history` moments. `Model` has, all [realtime]:
+///     void predict(Moment& to, const Moment& from)             x and P a period later, under to.u
+///     Fate measure(Moment& at, Eigen::Index channel, double gate)  takes one of at.z
+template <class Model>
+class Past {
+public:
+    /// Takes its memory here. [setup]
+    Past(Model& model, std::size_t history, Vector x0, Matrix p0, Eigen::Index inputs, Eigen::Index channels)
+        : model_(model), start_{x0, p0, Vector::Zero(inputs), Vector::Zero(channels)}, moments_(history, start_) {}
+
+    const Moment& now() const noexcept { return at(number_); }
+
+    /// A new moment; to be followed by tell() for each measurement and then settle(). [realtime]
+    void advance(const Vector& u) noexcept {
+        ++number_;
+        Moment& moment = at(number_);
+        moment.u = u;
+        moment.measured = moment.fresh = 0;
+        first_ = number_;
+        known_ = known_ < moments_.size() ? known_ + 1 : known_;
+    }
+    /// Measurement `channel`, `cycles` old. False: older than what is remembered. [realtime]
+    bool tell(Eigen::Index channel, double z, std::int64_t cycles) noexcept {
+        if (cycles < 0) cycles = 0;
+        // the oldest moment can no longer be done again: the one before it is gone
+        if (cycles >= static_cast<std::int64_t>(known_) - (full() ? 1 : 0)) return false;
+        const std::uint64_t where = number_ - static_cast<std::uint64_t>(cycles);
+        Moment&             moment = at(where);
+        moment.z(channel) = z;
+        moment.measured |= std::uint32_t{1} << channel;
+        moment.fresh |= std::uint32_t{1} << channel;
+        if (where < first_) first_ = where;
+        return true;
+    }
+    /// Does everything from the oldest new measurement on. [realtime]
+    void settle(double gate) noexcept {
+        for (std::uint64_t k = first_; k <= number_; ++k) {
+            Moment& moment = at(k);
+            if (k == 1) moment.x = start_.x, moment.p = start_.p;
+            else model_.predict(moment, at(k - 1));
+            for (Eigen::Index i = 0; i < moment.z.size(); ++i) {
+                if ((moment.measured >> i & 1) == 0) continue;
+                const Fate fate = model_.measure(moment, i, gate);
+                if (moment.fresh >> i & 1) used += fate == Fate::used, outliers += fate == Fate::outlier;
+                if (fate == Fate::lost) renew(moment);
+            }
+            moment.fresh = 0;
+            if (!finite(moment.x) || !finite(moment.p)) renew(moment);
+        }
+    }
+    /// Back to the start. [realtime]
+    void restart() noexcept {
+        number_ = 0;
+        known_ = 0;
+    }
+    std::uint32_t used = 0, outliers = 0, renewals = 0;  ///< counted; a measurement that is done again counts once
+
+private:
+    Moment&       at(std::uint64_t k) noexcept { return moments_[k % moments_.size()]; }
+    const Moment& at(std::uint64_t k) const noexcept { return moments_[k % moments_.size()]; }
+    bool          full() const noexcept { return number_ > moments_.size(); }
+    void          renew(Moment& moment) noexcept {
+        if (!finite(moment.x)) moment.x = start_.x;
+        moment.p = start_.p;
+        ++renewals;
+    }
+
+    Model&              model_;
+    const Moment        start_;
+    std::vector<Moment> moments_;
+    std::uint64_t       number_ = 0, first_ = 0;
+    std::size_t         known_ = 0;
+};
+
+}  // namespace hal::estimation
