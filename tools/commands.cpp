@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The only source that includes CLI11: a row per subcommand, and what its options are.
+// A row per subcommand, and what its options are; those of `hal node` are in declare_node.cpp. No other source includes CLI11.
 #include "commands.hpp"
 
 #include <CLI/CLI.hpp>
@@ -13,6 +13,7 @@
 
 #include "base/diagnostic.hpp"
 #include "base/types.hpp"
+#include "declare_node.hpp"
 #include "options.hpp"
 #include "paths.hpp"
 #include "say.hpp"
@@ -33,15 +34,6 @@ struct Subcommand {
 void words(CLI::App& app, Options& o, const char* name, const char* what, bool required = true) {
     CLI::Option* option = app.add_option(name, o.words, what);
     if (required) option->required();
-}
-
-void for_how_long(CLI::App& app, Options& o, const char* what) {
-    const auto take = [&o](const std::string& text) {
-        const auto ns = parse_duration_ns(text, false);
-        if (!ns || *ns < 0) throw CLI::ValidationError("--for", fmt::format("'{}' is not a duration; write 10s, 250ms or 2min", text));
-        o.for_ns = *ns;
-    };
-    app.add_option_function<std::string>("--for", take, what)->type_name("TIME");
 }
 
 void named(CLI::App& app, Options& o, const char* what) { app.add_option("-N,--name", o.name, what)->type_name("NAME"); }
@@ -148,7 +140,7 @@ void declare_doctor(CLI::App& app, Options& o) {
 
 void declare_completion(CLI::App& app, Options& o) { words(app, o, "SHELL", "bash"); }
 
-constexpr const char* address = "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0 or replay:FILE; options follow: ?bitrate=500k&datarate=2M&listen";
+constexpr const char* address = "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; options follow: ?bitrate=500k&datarate=2M&listen";
 
 void filtered(CLI::App& app, Options& o) {
     app.add_option("--filter", o.filters, "only frames with this identifier, or ID/MASK: 181, 180/780, 18FF0000/1FFF0000; may be repeated")
@@ -298,56 +290,14 @@ void declare_canopen_plan(CLI::App& app, Options& o) {
     app.add_flag("--json", o.json, "as JSON");
 }
 
+void declare_tdma_plan(CLI::App& app, Options& o) {
+    words(app, o, "FILE", "the schedule of the segment, NAME.tdma or RTnet's tdma.conf");
+    app.add_flag("--json", o.json, "as JSON");
+}
+
 void declare_canopen_check(CLI::App& app, Options& o) { words(app, o, "FILE", "configurations, NAME.canopen"); }
 
 void declare_can_eds_check(CLI::App& app, Options& o) { words(app, o, "FILE", "device descriptions: EDS, DCF, XDD, XDC"); }
-
-/// What every kind of simulated device takes.
-void declare_node(CLI::App& app, Options& o) {
-    NodeOptions& n = o.node;
-    app.add_option("--link", n.link, "the bus: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0; options follow: ?bitrate=500k")->type_name("ADDRESS");
-    app.add_option("--id", n.id, "its node-id, 1-127 or 0x..; none: an LSS master gives it one")->type_name("N");
-    app.add_flag("--eds", n.eds, "print its EDS and end");
-    app.add_option("--fault", n.faults, "what it does wrong: late-sdo, mute:from=5s:for=1s, twice:every=3 …; list: hal node faults; may be repeated")
-        ->type_name("FAULT")->allow_extra_args(false);
-    app.add_option("--set", n.settings, "the world around it: NAME=VALUE, or NAME=VALUE@2s for later; may be repeated")
-        ->type_name("NAME=VALUE")->allow_extra_args(false);
-    app.add_option("--heartbeat", n.heartbeat_ms, "ms between heartbeats until a master says otherwise (default 0: none)")->type_name("MS");
-    app.add_option("--serial", n.serial, "its serial number (default 1)")->type_name("N");
-    app.add_flag("--start", n.starts_itself, "operational after boot-up without a master");
-    for_how_long(app, o, "end after 10s, 2min …; without it: until Ctrl-C");
-}
-
-void declare_node_drive(CLI::App& app, Options& o) {
-    declare_node(app, o);
-    app.add_option("--axes", o.node.axes, "1-8 (default 1)")->check(CLI::Range(1, 8).description(""))->type_name("N");
-    app.add_option("--motor", o.node.motor, "of all axes: NAME:VALUE, as in inertia:1e-4,resolution:8192,endless:1; may be repeated")
-        ->type_name("NAME:VALUE")->allow_extra_args(false);
-}
-
-void declare_node_io(CLI::App& app, Options& o) {
-    declare_node(app, o);
-    NodeOptions& n = o.node;
-    app.add_option("--inputs", n.inputs, "digital inputs, 0-64 (default 64)")->check(CLI::Range(0, 64).description(""))->type_name("N");
-    app.add_option("--outputs", n.outputs, "digital outputs, 0-64 (default 64)")->check(CLI::Range(0, 64).description(""))->type_name("N");
-    app.add_option("--analog-inputs", n.analog_inputs, "0-12 (default 12)")->check(CLI::Range(0, 12).description(""))->type_name("N");
-    app.add_option("--analog-outputs", n.analog_outputs, "0-12 (default 12)")->check(CLI::Range(0, 12).description(""))->type_name("N");
-}
-
-void declare_node_jr3(CLI::App& app, Options& o) {
-    declare_node(app, o);
-    app.add_option("--stream", o.node.stream, "the sensor's line from this file, eight clocks to a byte, over and over")->type_name("FILE");
-    app.add_option("--record", o.node.record, "write the line of a simulated sensor for the time of --for into this file, and end")->type_name("FILE");
-}
-
-void declare_node_bootloader(CLI::App& app, Options& o) {
-    declare_node(app, o);
-    app.add_option("--program", o.node.version, "version of the program it comes with (default 1.0); none: its flash is empty")->type_name("VERSION");
-    app.add_option("--flash", o.node.flash, "keeps the flash from run to run")->type_name("FILE");
-    app.add_option("--make-image", o.node.image, "print a program of this version, to be downloaded, and end")->type_name("VERSION");
-}
-
-void declare_node_faults(CLI::App&, Options&) {}
 
 // What talks to a bus needs a third of the code, and other libraries: it is in the program hal-bus, which `hal` becomes then.
 // This source is compiled for both.
@@ -390,8 +340,11 @@ constexpr Subcommand table[] = {
     {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", ON_BUS(run_can_eds_check), declare_can_eds_check},
     {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", ON_BUS(run_canopen_check), declare_canopen_check},
     {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", ON_BUS(run_canopen_plan), declare_canopen_plan},
+    {"tdma plan", "FILE [--json]", "the slots of an Ethernet segment as a timeline, its load and the latency from input to output", ON_BUS(run_tdma_plan), declare_tdma_plan},
     {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", ON_BUS(run_node_drive), declare_node_drive},
     {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", ON_BUS(run_node_io), declare_node_io},
+    {"node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "a simulated axis whose loop is closed over the bus", ON_BUS(run_node_axis_io), declare_node_axis_io},
+    {"node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "a simulated safety I/O node of EN 50325-5, for trying out", ON_BUS(run_node_safe_io), declare_node},
     {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", ON_BUS(run_node_jr3), declare_node_jr3},
     {"node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus", ON_BUS(run_node_bootloader), declare_node_bootloader},
     {"node faults", "", "what simulated devices can do wrong on purpose", ON_BUS(run_node_faults), declare_node_faults},
@@ -408,7 +361,8 @@ struct Group {
 constexpr Group groups[] = {
     {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, pdo, lss, drive, gateway; eds check"},
     {"canopen", "checks and plans a CANopen network"},
-    {"node", "simulated CANopen devices as processes: drive, io, jr3, bootloader; what they can do wrong: faults"},
+    {"tdma", "plans the time slots of an Ethernet segment"},
+    {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; what they can do wrong: faults"},
 };
 
 const Group* find_group(std::string_view name) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // `hal doctor`: what on this machine spoils real time, what to type against it, and the wake-up jitter it has.
 #include <cctype>
+#include <cerrno>
+#include <cstring>
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/core.h>
@@ -11,6 +13,7 @@
 #include <set>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/utsname.h>
 #include <sys/xattr.h>
 #include <thread>
@@ -126,6 +129,18 @@ Finding capabilities() {
             grant()};
 }
 
+/// What the kernel answers; a container may refuse in spite of the capability.
+Finding raw_ethernet() {
+    const int socket = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);
+    const int problem = errno;
+    if (socket >= 0) ::close(socket);
+    if (socket >= 0) return {Verdict::good, "raw Ethernet", "allowed (cap_net_raw)"};
+    if (problem == EPERM || problem == EACCES)
+        return {Verdict::fair, "raw Ethernet", "refused: links of the kind eth:enp3s0 cannot be opened", grant()};
+    return {Verdict::fair, "raw Ethernet", fmt::format("no packet sockets in this kernel: {}", std::strerror(problem)),
+            "use a kernel with CONFIG_PACKET, as every distribution's is"};
+}
+
 Finding throttling() {
     const std::string text = first_line("/proc/sys/kernel/sched_rt_runtime_us");
     if (text.empty()) return {Verdict::good, "throttling", "none visible"};
@@ -194,8 +209,8 @@ Finding management_interrupts() {
             count == 0 ? "" : "in the firmware set-up switch off legacy USB, and power management of fans and memory"};
 }
 
-constexpr Finding (*checks[])() = {kernel,   machine,   scheduling,   memory,      capabilities,         throttling,
-                                   governor, isolation, clock_source, idle_states, management_interrupts};
+constexpr Finding (*checks[])() = {kernel,     machine,  scheduling, memory,       capabilities, raw_ethernet,
+                                   throttling, governor, isolation,  clock_source, idle_states,  management_interrupts};
 
 const char* word(Verdict verdict) {
     static constexpr const char* words[] = {"good", "fair", "poor"};

@@ -1,46 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <memory>
 
-#include "furuta_dynamics.hpp"
+#include "furuta_rig.hpp"
 #include "hal/component.hpp"
-#include "motor.hpp"
-#include "quadrature.hpp"
 
 namespace {
 
-/// An encoder read over a radio: each count comes out a fixed time after it went in.
-class DelayedCount {
-public:
-    /// Puts in the count of now and gives the one of `delay` ago. [realtime]
-    std::int64_t pass(std::int64_t count, std::int64_t now_ns, std::int64_t delay_ns) noexcept {
-        if (count != last_in_) {
-            if (in_ - out_ == edges_->size()) last_out_ = (*edges_)[out_++ % edges_->size()].count;  // full: the oldest comes early
-            (*edges_)[in_++ % edges_->size()] = {count, now_ns};
-            last_in_ = count;
-        }
-        while (out_ != in_ && now_ns - (*edges_)[out_ % edges_->size()].at_ns >= delay_ns)
-            last_out_ = (*edges_)[out_++ % edges_->size()].count;
-        return last_out_;
-    }
-    void clear(std::int64_t count) noexcept {
-        in_ = out_ = 0;
-        last_in_ = last_out_ = count;
-    }
-
-private:
-    struct Edge {
-        std::int64_t count, at_ns;
-    };
-    std::unique_ptr<std::array<Edge, 4096>> edges_ = std::make_unique<std::array<Edge, 4096>>();
-    std::size_t in_ = 0, out_ = 0;
-    std::int64_t last_in_ = 0, last_out_ = 0;
-};
-
 struct Furuta : hal::Component {
     static constexpr hal::Traits traits{.singleton = true};
+    static constexpr sim::FurutaConstants usual{};
 
     hal::RealArgument arm_start, pendulum_start;
 
@@ -73,34 +41,34 @@ struct Furuta : hal::Component {
     hal::Out<double> motor_torque{*this, "motor-torque", "torque of the motor on the arm", {.unit = "N*m", .finite = true}};
     hal::Out<double> energy{*this, "energy", "kinetic and potential energy of arm and pendulum; 0 at rest, hanging", {.unit = "J"}};
 
-    hal::Param<std::uint32_t> encoder_counts{*this, "encoder-counts", "counts of both encoders per turn, after x4 decoding; the source rig's", {.initial = 2000}};
-    hal::Param<double> radio_delay{*this, "radio-delay", "age of the pendulum's encoder when it arrives; assumed", {.initial = 0.003, .unit = "s"}};
+    hal::Param<std::uint32_t> encoder_counts{*this, "encoder-counts", "counts of both encoders per turn, after x4 decoding; the source rig's", {.initial = usual.encoder_counts}};
+    hal::Param<double> radio_delay{*this, "radio-delay", "age of the pendulum's encoder when it arrives; assumed", {.initial = usual.radio_delay, .unit = "s"}};
 
-    hal::Param<double> supply{*this, "supply-voltage", "supply of the amplifier; the source rig's", {.initial = 24.0, .unit = "V"}};
-    hal::Param<double> current_limit{*this, "current-limit", "current limit of the amplifier, 0 for none; the source rig's", {.initial = 4.0, .unit = "A"}};
-    hal::Param<double> torque_constant{*this, "torque-constant", "motor: torque per current, and voltage per speed; from 85 W at 3000 rpm and 4 A", {.initial = 0.0677, .unit = "N*m/A"}};
-    hal::Param<double> resistance{*this, "resistance", "motor: of the winding; what 24 V leave at 3000 rpm and 4 A", {.initial = 0.68, .unit = "Ohm"}};
-    hal::Param<double> inductance{*this, "inductance", "motor: of the winding; usual for this size", {.initial = 0.001, .unit = "H"}};
-    hal::Param<double> rotor_inertia{*this, "rotor-inertia", "motor: of the rotor; usual for this size", {.initial = 7.5e-5, .unit = "kg*m^2"}};
+    hal::Param<double> supply{*this, "supply-voltage", "supply of the amplifier; the source rig's", {.initial = usual.supply, .unit = "V"}};
+    hal::Param<double> current_limit{*this, "current-limit", "current limit of the amplifier, 0 for none; the source rig's", {.initial = usual.current_limit, .unit = "A"}};
+    hal::Param<double> torque_constant{*this, "torque-constant", "motor: torque per current, and voltage per speed; from 85 W at 3000 rpm and 4 A", {.initial = usual.torque_constant, .unit = "N*m/A"}};
+    hal::Param<double> resistance{*this, "resistance", "motor: of the winding; what 24 V leave at 3000 rpm and 4 A", {.initial = usual.resistance, .unit = "Ohm"}};
+    hal::Param<double> inductance{*this, "inductance", "motor: of the winding; usual for this size", {.initial = usual.inductance, .unit = "H"}};
+    hal::Param<double> rotor_inertia{*this, "rotor-inertia", "motor: of the rotor; usual for this size", {.initial = usual.rotor_inertia, .unit = "kg*m^2"}};
 
-    hal::Param<double> arm_length{*this, "arm-length", "from the motor's axis to the pendulum's pivot; assumed", {.initial = 0.2, .unit = "m"}};
-    hal::Param<double> arm_mass{*this, "arm-mass", "of the arm; assumed", {.initial = 0.2, .unit = "kg"}};
-    hal::Param<double> arm_centre{*this, "arm-centre", "from the motor's axis to the arm's centre of mass; a uniform bar", {.initial = 0.1, .unit = "m"}};
-    hal::Param<double> arm_inertia{*this, "arm-inertia", "of the arm about its centre of mass; a uniform bar, m L^2 / 12", {.initial = 6.667e-4, .unit = "kg*m^2"}};
-    hal::Param<double> arm_viscous{*this, "arm-viscous", "viscous friction of arm and motor; assumed", {.initial = 5e-4, .unit = "N*m*s/rad"}};
-    hal::Param<double> arm_coulomb{*this, "arm-coulomb", "Coulomb friction of arm and motor; usual for brushes of this size", {.initial = 0.008, .unit = "N*m"}};
+    hal::Param<double> arm_length{*this, "arm-length", "from the motor's axis to the pendulum's pivot; assumed", {.initial = usual.arm_length, .unit = "m"}};
+    hal::Param<double> arm_mass{*this, "arm-mass", "of the arm; assumed", {.initial = usual.arm_mass, .unit = "kg"}};
+    hal::Param<double> arm_centre{*this, "arm-centre", "from the motor's axis to the arm's centre of mass; a uniform bar", {.initial = usual.arm_centre, .unit = "m"}};
+    hal::Param<double> arm_inertia{*this, "arm-inertia", "of the arm about its centre of mass; a uniform bar, m L^2 / 12", {.initial = usual.arm_inertia, .unit = "kg*m^2"}};
+    hal::Param<double> arm_viscous{*this, "arm-viscous", "viscous friction of arm and motor; assumed", {.initial = usual.arm_viscous, .unit = "N*m*s/rad"}};
+    hal::Param<double> arm_coulomb{*this, "arm-coulomb", "Coulomb friction of arm and motor; usual for brushes of this size", {.initial = usual.arm_coulomb, .unit = "N*m"}};
 
-    hal::Param<double> pendulum_mass{*this, "pendulum-mass", "of the pendulum; assumed", {.initial = 0.1, .unit = "kg"}};
-    hal::Param<double> pendulum_centre{*this, "pendulum-centre", "from the pivot to the pendulum's centre of mass; a uniform rod of 0.3 m", {.initial = 0.15, .unit = "m"}};
-    hal::Param<double> pendulum_inertia{*this, "pendulum-inertia", "of the pendulum about its centre of mass; a uniform rod, m L^2 / 12", {.initial = 7.5e-4, .unit = "kg*m^2"}};
-    hal::Param<double> pendulum_viscous{*this, "pendulum-viscous", "viscous friction of the pivot; a free swing halves in about 15 s", {.initial = 2e-4, .unit = "N*m*s/rad"}};
-    hal::Param<double> pendulum_coulomb{*this, "pendulum-coulomb", "Coulomb friction of the pivot; two small ball bearings", {.initial = 5e-5, .unit = "N*m"}};
+    hal::Param<double> pendulum_mass{*this, "pendulum-mass", "of the pendulum; assumed", {.initial = usual.pendulum_mass, .unit = "kg"}};
+    hal::Param<double> pendulum_centre{*this, "pendulum-centre", "from the pivot to the pendulum's centre of mass; a uniform rod of 0.3 m", {.initial = usual.pendulum_centre, .unit = "m"}};
+    hal::Param<double> pendulum_inertia{*this, "pendulum-inertia", "of the pendulum about its centre of mass; a uniform rod, m L^2 / 12", {.initial = usual.pendulum_inertia, .unit = "kg*m^2"}};
+    hal::Param<double> pendulum_viscous{*this, "pendulum-viscous", "viscous friction of the pivot; a free swing halves in about 15 s", {.initial = usual.pendulum_viscous, .unit = "N*m*s/rad"}};
+    hal::Param<double> pendulum_coulomb{*this, "pendulum-coulomb", "Coulomb friction of the pivot; two small ball bearings", {.initial = usual.pendulum_coulomb, .unit = "N*m"}};
 
-    hal::Param<double> base_mass{*this, "base-mass", "of base and motor; assumed", {.initial = 2.5, .unit = "kg"}};
-    hal::Param<double> base_radius{*this, "base-radius", "of the foot the base stands on; assumed", {.initial = 0.08, .unit = "m"}};
-    hal::Param<double> base_height{*this, "base-height", "of the arm above the table; assumed", {.initial = 0.4, .unit = "m"}};
-    hal::Param<double> lift_hold{*this, "lift-hold", "how long a base that tipped takes to fall back; assumed", {.initial = 0.1, .unit = "s"}};
-    hal::Param<double> gravity{*this, "gravity", "standard gravity", {.initial = 9.80665, .unit = "m/s^2"}};
+    hal::Param<double> base_mass{*this, "base-mass", "of base and motor; assumed", {.initial = usual.base_mass, .unit = "kg"}};
+    hal::Param<double> base_radius{*this, "base-radius", "of the foot the base stands on; assumed", {.initial = usual.base_radius, .unit = "m"}};
+    hal::Param<double> base_height{*this, "base-height", "of the arm above the table; assumed", {.initial = usual.base_height, .unit = "m"}};
+    hal::Param<double> lift_hold{*this, "lift-hold", "how long a base that tipped takes to fall back; assumed", {.initial = usual.lift_hold, .unit = "s"}};
+    hal::Param<double> gravity{*this, "gravity", "standard gravity", {.initial = usual.gravity, .unit = "m/s^2"}};
 
     explicit Furuta(const hal_host* host)
         : Component(host),
@@ -114,95 +82,72 @@ struct Furuta : hal::Component {
         if (asked && !asked_) rest();
         asked_ = asked;
 
-        const sim::FurutaDynamics rig = dynamics();
-        const sim::Winding winding{resistance, inductance, torque_constant, current_limit};
-        if (const double tap = push; tap != 0.0) {
+        const sim::FurutaConstants now = constants();
+        if (const double given = push; given != 0.0) {
             push = 0.0;
-            if (pendulum_centre > 0.0 && std::isfinite(tap)) state_ = rig.pushed(state_, tap / pendulum_centre);
+            rig_.tap(now, given);
         }
-
         const double wanted = voltage + (pwm ? direction ? -supply : supply.get() : 0.0);
-        const double applied = std::clamp(wanted, -std::abs(supply), std::abs(supply));
-        const std::int64_t steps = std::max<std::int64_t>(1, (cycle.period_ns() + longest_step_ns - 1) / longest_step_ns);
-        const double dt = cycle.seconds() / static_cast<double>(steps);
-        double torque = 0.0;
-        for (std::int64_t i = 0; i < steps; ++i) {
-            const double before = current_;
-            current_ = enable ? winding.step(current_, applied, state_.arm_speed, dt) : 0.0;
-            torque = torque_constant * 0.5 * (before + current_);
-            state_ = rig.step(state_, torque, dt);
-        }
-        if (!std::isfinite(state_.arm + state_.pendulum + state_.arm_speed + state_.pendulum_speed + current_)) rest();
-        now_ns_ += cycle.period_ns();
-
-        show(rig, torque);
-        stand(rig, torque, cycle.period_ns());
+        if (!rig_.step(now, wanted, enable, cycle.period_ns())) rest();
+        rig_.show(now, cycle.period_ns());
+        show(now);
     }
 
 private:
-    static constexpr std::int64_t longest_step_ns = 100'000;  // the fastest mode is some 100 rad/s: an error far below 1e-9
+    void rest() noexcept { rig_.rest(constants(), arm_start, pendulum_start); }
 
-    void rest() noexcept {
-        state_ = {arm_start, pendulum_start, 0.0, 0.0};
-        current_ = 0.0;
-        lifted_ns_ = 0;
-        delayed_.clear(sim::counts_at(state_.pendulum, encoder_counts));
+    sim::FurutaConstants constants() const noexcept {
+        sim::FurutaConstants c;
+        c.radio_delay = radio_delay;
+        c.supply = supply;
+        c.current_limit = current_limit;
+        c.torque_constant = torque_constant;
+        c.resistance = resistance;
+        c.inductance = inductance;
+        c.rotor_inertia = rotor_inertia;
+        c.arm_length = arm_length;
+        c.arm_mass = arm_mass;
+        c.arm_centre = arm_centre;
+        c.arm_inertia = arm_inertia;
+        c.arm_viscous = arm_viscous;
+        c.arm_coulomb = arm_coulomb;
+        c.pendulum_mass = pendulum_mass;
+        c.pendulum_centre = pendulum_centre;
+        c.pendulum_inertia = pendulum_inertia;
+        c.pendulum_viscous = pendulum_viscous;
+        c.pendulum_coulomb = pendulum_coulomb;
+        c.base_mass = base_mass;
+        c.base_radius = base_radius;
+        c.base_height = base_height;
+        c.lift_hold = lift_hold;
+        c.gravity = gravity;
+        c.encoder_counts = encoder_counts;
+        return c;
     }
 
-    sim::FurutaDynamics dynamics() const noexcept {
-        return {.gravity = gravity,
-                .arm_length = arm_length,
-                .arm_mass = arm_mass,
-                .arm_centre = arm_centre,
-                .arm_inertia = rotor_inertia + arm_inertia + arm_mass * arm_centre * arm_centre,
-                .arm_viscous = arm_viscous,
-                .arm_coulomb = arm_coulomb,
-                .pendulum_mass = pendulum_mass,
-                .pendulum_centre = pendulum_centre,
-                .pendulum_inertia = pendulum_inertia,
-                .pendulum_viscous = pendulum_viscous,
-                .pendulum_coulomb = pendulum_coulomb,
-                .base_mass = base_mass,
-                .base_radius = base_radius,
-                .base_height = base_height};
-    }
+    void show(const sim::FurutaConstants& now) noexcept {
+        const sim::FurutaState& state = rig_.state();
+        arm_angle = state.arm;
+        arm_velocity = state.arm_speed;
+        pendulum_angle = state.pendulum;
+        pendulum_velocity = state.pendulum_speed;
+        motor_current = rig_.current();
+        motor_torque = rig_.torque();
+        energy = now.dynamics().energy(state);
 
-    void show(const sim::FurutaDynamics& rig, double torque) noexcept {
-        arm_angle = state_.arm;
-        arm_velocity = state_.arm_speed;
-        pendulum_angle = state_.pendulum;
-        pendulum_velocity = state_.pendulum_speed;
-        motor_current = current_;
-        motor_torque = torque;
-        energy = rig.energy(state_);
-
-        const std::int64_t per_turn = encoder_counts;
-        const std::int64_t arm = sim::counts_at(state_.arm, per_turn);
-        const auto delay_ns = nanoseconds(radio_delay);
-        const std::int64_t pendulum = delayed_.pass(sim::counts_at(state_.pendulum, per_turn), now_ns_, delay_ns);
-        const sim::Quadrature of_arm(arm, per_turn), of_pendulum(pendulum, per_turn);
+        const sim::Quadrature of_arm(rig_.arm_count(), now.encoder_counts), of_pendulum(rig_.pendulum_count(), now.encoder_counts);
         arm_a = of_arm.a, arm_b = of_arm.b, arm_z = of_arm.z;
         pendulum_a = of_pendulum.a, pendulum_b = of_pendulum.b, pendulum_z = of_pendulum.z;
-        arm_counts = static_cast<std::int32_t>(arm);
-        pendulum_counts = static_cast<std::int32_t>(pendulum);
-    }
+        arm_counts = static_cast<std::int32_t>(rig_.arm_count());
+        pendulum_counts = static_cast<std::int32_t>(rig_.pendulum_count());
 
-    /// Up to ten seconds; what is no number is none.
-    static std::int64_t nanoseconds(double seconds) noexcept { return seconds > 0.0 ? static_cast<std::int64_t>(std::min(seconds, 10.0) * 1e9) : 0; }
-
-    void stand(const sim::FurutaDynamics& rig, double torque, std::int64_t period_ns) noexcept {
-        tip_ratio = rig.tip_ratio(state_, rig.acceleration(state_, torque));
-        lifted_ns_ = std::max<std::int64_t>(0, lifted_ns_ - period_ns);
-        if (tip_ratio > 1.0) lifted_ns_ = nanoseconds(lift_hold) + 1;
-        base_lifted = lift || lifted_ns_ > 0;
+        tip_ratio = rig_.tip_ratio();
+        base_lifted = lift || rig_.tipped();
         base_down = !base_lifted;
     }
 
-    sim::FurutaState state_;
-    double current_ = 0.0;
-    std::int64_t now_ns_ = 0, lifted_ns_ = 0;  // lifted_ns_: until the base is down again
+    sim::FurutaRig rig_;
     bool asked_ = false;
-    DelayedCount delayed_;
 };
 
 }  // namespace

@@ -18,6 +18,14 @@ std::int64_t now_ns() {
     return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
 }
 
+std::string out_of_reach(const can::Description& bus) {
+    if (!bus.simulated || bus.transport == "capture") return {};
+    return fmt::format(
+        "'{}' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to one that they do: "
+        "hal shell loadrt can_bridge a={} b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and here udp:239.74.163.2:43113",
+        bus.address, bus.address);
+}
+
 bool Bus::open(const Options& options, const std::string& address, bool fd) {
     std::vector<can::Filter> filters(options.filters.size());
     std::string problem;
@@ -34,6 +42,7 @@ bool Bus::open(const Options& options, const std::string& address, bool fd) {
         opened = can::open(address, how);
     }
     if (!opened) return fail(options, opened.problem), false;
+    if (const std::string why = out_of_reach(opened.link->description()); !why.empty()) return fail(options, why), false;
     link = std::move(opened.link);
     if (!link->set_filters(filters)) return fail(options, "these are more filters than the driver holds; use a MASK: 180/780"), false;
     return true;

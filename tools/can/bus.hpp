@@ -48,5 +48,7 @@ std::string id_text(const can::Frame&);
 std::string data_text(const can::Frame&, const char* separator);
 
 std::int64_t now_ns();
+/// Why a program of its own cannot use this bus, and what to type instead: it is one in memory. Empty: it can.
+std::string out_of_reach(const can::Description&);
 
 }  // namespace hal::tools

@@ -39,6 +39,8 @@ constexpr Setting settings[] = {
     {"max-speed", object::profile_velocity, 0, 4, false, velocity, "of moves (6081h)"},
     {"max-acceleration", object::profile_acceleration, 0, 4, false, acceleration, "of moves (6083h)"},
     {"max-deceleration", object::profile_deceleration, 0, 4, false, acceleration, "of moves (6084h)"},
+    {"jerk", object::profile_jerk, 1, 4, false, acceleration, "of moves with ramps 3, per second (60A4h:1)"},
+    {"ramps", object::motion_profile_type, 0, 2, true, none, "of moves: 0 linear, 3 with limited jerk (6086h)"},
     {"quick-stop-deceleration", object::quick_stop_deceleration, 0, 4, false, acceleration, "6085h"},
     {"max-torque", object::max_torque, 0, 2, false, none, "thousandths of the rated one (6072h)"},
     {"following-error-window", object::following_error_window, 0, 4, false, position, "6065h"},
@@ -306,10 +308,8 @@ bool DriveShell::status(HandAxis& a) {
     for (const auto& [bit, name] : bits)
         if ((seen.statusword & bit) != 0) text += fmt::format(", {}", name);
     text += fmt::format("\n   position {:g}, speed {:g}, torque {:g}", a.position(), a.velocity(), a.rules.torque.to_user(seen.torque));
-    if (state == State::fault && seen.error_code != 0) {
-        const char* own = error_word(seen.error_code);
-        text += fmt::format("\n   error 0x{:04X}{}{}", seen.error_code, own ? ": " : "", own ? own : "");
-    }
+    if (state == State::fault && seen.error_code != 0)
+        text += fmt::format("\n   error 0x{:04X}: {}", seen.error_code, error_word(seen.error_code));
     return say(a, text);
 }
 

@@ -30,8 +30,7 @@ bool HandAxis::refuse(const std::string& sentence) const {
     canopen::RemoteNode& node = station_.network.add(node_);
     if (node.emergencies() > emergencies_) {
         const std::uint16_t code = node.emergency(0).code;
-        const char* const own = error_word(code);
-        text += fmt::format("; last EMCY 0x{:04X}: {}", code, own ? own : canopen::emergency_word(code));
+        text += fmt::format("; last EMCY 0x{:04X}: {}", code, error_word(code));
     }
     return fail(options_, text), false;
 }

@@ -205,6 +205,7 @@ int run_can_gateway(const Options& options) {
     for (const std::string& address : options.words) {
         can::Opened opened = can::open(address, {.receive_capacity = 16384});
         if (!opened) return fail(options, opened.problem);
+        if (const std::string why = out_of_reach(opened.link->description()); !why.empty()) return fail(options, why);
         links.push_back(std::move(opened.link));
     }
     Listener listener;

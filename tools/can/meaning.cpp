@@ -224,6 +224,8 @@ Meaning Interpreter::of(const Frame& f) {
     if (f.id == 0x000) return nmt(f);
     if (f.id == 0x080) return {Kind::sync, f.length == 1 ? fmt::format("SYNC {}", f.data[0]) : "SYNC"};
     if (f.id == 0x100) return time_stamp(f);
+    if (f.id == 0x001 && f.length == 0) return {Kind::nmt, "global fail-safe command (EN 50325-5)"};
+    if (f.id > 0x100 && f.id <= 0x180) return {Kind::pdo, service(f.id, false)};
     if (f.id == 0x7e4 || f.id == 0x7e5) return lss(f.id == 0x7e5, f);
     if (node == 0) return {};
     if (function == 1) return emergency(node, f);
@@ -240,6 +242,8 @@ std::string service(std::uint32_t id, bool extended) {
     if (id == 0x000) return "NMT";
     if (id == 0x080) return "SYNC";
     if (id == 0x100) return "TIME";
+    if (id == 0x001) return "global fail-safe command";
+    if (id > 0x100 && id <= 0x180) return fmt::format("SRDO {:03X}, {}", (id - 1) | 1, id % 2 == 1 ? "plain" : "inverted");
     if (id == 0x7e4) return "LSS slave";
     if (id == 0x7e5) return "LSS master";
     if (node == 0) return "";

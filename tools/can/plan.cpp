@@ -178,8 +178,14 @@ std::string network_text(const std::string& file, const config::MasterConfig& c)
     for (const config::Node& n : c.nodes) {
         text += fmt::format("node {} {}, {}\n", n.setup.id, n.name, n.setup.mandatory ? "mandatory" : "optional");
         for (const config::Pdo& p : n.pdos) {
-            text += fmt::format("  {}{} {:X}, {} bytes, {}\n", p.to_node ? "rpdo" : "tpdo", p.number, canopen::cob_id(p.cob), p.bytes(),
-                                transmission_text(p));
+            if (p.safety)
+                text += fmt::format("  {}{} {:X} and {:X}, {} bytes and the same inverted, every {} ms; SCT {} ms, SRVT {} ms\n",
+                                    p.to_node ? "rsrdo" : "tsrdo", p.number, p.cob, p.cob + 1, p.bytes(),
+                                    p.safety->refresh / canopen::millisecond, p.safety->sct / canopen::millisecond,
+                                    p.safety->srvt / canopen::millisecond);
+            else
+                text += fmt::format("  {}{} {:X}, {} bytes, {}\n", p.to_node ? "rpdo" : "tpdo", p.number, canopen::cob_id(p.cob), p.bytes(),
+                                    transmission_text(p));
             for (const config::Object& o : p.objects)
                 if (!o.filler) text += pin_text(n, o, p.to_node);
         }
@@ -195,6 +201,9 @@ int run_canopen_plan(const Options& options) {
     const std::string& file = options.words[0];
     config::Reading reading;
     if (const int status = read_configuration(options, file, reading); status != 0) return status;
+    if (const std::string& link = reading.config.link; link.starts_with("cane:"))
+        return fail(options, fmt::format("the frames of {} travel on Ethernet ({}), where no identifier waits for another; who sends when says: "
+                                         "hal tdma plan FILE.tdma", file, link));
     const auto cycle = parse_duration_ns(options.cycle, false);
     if (!cycle || *cycle < 1000) return fail(options, fmt::format("'{}' is no period of a thread; write --cycle 1ms", options.cycle));
     const Table table = table_of(config::schedule_of(reading.config, *cycle));

@@ -4,8 +4,10 @@
 #include <fmt/core.h>
 #include <stdexcept>
 
+#include "canopen/304/safe_io.hpp"
 #include "canopen/401/io.hpp"
 #include "canopen/404/jr3.hpp"
+#include "canopen/devices/axis_io.hpp"
 #include "canopen/devices/bootloader.hpp"
 #include "canopen/devices/drive.hpp"
 #include "canopen/devices/flash_file.hpp"
@@ -66,6 +68,19 @@ int run_node_io(const Options& options) {
     const std::string what = fmt::format("CiA 401, {}, {}, {} and {}", counted(o.inputs, "digital input"), counted(o.outputs, "output"),
                                          counted(o.analog_inputs, "analogue input"), counted(o.analog_outputs, "output"));
     return run_node(options, {"io", what}, program);
+}
+
+int run_node_axis_io(const Options& options) {
+    const NodeOptions& o = options.node;
+    auto plant = canopen::make_plant(o.plant);
+    if (!plant) return fail(options, fmt::format("there is no plant '{}'; there are {}", o.plant, canopen::plant_names));
+    canopen::AxisIo program({o.serial, o.heartbeat_ms, o.input_stops}, std::move(plant));
+    return run_node(options, {"axis-io", "loop over the bus, " + std::string(o.plant == "axis" ? "a slide on a screw" : "the pendulum rig")}, program);
+}
+
+int run_node_safe_io(const Options& options) {
+    canopen::SafeIo program({.serial = options.node.serial, .heartbeat_ms = options.node.heartbeat_ms});
+    return run_node(options, {"safe-io", "EN 50325-5, 8 safety inputs and outputs, not certified"}, program);
 }
 
 int run_node_jr3(const Options& options) {

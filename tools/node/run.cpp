@@ -12,6 +12,7 @@
 #include "can/bus.hpp"
 #include "canopen/devices/eds_export.hpp"
 #include "canopen/devices/node.hpp"
+#include "node/station.hpp"
 #include "say.hpp"
 #include "signals.hpp"
 
@@ -143,9 +144,14 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
     stop.listen();
     can::Options how;
     how.receive_capacity = 16384;
-    can::Opened opened = can::open(options.node.link, how);
+    std::string link = options.node.link;
+    std::unique_ptr<TdmaStation> station;
+    if (!options.node.tdma.empty())
+        if (const std::string problem = TdmaStation::make(options.node, link, station); !problem.empty()) return fail(options, problem);
+    can::Opened opened = can::open(link, how);
     if (!opened) return fail(options, opened.problem);
     const can::Description about = opened.link->description();
+    if (const std::string why = out_of_reach(about); !why.empty()) return fail(options, why);
     canopen::Node node(program, std::move(opened.link), {.node_id = id, .start_by_itself = options.node.starts_itself});
     for (const auto& [fault, setting] : faults) node.faults().set(fault, setting);
 
@@ -154,17 +160,33 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
     const std::int64_t began = now_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
     Reporter reporter(node, program, began);
     std::size_t next = 0;
-    std::int64_t now = began;
-    while (!stop.requested() && now < end) {
+    std::string problem;
+    const auto change_world = [&](std::int64_t now) {
         for (; next < settings.size() && now - began >= settings[next].at_ns; ++next)
             program.set(settings[next].name, settings[next].value);
-        node.turn(now, about.simulated ? now : can::unclocked);
-        if (!reporter.look(now)) return 1;
-        if (kind.keep)
-            if (const std::string problem = kind.keep(); !problem.empty()) return fail(options, problem);
-        node.link().wait(1'000'000);
-        now = now_ns();
+    };
+    const auto look = [&](std::int64_t now) { return reporter.look(now) && (!kind.keep || (problem = kind.keep()).empty()); };
+    std::int64_t now = began;
+    bool is_read = true;
+    if (station) {
+        station->run([&](std::int64_t local, bool) {
+            change_world(now);
+            node.turn(local, can::unclocked);
+            now = now_ns();
+            return !stop.requested() && now < end && (is_read = look(now));
+        });
+        if (is_read) is_read = print(station->summary());
+    } else {
+        while (!stop.requested() && now < end) {
+            change_world(now);
+            node.turn(now, about.simulated ? now : can::unclocked);
+            if (!(is_read = look(now))) break;
+            node.link().wait(1'000'000);
+            now = now_ns();
+        }
     }
+    if (!problem.empty()) return fail(options, problem);
+    if (!is_read) return 1;
     return print(reporter.end(now)) ? 0 : 1;
 }
 

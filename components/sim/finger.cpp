@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+
+#include "hal/component.hpp"
+#include "linear.hpp"
+
+namespace {
+
+struct Finger : hal::Component {
+    using Component::Component;
+
+    hal::In<double> effort{*this, "effort", "force of the actuator", {.unit = "N"}};
+    hal::In<bool>   reset{*this, "reset", "while TRUE the finger rests at 0"};
+    hal::In<double> wall{*this, "wall", "where the wall begins", {.initial = 0.01, .unit = "m"}};
+
+    hal::Param<double> mass{*this, "mass", "of the finger and what moves with it", {.initial = 0.5, .unit = "kg"}};
+    hal::Param<double> viscous{*this, "viscous", "friction", {.initial = 4.0, .unit = "N*s/m"}};
+    hal::Param<double> max_effort{*this, "max-effort", "limit of the actuator", {.initial = 100.0, .unit = "N"}};
+    hal::Param<double> actuator_lag{*this, "actuator-lag", "time constant of the actuator's force", {.initial = 0.002, .unit = "s"}};
+    hal::Param<double> wall_stiffness{*this, "wall-stiffness", "a steel sheet on a bench", {.initial = 2e4, .unit = "N/m"}};
+    hal::Param<double> wall_damping{*this, "wall-damping", "while the finger goes in", {.initial = 50.0, .unit = "N*s/m"}};
+
+    hal::Out<double> position{*this, "position", "of the finger's tip", {.unit = "m", .finite = true}};
+    hal::Out<double> velocity{*this, "velocity", "of the finger's tip", {.unit = "m/s", .finite = true}};
+    hal::Out<double> force{*this, "force", "of the finger on the wall; never negative", {.unit = "N", .finite = true}};
+    hal::Out<bool>   touching{*this, "touching", "the finger is at the wall"};
+
+    hal::Function run{*this, "update", &Finger::update, "moves the finger on by one period"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const double m = sim::sane(mass, 1e-6), b = sim::sane(viscous, 0.0), k = sim::sane(wall_stiffness, 0.0),
+                     d = sim::sane(wall_damping, 0.0);
+        const double       most = sim::sane(max_effort, 0.0), wanted = std::clamp(sim::force(effort), -most, most), edge = sim::force(wall);
+        const double       lag = sim::sane(actuator_lag, 0.0);
+        const std::int64_t steps = std::clamp<std::int64_t>(cycle.period_ns() / longest_step_ns, 1, 10'000);
+        const double       h = cycle.seconds() / static_cast<double>(steps);
+        for (std::int64_t i = 0; i < steps && !reset; ++i) {
+            push_ += (wanted - push_) * (lag > 0.0 ? -std::expm1(-h / lag) : 1.0);
+            // the velocity first, with friction and wall at the end of the step: stable for any stiffness
+            const double inside = x_ > edge || x_ + v_ * h > edge ? 1.0 : 0.0;
+            const double stiff = m / h + b + inside * (d + k * h);
+            v_ = (m / h * v_ + push_ - inside * k * std::fmax(x_ - edge, 0.0)) / stiff;
+            x_ += v_ * h;
+        }
+        if (reset || !(std::fabs(x_) + std::fabs(v_) < 1e9)) x_ = v_ = push_ = 0.0;
+        const double push = contact(x_ - edge, v_, k, d);
+        position = x_;
+        velocity = v_;
+        force = push;
+        touching = x_ > edge;
+    }
+
+private:
+    static constexpr std::int64_t longest_step_ns = 20'000;
+
+    static double contact(double depth, double speed, double k, double d) noexcept {
+        return depth > 0.0 ? std::fmax(k * depth + d * speed, 0.0) : 0.0;
+    }
+
+    double x_ = 0.0, v_ = 0.0, push_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Finger, "finger", "A robot's finger in front of a stiff wall", R"(
+    mass x'' = actuator - viscous x' - wall,   wall = max(0, wall-stiffness depth + wall-damping x') where depth = x - wall > 0
+    actuator-lag actuator' = effort - actuator
+
+The wall pushes and never pulls. Integrated by backward Euler in steps of 20 us. With the parameters as they are the finger rings on the wall with
+√(k / m) = 200 rad/s, damped to a quarter. Numbers are assumed; those of a small gripper against a sheet of steel.
+
+    loadrt finger names=tip
+    addf tip.update servo
+    net push    => tip.effort
+    net contact <= tip.force
+)")

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+# Sourced by bring-up: an Ethernet segment on one computer, a network namespace for each station and one for the switch between them.
+# Before: `machine` a short name, `stations` a list of names, `here` the machine's folder, "$@" what bring-up was called with.
+
+say() { echo "bring-up: $*"; }
+
+# Without root everything happens in a user namespace of its own, which is gone when this ends.
+if [ "$(id -u)" != 0 ]; then
+    if [ -z "${HAL_BRING_UP:-}" ] && unshare --user --map-root-user --net --mount true 2>/dev/null; then
+        say "not root: in a user namespace; without the right to real-time priorities the cycles are less exact"
+        export HAL_BRING_UP=1
+        exec unshare --user --map-root-user --net --mount "$0" "$@"
+    fi
+    say "this makes network namespaces; run it as root (sudo $0), or where user namespaces are allowed" >&2
+    exit 77
+fi
+if [ -n "${HAL_BRING_UP:-}" ]; then mount -t tmpfs tmpfs /run; fi
+
+hal=${HAL:-hal}
+command -v "$hal" >/dev/null || { say "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
+folder=$(mktemp -d "${TMPDIR:-/tmp}/hal-$machine.XXXXXX")
+switch=hal-$machine-switch
+pids=()
+
+clean_up() {
+    trap - EXIT INT TERM
+    for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null; done
+    for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null; done
+    for name in "${stations[@]}"; do ip netns delete "hal-$machine-$name" 2>/dev/null; done
+    ip netns delete "$switch" 2>/dev/null
+    say "processes ended, namespaces deleted; what each said is in $folder"
+}
+
+make_segment() {
+    if ip netns list | grep -q "^hal-$machine-"; then
+        say "there are namespaces hal-$machine-… already: another bring-up runs; or remove them: ip -all netns delete" >&2
+        exit 1
+    fi
+    trap clean_up EXIT
+    trap 'exit 130' INT TERM
+    say "a switch, and ${#stations[@]} stations on it: ${stations[*]}"
+    ip netns add "$switch" || { say "network namespaces are not to be had here" >&2; exit 77; }
+    ip -n "$switch" link add bridge0 type bridge stp_state 0 forward_delay 0 mcast_snooping 0 || exit 77
+    ip netns exec "$switch" sysctl -qw net.ipv6.conf.all.disable_ipv6=1 2>/dev/null
+    ip -n "$switch" link set bridge0 up
+    for name in "${stations[@]}"; do
+        ip netns add "hal-$machine-$name"
+        ip netns exec "hal-$machine-$name" sysctl -qw net.ipv6.conf.all.disable_ipv6=1 2>/dev/null
+        ip -n "$switch" link add "to-$name" type veth peer name wire0 netns "hal-$machine-$name"
+        ip -n "$switch" link set "to-$name" master bridge0 up
+        ip -n "hal-$machine-$name" link set wire0 up
+    done
+}
+
+# start NAME COMMAND…: in the station's namespace; its output goes to a file.
+start() {
+    local name=$1
+    shift
+    WIRE=wire0 ip netns exec "hal-$machine-$name" "$@" >"$folder/$name.log" 2>&1 &
+    pids+=($!)
+    eval "pid_$name=$!"
+}

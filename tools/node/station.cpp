@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#include "node/station.hpp"
+
+#include <sched.h>
+#include <sys/mman.h>
+
+#include <charconv>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "link/system.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+constexpr std::int64_t spin_ns = 40'000;  // a sleep ends so late at worst on a machine that is not busy
+constexpr int priority = 70;
+
+/// "200ppm", "-35.5ppm", or nothing.
+std::optional<double> parts_per_million(std::string_view text) {
+    double value = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+    if (wrong != std::errc{} || unit != "ppm" || !(std::abs(value) <= 500.0)) return std::nullopt;
+    return value * 1e-6;
+}
+
+}  // namespace
+
+std::string TdmaStation::make(const NodeOptions& options, std::string& link, std::unique_ptr<TdmaStation>& made) {
+    const auto question = link.find('?');
+    auto place = link.substr(0, question);
+    if (!place.starts_with("cane:")) return "TDMA is on Ethernet; write --link cane:eth0 with --tdma, or leave --tdma out";
+    const std::string segment = (place.find(':', 5) == std::string::npos ? "eth:" : "") + place.substr(5);
+    const auto skew = parts_per_million(options.skew.empty() ? "0ppm" : options.skew);
+    const auto drift = parts_per_million(options.drift.empty() ? "0ppm" : options.drift);
+    if (!skew) return fmt::format("'{}' is no skew of a clock; write --skew 200ppm, at most 500ppm", options.skew);
+    if (!drift) return fmt::format("'{}' is no drift of a clock; write --drift 0.1ppm, which is how its skew changes in a second", options.drift);
+    std::string text;
+    if (!tdma::config::read_from_disk(options.tdma, text)) return fmt::format("cannot read '{}': {}", options.tdma, text);
+    const auto reading = tdma::config::read(text);
+    if (!reading.good()) return tdma::config::to_string(reading, options.tdma);
+
+    ethernet::Options how;
+    how.types = {tdma::Station::types.begin(), tdma::Station::types.end()};
+    how.spin_ns = 200'000;
+    auto opened = ethernet::open(segment, how);
+    if (!opened) return opened.problem;
+    if (opened.port->description().simulated) return segment + " is in memory, and this process alone on it; write an interface, as in cane:eth0";
+    const auto which = tdma::config::find(reading.schedule, options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station);
+    if (!which)
+        return fmt::format("{} has no station '{}'; write --station with one of {}", options.tdma,
+                           options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station,
+                           tdma::config::names(reading.schedule));
+    const auto setup = tdma::config::setup_of(reading.schedule, *which);
+    if (setup.slots.empty()) return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", options.station, options.tdma);
+    if (link.find("slot=") == std::string::npos) link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', setup.slots.front().id);
+    made.reset(new TdmaStation(setup, segment, std::move(opened.port), *skew, *drift));
+    if (!ethernet::offer_discipline(segment, &made->station_)) return segment + " has a TDMA station already";
+    return {};
+}
+
+TdmaStation::TdmaStation(const tdma::StationSetup& setup, std::string segment, std::unique_ptr<ethernet::Port> port, double skew, double drift)
+    : clock_(can::monotonic_ns(), skew, drift), segment_(std::move(segment)), port_(std::move(port), clock_), station_(setup) {
+    station_.attach(port_);
+}
+
+TdmaStation::~TdmaStation() { ethernet::withdraw_discipline(&station_); }
+
+std::int64_t TdmaStation::sleep_until(std::int64_t local_ns) const noexcept {
+    const auto due = clock_.from_local(local_ns);
+    if (const auto until = due - spin_ns; until > can::monotonic_ns()) {
+        const timespec at{until / 1'000'000'000, until % 1'000'000'000};
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+    }
+    std::int64_t now = 0;
+    while ((now = can::monotonic_ns()) < due) {}
+    return clock_.local(now);
+}
+
+void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
+    mlockall(MCL_CURRENT | MCL_FUTURE);
+    const sched_param real_time{priority};
+    sched_setscheduler(0, SCHED_FIFO, &real_time);  // without the right to it it runs all the same, with more jitter
+    const auto cycle = station_.setup().cycle;
+    auto due = clock_.local(can::monotonic_ns()) + cycle;
+    for (bool goes_on = true; goes_on; ++cycles_) {
+        const auto now = sleep_until(due);
+        for (; due < now - cycle / 2; due += cycle) ++missed_;
+        station_.receive(due);
+        goes_on = turn(due, station_.status().synchronous);
+        station_.transmit(due);
+        due += cycle;
+        if (station_.status().synchronous) due += beat_.follow(station_.error(), cycle);
+    }
+}
+
+std::string TdmaStation::summary() const {
+    const auto& s = station_.status();
+    return fmt::format("TDMA: {}, {} cycles, {} missed; syncs {} received, {} lost; frames {} sent, {} late, {} dropped; clock {:+.1f} ppm, "
+                       "{} ns to the master, sync jitter {:.0f} ns\n",
+                       tdma::word(s.state), cycles_, missed_, s.count.syncs, s.count.syncs_lost, s.count.sent, s.count.late, s.count.dropped,
+                       s.drift * 1e6, s.delay, s.jitter);
+}
+
+}  // namespace hal::tools
