@@ -20,12 +20,13 @@ struct Options {
 struct Goal {
     enum class Kind { none, at_most, not_above, times_less, limit, at_least } kind = Kind::none;
     double value = 0.0;
+    double beside = 0.0;  ///< of `limit` and `at_least`: a machine on which the peer misses the figure is judged by the ratio of times to it
 };
 inline Goal not_above() { return {Goal::Kind::not_above, 1.1}; }
 inline Goal at_most(double ratio) { return {Goal::Kind::at_most, ratio}; }
 inline Goal times_less(double ratio) { return {Goal::Kind::times_less, ratio}; }
-inline Goal limit(double figure) { return {Goal::Kind::limit, figure}; }
-inline Goal at_least(double figure) { return {Goal::Kind::at_least, figure}; }
+inline Goal limit(double figure, double beside = 0.0) { return {Goal::Kind::limit, figure, beside}; }
+inline Goal at_least(double figure, double beside = 0.0) { return {Goal::Kind::at_least, figure, beside}; }
 
 struct Row {
     std::string what;
@@ -60,6 +61,7 @@ void edit(const Options&, Report&);
 void coherence(const Options&, Report&);
 void python(const Options&, Report&);
 void can(const Options&, Report&);
+void estimation(const Options&, Report&);
 void size(const Options&, Report&);
 void canopen_boot(const Options&, Report&);
 

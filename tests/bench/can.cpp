@@ -77,6 +77,7 @@ public:
         if (const char* named = std::getenv("HALCYON_BENCH_CAN")) interface_ = named;
         real_ = probe >= 0 && if_nametoindex(interface_.c_str()) != 0;
         if (!real_) interface_ = fmt::format("shim{}", getpid());
+        fifo_ = !find_program("chrt").empty() && run({.arguments = {"chrt", "-f", "5", "true"}}).status == 0;
     }
     std::string about() const {
         return real_ ? "SocketCAN on " + interface_
@@ -87,17 +88,20 @@ public:
         Start start{.arguments = std::move(words), .everywhere = true};
         // Both sides on one CPU: what a wake-up across two costs is the machine's, and the same for all.
         if (!find_program("taskset").empty()) start.arguments.insert(start.arguments.begin(), {"taskset", "-c", std::to_string(cpu_)});
+        // Above what else the machine does, which would be measured instead.
+        if (fifo_) start.arguments.insert(start.arguments.begin(), {"chrt", "-f", "5"});
         if (!real_) start.environment.push_back("LD_PRELOAD=" + programs_ + "can_shim.so");
         return start;
     }
     std::string ours() const { return programs_ + "can_stack"; }
     std::string neutral() const { return programs_ + "can_neutral"; }
     const std::string& interface() const { return interface_; }
+    bool fifo() const { return fifo_; }
 
 private:
     std::string programs_, interface_ = "vcan0";
     int cpu_;
-    bool real_ = false;
+    bool real_ = false, fifo_ = false;
 };
 
 /// Runs `master` beside `slave`.
@@ -128,8 +132,9 @@ void can(const Options& options, Report& report) {
         reference.read(pair(neutral_slave, neutral_master));
         master.read(pair(neutral_slave, our_master));
         slave.read(pair(our_slave, neutral_master));
-        {
-            Child receiver(rig.program({rig.ours(), "can:" + name, "receive", count}), true);
+        for (const auto& [words, figures] : {std::pair{std::vector{rig.ours(), "can:" + name}, &master},
+                                              std::pair{std::vector{rig.neutral(), name}, &reference}}) {
+            Child receiver(rig.program({words[0], words[1], "receive", count}), true);
             receiver.line(5000);
             run(rig.program({rig.neutral(), name, "generate", count, "100000"}), 60'000);
             std::string text;
@@ -137,47 +142,50 @@ void can(const Options& options, Report& report) {
                 text += *line + "\n";
                 if (line->starts_with("receive_cpu")) break;
             }
-            master.read(text);
+            figures->read(text);
         }
         memory.read(run({.arguments = {rig.ours(), "memory", part}, .everywhere = true}).out);
         if (python) foreign.read(pair(neutral_slave, rig.program({"python3", script, name, options.quick ? "500" : "2000"})));
     }
+    constexpr double beside = 1.15;
     const auto add = [&](const std::string& what, const std::string& figure, const std::string& unit, Goal goal) {
         for (const auto& [side, figures] : {std::pair<std::string, const Figures*>{"master", &master}, {"device", &slave}}) {
             if (!figures->best(figure)) continue;
-            Goal wanted = goal;
-            if (goal.kind == Goal::Kind::limit && figure.starts_with("sync_p"))
-                wanted.value = std::max(goal.value, reference.best(figure).value_or(0));  // or as the instrument
             report.row({.what = side + ": " + what,
                         .unit = unit,
                         .ours = figures->best(figure),
                         .peer = "no stack",
                         .theirs = reference.best(figure),
-                        .goal = wanted});
+                        .goal = goal});
         }
     };
-    add("SDO expedited upload", "exp_up", "/s", at_least(80'000));
-    add("SDO expedited download", "exp_down", "/s", at_least(80'000));
-    add("SDO segmented download, 1 MiB", "seg1m_down", "kB/s", at_least(650));
-    add("SDO segmented upload, 1 MiB", "seg1m_up", "kB/s", at_least(650));
-    add("SDO block download, 1 MiB", "blk1m_down", "kB/s", at_least(1500));
-    add("SDO block upload, 1 MiB", "blk1m_up", "kB/s", at_least(1500));
+    add("SDO expedited upload", "exp_up", "/s", at_least(80'000, beside));
+    add("SDO expedited download", "exp_down", "/s", at_least(80'000, beside));
+    add("SDO segmented download, 1 MiB", "seg1m_down", "kB/s", at_least(650, beside));
+    add("SDO segmented upload, 1 MiB", "seg1m_up", "kB/s", at_least(650, beside));
+    add("SDO block download, 1 MiB", "blk1m_down", "kB/s", at_least(1500, beside));
+    add("SDO block upload, 1 MiB", "blk1m_up", "kB/s", at_least(1500, beside));
     for (const char* which : {"up", "down"})
         report.row({.what = fmt::format("master: CPU of an expedited {}load", which),
                     .unit = "us",
                     .ours = master.best(fmt::format("exp_{}_cpu", which)),
                     .peer = "no stack",
                     .theirs = reference.best(fmt::format("exp_{}_cpu", which)),
-                    .goal = limit(6)});
-    add("SYNC to TPDO in the application, p50", "sync_p50", "us", limit(35));
-    add("SYNC to TPDO in the application, p99", "sync_p99", "us", limit(70));
+                    .goal = limit(6, beside)});
+    add("SYNC to TPDO in the application, p50", "sync_p50", "us", limit(35, beside));
+    add("SYNC to TPDO in the application, p99", "sync_p99", "us", limit(70, beside));
     report.row({.what = "master: CPU of a cycle of SYNC and TPDO, 1 kHz",
                 .unit = "us",
                 .ours = master.best("sync_cpu"),
                 .peer = "no stack",
                 .theirs = reference.best("sync_cpu"),
-                .goal = limit(38)});
-    report.row({.what = "master: CPU of a received PDO, 10 kHz", .unit = "us", .ours = master.best("receive_cpu"), .goal = limit(8)});
+                .goal = limit(38, beside)});
+    report.row({.what = "master: CPU of a received PDO, 10 kHz",
+                .unit = "us",
+                .ours = master.best("receive_cpu"),
+                .peer = "no stack",
+                .theirs = reference.best("receive_cpu"),
+                .goal = limit(8, beside)});
     for (const auto& [figure, what] : {std::pair{"blk_down", "block download"},
                                        {"blk_up", "block upload"},
                                        {"seg_down", "segmented download"},
@@ -202,9 +210,9 @@ void can(const Options& options, Report& report) {
     else report.note("the Python package canopen is not installed: python3 -m pip install canopen python-can");
     report.note("lely-core and CANopenNode are not installed as programs; docs/performance.md has their figures by the same method.");
     report.note(
-        fmt::format("Over {}. Both sides on one CPU. Best of {} rounds, all pairs in turn; median of the same rounds: SDO upload {:.0f}/s "
+        fmt::format("Over {}. Both sides on one CPU{}. Best of {} rounds, all pairs in turn; median of the same rounds: SDO upload {:.0f}/s "
                     "(no stack {:.0f}/s), SYNC p50 {:.1f} us ({:.1f} us).",
-                    rig.about(), rounds, master.middle("exp_up").value_or(0), reference.middle("exp_up").value_or(0),
+                    rig.about(), rig.fifo() ? ", SCHED_FIFO" : "", rounds, master.middle("exp_up").value_or(0), reference.middle("exp_up").value_or(0),
                     master.middle("sync_p50").value_or(0), reference.middle("sync_p50").value_or(0)));
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The other side of the CAN figures: no stack, blocking calls on one raw socket. `can_neutral IFACE slave`: SDO server of node 5 (2000h
    UNSIGNED32, 2001h domain; expedited, segmented, block), answers SYNC with TPDO 1 and RPDO 1 with TPDO 2, until it is killed.
-   `… master`: measures such a slave. `… generate COUNT NS`: sends that many TPDO 1 that far apart. Results are lines "name value". */
+   `… master`: measures such a slave. `… generate COUNT NS`: sends that many TPDO 1 that far apart, `… receive COUNT` takes them. Results are
+   lines "name value". */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <linux/can.h>
@@ -262,16 +263,16 @@ static void synchronous(unsigned count) {
 }
 
 int main(int argc, char** argv) {
-    if (argc < 3) return fputs("can_neutral IFACE slave|master [FACTOR]|generate COUNT NS\n", stderr), 2;
+    if (argc < 3) return fputs("can_neutral IFACE slave|master [FACTOR]|generate COUNT NS|receive COUNT\n", stderr), 2;
     struct sockaddr_can at = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex(argv[1])};
     const struct timeval patience = {2, 0};
     const int room = 4 << 20;
-    const int master = strcmp(argv[2], "master") == 0;
+    const int master = strcmp(argv[2], "master") == 0, answered = master || strcmp(argv[2], "receive") == 0;
     const struct can_filter heard[] = {{0x080, CAN_SFF_MASK}, {0x200 + node, CAN_SFF_MASK}, {0x600 + node, CAN_SFF_MASK}};
     const struct can_filter answers[] = {{0x180 + node, CAN_SFF_MASK}, {0x580 + node, CAN_SFF_MASK}};
     fd = socket(PF_CAN, SOCK_RAW, CAN_RAW);
     if (fd < 0) return perror("can_neutral"), 1;
-    setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, master ? answers : heard, master ? sizeof answers : sizeof heard);
+    setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, answered ? answers : heard, answered ? sizeof answers : sizeof heard);
     setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &room, sizeof room);
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     if (bind(fd, (struct sockaddr*)&at, sizeof at) < 0) return perror("can_neutral"), 1;
@@ -288,7 +289,15 @@ int main(int argc, char** argv) {
         }
         return 0;
     }
-    if (!master) return 2;
+    if (!master && strcmp(argv[2], "receive") != 0) return 2;
+    if (!master) {
+        struct can_frame f;
+        long got = 0, count = argc > 3 ? atol(argv[3]) : 1;
+        const int64_t cpu = now_ns(CLOCK_PROCESS_CPUTIME_ID);
+        while (got < count && get(&f)) ++got;
+        printf("received %ld\nreceive_cpu %.3f\n", got, (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (double)(got ? got : 1) / 1000);
+        return 0;
+    }
     const unsigned part = argc > 3 ? (unsigned)atoi(argv[3]) : 1; /* 4: a quarter of everything */
     expedited(1, 5000 / part);
     expedited(0, 5000 / part);

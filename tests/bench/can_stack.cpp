@@ -67,15 +67,15 @@ public:
         std::puts("ready");
         std::fflush(stdout);
     }
-    void send(FrameQueue& out) {
+    void send(FrameQueue& out, Time t) {
         if (out.size() == 0) return;
-        for (const Frame* f; (f = out.front()) != nullptr && opened_.link->send(*f, now()) == can::Sent::queued;) out.drop();
-        opened_.link->flush(now());
+        for (const Frame* f; (f = out.front()) != nullptr && opened_.link->send(*f, t) == can::Sent::queued;) out.drop();
+        opened_.link->flush(t);
     }
     /// Waits, and hands over what has come.
     template <class Take>
-    bool take(Take&& each) {
-        if (!opened_.link->wait(second)) return false;
+    bool take(Time at_most, Take&& each) {
+        if (!opened_.link->wait(at_most)) return false;
         const Time t = now();
         for (std::size_t count; (count = opened_.link->receive(room_, t)) > 0;)
             for (std::size_t n = 0; n < count; ++n) each(room_[n], t);
@@ -93,10 +93,11 @@ private:
     Port port(address, {{0x080, 0x7ff, false}, {0x200U + node, 0x7ff, false}, {0x600U + node, 0x7ff, false}, {0x000, 0x7ff, false}});
     device.start(now());
     for (;;) {
-        device.poll(now());
-        port.send(device.out());
-        if (device.sdo_server(0).busy() && device.out().size() > 0) continue;
-        port.take([&](const Frame& f, Time t) { device.handle(f, t); });
+        const Time t = now();
+        device.poll(t);
+        port.send(device.out(), t);
+        // What the bus had no room for goes soon, whatever comes.
+        port.take(device.out().size() > 0 ? millisecond : second, [&](const Frame& f, Time at) { device.handle(f, at); });
     }
 }
 
@@ -111,11 +112,12 @@ struct Master {
     void run(SdoRequest& r) {
         remote.sdo().submit(r);
         while (!r.done()) {
-            network.poll(now());
-            port.send(out);
-            if (!r.done()) port.take([&](const Frame& f, Time t) { network.handle(f, t); });
+            const Time t = now();
+            network.poll(t);
+            port.send(out, t);
+            if (!r.done()) port.take(second, [&](const Frame& f, Time at) { network.handle(f, at); });
         }
-        port.send(out);
+        port.send(out, now());
         if (!r.ok()) fail(word(r.abort));
     }
     void expedited(bool upload, unsigned count) {
@@ -151,7 +153,7 @@ void synchronous(const char* address, unsigned count) {
     Port port(address, {{0x180U + node, 0x7ff, false}});
     device.start(now());
     device.poll(now());
-    port.send(device.out());
+    port.send(device.out(), now());
     std::vector<Time> took;
     const Time used = cpu();
     Time next = now() + millisecond;
@@ -162,9 +164,9 @@ void synchronous(const char* address, unsigned count) {
         const Time began = now();
         device.poll(began);
         if (!device.produce_sync(began)) fail("no SYNC");
-        port.send(device.out());
+        port.send(device.out(), began);
         while (events.count == before)
-            if (!port.take([&](const Frame& f, Time at) { device.handle(f, at); })) fail("no TPDO after a SYNC");
+            if (!port.take(second, [&](const Frame& f, Time at) { device.handle(f, at); })) fail("no TPDO after a SYNC");
         took.push_back(now() - began);
     }
     const double cpu_us = static_cast<double>(cpu() - used) / count / 1000;
@@ -179,7 +181,8 @@ void receive(const char* address, std::uint64_t count) {
     Port port(address, {{0x180U + node, 0x7ff, false}});
     device.start(now());
     const Time used = cpu();
-    while (events.count < count && port.take([&](const Frame& f, Time at) { device.handle(f, at); })) device.poll(now());
+    while (events.count < count && port.take(second, [&](const Frame& f, Time at) { device.handle(f, at); }))
+        device.poll(now());
     std::printf("received %llu\nreceive_cpu %.3f\n", static_cast<unsigned long long>(events.count),
                 static_cast<double>(cpu() - used) / static_cast<double>(std::max<std::uint64_t>(events.count, 1)) / 1000);
 }

@@ -67,7 +67,8 @@ public:
     std::unique_ptr<Core> core(bool measure) {
         const Model& model = runtime_.session.model();
         Thread& t = *model.threads.front();
-        auto core = std::make_unique<Core>(1u, t.options.period_ns, ThreadPins{&t.time, &t.tmax, &t.tmax_increased, &t.beat, &t.missed, &t.wakeup}, board_, running_, measure);
+        const ThreadPins pins{&t.time, &t.tmax, &t.tmax_increased, &t.beat, &t.missed, &t.wakeup};
+        auto core = std::make_unique<Core>(1U, t.options.period_ns, pins, board_, timeline_, running_, measure);
         if (!plan_) compile_for(*core);
         core->offer(plan_.get());
         core->service();
@@ -104,6 +105,7 @@ private:
     Loop loop_;
     std::vector<void*> instances_;
     FaultBoard board_;
+    Timeline timeline_;
     std::atomic<bool> running_{true};
 };
 
@@ -126,9 +128,9 @@ Hot measure_hot(const Options& options, const Case& c) {
     };
     for (int round = 0; round < rounds; ++round) {
         run_real_time(options.cpu, [&] {
-            time(ours, [&](std::int64_t now, std::uint64_t) { measured->cycle(now, now); });
+            time(ours, [&](std::int64_t now, std::uint64_t) { measured->cycle(now, now, now); });
             time(loop, [&](std::int64_t, std::uint64_t i) { bed.loop(i); });
-            time(without, [&](std::int64_t now, std::uint64_t) { bare->cycle(now, now); });
+            time(without, [&](std::int64_t now, std::uint64_t) { bare->cycle(now, now, now); });
         });
     }
     const auto per = [&](std::vector<double>& samples) { return median(samples) / static_cast<double>(bed.count()); };

@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "bench.hpp"
+#include "ethernet.hpp"
 #include "linuxcnc.hpp"
 #include "machine.hpp"
 #include "sample.hpp"
@@ -30,6 +31,8 @@ constexpr Section sections[] = {
     {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
     {"python", "a component of 100 pins in Python", python, true},
     {"can", "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the Python package", can, true},
+    {"ethernet", "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program", raw_ethernet},
+    {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
     {"size", "of the program; with --full its build from cold", size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };

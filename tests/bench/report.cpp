@@ -38,6 +38,8 @@ void Report::row(const Row& row) {
     if (row.ours) ours = figure(*row.ours, row.unit);
     peer = row.theirs ? row.peer + " " + figure(*row.theirs, row.unit) : row.peer;
     std::optional<bool> reached;
+    double times = 0;  // of ours to theirs, less is better
+    bool peer_misses = false;
     const bool both = row.ours && row.theirs && *row.ours > 0.0 && *row.theirs > 0.0;
     switch (row.goal.kind) {
     case Goal::Kind::none:
@@ -55,16 +57,20 @@ void Report::row(const Row& row) {
         break;
     case Goal::Kind::limit:
         target = "≤ " + goal_number(row.goal.value) + (row.unit.empty() ? "" : " " + row.unit);
-        if (both) ratio = "× " + number(*row.ours / *row.theirs);
+        if (both) times = *row.ours / *row.theirs, ratio = "× " + number(times);
         if (row.ours) reached = *row.ours <= row.goal.value;
+        peer_misses = both && *row.theirs > row.goal.value;
         break;
     case Goal::Kind::at_least:
         target = "≥ " + goal_number(row.goal.value) + (row.unit.empty() ? "" : " " + row.unit);
-        if (both) ratio = "× " + number(*row.ours / *row.theirs);
+        if (both) times = *row.theirs / *row.ours, ratio = "time × " + number(times);
         if (row.ours) reached = *row.ours >= row.goal.value;
+        peer_misses = both && *row.theirs < row.goal.value;
         break;
     }
     if (row.goal.kind != Goal::Kind::none) verdict = !row.ours ? "not measured" : !reached ? "no peer here" : *reached ? "reached" : "NOT reached";
+    if (row.goal.beside > 0.0 && reached == false && peer_misses)
+        verdict = fmt::format("{} × {:g} of the peer, which misses it too", times <= row.goal.beside ? "within" : "NOT within", row.goal.beside);
     lines_.push_back(std::move(line));
 }
 

@@ -37,7 +37,8 @@ def tracked(root):
     if (root / ".git").exists():
         names = subprocess.run(command, check=True, capture_output=True).stdout.decode().split("\0")
         return [Path(n) for n in names if n and (root / n).is_file()]
-    return [Path(d, f).relative_to(root) for d, _, files in os.walk(root) for f in files if "build" not in Path(d).relative_to(root).parts[:1]]
+    walked = (Path(d, f).relative_to(root) for d, _, files in os.walk(root) for f in files)
+    return sorted(path for path in walked if path.parts[0] != "build")
 
 
 def main(root):

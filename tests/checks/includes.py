@@ -16,11 +16,11 @@ ROWS = {
     "runtime/execute": ["runtime/plan", "runtime/base"],
     "runtime/session": ["runtime/execute", "runtime/model", "runtime/netlist"],
     "runtime/shell": ["runtime/session"],
-    "tools": ["runtime/shell", "components/canopen"],  # hal can: device descriptions
+    "tools": ["runtime/shell", "components/canopen", "components/fieldbus"],  # hal can: device descriptions; hal node: stations
     "drivers/link": [],
     "drivers": ["drivers/link"],
     "components": ["runtime/sdk"],
-    "components/canopen": ["runtime/sdk", "drivers/link"],
+    "components/canopen": ["runtime/sdk", "drivers/link", "components/sim"],  # sim: the plants behind simulated devices
     "components/fieldbus": ["runtime/sdk", "drivers/link"],
     "components/ethercat": ["runtime/sdk", "drivers/link"],
 }

@@ -20,6 +20,11 @@ class Bench(Case):
         for component in ("and2", "sum2", "mux2", "limit1", "pid"):
             self.assertRegex(done.stdout, rf"(?m)^ *{component}\b.* \d+\.\d")
 
+    def test_a_section_that_loads_one_component_runs_it(self):
+        done = self.run_bench("--quick", "estimation")
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertRegex(done.stdout, r"kalman, 6 states, 3 measurements +[\d.]+ us|not measured: ")
+
     def test_a_wrong_word_lists_the_sections(self):
         done = self.run_bench("dispach")
         self.assertEqual(2, done.returncode)

@@ -106,7 +106,10 @@ class Dump(Can):
         self.assertEqual("hal can dump: 'xyz' is no filter; write an identifier in hex, 181, or one with the bits that count, 180/780\n",
                          self.bad_can("dump", "replay:c.log", "--filter", "xyz"))
         self.assertEqual("hal can dump: 'bus' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0 or replay:FILE\n", self.bad_can("dump", "bus"))
+                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE\n", self.bad_can("dump", "bus"))
+        self.assertEqual("hal can dump: 'sim:arm' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to "
+                         "one that they do: hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and "
+                         "here udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))
         self.assertEqual("hal can dump: nothing is expected at 'more'; see: hal help can dump\n", self.bad_can("dump", "replay:c.log", "more"))
         self.assertEqual("hal: there is no command 'can dmp'; did you mean 'can dump'?\n", self.bad_can("dmp"))
         self.assertEqual("hal: there is no command 'can qqqqqqqq'; type: hal help can\n", self.bad_can("qqqqqqqq"))
@@ -286,6 +289,11 @@ class Plan(Case):
         self.assertEqual(1, done.returncode)
         self.assertIn("17 frames with each SYNC of 1 ms take 1.895 ms at most: 189.5 %\n", done.stdout)
         self.assertIn("  = help: the SYNC comes with each cycle of the thread, here taken as 1ms; for another period add: --cycle 2ms\n", done.stderr)
+
+    def test_a_bus_in_Ethernet_frames_has_another_plan(self):
+        self.write("arm.canopen", AXES.replace("sim:arm", "cane:sim:arm") + "[node 1 x]\ntype = drive\n")
+        self.assertEqual("hal canopen plan: the frames of arm.canopen travel on Ethernet (cane:sim:arm), where no identifier waits for another; who sends "
+                         "when says: hal tdma plan FILE.tdma\n", self.bad("canopen", "plan", "arm.canopen"))
 
     def test_all_wrong_lines_are_named(self):
         self.write("plan.canopen", "[bus]\n[messages]\n0x100 = 9, 1ms\n0x100 = 8, soon\nxyz = 8, 1ms\n0x101 = 8\n0x102 = 8, 1ms\n0x102 = 4, 2ms\n0x103 = 8, 5\n")

@@ -84,10 +84,10 @@ class OneShot(Drive):
 
     def test_faults_and_reset(self):
         self.node("--set", "encoder-broken-0=1")
-        self.assertEqual("A: enable: drive is in fault (statusword 0x0218, error 0x7305: position sensor); remove the cause, then type: A reset\n",
+        self.assertEqual("A: enable: drive is in fault (statusword 0x0218, error 0x7305: incremental sensor 1); remove the cause, then type: A reset\n",
                          self.refused("A", "on"))
-        self.assertRegex(self.drive("A", "status"), r"(?s)^A: fault, mode .*\n   error 0x7305: position sensor\n$")
-        self.assertIn('A: reset: drive stays in "fault" after "fault reset" for 2.00 s (statusword 0x0218, error 0x7305: position sensor)',
+        self.assertRegex(self.drive("A", "status"), r"(?s)^A: fault, mode .*\n   error 0x7305: incremental sensor 1\n$")
+        self.assertIn('A: reset: drive stays in "fault" after "fault reset" for 2.00 s (statusword 0x0218, error 0x7305: incremental sensor 1)',
                       self.refused("A", "reset"))
 
     def test_fault_on_the_way(self):

@@ -119,7 +119,8 @@ class CompletionScript(Case):
 class Doctor(Case):
     def test_gives_verdicts_and_measures(self):
         text = self.good("doctor", "--seconds", "0.05")
-        for subject in ("kernel", "SCHED_FIFO", "memory locking", "capabilities", "throttling", "frequency", "isolated cpus", "clock source", "idle states"):
+        for subject in ("kernel", "SCHED_FIFO", "memory locking", "capabilities", "raw Ethernet", "throttling", "frequency", "isolated cpus",
+                        "clock source", "idle states"):
             self.assertRegex(text, rf"(?m)^(good|fair|poor)  {subject} ")
         self.assertRegex(text, r"(?m)^wake-up at 1 kHz, SCHED_\w+")
         self.assertRegex(text, r"(?m)^  sleeping, then spinning the last 200 us .*s$")

@@ -7,12 +7,9 @@ import sys
 import threading
 import time
 
-try:
-    import can
-    import canopen
-except ImportError:
-    print("the Python packages are missing; type: python3 -m pip install canopen python-can msgpack")
-    sys.exit(77)
+import peers
+
+can, canopen = peers.packages()
 
 GROUP, PORT = "239.74.163.78", 43178
 ADDRESS = f"udp:{GROUP}:{PORT}"

@@ -11,12 +11,9 @@ import threading
 import time
 import zlib
 
-try:
-    import can
-    import canopen
-except ImportError:
-    print("the Python packages are missing; type: python3 -m pip install canopen python-can msgpack")
-    sys.exit(77)
+import peers
+
+can, canopen = peers.packages()
 
 GROUP, PORT = "239.74.163.79", 43179
 HAL = sys.argv[1]

@@ -14,7 +14,10 @@ namespace hal::test {
 namespace {
 
 // Load arguments of components that cannot be made without.
-const std::map<std::string, std::string> arguments{{"canopen", "inputs=24831 outputs=24675 slavenodeid=2"}};
+const std::map<std::string, std::string> arguments{
+    {"canopen", "inputs=24831 outputs=24675 slavenodeid=2"},
+    {"tdma", "link=sim:rt/master station=master schedule=\"master:; cycle 2000; slot 0 100\""},
+};
 
 std::vector<std::string> all_components() {
     std::vector<std::string> names;

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""The machines at the other end of a wire, as processes in network namespaces. Figures are printed, none is asserted: the machine may be
+busy. What is asserted is that it comes up, that the stations are synchronous by clocks that differ, and that nothing is left behind."""
+import os
+import re
+import subprocess
+import sys
+import unittest
+
+from harness import HAL, ROOT, Case
+
+SECONDS = os.environ.get("HALCYON_ETHERNET_SECONDS", "12")
+
+
+class Segment(Case):
+    def bring_up(self, machine, *words):
+        script = ROOT / "halfiles" / machine / "bring-up"
+        done = subprocess.run([script, *words], cwd=self.folder, env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=240)
+        if done.returncode == 77 or "not to be had" in done.stdout:
+            self.skipTest("no network namespaces here: " + done.stdout.strip())
+        print(done.stdout, file=sys.stderr)
+        logs = next(self.folder.glob("hal-*"), None)
+        self.assertIsNotNone(logs, done.stdout)
+        return done, {log.stem: log.read_text() for log in logs.glob("*.log")}
+
+    def stations(self, logs, names):
+        """Each was synchronous, and found its skew within what a busy machine leaves of it."""
+        for name, ppm in names.items():
+            said = re.search(r"^TDMA: (.*)$", logs[name], re.M)
+            self.assertIsNotNone(said, f"{name}: {logs[name]}")
+            print(f"{name}: {said[1]}", file=sys.stderr)
+            self.assertGreater(int(re.search(r"syncs (\d+) received", said[1])[1]), 0, said[1])
+            self.assertLess(abs(float(re.search(r"clock ([-+.\d]+) ppm", said[1])[1]) + ppm), 150, said[1])
+
+    def test_the_rig_hangs_at_the_other_end(self):
+        done, logs = self.bring_up("ethernet-furuta", SECONDS)
+        self.assertEqual(0, done.returncode, done.stdout)
+        self.stations(logs, {"rig": 200})
+
+    def test_five_axes_and_io_are_eight_processes(self):
+        done, logs = self.bring_up("ethernet-cnc", "--lose-clock", SECONDS)
+        self.assertEqual(0, done.returncode, done.stdout)
+        self.stations(logs, {"x": 200, "y": -150, "z": 80, "a": -200, "c": 35, "io": -60})
+        self.assertIn("the control sends the syncs: TRUE", done.stdout, "the backup master took over")
+        left = subprocess.run(["ip", "netns", "list"], stdout=subprocess.PIPE, text=True).stdout
+        self.assertNotIn("hal-cnc-", left)
+
+    def test_wrong_words_are_named(self):
+        done = subprocess.run([ROOT / "halfiles/ethernet-cnc/bring-up", "fast"], env={**self.environment, "HAL": str(HAL)}, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        if done.returncode == 77:
+            self.skipTest("no network namespaces here")
+        self.assertEqual((1, True), (done.returncode, "'fast' means nothing; write bring-up [--lose-clock] [SECONDS]" in done.stdout), done.stdout)
+
+    def test_a_station_says_what_to_type(self):
+        tdma = self.folder / "one.tdma"
+        tdma.write_text("master:\nname control\ncycle 1000\nslot 0 250 1/1 300\n\nslave:\nname x\nphase 330\nslot 0 450 1/1 250\n")
+        node = lambda *words: subprocess.run(["hal", "node", "axis-io", "--id", "1", *words], executable=str(HAL), env=self.environment, text=True,
+                                             stdout=subprocess.PIPE, stderr=subprocess.PIPE).stderr
+        self.assertIn("write --link cane:eth0 with --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
+        self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
+        self.assertIn("there are axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
+        self.assertIn("cannot read 'none.tdma'", node("--link", "cane:lo", "--tdma", "none.tdma"))
+
+    def test_the_description_beside_the_machines_is_the_devices(self):
+        eds = subprocess.run(["hal", "node", "axis-io", "--eds"], executable=str(HAL), env=self.environment, text=True, stdout=subprocess.PIPE).stdout
+        dates = re.compile(r"^(Creation|Modification)(Date|Time)=.*\n|^(Description)=.*\n", re.M)
+        for machine in ("ethernet-furuta", "ethernet-cnc"):
+            self.assertEqual(dates.sub("", eds), dates.sub("", (ROOT / "halfiles" / machine / "axis-io.eds").read_text()), machine)
+
+
+if __name__ == "__main__":
+    unittest.main()
