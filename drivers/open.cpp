@@ -2,10 +2,9 @@
 // From an address to a driver: the one list of them.
 #include <algorithm>
 #include <charconv>
-#include <exception>
 #include <optional>
-#include <utility>
 
+#include "address.hpp"
 #include "cane/cane.hpp"
 #include "canudp/canudp.hpp"
 #include "link/can.hpp"
@@ -18,17 +17,12 @@ namespace hal::can {
 
 namespace {
 
-struct Driver {
-    std::string_view name;
-    Opened (*open)(const std::string& place, const Options&);
-    bool (*is_own_option)(std::string_view key) = nullptr;  ///< those stay behind the place, for the driver itself to read
-};
-constexpr Driver drivers[] = {
-    {"can", socketcan::open}, {"sim", simbus::open},       {"udp", canudp::open},
-    {"slcan", slcan::open},   {"replay", replay::open},    {"cane", cane::open, cane::is_own_option},
+constexpr link::Driver<Opened, Options> drivers[] = {
+    {"can", socketcan::open}, {"sim", simbus::open},    {"udp", canudp::open},
+    {"slcan", slcan::open},   {"replay", replay::open}, {"cane", cane::open, cane::is_own_option},
 };
 
-std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+using link::quoted;
 
 /// 500000, 500k, 1M, unlimited.
 std::optional<std::uint32_t> rate(std::string_view text) {
@@ -51,11 +45,7 @@ std::optional<std::uint32_t> number(std::string_view text) {
 
 /// What is wrong with `key=value`, or nothing.
 std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
-    const auto to_flag = [&](bool& flag) -> std::string {
-        if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
-        flag = !has_value || value == "1";
-        return {};
-    };
+    const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
     const auto to_rate = [&](std::uint32_t& to) -> std::string {
         const auto r = rate(value);
         if (!r) return std::string(key) + " is " + quoted(value) + "; write bits per second, as in 500000, 500k or 1M";
@@ -83,40 +73,10 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    const auto colon = address.find(':');
-    const auto name = address.substr(0, colon);
-    for (const auto& driver : drivers) {
-        if (driver.name != name || colon == address.npos) continue;
-        Options options = given;
-        auto place = address.substr(colon + 1);
-        const auto question = place.find('?');
-        auto rest = question == place.npos ? std::string_view{} : place.substr(question + 1);
-        std::string where(place.substr(0, question));
-        const char* separator = "?";
-        while (!rest.empty()) {
-            const auto end = std::min(rest.find('&'), rest.size());
-            const auto item = rest.substr(0, end);
-            rest.remove_prefix(std::min(end + 1, rest.size()));
-            const auto equals = std::min(item.find('='), item.size());
-            const bool has_value = equals < item.size();
-            if (driver.is_own_option != nullptr && driver.is_own_option(item.substr(0, equals))) {
-                where.append(std::exchange(separator, "&")).append(item);
-                continue;
-            }
-            auto problem = apply(item.substr(0, equals), has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
-            if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
-        }
-        try {
-            auto opened = driver.open(where, options);
-            if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
-            return opened;
-        } catch (const std::exception& e) {
-            return {nullptr, std::string(address) + ": " + e.what()};
-        }
-    }
-    return {nullptr, quoted(address) +
-                         " is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE"};
+    return link::open_address<Opened, Options>(
+        address, given, drivers, apply,
+        "a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE");
 }
 
 }  // namespace hal::can

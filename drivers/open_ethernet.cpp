@@ -2,8 +2,8 @@
 // From an address to a driver of an Ethernet segment: the one list of them.
 #include <algorithm>
 #include <charconv>
-#include <exception>
 
+#include "address.hpp"
 #include "link/ethernet.hpp"
 #include "rawether/rawether.hpp"
 #include "replay/ethernet.hpp"
@@ -13,15 +13,13 @@ namespace hal::ethernet {
 
 namespace {
 
-struct Driver {
-    std::string_view name;
-    Opened (*open)(const std::string& place, const Options&);
-};
-constexpr Driver drivers[] = {
-    {"eth", rawether::open}, {"sim", simbus::open}, {"replay", replay::open},
+constexpr link::Driver<Opened, Options> drivers[] = {
+    {"eth", rawether::open},
+    {"sim", simbus::open},
+    {"replay", replay::open},
 };
 
-std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+using link::quoted;
 
 template <class T>
 std::string to_number(std::string_view key, std::string_view value, T& to, long least, long most) {
@@ -56,11 +54,7 @@ std::string to_policy(std::string_view value, Policy& to) {
 
 /// What is wrong with `key=value`, or nothing.
 std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
-    const auto to_flag = [&](bool& flag) -> std::string {
-        if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
-        flag = !has_value || value == "1";
-        return {};
-    };
+    const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
     if (key == "policy") return to_policy(value, o.policy);
     if (key == "spin") return to_duration(key, value, o.spin_ns);
     if (key == "pacer") return to_flag(o.pacer);
@@ -85,34 +79,9 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    const auto colon = address.find(':');
-    const auto name = address.substr(0, colon);
-    for (const auto& driver : drivers) {
-        if (driver.name != name || colon == address.npos) continue;
-        Options options = given;
-        auto place = address.substr(colon + 1);
-        const auto question = place.find('?');
-        auto rest = question == place.npos ? std::string_view{} : place.substr(question + 1);
-        place = place.substr(0, question);
-        while (!rest.empty()) {
-            const auto end = std::min(rest.find('&'), rest.size());
-            const auto item = rest.substr(0, end);
-            rest.remove_prefix(std::min(end + 1, rest.size()));
-            const auto equals = std::min(item.find('='), item.size());
-            const bool has_value = equals < item.size();
-            auto problem = apply(item.substr(0, equals), has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
-            if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
-        }
-        try {
-            auto opened = driver.open(std::string(place), options);
-            if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
-            return opened;
-        } catch (const std::exception& e) {
-            return {nullptr, std::string(address) + ": " + e.what()};
-        }
-    }
-    return {nullptr, quoted(address) + " is no address of an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
-                                       "sim:NAME for a segment in memory or replay:FILE"};
+    return link::open_address<Opened, Options>(address, given, drivers, apply,
+                                               "an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
+                                               "sim:NAME for a segment in memory or replay:FILE");
 }
 
 }  // namespace hal::ethernet

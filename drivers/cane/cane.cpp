@@ -8,7 +8,7 @@
 
 #include "cane/settings.hpp"
 #include "cane/stations.hpp"
-#include "link/counting.hpp"
+#include "link/filtering.hpp"
 #include "link/ring.hpp"
 #include "link/segment.hpp"
 #include "link/system.hpp"
@@ -40,7 +40,7 @@ private:
     std::atomic<double> share_{0.0};
 };
 
-class CaneLink final : public Link {
+class CaneLink final : public FilteringLink {
 public:
     CaneLink(Settings settings, const Options& options, std::unique_ptr<ethernet::Port> port,
              std::shared_ptr<ethernet::DisciplineSeat> discipline, std::uint16_t session)
@@ -92,14 +92,6 @@ public:
         s.load = load_.share();
         return s;
     }
-    State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }
-    bool set_filters(std::span<const Filter> filters) override {
-        auto wanted = std::make_unique<std::vector<Filter>>(filters.begin(), filters.end());
-        filters_.store(wanted.get(), std::memory_order_release);
-        kept_.push_back(std::move(wanted));  // a cycle may still look at the old ones
-        return true;
-    }
-    const Description& description() const noexcept override { return description_; }
     int descriptor() const noexcept override { return port_->descriptor(); }
 
     bool wait(std::int64_t at_most_ns) override {
@@ -252,8 +244,7 @@ private:
     void keep(Frame& f, const ethernet::Address& from, std::int64_t time_ns) noexcept {
         f.time_ns = time_ns;
         if (settings_.learns && !f.extended && !f.remote && !nodes_.learn(f.id, from, time_ns)) Counting::add(counting_.errors);
-        const auto* filters = filters_.load(std::memory_order_acquire);
-        if (filters != nullptr && !passes(*filters, f)) return;
+        if (!filters_.pass(f)) return;
         counting_.count_received(f);
         buffer_[filled_++] = f;
     }
@@ -264,12 +255,8 @@ private:
     const std::shared_ptr<ethernet::DisciplineSeat> discipline_;  // nullptr: frames leave at once
     const std::uint16_t session_;
     const bool simulated_;
-    Description description_;
-    Counting counting_;
     Load load_;
     Nodes nodes_;
-    std::atomic<const std::vector<Filter>*> filters_{nullptr};  // setup writes, the receiving thread reads
-    std::vector<std::unique_ptr<std::vector<Filter>>> kept_;
     std::atomic<bool> line_up_{true};  // written by the receiving thread
 
     Ring<Frame> process_data_, service_data_;  // the sending thread's, as the next two

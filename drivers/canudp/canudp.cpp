@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "canudp/datagram.hpp"
-#include "link/counting.hpp"
+#include "link/filtering.hpp"
 #include "link/ring.hpp"
 #include "link/system.hpp"
 
@@ -115,7 +115,7 @@ Descriptor sender(const Place& p, std::string& problem) {
     return fd;
 }
 
-class UdpLink final : public Link {
+class UdpLink final : public FilteringLink {
 public:
     UdpLink(const Place& place, const Options& options, Descriptor in, Descriptor out)
         : options_(options), in_(std::move(in)), out_(std::move(out)), outgoing_(options.send_capacity) {
@@ -175,14 +175,6 @@ public:
     }
 
     Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
-    State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }
-    bool set_filters(std::span<const Filter> filters) override {
-        auto wanted = std::make_unique<std::vector<Filter>>(filters.begin(), filters.end());
-        filters_.store(wanted.get(), std::memory_order_release);
-        kept_.push_back(std::move(wanted));  // a cycle may still look at the old ones
-        return true;
-    }
-    const Description& description() const noexcept override { return description_; }
     bool wait(std::int64_t at_most_ns) override { return next_ != filled_ || readable_within(in_.get(), at_most_ns); }
     int descriptor() const noexcept override { return in_.get(); }
 
@@ -208,7 +200,6 @@ private:
         was_short_ = got < static_cast<int>(batch);
         counting_.tick(now_ns != unclocked ? now_ns : monotonic_ns());
         const auto offset = got > 0 ? real_to_monotonic_ns() : 0;
-        const auto* filters = filters_.load(std::memory_order_acquire);
         for (int i = 0; i < got; ++i) {
             Frame& f = buffer_[filled_];
             auto& header = messages[i].msg_hdr;
@@ -233,7 +224,7 @@ private:
             f.time_ns = time;
             f.own = is_self(from[i]);
             if ((f.own && !options_.own_frames) || (f.error && !options_.error_frames) || (f.fd && !options_.fd)) continue;
-            if (filters != nullptr && !f.error && !passes(*filters, f)) continue;
+            if (!f.error && !filters_.pass(f)) continue;
             counting_.count_received(f);
             ++filled_;
         }
@@ -252,12 +243,8 @@ private:
 
     const Options options_;
     const Descriptor in_, out_;
-    Counting counting_;
     Ring<Frame> outgoing_;  // written and read by the sending thread
-    Description description_;
     sockaddr_storage self_{};
-    std::atomic<const std::vector<Filter>*> filters_{nullptr};  // setup writes, the receiving thread reads
-    std::vector<std::unique_ptr<std::vector<Filter>>> kept_;
 
     Datagram out_buffers_[batch];                             // the sending thread's
     std::array<std::uint8_t, 512> in_buffers_[batch];  // from here on: the receiving thread's

@@ -199,7 +199,7 @@ struct Opened {
 };
 
 /// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&key=value`. Keys are those of Options (`bitrate=500000` or `500k`,
-/// `datarate=2M`, `fd`, `listen`, `restart=MS`) and win over them. Drivers: can, sim, udp, slcan, replay.
+/// `datarate=2M`, `fd`, `listen`, `restart=MS`) and win over them. Drivers: can, sim, udp, slcan, cane, replay.
 Opened open(std::string_view address, const Options& options = {});
 
 #pragma GCC visibility pop

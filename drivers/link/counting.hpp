@@ -65,12 +65,4 @@ private:
     std::atomic<double> load_{0.0};
 };
 
-/// Whether any of the filters passes the frame; none: all pass.
-inline bool passes(std::span<const Filter> filters, const Frame& f) noexcept {
-    if (filters.empty()) return true;
-    for (const auto& filter : filters)
-        if (filter.matches(f)) return true;
-    return false;
-}
-
 }  // namespace hal::can

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "link/capture.hpp"
-#include "link/counting.hpp"
+#include "link/filtering.hpp"
 #include "link/system.hpp"
 
 namespace hal::can::replay {
 
 namespace {
 
-class ReplayLink final : public Link {
+class ReplayLink final : public FilteringLink {
 public:
     ReplayLink(const std::string& file, const Options& options, std::vector<Frame> frames) : options_(options), frames_(std::move(frames)) {
         counting_.bit_rate = options.bit_rate != unlimited ? options.bit_rate : 0;
@@ -31,11 +31,10 @@ public:
     std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
         const auto now = now_ns != unclocked ? now_ns : monotonic_ns();
         if (next_ == 0 && !begun_) begun_ = true, shift_ = now - (frames_.empty() ? 0 : frames_.front().time_ns);
-        const auto* filters = filters_.load(std::memory_order_acquire);
         std::size_t count = 0;
         for (; count < room.size() && next_ < frames_.size() && frames_[next_].time_ns + shift_ <= now; ++next_) {
             Frame f = frames_[next_];
-            if (f.error ? !options_.error_frames : filters != nullptr && !passes(*filters, f)) continue;
+            if (f.error ? !options_.error_frames : !filters_.pass(f)) continue;
             f.time_ns += shift_;
             counting_.count_received(f);
             room[count++] = f;
@@ -45,14 +44,6 @@ public:
         return count;
     }
     Statistics statistics() const noexcept override { return counting_.read(0); }
-    State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }
-    bool set_filters(std::span<const Filter> filters) override {
-        auto wanted = std::make_unique<std::vector<Filter>>(filters.begin(), filters.end());
-        filters_.store(wanted.get(), std::memory_order_release);
-        kept_.push_back(std::move(wanted));  // a cycle may still look at the old ones
-        return true;
-    }
-    const Description& description() const noexcept override { return description_; }
     bool wait(std::int64_t at_most_ns) override {
         if (next_ == frames_.size()) return false;
         const auto left = begun_ ? std::max<std::int64_t>(0, frames_[next_].time_ns + shift_ - monotonic_ns()) : 0;
@@ -65,10 +56,6 @@ public:
 private:
     const Options options_;
     const std::vector<Frame> frames_;
-    Counting counting_;
-    Description description_;
-    std::atomic<const std::vector<Filter>*> filters_{nullptr};  // setup writes, the receiving thread reads
-    std::vector<std::unique_ptr<std::vector<Filter>>> kept_;
     std::size_t next_ = 0;  // from here on: the receiving thread's
     bool begun_ = false;
     std::int64_t shift_ = 0;

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "link/counting.hpp"
+#include "link/filtering.hpp"
 #include "link/ring.hpp"
 #include "link/system.hpp"
 #include "slcan/line.hpp"
@@ -58,7 +58,7 @@ Descriptor open_line(const std::string& device, const Options& o, std::string& p
     return fd;
 }
 
-class SerialLink final : public Link {
+class SerialLink final : public FilteringLink {
 public:
     SerialLink(const std::string& device, const Options& options, Descriptor fd)
         : options_(options), device_(device), line_(std::move(fd)), outgoing_(options.send_capacity), watcher_([this] { watch(); }) {
@@ -130,8 +130,7 @@ public:
             switch (decoder_.take(in_[next_++])) {
             case Decoder::Found::frame: {
                 Frame f = decoder_.frame();
-                const auto* filters = filters_.load(std::memory_order_acquire);
-                if ((f.fd && !options_.fd) || (filters != nullptr && !passes(*filters, f))) break;
+                if ((f.fd && !options_.fd) || !filters_.pass(f)) break;
                 f.time_ns = arrived_ns_;
                 counting_.count_received(f);
                 room[count++] = f;
@@ -147,14 +146,6 @@ public:
     }
 
     Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
-    State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }
-    bool set_filters(std::span<const Filter> filters) override {
-        auto wanted = std::make_unique<std::vector<Filter>>(filters.begin(), filters.end());
-        filters_.store(wanted.get(), std::memory_order_release);
-        kept_.push_back(std::move(wanted));  // a cycle may still look at the old ones
-        return true;
-    }
-    const Description& description() const noexcept override { return description_; }
     bool wait(std::int64_t at_most_ns) override {
         if (next_ != filled_) return true;
         if (state() != State::down) return readable_within(line_.get(), at_most_ns);
@@ -197,11 +188,7 @@ private:
     const Options options_;
     const std::string device_;
     const Descriptor line_;
-    Counting counting_;
     Ring<Frame> outgoing_;  // written and read by the sending thread
-    Description description_;
-    std::atomic<const std::vector<Filter>*> filters_{nullptr};  // setup writes, the receiving thread reads
-    std::vector<std::unique_ptr<std::vector<Filter>>> kept_;
 
     char text_[4096]{};  // the sending thread's: lines that are not yet written
     std::size_t text_size_ = 0;

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// `DRIVER:PLACE?key=value&key=value`, taken apart for both kinds of bus. [setup]
+#pragma once
+
+#include <algorithm>
+#include <exception>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace hal::link {
+
+inline std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+/// `key`, `key=0` or `key=1`; what is wrong with it, or nothing.
+inline std::string to_flag(std::string_view key, std::string_view value, bool has_value, bool& flag) {
+    if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
+    flag = !has_value || value == "1";
+    return {};
+}
+
+/// One way to a bus. Options that are the driver's own stay behind the place, for the driver itself to read.
+template <class Opened, class Options>
+struct Driver {
+    std::string_view name;
+    Opened (*open)(const std::string& place, const Options&);
+    bool (*is_own_option)(std::string_view key) = nullptr;
+};
+
+/// Opens by the driver that the address names. `apply(key, value, has_value, options)` says what is wrong with an option, or nothing;
+/// `help` completes "'x' is no address of ".
+template <class Opened, class Options, class Apply>
+Opened open_address(std::string_view address, Options options, std::span<const Driver<Opened, Options>> drivers, Apply apply,
+                    std::string_view help) {
+    const auto colon = address.find(':');
+    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) { return d.name == address.substr(0, colon); });
+    if (colon == address.npos || driver == drivers.end()) return {nullptr, quoted(address) + " is no address of " + std::string(help)};
+
+    const auto  place = address.substr(colon + 1);
+    const auto  question = std::min(place.find('?'), place.size());
+    auto        rest = place.substr(std::min(question + 1, place.size()));
+    std::string where(place.substr(0, question));
+    const char* separator = "?";
+    while (!rest.empty()) {
+        const auto end = std::min(rest.find('&'), rest.size());
+        const auto item = rest.substr(0, end);
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        const auto equals = std::min(item.find('='), item.size());
+        const auto key = item.substr(0, equals);
+        const bool has_value = equals < item.size();
+        if (driver->is_own_option != nullptr && driver->is_own_option(key)) {
+            where.append(std::exchange(separator, "&")).append(item);
+            continue;
+        }
+        const std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
+        if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
+    }
+    try {
+        auto opened = driver->open(where, options);
+        if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
+        return opened;
+    } catch (const std::exception& e) {
+        return {nullptr, std::string(address) + ": " + e.what()};
+    }
+}
+
+}  // namespace hal::link
