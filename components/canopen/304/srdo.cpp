@@ -57,7 +57,7 @@ std::uint16_t Srdos::signature(unsigned number) const noexcept {
     const auto add = [&](std::uint16_t at, std::uint8_t sub) {
         if (const Entry* e = dictionary_.find(at, sub); e != nullptr) crc = crc16(e->bytes(), crc);
     };
-    for (const std::uint8_t sub : {1, 2, 3, 5, 6}) add(index, sub);
+    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 2, 3, 5, 6}) add(index, sub);
     add(mapping, 0);
     const auto count = dictionary_.get<std::uint8_t>(mapping, 0, 0);
     for (unsigned n = 1; n <= count; ++n) {

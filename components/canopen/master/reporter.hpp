@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: MIT
-// What happened on the network, in sentences on standard error: numbers out of the cycle, words in a thread of their own.
+// What happened on the network, in sentences on standard error.
 #pragma once
 
-#include <atomic>
-#include <chrono>
-#include <cstdio>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "../302/flying.hpp"
 #include "../302/status.hpp"
 #include "../config/schedule.hpp"
 #include "emergency_words.hpp"
-#include "hal/queue.hpp"
+#include "hal/reporter.hpp"
 #include "link/can.hpp"
 
 namespace hal::canopen {
@@ -22,26 +18,22 @@ class Reporter {
 public:
     /// All outlive it. [setup]
     Reporter(std::string instance, const config::MasterConfig& config, const std::string& file)
-        : instance_(std::move(instance)), config_(config), setup_(config.setup()), file_(file) {}
-    ~Reporter() { stop(); }
+        : config_(config),
+          setup_(config.setup()),
+          file_(file),
+          told_(std::move(instance), [this](const Event& e) { return words(e); }, 512) {}
 
-    void start() {  // [setup]
-        ended_.store(false);
-        thread_ = std::thread([this] { run(); });
-    }
-    void stop() noexcept {  // [setup]
-        ended_.store(true);
-        if (thread_.joinable()) thread_.join();
-    }
+    void start() { told_.start(); }           // [setup]
+    void stop() noexcept { told_.stop(); }    // [setup]
 
     // By the cycle. What finds no room is not said. [realtime]
-    void node(const NodeStatus& s) noexcept { events_.push({Event::node, s, {}, {}, {}, 0}); }
-    void network(const NetworkStatus& n, const NodeStatus& s) noexcept { events_.push({Event::network, s, n, {}, {}, 0}); }
-    void emergency(const NodeStatus& s, const Emergency& e) noexcept { events_.push({Event::emergency, s, {}, e, {}, 0}); }
-    void bus(can::State state) noexcept { events_.push({Event::bus, {}, {}, {}, state, 0}); }
-    void cycle(Time period) noexcept { events_.push({Event::cycle, {}, {}, {}, {}, period}); }
+    void node(const NodeStatus& s) noexcept { told_.tell({Event::node, s, {}, {}, {}, 0}); }
+    void network(const NetworkStatus& n, const NodeStatus& s) noexcept { told_.tell({Event::network, s, n, {}, {}, 0}); }
+    void emergency(const NodeStatus& s, const Emergency& e) noexcept { told_.tell({Event::emergency, s, {}, e, {}, 0}); }
+    void bus(can::State state) noexcept { told_.tell({Event::bus, {}, {}, {}, state, 0}); }
+    void cycle(Time period) noexcept { told_.tell({Event::cycle, {}, {}, {}, {}, period}); }
     void flying(const FlyingMaster& f) noexcept {
-        if (f.master() != 0) events_.push({Event::flying, {}, {}, {}, {}, 0, f.master()});
+        if (f.master() != 0) told_.tell({Event::flying, {}, {}, {}, {}, 0, f.master()});
     }
 
 private:
@@ -55,16 +47,6 @@ private:
         std::uint8_t  master = 0;
     };
 
-    void run() {
-        for (bool last = false; !last;) {
-            last = ended_.load();  // looked at before the queue, so that what came before the end is still said
-            for (Event e; events_.pop(e);) say(words(e));
-            if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-        }
-    }
-    void say(const std::string& sentence) const {
-        if (!sentence.empty()) std::fputs((instance_ + ": " + sentence + "\n").c_str(), stderr);
-    }
     std::string called(std::uint8_t id) const {
         for (const config::Node& n : config_.nodes)
             if (n.setup.id == id) return "node " + std::to_string(id) + (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
@@ -80,13 +62,13 @@ private:
             const NetworkStatus& n = e.of_network;
             if ((n.state == NetworkState::booting && n.node == 0) || n.state == NetworkState::off) return {};
             if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
-            char text[120];
+            char         text[120];
             const double after = static_cast<double>(n.operational_since - n.begun) * 1e-9;
-            if (n.begun == told_)
+            if (n.begun == operational_told_)
                 std::snprintf(text, sizeof text, "the network is operational again: %u of %u nodes", n.operational, n.nodes);
             else
                 std::snprintf(text, sizeof text, "the network is operational: %u of %u nodes, after %.2f s", n.operational, n.nodes, after);
-            told_ = n.begun;
+            operational_told_ = n.begun;
             return text;
         }
         case Event::emergency: {
@@ -109,14 +91,11 @@ private:
         return {};
     }
 
-    const std::string           instance_;
     const config::MasterConfig& config_;
     const MasterSetup           setup_;
     const std::string           file_;
-    hal::Queue<Event>           events_{512};      // cycle to thread
-    Time told_ = -1;  // of which start it was said that the network is operational
-    std::atomic<bool>           ended_{false};
-    std::thread                 thread_;
+    Time                        operational_told_ = -1;  // of which start it was said that the network is operational
+    hal::Reporter<Event>        told_;                   // the last: its thread uses the others
 };
 
 }  // namespace hal::canopen

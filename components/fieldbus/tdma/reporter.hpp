@@ -1,34 +1,24 @@
 // SPDX-License-Identifier: MIT
-// What happened on the segment, in sentences on standard error: numbers out of the cycle, words in a thread of their own.
+// What happened on the segment, in sentences on standard error.
 #pragma once
 
-#include <atomic>
-#include <chrono>
-#include <cstdio>
 #include <string>
-#include <thread>
 
 #include "config.hpp"
-#include "hal/queue.hpp"
+#include "hal/reporter.hpp"
 
 namespace hal::tdma {
 
 class Reporter {
 public:
     /// The schedule outlives it. [setup]
-    Reporter(std::string instance, const config::Schedule& schedule) : instance_(std::move(instance)), schedule_(schedule) {}
-    ~Reporter() { stop(); }
+    Reporter(const std::string& instance, const config::Schedule& schedule)
+        : instance_(instance), schedule_(schedule), told_(instance, [this](const Happened& h) { return words(h); }) {}
 
-    void start() {  // [setup]
-        ended_.store(false);
-        thread_ = std::thread([this] { run(); });
-    }
-    void stop() noexcept {  // [setup]
-        ended_.store(true);
-        if (thread_.joinable()) thread_.join();
-    }
+    void start() { told_.start(); }         // [setup]
+    void stop() noexcept { told_.stop(); }  // [setup]
     /// By the cycle. What finds no room is not said. [realtime]
-    void event(Event event, const Address& who, Time value) noexcept { events_.push({event, who, value}); }
+    void event(Event event, const Address& who, Time value) noexcept { told_.tell({event, who, value}); }
 
     /// "x (02:00:00:00:00:02)", or the address alone. [setup]
     static std::string called(const config::Schedule& schedule, const Address& who) {
@@ -43,14 +33,6 @@ private:
         Address who{};
         Time    value = 0;
     };
-    void run() {
-        for (bool last = false; !last;) {
-            last = ended_.load();  // looked at before the queue, so that what came before the end is still said
-            for (Happened h; events_.pop(h);) say(words(h));
-            if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-        }
-    }
-    void        say(const std::string& sentence) const { std::fputs((instance_ + ": " + sentence + "\n").c_str(), stderr); }
     std::string words(const Happened& h) const {
         const std::string who = called(schedule_, h.who), value = std::to_string(h.value);
         switch (h.event) {
@@ -78,9 +60,7 @@ private:
 
     const std::string       instance_;
     const config::Schedule& schedule_;
-    hal::Queue<Happened>    events_{256};  // cycle to thread
-    std::atomic<bool>       ended_{false};
-    std::thread             thread_;
+    hal::Reporter<Happened> told_;  // the last: its thread uses the others
 };
 
 }  // namespace hal::tdma

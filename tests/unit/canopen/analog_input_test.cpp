@@ -187,7 +187,7 @@ TEST_F(AnalogInput, Passing_a_limit_sends_the_PDO_once_each_way) {
 }
 
 TEST_F(AnalogInput, Numbers_that_are_none_are_refused) {
-    for (const std::uint16_t index : {0x6120, 0x6121, 0x6124, 0x6126, 0x6133, 0x6134, 0x6138}) {
+    for (const std::uint16_t index : std::initializer_list<std::uint16_t>{0x6120, 0x6121, 0x6124, 0x6126, 0x6133, 0x6134, 0x6138}) {
         EXPECT_EQ(bench.write<float>(index, 1, std::numeric_limits<float>::quiet_NaN()), Abort::value);
         EXPECT_EQ(bench.write<float>(index, 1, std::numeric_limits<float>::infinity()), Abort::value);
     }

@@ -36,7 +36,7 @@ struct AxisIoDevice : testing::Test {
         bench.run(millisecond);
     }
     void switch_on() {
-        for (const std::uint16_t word : {0x06, 0x07, 0x0f, 0x0f}) cycle(word, 0);
+        for (const std::uint16_t word : std::initializer_list<std::uint16_t>{0x06, 0x07, 0x0f, 0x0f}) cycle(word, 0);
         ASSERT_EQ(program.state(), AxisIo::State::on);
     }
     AxisIo program;

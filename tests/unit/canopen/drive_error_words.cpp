@@ -27,7 +27,7 @@ TEST(DriveErrorWords, Other_codes_have_the_word_of_their_class) {
 
 TEST(DriveErrorWords, Master_says_them_of_drives_only) {
     config::MasterConfig config;
-    for (const std::uint8_t id : {5, 6, 7}) {
+    for (const std::uint8_t id : std::initializer_list<std::uint8_t>{5, 6, 7}) {
         config::Node n;
         n.setup.id = id;
         n.name = "n" + std::to_string(id);

@@ -9,7 +9,7 @@ struct Mpdo : Node {
     /// PDO 1 each way multiplexed, `kind` FFh for DAM, FEh for SAM.
     void make_multiplexed(std::uint8_t kind, bool with_list = true) {
         auto d = example();
-        for (const std::uint16_t mapping : {0x1600, 0x1a00}) *d.find(mapping, 0)->value.data() = kind;
+        for (const std::uint16_t mapping : std::initializer_list<std::uint16_t>{0x1600, 0x1a00}) *d.find(mapping, 0)->value.data() = kind;
         if (with_list) {
             // Object 2008h, from sub-index 1, four of them, is what node 7 has as 3000h from sub-index 5.
             d.add(0x1fd0, 0, Type::unsigned8, Access::constant, 1);

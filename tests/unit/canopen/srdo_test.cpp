@@ -32,7 +32,7 @@ struct Srdo : Node {
     }
     static Description with_srdos() {
         Description d = example();
-        for (const std::uint16_t index : {0x2300, 0x2301, 0x2310, 0x2311})
+        for (const std::uint16_t index : std::initializer_list<std::uint16_t>{0x2300, 0x2301, 0x2310, 0x2311})
             d.add(index, 0, Type::unsigned8, Access::read_write, (index & 1) != 0 ? 0xff : 0).mappable();
         const SrdoDescription both[] = {sends(), receives()};
         add_srdos(d, both);
@@ -295,7 +295,7 @@ TEST_F(Srdo, Whoever_changes_a_parameter_has_to_say_anew_that_all_are_valid) {
 
 TEST_F(Srdo, Parameters_cannot_be_written_while_operational) {
     operational();
-    for (const std::uint8_t sub : {1, 3}) EXPECT_EQ(write(0x1301, sub, 1, 1), Abort::device_state);
+    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 3}) EXPECT_EQ(write(0x1301, sub, 1, 1), Abort::device_state);
     EXPECT_EQ(write(0x1381, 1, 0x23000008, 4), Abort::device_state);
     EXPECT_EQ(write(0x13fe, 0, 0, 1), Abort::device_state);
     EXPECT_EQ(write(0x13ff, 1, 0, 2), Abort::device_state);
