@@ -8,6 +8,7 @@
 #include "fieldbus/tdma/config.hpp"
 #include "fieldbus/tdma/reporter.hpp"
 #include "fieldbus/tdma/station.hpp"
+#include "fieldbus/tdma/tap.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
 #include "hal/naming.hpp"
@@ -63,6 +64,7 @@ public:
             throw std::runtime_error(link_.get() + " has the address " + ethernet::to_string(opened.port->address()) +
                                      ", the configuration gives " + entry_->name + " " + ethernet::to_string(*entry_->mac) +
                                      "; mend the line 'mac' of its block");
+        OpenedTap tap = open_tunnel(*opened.port);
         const std::string key = link_.get().substr(0, link_.get().find('?'));
         if (!ethernet::offer_discipline(key, station_.get()))
             throw std::runtime_error(
@@ -77,11 +79,13 @@ public:
             throw;
         }
         port_ = std::move(opened.port);
+        tap_ = std::move(tap.tap);
         const std::string& remark = port_->description().remark;
         if (!remark.empty()) std::fputs((name_ + ": " + remark + "\n").c_str(), stderr);
         beat_.lose();
         told_period_ = was_reset_ = false;
         reporter_->start();
+        station_->accompany(nullptr, tunnel_.get());
         station_->attach(*port_);
     }
 
@@ -91,6 +95,7 @@ public:
         if (leads_) leading_instance.store(nullptr);
         leads_ = false;
         reporter_->stop();
+        tap_.reset();
         port_.reset();
     }
 
@@ -160,6 +165,33 @@ private:
             throw std::invalid_argument("on which segment? write link=eth:enp3s0 or link=sim:NAME/" + station_argument_.get());
         entry_ = schedule_.stations[*which];
         setup_ = config::setup_of(schedule_, *which);
+        look_at_tunnel(file);
+    }
+
+    /// What `tunnel=` asks of the schedule.
+    void look_at_tunnel(const std::string& file) const {
+        if (tunnel_argument_.get().empty()) return;
+        if (auto problem = wrong_name(tunnel_argument_.get()); !problem.empty()) throw std::invalid_argument("tunnel=: " + problem);
+        if (!parse_prefix(netmask_argument_.get()))
+            throw std::invalid_argument("netmask=" + netmask_argument_.get() + " is none; write 24 or 255.255.255.0");
+        const auto is_tunnels = [](const SlotSetup& s) { return s.id == tunnel_slot; };
+        if (std::none_of(setup_.slots.begin(), setup_.slots.end(), is_tunnels))
+            throw std::invalid_argument("tunnel=" + tunnel_argument_.get() + ": ordinary packets leave in slot 1, and " + entry_->name +
+                                        " has none; write slot 1 OFFSET into its block of " + file + "; `hal tdma plan` shows what is free");
+    }
+
+    /// The interface for ordinary packets, when there is to be one. [setup]
+    OpenedTap open_tunnel(const ethernet::Port& port) {
+        if (tunnel_argument_.get().empty()) return {};
+        tunnel_ = std::make_unique<Tunnel>(*station_);
+        OpenedTap opened = open_tap(
+            *tunnel_, {tunnel_argument_.get(), port.address(), entry_->ip, parse_prefix(netmask_argument_.get()).value_or(24)}, name_);
+        if (!opened.tap) throw std::runtime_error("tunnel: " + opened.problem);
+        std::fputs((name_ + ": ordinary packets pass by " + opened.tap->name() + ", MTU " + std::to_string(tunnel_->mtu()) +
+                    (entry_->ip ? ", IP " + config::to_string(*entry_->ip) : "") + "\n")
+                       .c_str(),
+                   stderr);
+        return opened;
     }
 
     /// The threads of this process come to the schedule. [realtime]
@@ -200,6 +232,12 @@ private:
         foreign = s.count.foreign;
         intruders = s.count.intruders;
         losses = s.count.losses;
+        if (!tunnel_) return;
+        tunnel_open = tunnel_->open();
+        tunnel_sent = tunnel_->sent();
+        tunnel_received = tunnel_->received();
+        tunnel_dropped = tunnel_->dropped();
+        tunnel_refused = tunnel_->refused();
     }
 
     void raise(const std::string& reason, double detail) noexcept {
@@ -249,6 +287,11 @@ private:
     hal::TextArgument inline_argument_{*this, "schedule", "", "the same as a text, with ; at the ends of its lines"};
     hal::TextArgument station_argument_{*this, "station", "", "which block of it this is: by name, ip or mac", {.per_instance = true}};
 
+    hal::TextArgument tunnel_argument_{*this, "tunnel", "",
+                                       "an interface for ordinary packets, which leave in slot 1: hal0, or hal%d for the first that is free",
+                                       {.per_instance = true}};
+    hal::TextArgument netmask_argument_{*this, "netmask", "24", "of the tunnel's network, as 24 or 255.255.255.0; its address is the block's ip"};
+
     hal::Function receive_{*this, "receive", &Tdma::receive,
                            "takes what came, keeps the clock; first in the thread, whose period is the cycle"};
     hal::Function transmit_{*this, "transmit", &Tdma::transmit,
@@ -279,6 +322,12 @@ private:
     hal::Out<std::uint64_t> foreign{*this, receive_, "frames-foreign", "cut, of another version, syncs of another schedule: not acted on"};
     hal::Out<std::uint64_t> intruders{*this, receive_, "frames-intruding", "of other stations in slots of this one"};
     hal::Out<std::uint64_t> losses{*this, receive_, "losses", "times the sync was lost"};
+    hal::Out<bool>          tunnel_open{*this, receive_, "tunnel-open", "ordinary packets may pass", {.safe = false}};
+    hal::Out<std::uint64_t> tunnel_sent{*this, receive_, "tunnel-sent", "ordinary packets handed to slot 1"};
+    hal::Out<std::uint64_t> tunnel_received{*this, receive_, "tunnel-received", "ordinary packets that came for this station"};
+    hal::Out<std::uint64_t> tunnel_dropped{*this, receive_, "tunnel-dropped", "ordinary packets, either way, that found no room or no sync"};
+    hal::Out<std::uint64_t> tunnel_refused{
+        *this, receive_, "tunnel-refused", "tunnelled frames that are for others, or cut, or of the segment's own types: not acted on"};
 
     config::Schedule                        schedule_;
     std::optional<config::StationEntry>     entry_;
@@ -288,6 +337,8 @@ private:
     std::unique_ptr<Station>                station_;
     std::unique_ptr<Reporter>               reporter_;
     std::unique_ptr<ethernet::Port>         port_;
+    std::unique_ptr<Tunnel>                 tunnel_;  // before tap_, which uses it
+    std::unique_ptr<Tap>                    tap_;
     hal::DisciplinedClock                   clock_;
     hal::Discipline                         beat_;
     const hal_faults*                       faults_ = nullptr;
