@@ -34,9 +34,15 @@ StationSetup setup_of(const Schedule& s, std::size_t index) {
     StationSetup        out;
     out.role = e.role, out.cycle = s.cycle, out.backup_offset = e.backup_offset, out.phase = e.phase, out.lead = e.lead;
     out.guard = s.guard, out.lost_limit = s.lost, out.rounds = s.rounds, out.speed = s.speed;
-    std::size_t most = 0;
-    for (const StationEntry& other : s.stations) most = std::max(most, other.slots.size());
-    out.babble_limit = static_cast<std::uint32_t>(std::max<std::size_t>(64, 8 * most));
+    // Twice what the slots of anybody hold of the shortest frames, with syncs and replies.
+    Time most = 0;
+    for (const StationEntry& other : s.stations) {
+        Time share = static_cast<Time>(s.stations.size()) + 2;
+        for (const SlotEntry& slot : other.slots)
+            share += s.wire(ethernet::header_bytes + slot.setup.size) / s.wire(ethernet::smallest_frame);
+        most = std::max(most, share);
+    }
+    out.babble_limit = static_cast<std::uint32_t>(std::max<Time>(64, 2 * most));
     for (const SlotEntry& slot : e.slots) out.slots.push_back(slot.setup);
     return out;
 }

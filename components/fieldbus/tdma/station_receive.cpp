@@ -42,7 +42,7 @@ void Station::take(const ethernet::Arrival& arrival, Time now) noexcept {
     }
     Decoded d = decode(frame);
     if (d.from == address_) return;
-    watch_.heard(d.from);
+    watch_.heard(d.from, arrival.time_ns, setup_.cycle);
     switch (d.kind) {
     case Kind::sync: take_sync(d, arrival.time_ns, now); return;
     case Kind::request:

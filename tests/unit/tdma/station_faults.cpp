@@ -179,6 +179,23 @@ TEST(Station_names_another, that_babbles) {
     EXPECT_TRUE(s.station.ready());
 }
 
+TEST(Station_judges_nobody, whose_frames_waited_for_a_late_thread) {
+    Bed bed;
+    bed.add(1, master());
+    Machine& s = bed.add(2, slave(300'000));
+    s.off = true;  // its port is open, its thread does not run yet
+    bed.run(300 * ms);
+    s.off = false, s.next = s.port.clock().local(bed.now);
+    bed.run(600 * ms);
+    ASSERT_TRUE(s.station.ready());
+    s.off = true;  // and now it is held up
+    bed.run(200 * ms);
+    s.off = false, s.next = s.port.clock().local(bed.now);
+    bed.run(600 * ms);
+    EXPECT_EQ(0, s.events[Event::babbling]);
+    EXPECT_TRUE(s.station.ready());
+}
+
 /// Each kind of damage to every 7th frame: nothing of it is acted on, and the station goes on.
 class Every_7th_frame : public testing::TestWithParam<const char*> {};
 TEST_P(Every_7th_frame, is_counted_and_not_acted_on) {

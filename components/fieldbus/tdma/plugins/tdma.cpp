@@ -177,7 +177,8 @@ private:
         const auto is_tunnels = [](const SlotSetup& s) { return s.id == tunnel_slot; };
         if (std::none_of(setup_.slots.begin(), setup_.slots.end(), is_tunnels))
             throw std::invalid_argument("tunnel=" + tunnel_argument_.get() + ": ordinary packets leave in slot 1, and " + entry_->name +
-                                        " has none; write slot 1 OFFSET into its block of " + file + "; `hal tdma plan` shows what is free");
+                                        " has none; write slot 1 OFFSET into its block of " + file +
+                                        "; `hal tdma plan` shows what is free");
     }
 
     /// The interface for ordinary packets, when there is to be one. [setup]
@@ -287,10 +288,9 @@ private:
     hal::TextArgument inline_argument_{*this, "schedule", "", "the same as a text, with ; at the ends of its lines"};
     hal::TextArgument station_argument_{*this, "station", "", "which block of it this is: by name, ip or mac", {.per_instance = true}};
 
-    hal::TextArgument tunnel_argument_{*this, "tunnel", "",
-                                       "an interface for ordinary packets, which leave in slot 1: hal0, or hal%d for the first that is free",
-                                       {.per_instance = true}};
-    hal::TextArgument netmask_argument_{*this, "netmask", "24", "of the tunnel's network, as 24 or 255.255.255.0; its address is the block's ip"};
+    hal::TextArgument tunnel_argument_{
+        *this, "tunnel", "", "an interface for ordinary packets, in slot 1: hal0, or hal%d for the first that is free", {.per_instance = true}};
+    hal::TextArgument netmask_argument_{*this, "netmask", "24", "of the tunnel, as 24 or 255.255.255.0; its address is the block's ip"};
 
     hal::Function receive_{*this, "receive", &Tdma::receive,
                            "takes what came, keeps the clock; first in the thread, whose period is the cycle"};
@@ -325,7 +325,7 @@ private:
     hal::Out<bool>          tunnel_open{*this, receive_, "tunnel-open", "ordinary packets may pass", {.safe = false}};
     hal::Out<std::uint64_t> tunnel_sent{*this, receive_, "tunnel-sent", "ordinary packets handed to slot 1"};
     hal::Out<std::uint64_t> tunnel_received{*this, receive_, "tunnel-received", "ordinary packets that came for this station"};
-    hal::Out<std::uint64_t> tunnel_dropped{*this, receive_, "tunnel-dropped", "ordinary packets, either way, that found no room or no sync"};
+    hal::Out<std::uint64_t> tunnel_dropped{*this, receive_, "tunnel-dropped", "ordinary packets, either way, without room or sync"};
     hal::Out<std::uint64_t> tunnel_refused{
         *this, receive_, "tunnel-refused", "tunnelled frames that are for others, or cut, or of the segment's own types: not acted on"};
 
