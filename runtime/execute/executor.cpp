@@ -221,6 +221,21 @@ Executor::Executor(bool virtual_clock) : virtual_(virtual_clock) {
     board_.shared.raise = [](const hal_faults*, const void* self, const char* reason, double detail) {
         if (Core* const core = Core::current()) core->raise({HAL_FAULT_COMPONENT, 0, core->cycle_number(), 0, detail, reason, self});
     };
+    static_assert(std::is_standard_layout_v<Between>);
+    background_.shared.size = sizeof background_.shared;
+    background_.shared.is_virtual = virtual_;
+    background_.shared.attach = [](const hal_background* b, void (*work)(void*, std::int64_t), void* self) {
+        if (b->is_virtual == 0) return false;
+        try {
+            reinterpret_cast<Between*>(const_cast<hal_background*>(b))->works.push_back({work, self});
+        } catch (const std::bad_alloc&) {
+            return false;
+        }
+        return true;
+    };
+    background_.shared.detach = [](const hal_background* b, void* self) {
+        std::erase_if(reinterpret_cast<Between*>(const_cast<hal_background*>(b))->works, [self](const Between::Work& w) { return w.self == self; });
+    };
     if (!virtual_) epoch_ns_ = monotonic_ns();
 }
 
@@ -387,7 +402,7 @@ void Executor::advance(std::int64_t ns) {
         return;
     }
     const std::int64_t end = virtual_now_ns_ + ns;
-    for (;;) {
+    for (bool ran = false;;) {
         Runner* next = nullptr;
         std::int64_t next_ns = 0;
         for (const auto& runner : runners_)  // fastest first, so it wins at equal instants
@@ -395,7 +410,10 @@ void Executor::advance(std::int64_t ns) {
                 next = runner.get();
                 next_ns = due;
             }
+        if (ran && (!next || next_ns != virtual_now_ns_))
+            for (const Between::Work& w : background_.works) w.work(w.self, virtual_now_ns_);
         if (!next) break;
+        ran = true;
         virtual_now_ns_ = next_ns;
         next->core.cycle(next->grid_ns, next_ns, next_ns);
         next->grid_ns += next->options.period_ns;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "execute/core.hpp"
+#include "hal/background.h"
 
 namespace hal {
 
@@ -74,6 +75,7 @@ public:
     FaultBoard& board() { return board_; }
     const Timeline& timeline() const { return timeline_; }
     hal_clock& clock() { return timeline_.shared; }
+    const hal_background& background() const { return background_.shared; }
     /// Somebody will make steps: threads watch for them from now on, those that sleep long at once.
     void lead();
 
@@ -85,12 +87,22 @@ public:
 
 private:
     struct Runner;
+    /// Given out as extension "hal.background/1". Work that instances do between two instants of the virtual clock.
+    struct Between {
+        hal_background shared{};  // first: the extension's functions get its address
+        struct Work {
+            void (*work)(void*, std::int64_t);
+            void* self;
+        };
+        std::vector<Work> works;
+    };
     void call(Runner& runner);       // gets its attention now rather than at its next cycle, where that is possible
     Runner& runner(const Core& core) const;
     const bool virtual_;
     std::atomic<bool> running_{false};
     FaultBoard board_;
     Timeline timeline_;
+    Between background_;
     std::vector<std::unique_ptr<Runner>> runners_;  // fastest first
     std::int64_t epoch_ns_ = 0;      // all positions of the grid are epoch + k * period
     std::int64_t virtual_now_ns_ = 0;

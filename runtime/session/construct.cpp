@@ -12,12 +12,13 @@
 #include "hal/texts.h"
 
 namespace hal {
-namespace {
 
 std::string dashed(std::string text) {
     std::replace(text.begin(), text.end(), '_', '-');
     return text;
 }
+
+namespace {
 
 std::vector<std::string> split(const std::string& text, char by) {
     std::vector<std::string> parts;
@@ -470,6 +471,7 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
             if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
+            if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
         }};
     instance.started = instance.component->plugin->start(instance.memory, &host);

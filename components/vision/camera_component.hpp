@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT
+// The base of every component that looks at frames: source, helper thread, mailbox, and the pins that all of them have.
+//
+//     struct Found { bool found = false; double x = 0; };                       // result: trivially copyable, `found` first
+//     struct Settings { double limit = 0; bool operator==(const Settings&) const = default; };
+//     struct Blob : vision::CameraComponent<Blob, Found, Settings> {
+//         using CameraComponent::CameraComponent;
+//         hal::Out<double> x{*this, "x", …};
+//         void detect(const vision::Frame&, const Settings&, Found&);           // helper thread; may throw: the frame is bad
+//         Settings settings() const noexcept { return {limit}; }                // [realtime] each cycle
+//         void show(const Found&, bool fresh, hal::Cycle) noexcept { … }        // [realtime] each cycle, after valid was set
+//     };
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "hal/background.hpp"
+#include "hal/component.hpp"
+#include "hal/naming.hpp"
+#include "hal/queue.hpp"
+#include "hal/texts.hpp"
+#include "vision/capture/worker.hpp"
+
+namespace hal::vision {
+
+template <class Derived, class Result, class Settings>
+class CameraComponent : public hal::Component {
+public:
+    explicit CameraComponent(const hal_host* host)
+        : Component(host),
+          instance_(name_of(host)),
+          texts_(*this),
+          source_(*this, "source", "v4l2:/dev/video0",
+                  "where frames come from: v4l2:/dev/video0?width=640&height=480&fps=30, frames:FOLDER?fps=30&loop, sim:SCENE"),
+          worker_(instance_, make_source(source_.get(), [this](const std::string& place) { return texts_.find(place); }),
+                  [this](const Frame& frame) { work(frame); }, [this](const Status& status) { deliver(status); }),
+          background_([this](std::int64_t now, bool may_wait) { turn(now, may_wait); }),
+          update_(*this, "update", &CameraComponent::update, "takes the newest result, if there is one"),
+          seq(*this, update_, "seq", "counts results: one per frame that was worked on"),
+          stamp_ns(*this, update_, "stamp-ns", "when the frame of the result was exposed, on the runtime's clock", {.unit = "ns"}),
+          age_ms(*this, update_, "age-ms", "time since then; before the first result: since the first cycle", {.unit = "ms"}),
+          valid(*this, update_, "valid", "the newest frame shows what is looked for, is younger than max-age-ms, and the source is well",
+                {.safe = false}),
+          dropped(*this, update_, "dropped", "frames that were not looked at, because a newer one was there or the camera lost them"),
+          proc_ms(*this, update_, "proc-ms", "what the work on the frame took; 0 on the virtual clock", {.unit = "ms"}),
+          frames(*this, update_, "frames", "frames that were of use"),
+          bad_frames(*this, update_, "bad-frames", "frames that were not: damaged, huge, black, frozen, of the wrong size"),
+          source_ok(*this, update_, "source-ok", "the source is open and its last frame was of use"),
+          trouble(*this, update_, "trouble",
+                  "what is wrong: 0 nothing, 1 absent, 2 refused, 3 unplugged, 4 silent, 5 damaged, 6 huge, 7 black, 8 frozen, 9 not of the "
+                  "calibration's size, 10 ended"),
+          max_age_ms(*this, update_, "max-age-ms", "a result that is older is not valid", {.initial = 200.0, .unit = "ms"}),
+          frozen_frames(*this, update_, "frozen-frames", "equal frames in a row that are a frozen camera; 0: never",
+                        {.initial = worker_.source_frozen_after()}) {}
+
+    void start() {
+        faults_ = hal::extension<hal_faults>("hal.faults/1");
+        raised_ = Trouble::none;
+        background_.start();
+    }
+    void stop() noexcept {
+        background_.stop();
+        worker_.close();
+    }
+
+    /// [realtime]
+    void update(hal::Cycle cycle) noexcept {
+        Derived&       self = static_cast<Derived&>(*this);
+        const Ordered  order{true, frozen_frames, self.settings()};
+        if (!(order == ordered_)) {
+            ordered_ = order;
+            orders_.put(order);
+        }
+        bool            fresh = false;
+        const Delivery& d = deliveries_.get(&fresh);
+        if (began_ns_ == no_time) began_ns_ = cycle.start_ns();
+        const bool newer = d.seq != seq;
+        if (fresh) {
+            seq = d.seq;
+            stamp_ns = d.stamp_ns;
+            proc_ms = static_cast<double>(d.proc_ns) * 1e-6;
+            dropped = d.status.dropped;
+            frames = d.status.frames;
+            bad_frames = d.status.bad;
+            source_ok = d.status.ok;
+            trouble = static_cast<std::uint32_t>(d.status.trouble);
+            raise(d.status.trouble);
+        }
+        const double age = static_cast<double>(cycle.start_ns() - (d.seq == 0 ? began_ns_ : d.stamp_ns)) * 1e-6;
+        age_ms = age > 0.0 ? age : 0.0;
+        valid = d.result.found && d.status.ok && age_ms <= max_age_ms;
+        self.show(d.result, newer, cycle);
+    }
+
+protected:
+    const hal::Texts&  texts() const { return texts_; }
+    const std::string& instance() const { return instance_; }
+    /// Frames of another size are refused, as the calibration `file` is not about them. In the constructor. [setup]
+    void expect(int width, int height, const std::string& file) { worker_.expect(width, height, file); }
+
+private:
+    static constexpr std::int64_t no_time = INT64_MIN;
+    struct Delivery {
+        Status        status{};
+        Result        result{};
+        std::int64_t  stamp_ns = 0, proc_ns = 0;
+        std::uint32_t seq = 0;
+    };
+    struct Ordered {
+        bool          given = false;
+        std::uint32_t frozen = 0;
+        Settings      settings{};
+        bool          operator==(const Ordered&) const = default;
+    };
+
+    static std::string name_of(const hal_host* host) {
+        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
+        return naming != nullptr ? naming->name(host) : "vision";
+    }
+    void turn(std::int64_t now, bool may_wait) {
+        measures_ = may_wait;
+        const Ordered& order = orders_.get();
+        if (order.given) worker_.freeze_after(order.frozen);
+        worker_.turn(now, may_wait);
+    }
+    void work(const Frame& frame) {
+        if (!orders_.get().given) return;  // no cycle has run so far
+        const std::int64_t begun = measures_ ? now() : 0;
+        next_.result = Result{};
+        static_cast<Derived*>(this)->detect(frame, orders_.get().settings, next_.result);
+        next_.stamp_ns = frame.stamp_ns;
+        next_.proc_ns = measures_ ? now() - begun : 0;
+        ++next_.seq;
+    }
+    void deliver(const Status& status) {
+        next_.status = status;
+        deliveries_.put(next_);
+    }
+    static std::int64_t now() noexcept {
+        timespec t;
+        clock_gettime(CLOCK_MONOTONIC, &t);
+        return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+    }
+    void raise(Trouble now) noexcept {
+        static constexpr const char* reasons[trouble_count] = {"",
+                                                               "there is no such source; valid is FALSE",
+                                                               "the source cannot be used; valid is FALSE",
+                                                               "the source went away; valid is FALSE",
+                                                               "no frames come; valid is FALSE",
+                                                               "a frame is damaged; valid is FALSE",
+                                                               "a frame is huge; valid is FALSE",
+                                                               "frames are black; valid is FALSE",
+                                                               "frames are frozen; valid is FALSE",
+                                                               "frames are not of the calibration's size; valid is FALSE",
+                                                               "all frames were shown; valid is FALSE"};
+        if (now == raised_) return;
+        raised_ = now;
+        if (now == Trouble::none || faults_ == nullptr) return;
+        faults_->raise(faults_, this, reasons[static_cast<std::size_t>(now)], std::numeric_limits<double>::quiet_NaN());
+    }
+
+    const std::string  instance_;
+    const hal::Texts   texts_;
+    hal::TextArgument  source_;
+    Worker             worker_;                // of the helper thread
+    Delivery           next_;                  // of the helper thread
+    bool               measures_ = false;      // of the helper thread
+    hal::Mailbox<Delivery> deliveries_;        // helper thread to cycle
+    hal::Mailbox<Ordered>  orders_;            // cycle to helper thread
+    Ordered            ordered_;
+    std::int64_t       began_ns_ = no_time;
+    const hal_faults*  faults_ = nullptr;
+    Trouble            raised_ = Trouble::none;
+    hal::Background    background_;
+    hal::Function      update_;
+
+public:
+    hal::Out<std::uint32_t>   seq;
+    hal::Out<std::int64_t>    stamp_ns;
+    hal::Out<double>          age_ms;
+    hal::Out<bool>            valid;
+    hal::Out<std::uint32_t>   dropped;
+    hal::Out<double>          proc_ms;
+    hal::Out<std::uint32_t>   frames, bad_frames;
+    hal::Out<bool>            source_ok;
+    hal::Out<std::uint32_t>   trouble;
+    hal::Param<double>        max_age_ms;
+    hal::Param<std::uint32_t> frozen_frames;
+};
+
+}  // namespace hal::vision

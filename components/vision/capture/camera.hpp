@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// A camera's calibration: the pinhole model with distortion, and the file it is read from.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hal::vision {
+
+/// Pinhole and lens: u = fx x' + cx, v = fy y' + cy, with x', y' distorted by k1 k2 p1 p2 k3 (D. Brown, 1966; the order of OpenCV).
+struct Camera {
+    int                   width = 0, height = 0;  ///< of the frames it is about
+    double                fx = 0, fy = 0, cx = 0, cy = 0;  ///< px; the centre of the top left pixel is (0, 0)
+    std::array<double, 5> distortion{};
+    std::string           file;  ///< where it is from
+};
+
+struct CameraProblem {
+    std::uint32_t begin, end;  ///< place in the text
+    std::string   sentence, help;
+};
+
+struct CameraText {
+    Camera                     camera;
+    std::vector<CameraProblem> problems;
+};
+
+/// Reads either of two kinds. An own one:
+///     size 640 480
+///     focal 600 600
+///     centre 319.5 239.5
+///     distortion 0 0 0 0 0          # k1 k2 p1 p2 k3; may be left out
+/// or the YAML that OpenCV's calibration sample writes: image_width, image_height, camera_matrix, distortion_coefficients. Bounded:
+/// whatever the text, it ends. [setup]
+CameraText read_camera(std::string_view text);
+
+}  // namespace hal::vision

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace hal::vision {
+
+enum class Format : std::uint8_t { grey, bgr };  ///< 1 or 3 bytes per pixel
+
+/// The most a frame may have: 64 MiB of colour.
+constexpr int most_wide = 8192, most_high = 8192;
+constexpr std::size_t most_pixels = 22'000'000;
+
+/// A picture and when it was taken. Owned by whoever made it; its memory is used again for the next one.
+struct Frame {
+    int                       width = 0, height = 0;
+    Format                    format = Format::grey;
+    std::int64_t              stamp_ns = 0;  ///< when it was exposed, on the runtime's clock
+    std::uint64_t             number = 0;    ///< counted by the source, those that nobody took included
+    std::vector<std::uint8_t> pixels;        ///< rows without a gap, top left first
+
+    int         channels() const { return format == Format::grey ? 1 : 3; }
+    std::size_t stride() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(channels()); }
+    /// Another size, pixels undefined. False, and nothing done, when it is empty or larger than a frame may be. [any]
+    bool resize(int w, int h, Format f) {
+        if (!fits(w, h)) return false;
+        width = w, height = h, format = f;
+        pixels.resize(stride() * static_cast<std::size_t>(h));
+        return true;
+    }
+    static bool fits(int w, int h) {
+        return w >= 1 && h >= 1 && w <= most_wide && h <= most_high && static_cast<std::size_t>(w) * static_cast<std::size_t>(h) <= most_pixels;
+    }
+    std::uint8_t*       row(int y) { return pixels.data() + stride() * static_cast<std::size_t>(y); }
+    const std::uint8_t* row(int y) const { return pixels.data() + stride() * static_cast<std::size_t>(y); }
+};
+
+/// Colour to grey in place, ITU-R BT.601-7 weights in 1/256; a grey frame stays. [any]
+void to_grey(Frame& frame);
+
+}  // namespace hal::vision

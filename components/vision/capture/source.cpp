@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include "vision/capture/source.hpp"
+
+#include <stdexcept>
+
+namespace hal::vision {
+
+void to_grey(Frame& frame) {
+    if (frame.format == Format::grey) return;
+    const std::size_t count = frame.pixels.size() / 3;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint8_t* const p = frame.pixels.data() + 3 * i;  // never behind the place that is written
+        frame.pixels[i] = static_cast<std::uint8_t>((29 * p[0] + 150 * p[1] + 77 * p[2] + 128) >> 8);
+    }
+    frame.format = Format::grey;
+    frame.pixels.resize(count);
+}
+
+const char* word(Trouble trouble) {
+    static constexpr const char* words[trouble_count] = {"none",  "absent", "refused", "unplugged",  "silent", "damaged",
+                                                         "huge", "black",  "frozen",  "wrong size", "ended"};
+    return words[static_cast<std::size_t>(trouble)];
+}
+
+std::unique_ptr<Source> make_source(const std::string& address, const std::function<std::string(const std::string&)>& find) {
+    Address parsed(address);
+    if (parsed.driver() == "v4l2") return v4l2_source(std::move(parsed));
+    if (parsed.driver() == "frames") return frames_source(std::move(parsed), find);
+    if (parsed.driver() == "sim") return sim_source(std::move(parsed));
+    throw std::invalid_argument("source=" + address + ": there is no source '" + parsed.driver() +
+                                ":'; write v4l2:/dev/video0, frames:FOLDER or sim:SCENE");
+}
+
+}  // namespace hal::vision
