@@ -13,6 +13,7 @@
 #include "components/fieldbus/tdma/plan.hpp"
 #include "components/fieldbus/tdma/rtcfg_frames.hpp"
 #include "components/fieldbus/tdma/station.hpp"
+#include "components/fieldbus/tdma/tunnel.hpp"
 
 namespace {
 
@@ -37,7 +38,8 @@ void frames(std::span<const std::uint8_t> given) {
         require(untunnel(std::span(out).first(n), back) == frame.size(), "what went into the tunnel comes out");
         require(std::memcmp(back.data(), frame.data(), frame.size()) == 0, "as it was");
     }
-    untunnel(frame, out);
+    const std::size_t packet = untunnel(frame, out);
+    require(!is_packet(d, d.to) || packet == frame.size() - rtmac_bytes, "what is a packet has a place in the kernel's longest frame");
     rtcfg::Message m;
     if (!rtcfg::decode(frame, m)) return;
     const std::size_t n = rtcfg::encode(m, out);

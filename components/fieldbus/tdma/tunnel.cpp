@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::uint16_t smallest_type = 0x0600, ipv4 = 0x0800, arp = 0x0806, ipv6 = 0x86dd;
 
+constexpr std::size_t largest_payload = ethernet::largest_frame - ethernet::header_bytes - rtmac_bytes;
+
 bool is_group(const Address& a) noexcept { return (a[0] & 1) != 0; }
 
 /// As long as its own header says (RFC 791, 826, 8200); the padding of a short frame comes behind.
@@ -31,6 +33,7 @@ bool is_whole(std::uint16_t type, std::span<const std::uint8_t> p) noexcept {
 
 bool is_packet(const Decoded& d, const Address& own) noexcept {
     if (d.kind != Kind::tunnelled || (d.to != own && !is_group(d.to)) || d.from == own || is_group(d.from)) return false;
+    if (d.tunnelled.payload.size() > largest_payload) return false;
     const std::uint16_t type = d.tunnelled.type;
     return type >= smallest_type && type != rtmac_type && type != rtcfg_type && type != cane_type && is_whole(type, d.tunnelled.payload);
 }
@@ -45,7 +48,7 @@ void Tunnel::look_at_slot() noexcept {
 }
 
 void Tunnel::arrived(std::span<const std::uint8_t> frame, Time) noexcept {
-    if (frame.size() > ethernet::largest_frame || !is_packet(decode(frame), station_.address())) return count(refused_);
+    if (!is_packet(decode(frame), station_.address())) return count(refused_);
     Packet* place = in_.place();
     if (place == nullptr) return count(dropped_in_);
     std::copy(frame.begin(), frame.end(), place->bytes.begin());
