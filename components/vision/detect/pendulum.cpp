@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+#include "vision/detect/pendulum.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace hal::vision {
+
+namespace {
+
+using Middles = std::array<double, 4>;  // u and v of the pivot's ball, then of the other
+
+/// Where the camera sees the balls. The camera is at (distance, 0, height) and looks at 0; its picture's axes are the world's y, and
+/// (sin tilt, 0, -cos tilt) with tilt the angle it looks down.
+Middles seen_at(const PendulumView& view, double arm, double pendulum) {
+    const double cos = std::cos(arm), sin = std::sin(arm), swing = view.rod_length * std::sin(pendulum);
+    const double place[2][3] = {{view.arm_length * cos, view.arm_length * sin, 0.0},
+                                {view.arm_length * cos - swing * sin, view.arm_length * sin + swing * cos, -view.rod_length * std::cos(pendulum)}};
+    const double tilt = std::atan2(view.height, view.distance), far = std::hypot(view.height, view.distance);
+    Middles      middles{};
+    for (std::size_t i = 0; i < 2; ++i) {
+        const double ahead = std::fmax(far - place[i][0] * std::cos(tilt) - place[i][2] * std::sin(tilt), 0.01);
+        middles[2 * i] = view.middle_u + view.focal_u * place[i][1] / ahead;
+        middles[2 * i + 1] = view.middle_v + view.focal_v * (place[i][0] * std::sin(tilt) - place[i][2] * std::cos(tilt)) / ahead;
+    }
+    return middles;
+}
+
+double squared(const Middles& a, const Middles& b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sum;
+}
+
+}  // namespace
+
+bool fit_pendulum(const PendulumView& view, double pivot_u, double pivot_v, double tip_u, double tip_v, PendulumSeen& seen) {
+    const Middles   measured{pivot_u, pivot_v, tip_u, tip_v};
+    constexpr int   grid = 36;
+    constexpr double step = 2.0 * std::numbers::pi / grid, small = 1e-6;
+    double          best = 1e300, arm = 0.0, pendulum = 0.0;
+    for (int i = 0; i < grid; ++i)
+        for (int j = 0; j < grid; ++j)
+            if (const double off = squared(seen_at(view, i * step, j * step), measured); off < best) best = off, arm = i * step, pendulum = j * step;
+    for (int turn = 0; turn < 12; ++turn) {
+        const Middles at = seen_at(view, arm, pendulum), by_arm = seen_at(view, arm + small, pendulum), by_pendulum = seen_at(view, arm, pendulum + small);
+        double        aa = 1e-9, ap = 0.0, pp = 1e-9, ra = 0.0, rp = 0.0;  // the normal equations
+        for (std::size_t i = 0; i < at.size(); ++i) {
+            const double da = (by_arm[i] - at[i]) / small, dp = (by_pendulum[i] - at[i]) / small, off = measured[i] - at[i];
+            aa += da * da, ap += da * dp, pp += dp * dp, ra += da * off, rp += dp * off;
+        }
+        const double determinant = aa * pp - ap * ap;
+        if (!(determinant > 1e-9)) return false;
+        const double to_arm = (pp * ra - ap * rp) / determinant, to_pendulum = (aa * rp - ap * ra) / determinant;
+        // half the step while it leads away
+        double part = 1.0;
+        while (part > 0.01 && squared(seen_at(view, arm + part * to_arm, pendulum + part * to_pendulum), measured) > squared(at, measured)) part *= 0.5;
+        arm += part * to_arm, pendulum += part * to_pendulum;
+        if (std::fabs(to_arm) + std::fabs(to_pendulum) < 1e-7) break;
+    }
+    seen.arm = std::remainder(arm, 2.0 * std::numbers::pi);
+    seen.pendulum = std::remainder(pendulum, 2.0 * std::numbers::pi);
+    seen.residual = std::sqrt(squared(seen_at(view, arm, pendulum), measured) / 4.0);
+    return std::isfinite(seen.arm + seen.pendulum + seen.residual);
+}
+
+PendulumSeen find_pendulum(const Frame& frame, const PendulumView& view, const PendulumLimits& limits) {
+    PendulumSeen              seen;
+    std::vector<std::uint8_t> weights;
+    weigh(frame, limits.pivot, weights);
+    const auto pivots = find_spots(weights, frame.width, frame.height, limits.threshold, limits.least_area, 1);
+    weigh(frame, limits.tip, weights);
+    const auto tips = find_spots(weights, frame.width, frame.height, limits.threshold, limits.least_area, 1);
+    if (pivots.empty() || tips.empty()) return seen;
+    seen.pivot_ball = pivots[0], seen.tip_ball = tips[0];
+    seen.found = fit_pendulum(view, pivots[0].u, pivots[0].v, tips[0].u, tips[0].v, seen) && seen.residual <= limits.most_residual;
+    return seen;
+}
+
+}  // namespace hal::vision

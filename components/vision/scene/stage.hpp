@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// What a simulated camera looks at: the newest states of a plant, written by the cycle, read by whoever renders them.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace hal::vision::scene {
+
+enum class Kind { furuta, floor, markers };
+
+/// What does not change while a scene stands. Lengths in m, angles in rad.
+struct Settings {
+    Kind          kind = Kind::furuta;
+    int           width = 320, height = 240;
+    double        focal = 280.0;      ///< px; the axis goes through the middle of the picture
+    double        fps = 100.0;
+    std::uint64_t seed = 1;
+    bool          grey = false;
+    double        distance = 1.2;     ///< furuta: from the motor's axis; markers: not used
+    double        camera_height = 0.3;  ///< furuta: above the arm; floor: above the floor
+    double        pitch = 0.6;        ///< floor: how far the camera looks down
+    int           objects = 0;        ///< floor: bottles and cans
+    int           markers = 0;        ///< markers, floor
+};
+
+/// Where in a state what stands. Poses begin at `poses`.
+namespace at {
+constexpr std::size_t light = 0, noise = 1, blur = 2, covered = 3, frozen = 4, unplugged = 5, exposure = 6, delay = 7, poses = 8;
+constexpr std::size_t arm = poses, pendulum = poses + 1;                                       // furuta
+constexpr std::size_t x = poses, y = poses + 1, heading = poses + 2;                            // floor: the robot with the camera
+constexpr std::size_t line_width = poses + 3, line_amplitude = poses + 4, line_length = poses + 5, line_dark = poses + 6, line_gap = poses + 7;
+constexpr std::size_t objects = poses + 8, of_object = 3;                                       // floor: kind (0 none, 1 bottle, 2 can), x, y
+constexpr std::size_t markers = poses, of_marker = 8;                                           // markers: id size x y z roll pitch yaw
+}  // namespace at
+
+constexpr std::size_t most_values = 72, most_objects = 16, most_markers = 8;
+
+/// The state of the scene at a moment of the runtime's clock.
+struct State {
+    std::int64_t                    stamp_ns = 0;
+    std::array<double, most_values> values{};
+
+    double operator[](std::size_t i) const noexcept { return values[i]; }
+};
+
+/// The newest states. One writer, any number of readers.
+///
+/// Each slot is a sequence lock: (1) the writer makes its number odd, (2) writes, (3) makes it even; a reader that sees an odd number, or another
+/// one after it has copied than before, takes the slot as gone. All words are atomic, so a copy that is thrown away is no data race.
+class Stage {
+public:
+    explicit Stage(const Settings& settings) : settings_(settings) {}
+    const Settings& settings() const noexcept { return settings_; }
+
+    /// A state, not older than the one before. [realtime] one writer
+    void put(std::int64_t stamp_ns, std::span<const double> values) noexcept;
+    /// The newest state. False: there is none yet. [any]
+    bool newest(State& to) const noexcept;
+    /// The state at `stamp_ns`, between its two neighbours in a straight line; the oldest or the newest that is known where it lies outside.
+    /// Only poses lie between; of the conditions the earlier are taken. False: there is none yet. [any]
+    bool when(std::int64_t stamp_ns, State& to) const noexcept;
+
+private:
+    static constexpr std::size_t kept = 512;
+    struct Slot {
+        std::atomic<std::uint64_t>                            number{0};
+        std::atomic<std::int64_t>                             stamp{0};
+        std::array<std::atomic<double>, most_values> values{};
+    };
+    bool read(std::uint64_t n, State& to) const noexcept;
+
+    const Settings                          settings_;
+    std::unique_ptr<std::array<Slot, kept>> slots_ = std::make_unique<std::array<Slot, kept>>();
+    std::atomic<std::uint64_t>              count_{0};  // states so far; written by put()
+};
+
+/// Makes the stage known to sim:NAME. Throws std::invalid_argument when there is one of this name. [setup]
+void open(const std::string& name, std::shared_ptr<Stage> stage);
+/// [setup]
+void close(const std::string& name) noexcept;
+/// Null when there is none. [setup] and helper threads
+std::shared_ptr<const Stage> find(const std::string& name);
+
+}  // namespace hal::vision::scene
