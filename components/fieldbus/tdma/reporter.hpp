@@ -12,8 +12,12 @@ namespace hal::tdma {
 class Reporter {
 public:
     /// The schedule outlives it. [setup]
-    Reporter(const std::string& instance, const config::Schedule& schedule)
-        : instance_(instance), schedule_(schedule), told_(instance, [this](const Happened& h) { return words(h); }) {}
+    /// `known_as`: the IP address of a station without a schedule, when it goes by that.
+    Reporter(const std::string& instance, const config::Schedule& schedule, std::string known_as = {})
+        : instance_(instance),
+          schedule_(schedule),
+          known_as_(std::move(known_as)),
+          told_(instance, [this](const Happened& h) { return words(h); }) {}
 
     void start() { told_.start(); }         // [setup]
     void stop() noexcept { told_.stop(); }  // [setup]
@@ -33,6 +37,15 @@ private:
         Address who{};
         Time    value = 0;
     };
+    std::string of_schedule(const Happened& h) const {
+        return schedule_.stations.at(static_cast<std::size_t>(h.value)).name + " (" + ethernet::to_string(h.who) + ")";
+    }
+    std::size_t longest_stage_1() const {
+        std::size_t longest = 0;
+        for (std::size_t i = 0; i < schedule_.stations.size(); ++i)
+            longest = std::max(longest, config::block_of(schedule_, i).size() + (schedule_.stations[i].ip ? 13 : 5));
+        return longest;
+    }
     std::string words(const Happened& h) const {
         const std::string who = called(schedule_, h.who), value = std::to_string(h.value);
         switch (h.event) {
@@ -54,12 +67,41 @@ private:
         case Event::foreign_frame: return who + " sends in slot " + value + " of this station; compare the configurations of both";
         case Event::babbling: return who + " babbles: " + value + " frames in one cycle";
         case Event::master_changed: return "the syncs come from " + who + " now";
+        case Event::master_there:
+            return "there is a master already, " + who + ", so this one does not send; make one of both a backup-master:, then: setp " +
+                   instance_ + ".reset TRUE";
+        case Event::other_schedule:
+            return "the syncs of " + who + " are not followed: " +
+                   (h.value != 0
+                        ? "one comes every " + config::microseconds(h.value) + ", which is not this station's cycle; give both the same"
+                        : "they are of another schedule than those of a second master; one of both has to go");
+        case Event::out_of_step:
+            return "the sync of " + who + " is heard, but this thread is " + config::microseconds(h.value) +
+                   " off and comes no nearer; do the threads of this process follow another instance?";
+        case Event::unconfigured:
+            return "has no schedule and waits for the master of the segment to send it one (RTcfg); the master's file must have a block "
+                   "with '" +
+                   (known_as_.empty() ? "mac " + who : "ip " + known_as_) + "'";
+        case Event::other_server: return "a second RTcfg server, " + who + ", is not listened to; this station has its configuration";
+        case Event::other_configuration:
+            return who +
+                   " sends another configuration than the one in use; it is taken when the sync was lost: stop the master for a moment";
+        case Event::reported_dead: return "the master says that " + who + " is dead";
+        case Event::station_ready: return "station " + of_schedule(h) + " is configured";
+        case Event::station_dead:
+            return "station " + of_schedule(h) + " is dead: no heartbeat for " + std::to_string(2 * schedule_.heartbeat_ms) +
+                   " ms; all were told, and it is invited again";
+        case Event::station_too_long:
+            return "nothing is heard of " + schedule_.stations.at(static_cast<std::size_t>(h.value)).name +
+                   "; if it waits for its configuration: this master's slot 0 is too short for it, " + std::to_string(longest_stage_1()) +
+                   " bytes are needed";
         }
         return {};
     }
 
     const std::string       instance_;
     const config::Schedule& schedule_;
+    const std::string       known_as_;
     hal::Reporter<Happened> told_;  // the last: its thread uses the others
 };
 

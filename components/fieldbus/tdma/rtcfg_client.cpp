@@ -5,8 +5,8 @@
 
 namespace hal::tdma::rtcfg {
 
-Client::Client(Station& station, Logical own, ClientEvents& events, std::size_t most)
-    : station_(station), own_(own), events_(events), file_(most) {}
+Client::Client(Station& station, Logical own, ClientEvents& events, bool wants_file)
+    : station_(station), own_(own), events_(events), wants_file_(wants_file), file_(largest_stage_2) {}
 
 void Client::begin() noexcept {
     step_ = Step::waiting;
@@ -14,11 +14,23 @@ void Client::begin() noexcept {
     said_ = INT64_MIN / 2;
 }
 
+void Client::accept(const Address& server, std::uint16_t heartbeat_ms) noexcept {
+    begin();
+    server_ = server;
+    heartbeat_ms_ = heartbeat_ms;
+    step_ = Step::announcing;
+}
+
 bool Client::send(Message& m) noexcept {
     m.from = station_.address();
     m.client = own_;
     const std::size_t length = encode(m, frame_);
     return length != 0 && station_.send(std::span(frame_).first(length), default_slot, last_priority) == ethernet::Sent::queued;
+}
+
+/// By its IP address where both know one, else by its MAC address.
+bool Client::is_for_us(const Message& m) const noexcept {
+    return own_.by_ip && m.client.by_ip ? m.client == own_ : m.to == station_.address();
 }
 
 /// A part of the file, in its order; one that was lost is asked for again by the acknowledgement of what is there.
@@ -33,38 +45,47 @@ void Client::take(const Message& m, std::span<const std::uint8_t> data, Time now
     if (++since_ >= burst_ || received_ == length_ || m.id == Id::stage_2) acknowledge_ = true;
     if (received_ == length_) {
         step_ = Step::finished;
-        events_.on_stage_2(std::span(file_).first(received_));
+        events_.on_stage_2(file_, received_, server_);
     }
 }
 
 void Client::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
     Message m;
-    if (!decode(frame, m)) return;
+    if (!decode(frame, m)) {
+        ++foreign_;
+        return;
+    }
     switch (m.id) {
     case Id::stage_1:
-        if (m.client.by_ip ? m.client != own_ : m.to != station_.address()) return;
-        if (step_ != Step::waiting && m.from != server_) return;  // two servers: the first has it
-        server_ = m.from;
+        if (!is_for_us(m)) return;
+        if (step_ != Step::waiting && m.from != server_) {  // two servers: the first has it
+            ++foreign_;
+            events_.on_other_server(m.from);
+            return;
+        }
         burst_ = static_cast<std::uint8_t>(std::clamp<unsigned>(m.burst, 1, 4));
-        step_ = Step::announcing;  // a server that restarted invites again
-        said_ = INT64_MIN / 2;
-        events_.on_stage_1(m.data);
-        break;
+        events_.on_stage_1(m.data, m.from);
+        return;
     case Id::stage_2:
-        if (step_ != Step::announcing || m.from != server_ || m.to != station_.address() || m.length > file_.size()) return;
-        length_ = m.length, received_ = 0, since_ = 0;
-        heartbeat_ms_ = m.heartbeat_ms;
-        step_ = Step::receiving;
-        take(m, m.data, now);
+        if (step_ == Step::announcing && wants_file_ && m.from == server_ && m.to == station_.address() && m.length <= file_.size()) {
+            length_ = m.length, received_ = 0, since_ = 0;
+            heartbeat_ms_ = m.heartbeat_ms;
+            step_ = Step::receiving;
+            take(m, m.data, now);
+            return;
+        }
         break;
     case Id::stage_2_fragment:
-        if (step_ != Step::receiving || m.from != server_) return;
-        take(m, m.data, now);
+        if (step_ == Step::receiving && m.from == server_ && m.to == station_.address()) return take(m, m.data, now);
+        if (step_ >= Step::finished && m.from == server_) return acknowledge_ = true, void();  // its acknowledgement was lost
         break;
-    case Id::announce_new: reply_to_ = m.from, reply_ = true; break;
-    case Id::dead_station: events_.on_dead_station(m.dead); break;
-    default: break;
+    case Id::announce_new: reply_to_ = m.from, reply_ = configured(); return;
+    case Id::dead_station:
+        if (configured() && m.from == server_) return events_.on_dead_station(m.dead);
+        break;
+    default: return;  // between others
     }
+    ++foreign_;
 }
 
 void Client::before_slots(Time now) noexcept {
@@ -78,25 +99,30 @@ void Client::before_slots(Time now) noexcept {
     case Step::waiting: break;
     case Step::announcing:
         if (!late) break;
-        m.id = Id::announce_new, m.to = ethernet::broadcast, m.flags = wants_stage_2, m.burst = burst_;
-        if (send(m)) said_ = now;
+        m = {};
+        m.id = Id::announce_new, m.to = ethernet::broadcast, m.flags = wants_file_ ? wants_stage_2 : is_ready, m.burst = burst_;
+        if (!send(m)) break;
+        said_ = now;
+        if (!wants_file_) step_ = Step::finished;
         break;
     case Step::receiving:
     case Step::finished:
+    case Step::ready:
         if (acknowledge_ || (late && step_ == Step::receiving)) {
+            m = {};
             m.id = Id::acknowledge, m.to = server_, m.length = received_;
             if (!send(m)) break;
             acknowledge_ = false, since_ = 0, said_ = now;
         }
         if (step_ == Step::receiving) break;
         m = {};
-        m.id = Id::ready, m.to = ethernet::broadcast;
-        if (send(m)) step_ = Step::ready, said_ = now;
-        break;
-    case Step::ready:
-        if (heartbeat_ms_ == 0 || now - said_ < static_cast<Time>(heartbeat_ms_) * 1'000'000) break;
-        m.id = Id::heartbeat, m.to = server_;
-        if (send(m)) said_ = now;
+        if (step_ == Step::finished) {
+            m.id = Id::ready, m.to = ethernet::broadcast;
+            if (send(m)) step_ = Step::ready, said_ = now;
+        } else if (heartbeat_ms_ != 0 && now - said_ >= static_cast<Time>(heartbeat_ms_) * 1'000'000) {
+            m.id = Id::heartbeat, m.to = server_;
+            if (send(m)) said_ = now;
+        }
         break;
     }
 }

@@ -10,47 +10,74 @@ Server::Server(Station& station, Logical own, std::vector<ClientSetup> clients, 
     for (ClientSetup& c : clients) clients_.emplace_back().setup = std::move(c);
 }
 
+void Server::begin() noexcept {
+    for (Client& c : clients_) {
+        if (c.learnt) c.setup.mac = {};
+        const ClientSetup setup = std::move(c.setup);
+        c = {};
+        c.setup = setup;
+    }
+    ready_ = 0, foreign_ = 0, began_ = INT64_MIN;
+}
+
 void Server::become(Client& c, ClientState state) noexcept {
     if (c.state == state) return;
     c.state = state;
-    if (events_ != nullptr) events_->on_client(static_cast<std::size_t>(&c - clients_.data()), state);
+    ready_ = static_cast<std::uint32_t>(
+        std::count_if(clients_.begin(), clients_.end(), [](const Client& o) { return o.state == ClientState::ready; }));
+    if (events_ != nullptr) events_->on_client(static_cast<std::size_t>(&c - clients_.data()), state, c.setup.mac);
 }
 
+/// Who sent it; by its IP address only where that is all that is known, or the one that had it is gone.
 Server::Client* Server::find(const Message& m) noexcept {
-    const auto found = std::find_if(clients_.begin(), clients_.end(), [&](const Client& c) {
-        return c.setup.mac == m.from ||
-               (c.setup.mac == Address{} && m.id == Id::announce_new && m.client.by_ip && m.client == c.setup.logical);
-    });
-    return found == clients_.end() ? nullptr : &*found;
+    for (Client& c : clients_)
+        if (c.setup.mac == m.from) return &c;
+    if (m.id != Id::announce_new || !m.client.by_ip) return nullptr;
+    for (Client& c : clients_) {
+        const bool open = c.setup.mac == Address{} || (c.learnt && (c.state == ClientState::dead || c.state == ClientState::searching));
+        if (!open || m.client != c.setup.logical) continue;
+        c.learnt = true;
+        c.setup.mac = m.from;
+        return &c;
+    }
+    return nullptr;
+}
+
+void Server::heard(const Address& from, Time now) noexcept {
+    for (Client& c : clients_)
+        if (c.setup.mac == from) c.seen = now;
 }
 
 void Server::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
     Message m;
-    if (!decode(frame, m)) return;
-    Client* c = find(m);
-    if (c == nullptr) return;
+    Client* c = decode(frame, m) ? find(m) : nullptr;
+    if (c == nullptr || !take(*c, m, now)) ++foreign_;
+}
+
+bool Server::take(Client& c, const Message& m, Time now) noexcept {
     switch (m.id) {
     case Id::announce_new:
-        c->setup.mac = m.from;
-        c->heard = now;
-        c->burst = static_cast<std::uint8_t>(std::clamp<unsigned>(m.burst, 1, 4));
-        c->acknowledged = c->sent = 0;
-        c->began = false;
-        become(*c, (m.flags & wants_stage_2) != 0 ? ClientState::configuring : ClientState::ready);
-        c->left = 1;  // the stage 2 frame itself
-        break;
+        c.heard = now;
+        c.burst = static_cast<std::uint8_t>(std::clamp<unsigned>(m.burst, 1, 4));
+        c.sent = 0;
+        c.began = c.restart = false;
+        c.left = 1;  // the stage 2 frame itself
+        become(c, (m.flags & wants_stage_2) != 0 ? ClientState::configuring : ClientState::ready);
+        return true;
     case Id::acknowledge:
-        if (c->state != ClientState::configuring || m.length > c->setup.stage_2.size()) break;
-        c->heard = now;
-        c->acknowledged = c->sent = m.length;
-        c->left = c->burst;
-        break;
+        if (c.state != ClientState::configuring || m.length > c.sent) return c.state == ClientState::ready;  // twice: no harm
+        c.heard = now;
+        c.sent = m.length;
+        c.left = c.burst;
+        return true;
     case Id::ready:
-        c->heard = now;
-        become(*c, ClientState::ready);
-        break;
-    case Id::heartbeat: c->heard = now; break;
-    default: break;
+    case Id::heartbeat:
+        c.heard = now;
+        if (c.state == ClientState::searching || c.state == ClientState::dead) c.restart = true;
+        else become(c, ClientState::ready);  // a heartbeat: the frame that said so was lost
+        return true;
+    case Id::announce_reply: return true;
+    default: return false;  // a server's: there is another one
     }
 }
 
@@ -85,7 +112,28 @@ bool Server::send_stage_2(Client& c) noexcept {
     return true;
 }
 
+/// True: a frame was queued.
+bool Server::invite(Client& c, Time now) noexcept {
+    if (c.state != ClientState::searching && c.state != ClientState::dead) return false;
+    if (now - c.invited < invitation || (now - c.seen < invitation && !c.restart)) return false;
+    Message m;
+    m.id = Id::stage_1, m.to = c.setup.mac == Address{} ? ethernet::broadcast : c.setup.mac;
+    m.client = c.setup.logical, m.server = own_;
+    m.data = std::span(reinterpret_cast<const std::uint8_t*>(c.setup.stage_1.data()), c.setup.stage_1.size());
+    if (stage_1_bytes(m) > station_.room(default_slot)) {
+        if (!c.told_too_long && now - std::max(c.seen, began_) > long_silence && events_ != nullptr) {
+            c.told_too_long = true;
+            events_->on_too_long(static_cast<std::size_t>(&c - clients_.data()));
+        }
+        return false;
+    }
+    c.invited = now;
+    c.restart = false;
+    return send(m);
+}
+
 void Server::before_slots(Time now) noexcept {
+    if (began_ == INT64_MIN) began_ = now;
     const Time silence = 2 * static_cast<Time>(heartbeat_ms_) * 1'000'000;
     for (Client& c : clients_) {
         if (c.state != ClientState::ready || heartbeat_ms_ == 0 || now - c.heard <= silence + 1'000'000) continue;
@@ -98,16 +146,8 @@ void Server::before_slots(Time now) noexcept {
     for (std::size_t i = 0; i < clients_.size(); ++i) {
         Client& c = clients_[next_++ % clients_.size()];
         if (c.state == ClientState::configuring && c.left != 0 && send_stage_2(c)) return;
-        const bool stuck = c.state == ClientState::configuring && now - c.heard > 5 * invitation;
-        if (stuck) become(c, ClientState::searching);
-        if ((c.state != ClientState::searching && c.state != ClientState::dead) || now - c.invited < invitation) continue;
-        c.invited = now;
-        Message m;
-        m.id = Id::stage_1, m.to = c.setup.mac == Address{} ? ethernet::broadcast : c.setup.mac;
-        m.client = c.setup.logical, m.server = own_;
-        m.data = std::span(reinterpret_cast<const std::uint8_t*>(c.setup.stage_1.data()), c.setup.stage_1.size());
-        send(m);
-        return;
+        if (c.state == ClientState::configuring && now - c.heard > 5 * invitation) become(c, ClientState::searching);
+        if (invite(c, now)) return;
     }
 }
 

@@ -35,9 +35,10 @@ struct StationSetup {
     std::uint32_t          rounds = 100;        ///< of a calibration, at most 250
     std::uint32_t          listen_cycles = 3;   ///< of a master before it begins
     std::uint32_t          speed = 100;         ///< of the line, Mbit/s
-    std::uint32_t          babble_limit = 0;    ///< frames of one station in a cycle that are too many; 0: twice its share, at least 32
+    std::uint32_t          babble_limit = 0;    ///< frames of one station in a cycle that are too many; 0: 65
     std::size_t            queue = 32;          ///< frames that may wait for a slot
     std::size_t            room_for_slots = 0;  ///< as many may come by reconfigure()
+    bool                   configured = true;   ///< false: it hears RTcfg only, until reconfigure()
     std::vector<SlotSetup> slots{};             ///< at most 16, with different ids
 };
 
@@ -46,7 +47,8 @@ enum class State : std::uint8_t {
     synchronising, ///< estimates the clock
     calibrating,   ///< measures the way to the master and back
     running,       ///< may use its slots
-    withdrawn,     ///< a master that found another, with a smaller address; until reset()
+    withdrawn,     ///< a master that found another, there before it or with a smaller address; until reset()
+    unconfigured,  ///< it has no schedule yet: reconfigure()
 };
 const char* word(State) noexcept;
 
@@ -64,6 +66,18 @@ enum class Event : std::uint8_t {
     foreign_frame,  ///< somebody else sends in a slot of this station; who; value: the slot's id
     babbling,       ///< a station sends much more than it may; who; value: frames in a cycle
     master_changed, ///< who: the new one
+    master_there,   ///< this master found another before it sent anything, and does not; until reset(). who
+    other_schedule, ///< syncs come, but not in this station's schedule. who; value: ns from one to the next, 0: as it should be
+    out_of_step,    ///< the sync is followed, but this thread does not come to it. who; value: ns it is off
+
+    // of RTcfg
+    unconfigured,        ///< it waits for its schedule
+    other_server,        ///< a second server; not listened to. who
+    other_configuration, ///< the server sends another schedule while this one is in use; not taken. who
+    reported_dead,       ///< by the server. who: the station
+    station_ready,       ///< a station has what this server gave it. who; value: the server's number of it
+    station_dead,        ///< its heartbeat ended. who; value: the same
+    station_too_long,    ///< what it is to be given does not fit in this server's slot 0. value: the same
 };
 
 /// [realtime] called by receive() and transmit()

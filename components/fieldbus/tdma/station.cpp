@@ -8,7 +8,7 @@
 namespace hal::tdma {
 
 const char* word(State state) noexcept {
-    constexpr const char* words[] = {"listening", "synchronising", "calibrating", "running", "withdrawn"};
+    constexpr const char* words[] = {"listening", "synchronising", "calibrating", "running", "withdrawn", "unconfigured"};
     return words[static_cast<std::size_t>(state)];
 }
 
@@ -59,6 +59,7 @@ bool Station::reconfigure(const StationSetup& s) noexcept {
     setup_.guard = s.guard;
     setup_.lost_limit = s.lost_limit, setup_.rounds = s.rounds, setup_.speed = s.speed, setup_.babble_limit = s.babble_limit;
     setup_.slots.assign(s.slots.begin(), s.slots.end());  // its memory was reserved
+    setup_.configured = true;
     begin();
     return true;
 }
@@ -67,6 +68,7 @@ void Station::begin() noexcept {
     const Counters kept = status_.count;
     status_ = {};
     status_.count = kept;
+    if (!setup_.configured) status_.state = State::unconfigured;
     clock_.clear();
     watch_.clear();
     for (Pending& p : pending_) p.used = false;

@@ -30,6 +30,8 @@ public:
     virtual void arrived(std::span<const std::uint8_t> frame, Time now) noexcept = 0;
     /// Before the slots are filled: it may send(). [realtime]
     virtual void before_slots(Time now) noexcept = 0;
+    /// A frame of any kind came from there. [realtime]
+    virtual void heard(const Address&, Time /*now*/) noexcept {}
 };
 
 class Station final : public ethernet::Discipline {

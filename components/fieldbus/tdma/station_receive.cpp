@@ -43,6 +43,8 @@ void Station::take(const ethernet::Arrival& arrival, Time now) noexcept {
     Decoded d = decode(frame);
     if (d.from == address_) return;
     watch_.heard(d.from, arrival.time_ns, setup_.cycle);
+    if (rtcfg_ != nullptr) rtcfg_->heard(d.from, now);
+    if (status_.state == State::unconfigured && d.kind != Kind::none) return;
     switch (d.kind) {
     case Kind::sync: take_sync(d, arrival.time_ns, now); return;
     case Kind::request:
@@ -191,11 +193,11 @@ void Station::take_reply(const Decoded& d, Time arrived, Time now) noexcept {
 void Station::look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
     if (status_.state != State::running || !status_.calibrated || own_schedule_) return;
     constexpr Time tolerance = 2'000;
-    const Time longer = 2 * (wire(frame.size()) - wire(0));  // stored and forwarded once
-    const Time into = clock_.global(arrived) - status_.delay - longer - start_;
-    const Time cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
-    const auto cycle = number_ + static_cast<std::uint32_t>(cycles);
-    const Time at = into - cycles * setup_.cycle;
+    const Time     longer = 2 * (wire(frame.size()) - wire(0));  // stored and forwarded once
+    const Time     into = clock_.global(arrived) - status_.delay - longer - start_;
+    const Time     cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
+    const auto     cycle = number_ + static_cast<std::uint32_t>(cycles);
+    const Time     at = into - cycles * setup_.cycle;
     for (const Slot& s : slots_) {
         const SlotSetup& slot = s.setup();
         if (!s.used_in(cycle) || at < slot.offset - tolerance || at > slot.offset + wire(ethernet::header_bytes + slot.size) + tolerance)
@@ -264,7 +266,8 @@ void Station::count_silence(Time now) noexcept {
             advance(now);
         }
         return;
-    case State::withdrawn: return;
+    case State::withdrawn:
+    case State::unconfigured: return;
     case State::synchronising:
         if (clock_.settled() && std::abs(status_.error) < setup_.cycle / 16) {
             status_.synchronous = true;

@@ -2,9 +2,12 @@
 // A station that knows only its MAC or IP address gets its schedule and a file from the server.
 #include <gtest/gtest.h>
 
-#include "components/fieldbus/tdma/config.hpp"
-#include "components/fieldbus/tdma/rtcfg_client.hpp"
-#include "components/fieldbus/tdma/rtcfg_server.hpp"
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "components/fieldbus/tdma/rtcfg_applicant.hpp"
+#include "components/fieldbus/tdma/rtcfg_service.hpp"
 #include "wire.hpp"
 
 namespace tdma_tests {
@@ -14,26 +17,33 @@ constexpr Time ms = 1'000'000;
 constexpr const char* text = R"(
 master:
 cycle 1000
+heartbeat 100
 slot 0 50
 slave:
 name x
 mac 02:00:00:00:00:02
+stage2 x.cfg
 slot 0 300
 slave:
 name y
 ip 10.0.0.3
-slot 0 600
+slot 0 600 1/1 100
+slot 2 700
 )";
 
-struct Listener final : rtcfg::ClientEvents, rtcfg::ServerEvents {
-    void on_stage_1(std::span<const std::uint8_t> data) noexcept override { stage_1.assign(data.begin(), data.end()); }
-    void on_stage_2(std::span<const std::uint8_t> data) noexcept override { stage_2.assign(data.begin(), data.end()), ++files; }
-    void on_dead_station(const Address& who) noexcept override { dead = who; }
-    void on_client(std::size_t client, rtcfg::ClientState state) noexcept override { last[client] = state; }
-    std::string stage_1, stage_2;
-    int files = 0;
-    Address dead{};
-    std::map<std::size_t, rtcfg::ClientState> last;
+/// A station that knows only its address, with what its component does for it; its helper has its turn behind each cycle.
+struct Newcomer {
+    Newcomer(Machine& m, rtcfg::Logical own, std::string file)
+        : machine(m), applicant("tdma." + std::to_string(m.port.address()[5]), m.station, own, std::move(file), m) {
+        m.station.accompany(&applicant.client(), nullptr);
+        m.in_cycle = [this](Machine&) {
+            applicant.work();
+            configured += applicant.cycle() ? 1 : 0;
+        };
+    }
+    Machine& machine;
+    rtcfg::Applicant applicant;
+    int configured = 0;
 };
 
 struct Cell : Bed {
@@ -41,88 +51,219 @@ struct Cell : Bed {
     Machine& m;
     Machine& x;
     Machine& y;
-    Listener at_m, at_x, at_y;
-    std::string file;
-    std::unique_ptr<rtcfg::Server> server;
-    rtcfg::Client client_x, client_y;
+    std::string file, path = testing::TempDir() + "tdma_rtcfg_" + std::to_string(getpid());
+    std::unique_ptr<rtcfg::Service> service;
+    Newcomer at_x, at_y;
 
     static StationSetup unknown() {
         StationSetup s;
         s.room_for_slots = most_slots;
+        s.configured = false;
         return s;
     }
     Cell()
-        : m(add(1, config::setup_of(reading.schedule, 0))), x(add(2, unknown())), y(add(3, unknown())), client_x(x.station, {}, at_x),
-          client_y(y.station, {true, {10, 0, 0, 3}}, at_y) {
+        : m(add(1, config::setup_of(reading.schedule, 0))),
+          x(add(2, unknown())),
+          y(add(3, unknown())),
+          at_x(x, {}, path),
+          at_y(y, {true, {10, 0, 0, 3}}, "") {
         for (int i = 0; i < 3000; ++i) file += static_cast<char>('a' + i % 26);
-        std::vector<rtcfg::Server::ClientSetup> clients(2);
-        clients[0] = {mac(2), {}, config::block_of(reading.schedule, 1), file};
-        clients[1] = {{}, {true, {10, 0, 0, 3}}, config::block_of(reading.schedule, 2), ""};
-        server = std::make_unique<rtcfg::Server>(m.station, rtcfg::Logical{true, {10, 0, 0, 1}}, clients, std::uint16_t{100}, &at_m);
-        m.station.accompany(server.get(), nullptr);
-        x.station.accompany(&client_x, nullptr);
-        y.station.accompany(&client_y, nullptr);
-        for (auto [machine, listener] : {std::pair{&x, &at_x}, {&y, &at_y}})
-            machine->in_cycle = [known = std::string(), listener](Machine& me) mutable {
-                if (listener->stage_1 == known) return;
-                known = listener->stage_1;
-                const auto block = config::read(known);
-                if (!block.good()) return;  // not from our server
-                EXPECT_TRUE(me.station.reconfigure(config::setup_of(block.schedule, 0)));
-            };
+        const auto read = [this](const std::string& name, std::string& bytes) {
+            EXPECT_EQ("x.cfg", name);
+            return bytes = file, true;
+        };
+        service = std::make_unique<rtcfg::Service>(m.station, reading.schedule, 0, read, m);
+        m.station.accompany(&service->server(), nullptr);
+        std::remove(path.c_str());
     }
+    ~Cell() { std::remove(path.c_str()); }
+    rtcfg::ClientState state(std::size_t client) const { return service->server().state(client); }
+    std::string received() const {
+        std::string bytes;
+        return config::read_from_disk(path, bytes) ? bytes : "";
+    }
+    void inject(rtcfg::Message message, int from, Time at) {
+        message.from = mac(from);
+        std::vector<std::uint8_t> frame(ethernet::largest_frame);
+        frame.resize(rtcfg::encode(message, frame));
+        wire.inject(frame, from, at);
+    }
+};
+
+/// What is said on standard error while it lives.
+struct Said {
+    Said() { testing::internal::CaptureStderr(); }
+    std::string text() { return testing::internal::GetCapturedStderr(); }
 };
 
 TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
     Cell cell;
+    Said said;
     cell.run(4000 * ms);
+    EXPECT_EQ(
+        "tdma.2: configured by 02:00:00:00:00:01: it is station x with 1 slot, the cycle is 1000 us\n"
+        "tdma.3: configured by 02:00:00:00:00:01: it is station y with 2 slots, the cycle is 1000 us\n"
+        "tdma.2: the file from 02:00:00:00:00:01, 3000 bytes, is in '" +
+            cell.path + "'\n",
+        said.text());
     EXPECT_TRUE(cell.x.station.ready() && cell.y.station.ready());
     EXPECT_EQ(300'000, cell.x.station.setup().slots.at(0).offset);
     EXPECT_EQ(600'000, cell.y.station.setup().slots.at(0).offset);
-    EXPECT_EQ(cell.file, cell.at_x.stage_2);
-    EXPECT_EQ(1, cell.at_x.files);
-    EXPECT_TRUE(cell.client_x.complete() && cell.client_y.complete());
-    EXPECT_EQ(rtcfg::ClientState::ready, cell.server->state(0));
-    EXPECT_EQ(rtcfg::ClientState::ready, cell.server->state(1));
+    EXPECT_EQ(2U, cell.y.station.setup().slots.at(1).id);
+    EXPECT_EQ("y", cell.at_y.applicant.accepted()->schedule.stations.at(0).name);
+    EXPECT_EQ(cell.file, cell.received());
+    EXPECT_EQ(3000U, cell.at_x.applicant.file_bytes());
+    EXPECT_TRUE(cell.at_x.applicant.client().complete() && cell.at_y.applicant.client().complete());
+    EXPECT_EQ(rtcfg::ClientState::ready, cell.state(0));
+    EXPECT_EQ(rtcfg::ClientState::ready, cell.state(1));
+    EXPECT_EQ(2U, cell.service->server().ready());
+    EXPECT_EQ(0U, cell.service->server().foreign() + cell.at_x.applicant.foreign() + cell.at_y.applicant.foreign());
+}
+
+TEST(Rtcfg_server, does_not_ask_a_station_that_is_at_work) {
+    Cell cell;
+    Said said;
+    cell.x.in_cycle = nullptr;
+    cell.x.station.accompany(nullptr, nullptr);
+    ASSERT_TRUE(cell.x.station.reconfigure(config::setup_of(cell.reading.schedule, 1)));  // a file of its own
+    cell.run(3000 * ms);
+    ASSERT_TRUE(cell.x.station.ready());
+    cell.x.in_cycle = [](Machine& me) {
+        std::array<std::uint8_t, 60> frame{0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 2, 0, 0, 0, 0, 2, 0x90, 0x23};
+        me.station.send(frame, 0, 0);
+    };
+    cell.run(2000 * ms);
+    int invitations = 0;
+    cell.wire.fault = [&](Wire::Frame& f) {
+        rtcfg::Message message;
+        if (rtcfg::decode(f.bytes, message) && message.id == rtcfg::Id::stage_1) ++invitations;
+        return true;
+    };
+    cell.run(5000 * ms);
+    EXPECT_EQ(0, invitations);
+    said.text();
 }
 
 TEST(Rtcfg_server, notices_a_dead_station_and_configures_it_again) {
     Cell cell;
+    Said said;
     cell.run(4000 * ms);
     cell.x.off = cell.x.port.cut = true;
     cell.run(400 * ms);
-    EXPECT_EQ(rtcfg::ClientState::dead, cell.at_m.last[0]);
-    EXPECT_EQ(mac(2), cell.at_y.dead) << "all are told";
+    EXPECT_EQ(rtcfg::ClientState::dead, cell.state(0));
+    EXPECT_EQ(1U, cell.service->dead());
+    EXPECT_EQ(1, cell.m.events[Event::station_dead]);
+    EXPECT_EQ(mac(2), cell.y.last_who[Event::reported_dead]) << "all are told";
     cell.x.off = cell.x.port.cut = false;  // power-cycled
-    cell.client_x.begin();
+    cell.at_x.applicant.begin();
     cell.x.next = cell.x.port.clock().local(cell.now);
     cell.run(4000 * ms);
-    EXPECT_EQ(rtcfg::ClientState::ready, cell.server->state(0));
-    EXPECT_EQ(2, cell.at_x.files);
+    EXPECT_EQ(rtcfg::ClientState::ready, cell.state(0));
+    EXPECT_EQ(0U, cell.service->dead());
+    EXPECT_EQ(2, cell.m.events[Event::station_ready] - 1) << "x twice, y once";
+    EXPECT_EQ(2, cell.at_x.configured);
+    said.text();
+}
+
+TEST(Rtcfg_server, that_began_anew_finds_the_stations_that_run) {
+    Cell cell;
+    Said said;
+    cell.run(4000 * ms);
+    cell.service->begin();
+    EXPECT_EQ(0U, cell.service->server().ready());
+    cell.run(4000 * ms);
+    EXPECT_EQ(2U, cell.service->server().ready());
+    EXPECT_EQ(1, cell.at_x.configured) << "the same configuration changes nothing";
+    EXPECT_EQ(0, cell.x.events[Event::sync_lost]);
+    said.text();
 }
 
 TEST(Rtcfg_server, repeats_what_was_lost) {
     Cell cell;
+    Said said;
     cell.wire.fault = [&cell](Wire::Frame& f) { return f.bytes[13] != 0x22 || cell.wire.random() % 4 != 0; };
     cell.run(30'000 * ms);
-    EXPECT_EQ(cell.file, cell.at_x.stage_2);
-    EXPECT_TRUE(cell.client_x.configured());
+    EXPECT_EQ(cell.file, cell.received());
+    EXPECT_EQ(2U, cell.service->server().ready());
+    said.text();
+}
+
+TEST(Rtcfg_server, says_that_its_slot_is_too_short_when_nothing_is_heard_of_a_station) {
+    Cell cell;
+    StationSetup small = config::setup_of(cell.reading.schedule, 0);
+    small.slots[0].size = 100;
+    ASSERT_TRUE(cell.m.station.reconfigure(small));
+    cell.run(20'000 * ms);
+    EXPECT_EQ(2, cell.m.events[Event::station_too_long]);
+    EXPECT_EQ(State::unconfigured, cell.x.status().state);
+    EXPECT_EQ(0, cell.x.events[Event::running]);
+}
+
+TEST(Rtcfg_client, takes_nothing_from_a_second_server_and_no_other_configuration_while_it_runs) {
+    Cell cell;
+    Said said;
+    cell.run(4000 * ms);
+    ASSERT_TRUE(cell.x.station.ready());
+    const std::string other = "cycle 2000\nslave:\nslot 0 900\n";
+    rtcfg::Message m;
+    m.id = rtcfg::Id::stage_1, m.to = mac(2);
+    m.data = std::span(reinterpret_cast<const std::uint8_t*>(other.data()), other.size());
+    for (int i = 0; i < 5; ++i) cell.inject(m, 9, cell.now + (2 * i + 1) * ms);
+    cell.run(20 * ms);
+    EXPECT_EQ(1, cell.x.events[Event::other_server]);
+    EXPECT_EQ(mac(9), cell.x.last_who[Event::other_server]);
+    for (int i = 0; i < 5; ++i) cell.inject(m, 1, cell.now + (2 * i + 1) * ms);  // as if from the master
+    cell.run(20 * ms);
+    EXPECT_EQ(1, cell.x.events[Event::other_configuration]);
+    EXPECT_EQ(10U, cell.at_x.applicant.foreign());
+    EXPECT_TRUE(cell.x.station.ready());
+    EXPECT_EQ(300'000, cell.x.station.setup().slots.at(0).offset);
+    said.text();
+}
+
+TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
+    Cell cell;
+    Said said;
+    cell.m.off = true;
+    const std::string wrong = "cycle 1000\nslave:\nslott 0 900\n";
+    rtcfg::Message m;
+    m.id = rtcfg::Id::stage_1, m.to = mac(2);
+    m.data = std::span(reinterpret_cast<const std::uint8_t*>(wrong.data()), wrong.size());
+    for (int i = 0; i < 5; ++i) cell.inject(m, 9, 10 * ms + i * 5 * ms);
+    cell.run(100 * ms);
+    EXPECT_EQ(
+        "tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:3:1: error: there is no key 'slott'; "
+        "did you mean 'slot'?; this station waits for another\n",
+        said.text());
+    EXPECT_EQ(State::unconfigured, cell.x.status().state);
+    EXPECT_EQ(5U, cell.at_x.applicant.foreign());
+    Said again;
+    cell.m.off = false;
+    cell.m.next = cell.m.port.clock().local(cell.now);
+    cell.run(4000 * ms);
+    EXPECT_TRUE(cell.x.station.ready());
+    again.text();
 }
 
 TEST(Rtcfg_client, survives_whatever_comes) {
     Cell cell;
+    Said said;
     for (int i = 0; i < 20'000; ++i) {
         std::vector<std::uint8_t> frame(14 + cell.wire.random() % 80);
         for (auto& byte : frame) byte = static_cast<std::uint8_t>(cell.wire.random());
-        std::fill_n(frame.begin(), 6, std::uint8_t{0xff});
+        std::copy_n((i % 3 == 0 ? mac(2) : i % 3 == 1 ? mac(1) : ethernet::broadcast).begin(), 6, frame.begin());
         frame[12] = 0x90, frame[13] = 0x22;
-        if (i % 2 == 0) std::copy_n(mac(1).begin(), 6, frame.begin() + 6);
+        if (i % 2 == 0) std::copy_n(mac(1 + i / 2 % 2).begin(), 6, frame.begin() + 6);
         if (frame.size() > 14) frame[14] = static_cast<std::uint8_t>((i % 9 == 0 ? 1 : i % 9));
         cell.wire.inject(std::move(frame), 9, 10 * ms + Time{i} * 150'000);
     }
     cell.run(8000 * ms);
     EXPECT_TRUE(cell.x.station.ready());
-    EXPECT_LE(cell.at_x.stage_2.size(), 65536U);
+    EXPECT_EQ(300'000, cell.x.station.setup().slots.at(0).offset);
+    EXPECT_EQ(1, cell.at_x.configured);
+    EXPECT_EQ(0, cell.x.events[Event::sync_lost]);
+    EXPECT_GT(cell.at_x.applicant.foreign() + cell.service->server().foreign(), 1000U);
+    said.text();
 }
 
 }  // namespace

@@ -7,8 +7,11 @@
 
 #include "fieldbus/tdma/config.hpp"
 #include "fieldbus/tdma/reporter.hpp"
+#include "fieldbus/tdma/rtcfg_applicant.hpp"
+#include "fieldbus/tdma/rtcfg_service.hpp"
 #include "fieldbus/tdma/station.hpp"
 #include "fieldbus/tdma/tap.hpp"
+#include "hal/background.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
 #include "hal/naming.hpp"
@@ -22,34 +25,16 @@ namespace ethernet = hal::ethernet;
 /// The first instance of the process disciplines its threads' clock; the others, if there are any, share these threads.
 std::atomic<const void*> leading_instance{nullptr};  // written in start and stop
 
-/// Faults in words, made before the first cycle.
-struct FaultWords {
-    std::string                                   sync_lost, other_master, withdrew, babbling, uncalibrated, period;
-    std::vector<std::pair<unsigned, std::string>> foreign;  // by slot
-
-    explicit FaultWords(const StationSetup& s) {
-        const std::string limit = std::to_string(s.lost_limit) + (s.lost_limit == 1 ? " cycle" : " cycles");
-        sync_lost = "no sync for {} s (limit " + limit + "); the station is silent and its slots are empty";
-        other_master = "there is a second master on the segment with a schedule of its own";
-        withdrew = "this master found another with a smaller address; it is silent until its pin reset is set";
-        babbling = "a station sends {} frames in one cycle";
-        uncalibrated = "{} calibration requests were not answered; they are repeated";
-        period = "the thread's period is {} us, the configuration's cycle is " + config::microseconds(s.cycle) +
-                 "; nothing is sent: make them equal";
-        for (const SlotSetup& slot : s.slots)
-            foreign.emplace_back(slot.id, "another station sends in slot " + std::to_string(slot.id) + " of this one");
-    }
-};
-
 class Tdma : public hal::Component, private Events {
 public:
     explicit Tdma(const hal_host* host) : Component(host), name_(name_of(host)) {
         load();
         station_ = std::make_unique<Station>(setup_, static_cast<Events*>(this));
-        words_ = std::make_unique<FaultWords>(setup_);
+        own_words_ = std::make_unique<FaultWords>(setup_);
+        join_rtcfg();
         waiting_.emplace(*this, transmit_, "slot-#.waiting", static_cast<std::int64_t>(setup_.slots.size()),
                          "frames that wait for the #th slot of the configuration");
-        reporter_ = std::make_unique<Reporter>(name_, schedule_);
+        reporter_ = std::make_unique<Reporter>(name_, schedule_, own_ip_ ? config::to_string(*own_ip_) : std::string());
     }
 
     void start() {
@@ -57,14 +42,18 @@ public:
         ethernet::Options options;
         options.types.assign(Station::types.begin(), Station::types.end());
         options.pacer = link_.get().starts_with("eth:");
-        if (entry_ && entry_->mac && link_.get().starts_with("sim:")) options.address = *entry_->mac;
+        const auto wanted = entry_ ? entry_->mac : own_mac_;
+        if (wanted && link_.get().starts_with("sim:")) options.address = *wanted;
         auto opened = ethernet::open(link_.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
+        if (own_mac_ && opened.port->address() != *own_mac_)
+            throw std::runtime_error(link_.get() + " has the address " + ethernet::to_string(opened.port->address()) +
+                                     ", not that of station=" + station_argument_.get() + "; write station=auto");
         if (entry_ && entry_->mac && opened.port->address() != *entry_->mac)
             throw std::runtime_error(link_.get() + " has the address " + ethernet::to_string(opened.port->address()) +
                                      ", the configuration gives " + entry_->name + " " + ethernet::to_string(*entry_->mac) +
                                      "; mend the line 'mac' of its block");
-        OpenedTap tap = open_tunnel(*opened.port);
+        OpenedTap         tap = open_tunnel(*opened.port);
         const std::string key = link_.get().substr(0, link_.get().find('?'));
         if (!ethernet::offer_discipline(key, station_.get()))
             throw std::runtime_error(
@@ -84,9 +73,13 @@ public:
         if (!remark.empty()) std::fputs((name_ + ": " + remark + "\n").c_str(), stderr);
         beat_.lose();
         told_period_ = was_reset_ = false;
+        words_ = own_words_.get();
+        if (service_) service_->begin();
+        if (applicant_) applicant_->begin(), background_->start();
         reporter_->start();
-        station_->accompany(nullptr, tunnel_.get());
+        station_->accompany(companion(), tunnel_.get());
         station_->attach(*port_);
+        if (applicant_) reporter_->event(Event::unconfigured, port_->address(), 0);
     }
 
     void stop() noexcept {
@@ -94,13 +87,16 @@ public:
         station_->detach();
         if (leads_) leading_instance.store(nullptr);
         leads_ = false;
+        if (background_) background_->stop();
+        if (applicant_) applicant_->work();  // what came by now is still written
         reporter_->stop();
         tap_.reset();
         port_.reset();
     }
 
     void receive(hal::Cycle cycle) noexcept {
-        const bool fits = cycle.period_ns() == setup_.cycle;
+        if (applicant_ && applicant_->cycle()) words_ = &applicant_->accepted()->words, told_period_ = false;
+        const bool fits = turns_in(cycle);
         if (!fits && !told_period_) {
             told_period_ = true;
             fault = true;
@@ -119,12 +115,17 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        if (cycle.period_ns() == setup_.cycle) station_->transmit(cycle.start_ns());
+        if (turns_in(cycle)) station_->transmit(cycle.start_ns());
         for (std::size_t i = 0; i < waiting_->size(); ++i)
             (*waiting_)[i] = static_cast<std::uint32_t>(station_->waiting(setup_.slots[i].id));
     }
 
 private:
+    bool turns_in(hal::Cycle cycle) const noexcept { return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle; }
+    Companion* companion() const noexcept {
+        return service_ ? static_cast<Companion*>(&service_->server()) : applicant_ ? &applicant_->client() : nullptr;
+    }
+
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
     static std::string name_of(const hal_host* host) {
@@ -135,9 +136,19 @@ private:
     void load() {
         const hal::Texts texts(*this);
         std::string      file = "schedule=", text = inline_argument_.get();
+        if (is_by_rtcfg()) {
+            if (link_.get().empty()) throw std::invalid_argument("on which segment? write link=eth:enp3s0");
+            if (!tunnel_argument_.get().empty())
+                throw std::invalid_argument("tunnel= needs the schedule at once: give config= and the station's name");
+            return;
+        }
+        if (!stage_2_argument_.get().empty())
+            throw std::invalid_argument("stage2= is of a station that gets its schedule from the master: station=auto");
         if (file_argument_.get().empty() && text.empty()) {
             if (!texts.offered()) return;
-            throw std::invalid_argument("it needs a schedule: loadrt tdma link=eth:enp3s0 config=FILE.tdma station=NAME");
+            throw std::invalid_argument(
+                "it needs a schedule: loadrt tdma link=eth:enp3s0 config=FILE.tdma station=NAME; or, with station=auto, "
+                "the master sends it one");
         }
         if (!file_argument_.get().empty() && !text.empty())
             throw std::invalid_argument("config= and schedule= are both given; one of them says who sends when");
@@ -166,6 +177,38 @@ private:
         entry_ = schedule_.stations[*which];
         setup_ = config::setup_of(schedule_, *which);
         look_at_tunnel(file);
+    }
+
+    /// The station has no schedule, but only its address: by its MAC address, or by `station=10.0.0.3`.
+    bool is_by_rtcfg() {
+        const std::string& which = station_argument_.get();
+        if (which != "auto") {
+            if (!file_argument_.get().empty() || !inline_argument_.get().empty()) return false;
+            own_ip_ = config::parse_ip(which);
+            own_mac_ = ethernet::parse_address(which);
+            if (!own_ip_ && !own_mac_) return false;
+        }
+        setup_.configured = false;
+        setup_.room_for_slots = most_slots;
+        return true;
+    }
+
+    /// The master gives stations their schedule, a station without one takes it. [setup]
+    void join_rtcfg() {
+        if (!setup_.configured) {
+            rtcfg::Logical own;
+            if (own_ip_) own = {true, *own_ip_};
+            applicant_ = std::make_unique<rtcfg::Applicant>(name_, *station_, own, stage_2_argument_.get(), static_cast<Events&>(*this));
+            background_ = std::make_unique<hal::Background>([this](std::int64_t, bool may_wait) {
+                applicant_->work();
+                if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            });
+        } else if (entry_ && entry_->role == Role::master) {
+            const hal::Texts texts(*this);
+            const auto read = [&](const std::string& file, std::string& bytes) { return config::read_from_disk(texts.find(file), bytes); };
+            service_ = std::make_unique<rtcfg::Service>(*station_, schedule_, config::find(schedule_, entry_->name).value(), read,
+                                                        static_cast<Events&>(*this));
+        }
     }
 
     /// What `tunnel=` asks of the schedule.
@@ -199,7 +242,7 @@ private:
     void follow(std::int64_t period) noexcept {
         const Status& s = station_->status();
         if (!leads_) return;
-        const bool beat = s.state != State::listening && s.state != State::withdrawn;
+        const bool beat = s.state != State::listening && s.state != State::withdrawn && s.state != State::unconfigured;
         if (!beat) {
             if (was_beat_) beat_.lose();
         } else {
@@ -230,7 +273,10 @@ private:
         sent = s.count.sent;
         dropped = s.count.dropped;
         late = s.count.late + port.late;
-        foreign = s.count.foreign;
+        foreign = s.count.foreign + (service_ ? service_->server().foreign() : applicant_ ? applicant_->foreign() : 0);
+        configured = station_->setup().configured;
+        if (service_) stations = service_->server().ready(), stations_dead = service_->dead();
+        if (applicant_) stage_2_bytes = applicant_->file_bytes();
         intruders = s.count.intruders;
         losses = s.count.losses;
         if (!tunnel_) return;
@@ -255,6 +301,10 @@ private:
         case Event::other_master:
             fault = true;
             raise(words_->other_master, not_a_number);
+            break;
+        case Event::master_there:
+            fault = true;
+            raise(words_->master_there, not_a_number);
             break;
         case Event::withdrew:
             fault = true;
@@ -286,10 +336,23 @@ private:
     hal::TextArgument link_{*this, "link", "", "the segment: eth:enp3s0, or in memory sim:NAME/STATION", {.per_instance = true}};
     hal::TextArgument file_argument_{*this, "config", "", "the schedule of the segment: RTnet's tdma.conf and a few keys more"};
     hal::TextArgument inline_argument_{*this, "schedule", "", "the same as a text, with ; at the ends of its lines"};
-    hal::TextArgument station_argument_{*this, "station", "", "which block of it this is: by name, ip or mac", {.per_instance = true}};
+    hal::TextArgument station_argument_{*this,
+                                        "station",
+                                        "",
+                                        "which block of it this is: by name, ip or mac; auto, or an ip or mac without config=: the master "
+                                        "sends the block (RTcfg)",
+                                        {.per_instance = true}};
+    hal::TextArgument stage_2_argument_{*this,
+                                        "stage2",
+                                        "",
+                                        "with station=auto: where the file is written that the master has for this station (its `stage2`)",
+                                        {.per_instance = true}};
 
-    hal::TextArgument tunnel_argument_{
-        *this, "tunnel", "", "an interface for ordinary packets, in slot 1: hal0, or hal%d for the first that is free", {.per_instance = true}};
+    hal::TextArgument tunnel_argument_{*this,
+                                       "tunnel",
+                                       "",
+                                       "an interface for ordinary packets, in slot 1: hal0, or hal%d for the first that is free",
+                                       {.per_instance = true}};
     hal::TextArgument netmask_argument_{*this, "netmask", "24", "of the tunnel, as 24 or 255.255.255.0; its address is the block's ip"};
 
     hal::Function receive_{*this, "receive", &Tdma::receive,
@@ -298,12 +361,17 @@ private:
                             "sends what waits for the slots of this cycle, and the master's sync; last in the thread"};
 
     hal::In<bool>           reset{*this, receive_, "reset", "rising: a master that withdrew begins anew; fault is acknowledged"};
-    hal::Out<std::int32_t>  state{*this, receive_, "state", "0 listening, 1 synchronising, 2 calibrating, 3 running, 4 withdrawn"};
+    hal::Out<std::int32_t>  state{*this, receive_, "state",
+                                 "0 listening, 1 synchronising, 2 calibrating, 3 running, 4 withdrawn, 5 unconfigured"};
     hal::Out<bool>          synchronous{*this, receive_, "synchronous", "the sync is there, or was a few cycles ago", {.safe = false}};
     hal::Out<bool>          calibrated{*this, receive_, "calibrated", "the way to the master is measured"};
     hal::Out<bool>          running{*this, receive_, "running", "the slots may be used", {.safe = false}};
     hal::Out<bool>          leading{*this, receive_, "leading", "this station sends the syncs"};
     hal::Out<bool>          master_active{*this, receive_, "master-active", "somebody sends them"};
+    hal::Out<bool>          configured{*this, receive_, "configured", "it has a schedule: its own, or the master's by RTcfg"};
+    hal::Out<std::uint32_t> stations{*this, receive_, "stations", "master: stations that got their schedule from it and are alive"};
+    hal::Out<std::uint32_t> stations_dead{*this, receive_, "stations-dead", "master: such that are silent now"};
+    hal::Out<std::uint32_t> stage_2_bytes{*this, receive_, "stage2-bytes", "of the file that came from the master and is written"};
     hal::Out<bool>          link_up{*this, receive_, "link-up", "the line has a carrier"};
     hal::Out<bool>          fault{*this, receive_, "fault", "see show fault; ends when it recovered by itself, or by reset"};
     hal::Out<std::uint32_t> cycle_number{*this, receive_, "cycle", "number of this cycle, the same in all stations"};
@@ -326,15 +394,21 @@ private:
     hal::Out<std::uint64_t> tunnel_sent{*this, receive_, "tunnel-sent", "ordinary packets handed to slot 1"};
     hal::Out<std::uint64_t> tunnel_received{*this, receive_, "tunnel-received", "ordinary packets that came for this station"};
     hal::Out<std::uint64_t> tunnel_dropped{*this, receive_, "tunnel-dropped", "ordinary packets, either way, without room or sync"};
-    hal::Out<std::uint64_t> tunnel_refused{
-        *this, receive_, "tunnel-refused", "tunnelled frames that are for others, or cut, or of the segment's own types: not acted on"};
+    hal::Out<std::uint64_t> tunnel_refused{*this, receive_, "tunnel-refused",
+                                           "tunnelled frames that are for others, or cut, or of the segment's own types: not acted on"};
 
     config::Schedule                        schedule_;
     std::optional<config::StationEntry>     entry_;
     StationSetup                            setup_;
     std::optional<hal::Outs<std::uint32_t>> waiting_;
-    std::unique_ptr<FaultWords>             words_;
+    std::unique_ptr<FaultWords>             own_words_;
+    const FaultWords*                       words_ = nullptr;  // or those of the schedule that came
+    std::optional<config::Ip>               own_ip_;           // of a station without a schedule
+    std::optional<Address>                  own_mac_;
     std::unique_ptr<Station>                station_;
+    std::unique_ptr<rtcfg::Service>         service_;     // of the master
+    std::unique_ptr<rtcfg::Applicant>       applicant_;   // of a station without a schedule
+    std::unique_ptr<hal::Background>        background_;  // the applicant's helper
     std::unique_ptr<Reporter>               reporter_;
     std::unique_ptr<ethernet::Port>         port_;
     std::unique_ptr<Tunnel>                 tunnel_;  // before tap_, which uses it

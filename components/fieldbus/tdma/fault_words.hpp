@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// The faults of a station in words, made before the cycle that may need them.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "config.hpp"
+
+namespace hal::tdma {
+
+struct FaultWords {
+    std::string                                   sync_lost, other_master, master_there, withdrew, babbling, uncalibrated, period;
+    std::vector<std::pair<unsigned, std::string>> foreign;  // by slot
+
+    explicit FaultWords(const StationSetup& s) {
+        const std::string limit = std::to_string(s.lost_limit) + (s.lost_limit == 1 ? " cycle" : " cycles");
+        sync_lost = "no sync for {} s (limit " + limit + "); the station is silent and its slots are empty";
+        other_master = "there is a second master on the segment with a schedule of its own";
+        master_there = "there was a master on the segment before this one; it is silent until its pin reset is set";
+        withdrew = "this master found another with a smaller address; it is silent until its pin reset is set";
+        babbling = "a station sends {} frames in one cycle";
+        uncalibrated = "{} calibration requests were not answered; they are repeated";
+        period = "the thread's period is {} us, the configuration's cycle is " + config::microseconds(s.cycle) +
+                 "; nothing is sent: make them equal";
+        for (const SlotSetup& slot : s.slots)
+            foreign.emplace_back(slot.id, "another station sends in slot " + std::to_string(slot.id) + " of this one");
+    }
+};
+
+}  // namespace hal::tdma

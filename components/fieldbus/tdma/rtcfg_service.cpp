@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#include "rtcfg_service.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "rtcfg_client.hpp"
+
+namespace hal::tdma::rtcfg {
+
+Logical Service::logical_of(const config::StationEntry& e) {
+    Logical logical;
+    if (e.ip) logical.by_ip = true, logical.ip = *e.ip;
+    return logical;
+}
+
+std::vector<Server::ClientSetup> Service::clients_of(const config::Schedule& schedule, std::size_t own, const Read& read) {
+    std::vector<Server::ClientSetup> clients;
+    for (std::size_t i = 0; i < schedule.stations.size(); ++i) {
+        const config::StationEntry& e = schedule.stations[i];
+        if (i == own || e.role == Role::master || (!e.ip && !e.mac)) continue;
+        Server::ClientSetup client{e.mac.value_or(Address{}), logical_of(e), config::block_of(schedule, i), {}};
+        if (!e.stage_2.empty()) {
+            const std::string which = "stage2 of station " + e.name + ": the file '" + e.stage_2 + "'";
+            if (!read(e.stage_2, client.stage_2)) throw std::invalid_argument(which + " cannot be read: " + client.stage_2);
+            if (client.stage_2.size() > largest_stage_2)
+                throw std::invalid_argument(which + " has " + std::to_string(client.stage_2.size()) + " bytes; stations take " +
+                                            std::to_string(largest_stage_2) + " at most");
+        }
+        clients.push_back(std::move(client));
+        numbers_.push_back(i);
+    }
+    is_dead_.resize(clients.size());
+    return clients;
+}
+
+Service::Service(Station& station, const config::Schedule& schedule, std::size_t own, const Read& read, Events& events)
+    : events_(events),
+      server_(station, logical_of(schedule.stations.at(own)), clients_of(schedule, own, read), schedule.heartbeat_ms, this) {}
+
+void Service::begin() noexcept {
+    server_.begin();
+    dead_ = 0;
+    std::fill(is_dead_.begin(), is_dead_.end(), false);
+}
+
+void Service::on_client(std::size_t client, ClientState state, const Address& who) noexcept {
+    const auto number = static_cast<Time>(numbers_[client]);
+    if (state == ClientState::ready) {
+        if (is_dead_[client]) is_dead_[client] = false, --dead_;
+        events_.on_event(Event::station_ready, who, number);
+    } else if (state == ClientState::dead) {
+        if (!is_dead_[client]) is_dead_[client] = true, ++dead_;
+        events_.on_event(Event::station_dead, who, number);
+    }
+}
+
+void Service::on_too_long(std::size_t client) noexcept {
+    events_.on_event(Event::station_too_long, {}, static_cast<Time>(numbers_[client]));
+}
+
+}  // namespace hal::tdma::rtcfg
