@@ -88,6 +88,9 @@ public:
     Signal* signal(Word name);
     Function* function(Word name);
     Thread* thread(Word name);
+    /// What was to be made and was not, as was said: that its pins, functions or the like are not there either is not said again.
+    void note_absent(std::string name) { absent_.insert(std::move(name)); }
+    bool is_absent(std::string_view name) const;  ///< 'pid.0.output' is with 'pid.0' and with 'pid'
 
     // --- what the transaction did -----------------------------------------------------------------------------------
     bool structural() const { return structural_; }
@@ -136,6 +139,7 @@ private:
     void on_undo(std::function<void()> action) { undo_.push_back(std::move(action)); }
 
     Model& model_;
+    std::unordered_set<std::string> absent_;
     std::vector<std::function<void()>> undo_;
     Removed removed_;
     std::deque<Replaced> replaced_;

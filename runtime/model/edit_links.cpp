@@ -45,8 +45,17 @@ bool Edit::fail(Code code, Span at, std::string message, std::string label, std:
     return false;
 }
 
+bool Edit::is_absent(std::string_view name) const {
+    if (absent_.empty()) return false;
+    for (std::size_t end = name.size();; end = name.rfind('.', end - 1)) {
+        if (end == std::string_view::npos || end == 0) return false;
+        if (absent_.contains(std::string(name.substr(0, end)))) return true;
+    }
+}
+
 Pin* Edit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
+    if (is_absent(name.text)) return nullptr;
     std::string help = pins_of_instance(model_, name.text);
     if (model_.find_signal(name.text)) help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
     if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt makes instances with pins";
@@ -56,6 +65,7 @@ Pin* Edit::pin(Word name) {
 
 Signal* Edit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
+    if (is_absent(name.text)) return nullptr;
     const std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
                              : model_.signal.empty()    ? nothing_yet("signal") + "; net makes signals"
                                                         : "";
@@ -65,6 +75,7 @@ Signal* Edit::signal(Word name) {
 
 Function* Edit::function(Word name) {
     if (Function* const found = model_.find_function(name.text)) return found;
+    if (is_absent(name.text)) return nullptr;
     std::string help;
     if (const Instance* const instance = model_.find_instance(name.text)) {
         std::vector<std::string> own;
@@ -77,6 +88,7 @@ Function* Edit::function(Word name) {
 
 Thread* Edit::thread(Word name) {
     if (Thread* const found = model_.find_thread(name.text)) return found;
+    if (is_absent(name.text)) return nullptr;
     const std::string help = model_.threads.empty() ? "make one first: loadrt threads name1=servo-thread period1=1000000"
                                                      : "threads: " + listed(names(model_.thread));
     fail("no-such-thread", name.span, "there is no thread " + quoted(name.text), did_you_mean(name.text, names(model_.thread)), help);

@@ -34,7 +34,11 @@ std::string unquoted(std::string text) {
 
 void load_threads(Elaboration& on, const Token& name, Args args, const std::string& written) {
     std::vector<NewThread> threads;
-    if (!parse_threads(args, name.span, threads, on.diagnostics)) return;
+    if (!parse_threads(args, name.span, threads, on.diagnostics)) {
+        for (const Token& token : args)
+            if (token.text.starts_with("name")) on.edit.note_absent(token.text.substr(token.text.find('=') + 1));
+        return;
+    }
     Component* component = on.model.find_component("threads");
     if (!component) component = &on.edit.add_component("threads", name.span);
     on.edit.note_arguments(*component, written, {});
@@ -52,17 +56,12 @@ bool names_itself(Elaboration& on, const Token& name) {
     return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
 }
 
-void loadrt(Elaboration& on, const Command& command, Args args) {
-    const Token& name = args[0];
-    std::string written;
-    for (const Token& token : args.subspan(1)) written += (written.empty() ? "" : " ") + token.text;
-    if (name.text == "threads") return load_threads(on, name, args.subspan(1), written);
-
-    LoadRequest request;
+/// The arguments of loadrt that say which instances there shall be, and the others; false after saying what is wrong.
+bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& request) {
     request.at = name.span;
     bool good = true;
     Span names_at;
-    for (const Token& token : args.subspan(1)) {
+    for (const Token& token : args) {
         const auto equals = token.text.find('=');
         if (equals == std::string::npos || equals == 0) {
             on.diagnostics.error("bad-argument", token.span, quoted(token.text) + " is not an argument", "", "arguments are written NAME=VALUE, without blanks around the =");
@@ -98,16 +97,18 @@ void loadrt(Elaboration& on, const Command& command, Args args) {
         on.diagnostics.add(std::move(d));
         good = false;
     }
-    if (!good) return;
+    return good;
+}
 
+bool make_instances(Elaboration& on, const Token& name, const LoadRequest& request, const std::string& written) {
     Component* component = on.model.find_component(name.text);
     if (component && !component->plugin) {
         on.diagnostics.error("name-taken", name.span, quoted(name.text) + " is a program started by loadusr");
-        return;
+        return false;
     }
     if (!component) {
         auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
-        if (!plugin) return;
+        if (!plugin) return false;
         component = &on.edit.add_component(plugin->component->name, name.span);
         component->plugin = plugin->component;
         component->library = plugin->library;
@@ -117,8 +118,19 @@ void loadrt(Elaboration& on, const Command& command, Args args) {
     for (const auto& [key, given] : request.arguments) load.arguments.emplace(key, given.value);
     load.personalities = request.personalities;
     on.edit.note_arguments(*component, written, std::move(load));
-    construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
-    (void)command;
+    return construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
+}
+
+void loadrt(Elaboration& on, const Command&, Args args) {
+    std::string written;
+    for (const Token& token : args.subspan(1)) written += (written.empty() ? "" : " ") + token.text;
+    if (args[0].text == "threads") return load_threads(on, args[0], args.subspan(1), written);
+    LoadRequest request;
+    if (read_request(on, args[0], args.subspan(1), request) && make_instances(on, args[0], request, written)) return;
+    for (const std::string& name : request.names) on.edit.note_absent(name);
+    if (!request.names.empty()) return;
+    on.edit.note_absent(args[0].text);
+    on.edit.note_absent(dashed(args[0].text));
 }
 
 Component* loaded_component(Elaboration& on, const Token& name) {
@@ -201,7 +213,7 @@ void reload(Elaboration& on, const Command&, Args args) {
 
 void newthread(Elaboration& on, const Command&, Args args) {
     NewThread thread;
-    if (!parse_new_thread(args, thread, on.diagnostics)) return;
+    if (!parse_new_thread(args, thread, on.diagnostics)) return on.edit.note_absent(args[0].text);
     fit_period(on.model, thread, on.diagnostics);
     on.edit.add_thread({thread.name, thread.at}, thread.options);
 }
@@ -261,6 +273,7 @@ void net(Elaboration& on, const Command&, Args args) {
         Arrow arrow;
     };
     std::vector<Wanted> wanted;
+    bool unknown_type = false;
     Arrow arrow = Arrow::none;
     for (const Token& token : args.subspan(1)) {
         if (is_arrow(token.text)) {
@@ -268,8 +281,10 @@ void net(Elaboration& on, const Command&, Args args) {
             continue;
         }
         if (Pin* const pin = on.edit.pin(word(token))) wanted.push_back({pin, &token, arrow});
+        unknown_type |= on.edit.is_absent(token.text);
     }
     Signal* signal = on.model.find_signal(args[0].text);
+    if (!signal && unknown_type) return on.edit.note_absent(args[0].text);
     if (!signal) {
         if (on.model.find_pin(args[0].text)) {
             on.diagnostics.error("signal-named-like-pin", args[0].span, "signal name " + quoted(args[0].text) + " is the name of a pin", "a pin",
@@ -277,6 +292,7 @@ void net(Elaboration& on, const Command&, Args args) {
             return;
         }
         if (wanted.empty()) {
+            on.edit.note_absent(args[0].text);
             if (args.size() < 2) on.diagnostics.error("wrong-arguments", args[0].span, "net needs a pin to make a new signal", "", "net SIGNAL PIN…");
             return;
         }
