@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT
+#include "vision/capture/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+
+namespace hal::vision {
+namespace {
+
+struct Word {
+    std::size_t begin = 0, end = 0;
+};
+
+/// What both kinds of file share: where things stand, what is wrong, and what came of it.
+class Text {
+public:
+    explicit Text(std::string_view text) : text_(text) {}
+    CameraText finish() {
+        if (found_.problems.empty()) check();
+        return std::move(found_);
+    }
+
+protected:
+    void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+        if (found_.problems.size() < 20)
+            found_.problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+    }
+    std::string of(Word w) const { return std::string(text_.substr(w.begin, std::min<std::size_t>(w.end - w.begin, 60))); }
+
+    bool number(Word w, double& to) {
+        const std::string token = of(w);
+        char*             end = nullptr;
+        to = std::strtod(token.c_str(), &end);
+        if (*end == '\0' && std::fabs(to) < 1e12) return true;
+        say(w.begin, w.end, "'" + token + "' is not a number", "numbers are written as in 600.5 or -2e-3");
+        return false;
+    }
+    bool whole(Word w, int& to) {
+        double value = 0;
+        if (!number(w, value)) return false;
+        if (value != std::floor(value) || value < 1 || value > 8192) {
+            say(w.begin, w.end, "'" + of(w) + "' is no width or height of a picture", "it is a whole number from 1 to 8192");
+            return false;
+        }
+        to = static_cast<int>(value);
+        return true;
+    }
+    void missing(const char* name, const std::string& example) {
+        say(0, std::min<std::size_t>(text_.size(), 1), std::string("there is no ") + name, "write a line: " + example);
+    }
+    /// What no camera has: the usual reason is a file of another kind, or numbers in the wrong order.
+    void check() {
+        const Camera& c = found_.camera;
+        const auto    wrong = [&](Word at, const std::string& sentence, const std::string& help) { say(at.begin, std::max(at.end, at.begin + 1), sentence, help); };
+        if (!(c.fx > 0 && c.fy > 0)) return wrong(focal_, "a focal length is not positive", "focal lengths in px, often about the width of the picture");
+        if (c.fx > 100.0 * c.width || c.fx < 0.05 * c.width || c.fy > 2 * c.fx || c.fx > 2 * c.fy)
+            wrong(focal_, "these focal lengths fit no picture " + std::to_string(c.width) + " px wide", "in px, and the two alike; often about the width");
+        if (c.cx < -c.width || c.cx > 2 * c.width || c.cy < -c.height || c.cy > 2 * c.height)
+            wrong(centre_, "the centre is far outside of the picture", "in px, and near to half of the width and of the height");
+        for (const double k : c.distortion)
+            if (std::fabs(k) > 1000.0) return wrong(distortion_, "this distortion bends the picture beyond use", "k1 k2 p1 p2 k3, of the order of 0.1");
+    }
+
+    std::string_view text_;
+    CameraText       found_;
+    Word             focal_, centre_, distortion_;
+};
+
+class OwnText : public Text {
+public:
+    using Text::Text;
+    CameraText read() {
+        for (std::size_t line = 0; line < text_.size();) {
+            const std::size_t end = std::min(text_.find('\n', line), text_.size());
+            one(line, std::min(text_.find('#', line), end));
+            line = end + 1;
+        }
+        Camera& c = found_.camera;
+        if (found_.problems.empty()) {
+            if (c.width == 0) missing("size", "size 640 480");
+            if (c.fx == 0 && focal_.end == 0) missing("focal", "focal 600 600");
+            if (centre_.end == 0) c.cx = (c.width - 1) / 2.0, c.cy = (c.height - 1) / 2.0;
+        }
+        return finish();
+    }
+
+private:
+    void one(std::size_t at, std::size_t end) {
+        const auto        blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == '='; };
+        std::vector<Word> words;
+        while (at < end) {
+            while (at < end && blank(text_[at])) ++at;
+            const std::size_t begin = at;
+            while (at < end && !blank(text_[at])) ++at;
+            if (at > begin && words.size() < 16) words.push_back({begin, at});
+        }
+        if (words.empty()) return;
+        Camera&           c = found_.camera;
+        const std::string name = of(words[0]);
+        const Word        all{words[0].begin, words.back().end};
+        if (name == "size") {
+            if (counted(words, name, 2, 2, "size 640 480") && once(c.width != 0, words[0])) {
+                whole(words[1], c.width);
+                whole(words[2], c.height);
+            }
+        } else if (name == "focal") {
+            if (!counted(words, name, 1, 2, "focal 600 600") || !once(focal_.end != 0, words[0])) return;
+            focal_ = all;
+            if (number(words[1], c.fx)) c.fy = c.fx;
+            if (words.size() == 3) number(words[2], c.fy);
+        } else if (name == "centre" || name == "center") {
+            if (!counted(words, name, 2, 2, "centre 319.5 239.5") || !once(centre_.end != 0, words[0])) return;
+            centre_ = all;
+            number(words[1], c.cx);
+            number(words[2], c.cy);
+        } else if (name == "distortion") {
+            if (!counted(words, name, 1, 5, "distortion 0.1 -0.2 0 0 0") || !once(distortion_.end != 0, words[0])) return;
+            distortion_ = all;
+            for (std::size_t i = 1; i < words.size(); ++i) number(words[i], c.distortion[i - 1]);
+        } else {
+            say(words[0].begin, words[0].end, "'" + name + "' is no word of a calibration", "there are size, focal, centre, distortion");
+        }
+    }
+    bool counted(const std::vector<Word>& words, const std::string& name, std::size_t least, std::size_t most, const char* example) {
+        const std::size_t count = words.size() - 1;
+        if (count >= least && count <= most) return true;
+        const std::string wants = least == most ? std::to_string(most) : std::to_string(least) + " to " + std::to_string(most);
+        say(words[0].begin, words.back().end, name + " has " + std::to_string(count) + (count == 1 ? " number" : " numbers") + ", it takes " + wants,
+            std::string("as in: ") + example);
+        return false;
+    }
+    bool once(bool twice, Word name) {
+        if (twice) say(name.begin, name.end, "'" + of(name) + "' is there twice", "delete one of them");
+        return !twice;
+    }
+};
+
+/// The part of YAML that cv::FileStorage writes: `name: number`, and matrices as a block with `data: [ ... ]`.
+class OpenCvText : public Text {
+public:
+    using Text::Text;
+    CameraText read() {
+        Camera& c = found_.camera;
+        if (const auto w = scalar("image_width")) whole(*w, c.width);
+        if (const auto w = scalar("image_height")) whole(*w, c.height);
+        if (found_.problems.empty() && (c.width == 0 || c.height == 0)) missing("image_width and image_height", "image_width: 640");
+        std::vector<double> k, d;
+        if (matrix("camera_matrix", k, focal_)) {
+            if (k.size() == 9 && (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1))
+                say(focal_.begin, focal_.end, "camera_matrix is no camera's matrix", "its rows are fx 0 cx, 0 fy cy, 0 0 1");
+            else if (k.size() == 9) c.fx = k[0], c.cx = k[2], c.fy = k[4], c.cy = k[5];
+            else say(focal_.begin, focal_.end, "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9", "it has 3 rows and 3 columns");
+            centre_ = focal_;
+        } else if (found_.problems.empty()) {
+            missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
+        }
+        bool plain = matrix("distortion_coefficients", d, distortion_);
+        if (plain && d.size() > 5 && std::any_of(d.begin() + 5, d.end(), [](double v) { return v != 0; })) {
+            say(distortion_.begin, distortion_.end, "the distortion has " + std::to_string(d.size()) + " coefficients",
+                "calibrate with k1 k2 p1 p2 k3 only");
+            plain = false;
+        }
+        for (std::size_t i = 0; plain && i < std::min<std::size_t>(d.size(), 5); ++i) c.distortion[i] = d[i];
+        return finish();
+    }
+
+private:
+    /// Behind `name:` at the beginning of a line.
+    std::size_t find(const char* name) const {
+        const std::string key = std::string(name) + ":";
+        for (std::size_t at = 0; (at = text_.find(key, at)) != std::string_view::npos; ++at) {
+            std::size_t begin = at;
+            while (begin > 0 && (text_[begin - 1] == ' ' || text_[begin - 1] == '\t')) --begin;
+            if (begin == 0 || text_[begin - 1] == '\n') return at + key.size();
+        }
+        return std::string_view::npos;
+    }
+    std::optional<Word> scalar(const char* name) const {
+        std::size_t at = find(name);
+        if (at == std::string_view::npos) return std::nullopt;
+        while (at < text_.size() && text_[at] == ' ') ++at;
+        const std::size_t end = std::min(text_.find_first_of(" \r\n", at), text_.size());
+        return Word{at, std::max(end, std::min(at + 1, text_.size()))};
+    }
+    bool matrix(const char* name, std::vector<double>& to, Word& place) {
+        const std::size_t at = find(name);
+        if (at == std::string_view::npos) return false;
+        place = {at - std::string_view(name).size() - 1, at - 1};
+        const std::size_t data = text_.find("data:", at), open = text_.find('[', at), close = text_.find(']', at);
+        if (data == std::string_view::npos || open == std::string_view::npos || close == std::string_view::npos || open < data || close < open) {
+            say(place.begin, place.end, std::string(name) + " has no data", "it is followed by rows:, cols:, dt: and data: [ numbers ]");
+            return false;
+        }
+        const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == ','; };
+        for (std::size_t i = open + 1; i < close;) {
+            while (i < close && blank(text_[i])) ++i;
+            const std::size_t begin = i;
+            while (i < close && !blank(text_[i])) ++i;
+            double value = 0;
+            if (i == begin) break;
+            if (to.size() >= 64 || !number({begin, i}, value)) return false;
+            to.push_back(value);
+        }
+        return true;
+    }
+};
+
+}  // namespace
+
+CameraText read_camera(std::string_view text) {
+    const std::size_t first = text.find_first_not_of(" \t\r\n");
+    const bool        yaml = first != std::string_view::npos && (text.substr(first, 5) == "%YAML" || text.find("camera_matrix:") != std::string_view::npos);
+    return yaml ? OpenCvText(text).read() : OwnText(text).read();
+}
+
+}  // namespace hal::vision
