@@ -34,7 +34,8 @@ struct Place {
 /// The type of one topic.
 struct Schema {
     std::string               type;                  ///< name on the wire
-    std::string               hint;                  ///< topic prefix: "rt/" for ROS 2 types, else ""
+    std::string               prefix;  ///< of the topic's name on the wire: "rt/" for ROS 2 types, else ""
+    std::vector<std::string>  names;   ///< joints of a JointState
     std::vector<Field>        fields;         ///< in the order of the pins
     std::vector<std::uint8_t> sample;  ///< one whole sample with all values 0, header included
     std::vector<Place>        places;         ///< of each field in `sample`
@@ -42,17 +43,19 @@ struct Schema {
     std::string               ros;  ///< "std_msgs/Float64", or "" for a type made of the fields
     std::string               layout;  ///< how decode() walks a sample whose strings and sequences are of any length
 
-    /// "angle:float,ready:bit,joint-#:float*6,effort:float=0": NAME:TYPE, with *N a row (# is its index), with =VALUE what subscribers
+    /// "angle:float,ready:bit,joint:float*6,effort:float=0": NAME:TYPE, with *N a row (joint-0, joint-1 ...), with =VALUE what subscribers
     /// show while nothing valid is there. Types: bit, float, s32, u32, s64, u64. `type` "" derives the name from the fields, so that
     /// different groups never match. Throws std::invalid_argument.
     static Schema of_fields(std::string_view fields, std::string type = "");
-    /// A type of ROS 2: std_msgs/Float64 Bool Int32 Header, geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState Image (its header and
-    /// format, without pixels). `names` are the joints of a JointState, `frame` the header's frame_id. Throws std::invalid_argument.
-    static Schema of_ros(std::string_view ros, const std::vector<std::string>& names = {}, std::string_view frame = "");
+    /// A type of ROS 2: std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState Image
+    /// (its header and format, without pixels). `names` are the joints of a JointState, `frame` the header's frame_id, `encoding` of an
+    /// Image. Throws std::invalid_argument.
+    static Schema of_ros(std::string_view ros, const std::vector<std::string>& names = {}, std::string_view frame = "",
+                         std::string_view encoding = "bgr8");
 };
 
-/// Values of the fields, in their order, out of one sample that came from anywhere. False, and `values` untouched, when the bytes are not
-/// of this type. Takes no memory. [any]
+/// Values of the fields, in their order, out of one sample that came from anywhere; what a JointState does not have keeps its value. False,
+/// and `values` untouched, when the bytes are not of this type. Takes no memory. [any]
 bool decode(const Schema&, std::span<const std::uint8_t> bytes, std::span<hal_value> values) noexcept;
 
 }  // namespace hal::dds

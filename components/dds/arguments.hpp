@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// Load arguments that dds_publish and dds_subscribe have in common.
+#pragma once
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "engine.hpp"
+#include "hal/component.hpp"
+#include "hal/naming.hpp"
+#include "hal/texts.hpp"
+#include "schema.hpp"
+
+namespace hal::dds {
+
+/// "a,b,c" or, as netlists without quotes have it, "a;b;c".
+inline std::vector<std::string> list_of(const std::string& text) {
+    std::vector<std::string> all;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = std::min(text.find_first_of(",;", at), text.size());
+        if (end > at) all.push_back(text.substr(at, end - at));
+        at = end + 1;
+    }
+    return all;
+}
+
+/// A member before the pins.
+class Arguments {
+public:
+    explicit Arguments(hal::Component& c)
+        : name(name_of(c)),
+          texts_(c),
+          topic_(c, "topic", "", "name of the topic; ROS 2's /arm/state is topic=/arm/state with ros=", {.per_instance = true}),
+          fields_(c, "fields", "", "the group: NAME:TYPE, separated by commas, NAME:TYPE*N for a row; types bit float s32 u32 s64 u64"),
+          type_(c, "type", "", "name of the type on the wire; without it one is made of the fields"),
+          ros_(c, "ros", "",
+               "instead of fields: a type of ROS 2, std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist "
+               "WrenchStamped, sensor_msgs/JointState Image"),
+          joints_(c, "joints", "", "names of a JointState's joints"),
+          frame_(c, "frame", "", "frame_id of a ROS header"),
+          encoding_(c, "encoding", "bgr8", "of an Image"),
+          reliable_(c, "reliable", 1, "1: what is lost is sent again; 0: best effort", {.min = 0, .max = 1}),
+          depth_(c, "depth", 16, "samples kept for those who have not got them yet", {.min = 1, .max = 100'000}),
+          deadline_(c, "deadline_ms", 0, "a sample at least so often: promised by publishers, asked for by subscribers; 0: none"),
+          budget_(c, "latency_ms", 0, "latency budget: a hint for the engine"),
+          lease_(c, "lease_ms", 0, "liveliness: a publisher not heard of for so long counts as dead; 0: as its participant, 5000"),
+          domain_(c, "domain", 0, "DDS domain", {.min = 0, .max = 232}),
+          interfaces_(c, "interfaces", "", "addresses or names of interfaces, or all; without it nothing leaves this machine"),
+          peers_(c, "peers", "", "addresses where others are looked for, besides multicast"),
+          server_(c, "server", "", "discovery servers ADDRESS:PORT instead of multicast"),
+          shared_memory_(c, "shared_memory", 0, "1: between processes of this machine too", {.min = 0, .max = 1}),
+          profile_(c, "profile", "",
+                   "participant profile of Fast DDS: FILE.xml:NAME; data_writer and data_reader profiles named like the topic count too"),
+          security_(c, "security", "", "folder of certificates and permissions, as ROS 2's enclaves have it") {}
+
+    /// False: the declarations are looked at, nobody loads this. [setup]
+    bool loading() const { return texts_.offered(); }
+    /// Throws std::invalid_argument. [setup]
+    Schema schema() const {
+        if (!loading() && fields_.get().empty() && ros_.get().empty()) return Schema::of_fields("value:float");
+        if (topic_.get().empty()) throw std::invalid_argument("which topic? write topic=NAME");
+        if (!ros_.get().empty()) {
+            if (!fields_.get().empty() || !type_.get().empty())
+                throw std::invalid_argument("ros= gives the fields and the type; leave fields= and type= out");
+            return Schema::of_ros(ros_.get(), list_of(joints_.get()), frame_.get(), encoding_.get());
+        }
+        if (fields_.get().empty()) throw std::invalid_argument("which pins? write fields=angle:float,ready:bit or ros=std_msgs/Float64");
+        return Schema::of_fields(fields_.get(), type_.get());
+    }
+    TopicType topic(const Schema& schema) const {
+        std::string wire = topic_.get();
+        if (!schema.prefix.empty()) wire = schema.prefix + wire.substr(std::min(wire.find_first_not_of('/'), wire.size()));
+        return {wire, schema.type,
+                schema.ros == "sensor_msgs/JointState" || schema.ros == "sensor_msgs/Image" ? 65'536 : schema.sample.size()};
+    }
+    Quality quality() const {
+        constexpr std::int64_t ms = 1'000'000;
+        return {.reliable = reliable_ != 0,
+                .last_value = false,
+                .depth = static_cast<int>(depth_),
+                .deadline_ns = deadline_ * ms,
+                .latency_budget_ns = budget_ * ms,
+                .lease_ns = lease_ * ms};
+    }
+    /// [setup]
+    Settings settings() const {
+        Settings s;
+        s.domain = static_cast<int>(domain_);
+        s.name = "halcyon";
+        s.interfaces = list_of(interfaces_.get());
+        s.peers = list_of(peers_.get());
+        s.servers = list_of(server_.get());
+        s.shared_memory = shared_memory_ != 0;
+        s.profile = profile_.get();
+        if (const auto colon = s.profile.rfind(':'); colon != s.profile.npos)
+            s.profile = texts_.find(s.profile.substr(0, colon)) + s.profile.substr(colon);
+        else if (!s.profile.empty()) s.profile = texts_.find(s.profile);
+        if (!security_.get().empty()) s.security = texts_.find(security_.get());
+        return s;
+    }
+    std::int64_t       deadline_ms() const noexcept { return deadline_; }
+    std::int64_t       depth() const noexcept { return depth_; }
+    const std::string& said_topic() const noexcept { return topic_.get(); }
+    /// A line on standard error, never in a cycle.
+    void say(const std::string& sentence) const { std::fputs((name + ": " + sentence + "\n").c_str(), stderr); }
+
+    const std::string name;  ///< of the instance
+
+private:
+    static std::string name_of(hal::Component&) {
+        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
+        return naming != nullptr ? naming->name(hal::detail::creating) : "dds";
+    }
+    hal::Texts        texts_;
+    hal::TextArgument topic_, fields_, type_, ros_, joints_, frame_, encoding_;
+    hal::Argument     reliable_, depth_, deadline_, budget_, lease_, domain_;
+    hal::TextArgument interfaces_, peers_, server_;
+    hal::Argument     shared_memory_;
+    hal::TextArgument profile_, security_;
+};
+
+}  // namespace hal::dds
