@@ -25,12 +25,53 @@ inline std::vector<std::string> list_of(const std::string& text) {
     return all;
 }
 
+/// Of the participant: who may meet. A member before the pins.
+class ParticipantArguments {
+public:
+    explicit ParticipantArguments(hal::Component& c)
+        : texts_(c),
+          domain_(c, "domain", 0, "DDS domain", {.min = 0, .max = 232}),
+          interfaces_(c, "interfaces", "", "addresses or names of interfaces, or all; without it nothing leaves this machine"),
+          peers_(c, "peers", "", "addresses where others are looked for, besides multicast"),
+          server_(c, "server", "", "discovery servers ADDRESS:PORT instead of multicast"),
+          shared_memory_(c, "shared_memory", 0, "1: between processes of this machine too", {.min = 0, .max = 1}),
+          profile_(c, "profile", "",
+                   "participant profile of Fast DDS: FILE.xml:NAME; data_writer and data_reader profiles named like the topic count too"),
+          security_(c, "security", "", "folder of certificates and permissions, as ROS 2's enclaves have it") {}
+
+    /// In the component's constructor: files are looked for beside the netlist. [setup]
+    Settings settings() const {
+        Settings s;
+        s.domain = static_cast<int>(domain_);
+        s.name = "halcyon";
+        s.interfaces = list_of(interfaces_.get());
+        s.peers = list_of(peers_.get());
+        s.servers = list_of(server_.get());
+        s.shared_memory = shared_memory_ != 0;
+        s.profile = profile_.get();
+        if (const auto colon = s.profile.rfind(':'); colon != s.profile.npos)
+            s.profile = texts_.find(s.profile.substr(0, colon)) + s.profile.substr(colon);
+        else if (!s.profile.empty()) s.profile = texts_.find(s.profile);
+        if (!security_.get().empty()) s.security = texts_.find(security_.get());
+        return s;
+    }
+    /// False: the declarations are looked at, nobody loads this. [setup]
+    bool loading() const { return texts_.offered(); }
+
+private:
+    hal::Texts        texts_;
+    hal::Argument     domain_;
+    hal::TextArgument interfaces_, peers_, server_;
+    hal::Argument     shared_memory_;
+    hal::TextArgument profile_, security_;
+};
+
 /// A member before the pins.
 class Arguments {
 public:
     explicit Arguments(hal::Component& c)
         : name(name_of(c)),
-          texts_(c),
+
           topic_(c, "topic", "", "name of the topic; ROS 2's /arm/state is topic=/arm/state with ros=", {.per_instance = true}),
           fields_(c, "fields", "", "the group: NAME:TYPE, separated by commas, NAME:TYPE*N for a row; types bit float s32 u32 s64 u64"),
           type_(c, "type", "", "name of the type on the wire; without it one is made of the fields"),
@@ -45,20 +86,11 @@ public:
           deadline_(c, "deadline_ms", 0, "a sample at least so often: promised by publishers, asked for by subscribers; 0: none"),
           budget_(c, "latency_ms", 0, "latency budget: a hint for the engine"),
           lease_(c, "lease_ms", 0, "liveliness: a publisher not heard of for so long counts as dead; 0: as its participant, 5000"),
-          domain_(c, "domain", 0, "DDS domain", {.min = 0, .max = 232}),
-          interfaces_(c, "interfaces", "", "addresses or names of interfaces, or all; without it nothing leaves this machine"),
-          peers_(c, "peers", "", "addresses where others are looked for, besides multicast"),
-          server_(c, "server", "", "discovery servers ADDRESS:PORT instead of multicast"),
-          shared_memory_(c, "shared_memory", 0, "1: between processes of this machine too", {.min = 0, .max = 1}),
-          profile_(c, "profile", "",
-                   "participant profile of Fast DDS: FILE.xml:NAME; data_writer and data_reader profiles named like the topic count too"),
-          security_(c, "security", "", "folder of certificates and permissions, as ROS 2's enclaves have it") {}
+          participant(c) {}
 
-    /// False: the declarations are looked at, nobody loads this. [setup]
-    bool loading() const { return texts_.offered(); }
     /// Throws std::invalid_argument. [setup]
     Schema schema() const {
-        if (!loading() && fields_.get().empty() && ros_.get().empty()) return Schema::of_fields("value:float");
+        if (!participant.loading() && fields_.get().empty() && ros_.get().empty()) return Schema::of_fields("value:float");
         if (topic_.get().empty()) throw std::invalid_argument("which topic? write topic=NAME");
         if (!ros_.get().empty()) {
             if (!fields_.get().empty() || !type_.get().empty())
@@ -83,22 +115,6 @@ public:
                 .latency_budget_ns = budget_ * ms,
                 .lease_ns = lease_ * ms};
     }
-    /// [setup]
-    Settings settings() const {
-        Settings s;
-        s.domain = static_cast<int>(domain_);
-        s.name = "halcyon";
-        s.interfaces = list_of(interfaces_.get());
-        s.peers = list_of(peers_.get());
-        s.servers = list_of(server_.get());
-        s.shared_memory = shared_memory_ != 0;
-        s.profile = profile_.get();
-        if (const auto colon = s.profile.rfind(':'); colon != s.profile.npos)
-            s.profile = texts_.find(s.profile.substr(0, colon)) + s.profile.substr(colon);
-        else if (!s.profile.empty()) s.profile = texts_.find(s.profile);
-        if (!security_.get().empty()) s.security = texts_.find(security_.get());
-        return s;
-    }
     std::int64_t       deadline_ms() const noexcept { return deadline_; }
     std::int64_t       depth() const noexcept { return depth_; }
     const std::string& said_topic() const noexcept { return topic_.get(); }
@@ -112,12 +128,11 @@ private:
         const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
         return naming != nullptr ? naming->name(hal::detail::creating) : "dds";
     }
-    hal::Texts        texts_;
     hal::TextArgument topic_, fields_, type_, ros_, joints_, frame_, encoding_;
-    hal::Argument     reliable_, depth_, deadline_, budget_, lease_, domain_;
-    hal::TextArgument interfaces_, peers_, server_;
-    hal::Argument     shared_memory_;
-    hal::TextArgument profile_, security_;
+    hal::Argument     reliable_, depth_, deadline_, budget_, lease_;
+
+public:
+    const ParticipantArguments participant;
 };
 
 }  // namespace hal::dds

@@ -128,7 +128,7 @@ private:
     const Schema    schema_ = arguments_.schema();
     const TopicType topic_ = arguments_.topic(schema_);
     const Quality   quality_ = arguments_.quality();
-    const Settings  settings_ = arguments_.settings();
+    const Settings  settings_ = arguments_.participant.settings();
 
     FieldPins<hal::In> fields_{*this, publish_, schema_, "field of the topic"};
     hal::In<bool>      enable{*this, publish_, "enable", "FALSE: nothing is published", {.initial = true}};

@@ -173,7 +173,7 @@ private:
     const Schema    schema_ = arguments_.schema();
     const TopicType topic_ = arguments_.topic(schema_);
     const Quality   quality_ = arguments_.quality();
-    const Settings  settings_ = arguments_.settings();
+    const Settings  settings_ = arguments_.participant.settings();
 
     FieldPins<hal::Out>     fields_{*this, take_, schema_, "field of the topic"};
     hal::Out<std::uint64_t> seq{*this, take_, "seq", "number of the sample, as its publisher counts"};

@@ -92,7 +92,7 @@ public:
     }
 
     void start() {
-        hal::dds::Settings settings = arguments_.settings();
+        hal::dds::Settings settings = arguments_.participant.settings();
         participant_ = open(settings);
         Quality quality = status_quality();
         quality.depth = 64;
