@@ -71,10 +71,10 @@ private:
             return "there is a master already, " + who + ", so this one does not send; make one of both a backup-master:, then: setp " +
                    instance_ + ".reset TRUE";
         case Event::other_schedule:
-            return "the syncs of " + who + " are not followed: " +
-                   (h.value != 0
-                        ? "one comes every " + config::microseconds(h.value) + ", which is not this station's cycle; give both the same"
-                        : "they are of another schedule than those of a second master; one of both has to go");
+            return "the syncs of " + who + " are not followed: one comes every " + config::microseconds(h.value) +
+                   ", this station's cycle is another; give both the same";
+        case Event::no_carrier: return "the line has no carrier: nothing is sent or received; is the cable in, the switch on?";
+        case Event::carrier: return "the line has a carrier again";
         case Event::out_of_step:
             return "the sync of " + who + " is heard, but this thread is " + config::microseconds(h.value) +
                    " off and comes no nearer; do the threads of this process follow another instance?";

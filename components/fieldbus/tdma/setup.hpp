@@ -67,7 +67,9 @@ enum class Event : std::uint8_t {
     babbling,       ///< a station sends much more than it may; who; value: frames in a cycle
     master_changed, ///< who: the new one
     master_there,   ///< this master found another before it sent anything, and does not; until reset(). who
-    other_schedule, ///< syncs come, but not in this station's schedule. who; value: ns from one to the next, 0: as it should be
+    other_schedule,  ///< syncs come, but not in this station's cycle. who; value: ns from one to the next
+    no_carrier,     ///< the port's line went away: a cable, a switch
+    carrier,        ///< and is back
     out_of_step,    ///< the sync is followed, but this thread does not come to it. who; value: ns it is off
 
     // of RTcfg

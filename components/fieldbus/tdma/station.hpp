@@ -77,6 +77,13 @@ private:
         bool          used = false;
     };
 
+    /// Who sends syncs that are not of this station's schedule, and in which they are.
+    struct Claimant {
+        Address       who{};
+        std::uint32_t cycle = 0, row = 0;  // row: syncs in a row that go on
+        Time          scheduled = 0, every = 0;
+    };
+
     void        begin() noexcept;
     const Slot* find(unsigned id) const noexcept;
     void        become(State, Time now) noexcept;
@@ -88,6 +95,9 @@ private:
     void take(const ethernet::Arrival&, Time now) noexcept;
     void take_sync(const Decoded&, Time arrived, Time now) noexcept;
     void take_foreign_sync(const Decoded&) noexcept;
+    void listen_to(const Decoded&, Time arrived, Time now) noexcept;
+    const Claimant& claim(const Decoded&) noexcept;
+    void withdraw(Event why, const Address& who) noexcept;
     void take_request(const Decoded&, Time arrived) noexcept;
     void take_reply(const Decoded&, Time arrived, Time now) noexcept;
     void look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
@@ -143,6 +153,13 @@ private:
     std::uint32_t foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the same is said again
     std::uint32_t recalibration_ = 0;  // requests only in each so-manieth cycle, beside frames; 0: in each
     bool          told_uncalibrated_ = false;
+    std::array<Claimant, 4> claimants_{};
+    std::size_t   next_claimant_ = 0;
+    Time          unfit_sync_ = 0;  // when the last came while it listened, local; 0: none
+    Address       punctual_{};
+    std::uint32_t punctual_row_ = 0;  // its syncs in a row that a master sent, not a backup
+    std::uint32_t out_of_step_ = 0;  // cycles it has been synchronising for
+    bool          told_schedule_ = false;
     std::uint32_t limit_ = 32;  // frames of one station in a cycle
 };
 

@@ -11,6 +11,8 @@ namespace {
 constexpr std::size_t   most_arrivals = 1024;  // in a cycle: a babbling station must not hold the thread
 constexpr std::uint32_t rows = 3;              // that often in a row makes it a fact
 constexpr std::uint32_t silence_after = 1000;  // cycles until the same complaint is repeated
+constexpr Time          unfit_for = 100'000'000;         // a master does not begin so soon after another's sync
+constexpr Time          too_long_out = 5'000'000'000;    // to come into phase takes a fraction of it
 
 }  // namespace
 
@@ -81,20 +83,15 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
         status_.master = d.from;
         return;
     }
-    const bool fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
-    if (status_.state == State::listening) {
-        // Three of one schedule in a row: a single frame may be anything.
-        good_row_ = fits && s.cycle != heard_cycle_ ? good_row_ + 1 : 1;
-        if (!fits) clock_.clear();
-        number_ = s.cycle, start_ = s.scheduled, based_ = true;
-        clock_.take(s.stamp, arrived, status_.delay);
-        heard_cycle_ = s.cycle, heard_ever_ = heard_ = true;
-        last_sync_ = now;
-        status_.master = d.from;
-        ++status_.count.syncs;
-        if (good_row_ >= rows) become(State::synchronising, now);
-        return;
+    if (setup_.role == Role::master && !status_.leading) {
+        // A backup's syncs are late by its offset: whose are not is another master, and there is nothing to take over from it.
+        const bool punctual = std::abs(lateness) <= setup_.guard;
+        punctual_row_ = !punctual ? 0 : d.from == punctual_ ? punctual_row_ + 1 : 1;
+        punctual_ = d.from;
+        if (punctual_row_ >= rows) return withdraw(Event::master_there, d.from);
     }
+    if (status_.state == State::listening) return listen_to(d, arrived, now);
+    const bool fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
     if (!fits) return take_foreign_sync(d);
     if (heard_ever_ && static_cast<std::int32_t>(s.cycle - heard_cycle_) <= 0 && !(status_.leading && setup_.role == Role::master)) return;
     if (status_.leading) {
@@ -123,26 +120,69 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     clock_.take(s.stamp, arrived, status_.delay);
 }
 
+/// Three of one schedule in a row make it this station's: a single frame may be anything.
+void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
+    const Sync&     s = d.sync;
+    const bool      fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
+    const Claimant& c = claim(d);
+    if (!fits) unfit_sync_ = now;
+    if (c.row >= rows && std::abs(c.every - setup_.cycle) > setup_.cycle / 8) {
+        ++status_.count.foreign;
+        if (!told_schedule_) say(Event::other_schedule, d.from, c.every);
+        told_schedule_ = true;
+        return;
+    }
+    good_row_ = fits && s.cycle != heard_cycle_ ? good_row_ + 1 : c.row >= rows ? rows : 1;  // of two masters the first that has three
+    if (!fits) clock_.clear();
+    number_ = s.cycle, start_ = s.scheduled, based_ = true;
+    clock_.take(s.stamp, arrived, status_.delay);
+    heard_cycle_ = s.cycle, heard_ever_ = heard_ = true;
+    last_sync_ = now;
+    status_.master = d.from;
+    ++status_.count.syncs;
+    if (good_row_ >= rows) become(State::synchronising, now);
+}
+
+/// What its sender's syncs are like, with this one.
+const Station::Claimant& Station::claim(const Decoded& d) noexcept {
+    const Sync& s = d.sync;
+    Claimant*   c = nullptr;
+    for (Claimant& known : claimants_)
+        if (known.row != 0 && known.who == d.from) c = &known;
+    if (c == nullptr) {
+        c = &claimants_[next_claimant_++ % claimants_.size()];
+        *c = {d.from, s.cycle, 1, s.scheduled, 0};
+        return *c;
+    }
+    const auto cycles = static_cast<std::int32_t>(s.cycle - c->cycle);
+    const Time every = cycles > 0 && cycles < 1000 ? (s.scheduled - c->scheduled) / cycles : 0;
+    const bool goes_on = every > 0 && (c->row == 1 || std::abs(every - c->every) <= setup_.guard);
+    *c = {d.from, s.cycle, goes_on ? c->row + 1 : 1, s.scheduled, every};
+    return *c;
+}
+
 /// A sync of a schedule that is not the one this station keeps.
 void Station::take_foreign_sync(const Decoded& d) noexcept {
     ++status_.count.foreign;
-    if (++foreign_row_ < rows) return;
-    if (!status_.leading && d.from == status_.master) {  // it restarted: its old schedule is gone
+    const bool is_master = !status_.leading && d.from == status_.master;
+    if (is_master && ++foreign_row_ >= rows) {  // it restarted: its old schedule is gone
         say(Event::sync_lost, d.from, 0);
         ++status_.count.losses;
-        foreign_row_ = 0;
         return begin();
     }
+    if (claim(d).row < rows || is_master) return;
     if (foreign_gap_ == 0) {
         foreign_gap_ = silence_after;
         say(Event::other_master, d.from);
     }
-    if (status_.leading && setup_.role == Role::master && d.from < address_) {
-        status_.leading = status_.synchronous = false;
-        status_.master = d.from;
-        become(State::withdrawn, 0);
-        say(Event::withdrew, d.from);
-    }
+    if (status_.leading && setup_.role == Role::master && d.from < address_) withdraw(Event::withdrew, d.from);
+}
+
+void Station::withdraw(Event why, const Address& who) noexcept {
+    status_.leading = status_.synchronous = false;
+    status_.master = who;
+    become(State::withdrawn, 0);
+    say(why, who);
 }
 
 void Station::take_request(const Decoded& d, Time arrived) noexcept {
@@ -259,7 +299,8 @@ void Station::count_silence(Time now) noexcept {
     switch (status_.state) {
     case State::listening:
         if (setup_.role == Role::master && !heard_ && now - began_ >= std::max<Time>(setup_.listen_cycles * setup_.cycle, 3'000'000) &&
-            (!heard_ever_ || now - last_sync_ > setup_.listen_cycles * setup_.cycle)) {
+            (!heard_ever_ || now - last_sync_ > setup_.listen_cycles * setup_.cycle) &&
+            (unfit_sync_ == 0 || now - unfit_sync_ > unfit_for)) {
             clock_.clear();
             based_ = false;
             start_leading(now);
@@ -273,6 +314,8 @@ void Station::count_silence(Time now) noexcept {
             status_.synchronous = true;
             say(Event::synchronised, status_.master);
             become(setup_.slots.empty() ? State::running : State::calibrating, now);
+        } else if (++out_of_step_ == static_cast<std::uint32_t>(too_long_out / setup_.cycle) && status_.error != 0) {
+            say(Event::out_of_step, status_.master, std::abs(status_.error));
         }
         break;
     case State::calibrating:

@@ -135,9 +135,77 @@ TEST(Station_withdraws, when_a_second_master_with_a_smaller_address_is_there) {
     EXPECT_EQ(State::withdrawn, b.status().state);
     EXPECT_EQ(1, b.events[Event::withdrew]);
     EXPECT_FALSE(b.station.ready());
-    b.station.reset();  // it finds a master, calibrates, and takes its part over from it: with two master: blocks the file is wrong
+    b.station.reset();  // it finds a master that is none of its backups, and does not begin
     bed.run(20 * ms);
-    EXPECT_EQ(State::calibrating, b.status().state);
+    EXPECT_EQ(State::withdrawn, b.status().state);
+    EXPECT_EQ(1, b.events[Event::master_there]);
+    EXPECT_EQ(mac(1), b.last_who[Event::master_there]);
+    EXPECT_EQ(1, a.events[Event::leading]);
+}
+
+TEST(Master_that_begins, does_not_send_where_there_is_one_with_another_cycle) {
+    Bed bed;
+    Machine& a = bed.add(1, master(4'000'000));
+    bed.run(50 * ms);
+    Machine& b = bed.add(2, master());
+    b.next = b.port.clock().local(bed.now);
+    bed.wire.watching = true;
+    bed.run(200 * ms);
+    EXPECT_TRUE(a.status().leading);
+    EXPECT_EQ(State::withdrawn, b.status().state);
+    EXPECT_EQ(1, b.events[Event::master_there]);
+    EXPECT_EQ(0, b.events[Event::leading]);
+    for (const Wire::Frame& f : bed.wire.seen) EXPECT_EQ(1, f.from);
+    a.off = true;
+    b.station.reset();
+    bed.run(200 * ms);
+    EXPECT_TRUE(b.status().leading) << "when the other is gone";
+}
+
+TEST(Station_in_another_cycle, says_so_once_and_follows_nobody) {
+    Bed bed;
+    bed.add(1, master(2'000'000));
+    Machine& s = bed.add(2, slave(300'000));
+    bed.run(3000 * ms);
+    EXPECT_EQ(State::listening, s.status().state);
+    EXPECT_EQ(1, s.events[Event::other_schedule]);
+    EXPECT_EQ(mac(1), s.last_who[Event::other_schedule]);
+    EXPECT_EQ(2'000'000, s.last_value[Event::other_schedule]);
+    EXPECT_EQ(0, s.events[Event::sync_lost] + s.events[Event::running]);
+    EXPECT_GT(s.status().count.foreign, 1000U);
+}
+
+TEST(Station_between_two_masters, follows_one_and_names_the_other) {
+    Bed bed;
+    StationSetup stubborn = master();
+    Machine& a = bed.add(1, stubborn);
+    Machine& b = bed.add(5, stubborn);
+    a.port.cut = b.port.cut = true;
+    b.next += 400'000;
+    bed.run(50 * ms);
+    ASSERT_TRUE(a.status().leading && b.status().leading);
+    a.port.cut = b.port.cut = false;
+    bed.wire.deaf = {1, 5};  // neither hears that there is another
+    Machine& s = bed.add(3, slave(300'000, 1'000'000), {50e-6, 0});
+    s.next = s.port.clock().local(bed.now);
+    bed.run(2000 * ms);
+    EXPECT_TRUE(s.station.ready());
+    EXPECT_GE(s.events[Event::other_master], 1);
+    EXPECT_NE(s.status().master, s.last_who[Event::other_master]);
+    EXPECT_EQ(0, s.events[Event::sync_lost]);
+    EXPECT_LT(std::abs(s.status().error), 3'000);
+}
+
+TEST(Station_whose_thread_does_not_follow, says_so_once) {
+    Bed bed;
+    bed.add(1, master());
+    Machine& s = bed.add(2, slave(300'000));
+    s.stiff = true, s.next += 400'000;
+    bed.run(12'000 * ms);
+    EXPECT_EQ(State::synchronising, s.status().state);
+    EXPECT_EQ(1, s.events[Event::out_of_step]);
+    EXPECT_EQ(mac(1), s.last_who[Event::out_of_step]);
+    EXPECT_GT(s.last_value[Event::out_of_step], 100'000);
 }
 
 TEST(Station_names_another, that_uses_its_slot) {

@@ -90,6 +90,7 @@ public:
     std::vector<Frame> seen;  // all that left, in order, when `watching`
     bool watching = false;
     double noise_ns = 0.0;
+    std::vector<int> deaf;  // ports that get nothing but what is for them alone
 
     void inject(std::vector<std::uint8_t> bytes, int from, Time at) { queue({std::move(bytes), from, at, 0}); }
     void queue(Frame f) { waiting_.emplace(f.left, std::move(f)); }
@@ -112,7 +113,8 @@ public:
             for (auto& p : ports_) {
                 Address to{};
                 if (f.bytes.size() >= 6) std::copy_n(f.bytes.begin(), 6, to.begin());
-                if (p->number_ != f.from && !p->cut && (to == ethernet::broadcast || to == p->address_ || f.bytes.size() < 6))
+                const bool shuns = to == ethernet::broadcast && std::find(deaf.begin(), deaf.end(), p->number_) != deaf.end();
+                if (p->number_ != f.from && !p->cut && !shuns && (to == ethernet::broadcast || to == p->address_ || f.bytes.size() < 6))
                     p->inbox_.push_back(f);
             }
         }
@@ -140,7 +142,7 @@ struct Machine final : Events {
         station.transmit(next);
         const Time error = station.error();
         const Time step = std::abs(error) > 20'000 ? error : error / 2;
-        if (station.status().leading && !follows) next += station.setup().cycle;
+        if (stiff || (station.status().leading && !follows)) next += station.setup().cycle;
         else next += station.setup().cycle + step;
     }
     Time due() const { return port.clock().real(next); }
@@ -154,7 +156,7 @@ struct Machine final : Events {
     Wire::Port& port;
     Station station;
     Time next = 0;
-    bool follows = true, off = false;
+    bool follows = true, off = false, stiff = false;  // stiff: its thread keeps its own time
     std::function<void(Machine&)> in_cycle;
     std::map<Event, int> events;
     std::map<Event, Address> last_who;
