@@ -40,19 +40,21 @@ std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width
         spot.left = s[cv::CC_STAT_LEFT], spot.top = s[cv::CC_STAT_TOP];
         spot.right = spot.left + s[cv::CC_STAT_WIDTH] - 1, spot.bottom = spot.top + s[cv::CC_STAT_HEIGHT] - 1;
         // its rim lies below the threshold: what is next to it counts too
-        std::vector<double> rows;
+        std::vector<double> rows, moments;  // of each row: its weight, and that times u
         double              sum = 0.0, sum_u = 0.0, sum_v = 0.0;
         for (int v = std::max(spot.top - 1, 0); v <= std::min(spot.bottom + 1, height - 1); ++v) {
-            double row = 0.0;
+            double row = 0.0, moment = 0.0;
             for (int u = std::max(spot.left - 1, 0); u <= std::min(spot.right + 1, width - 1); ++u) {
                 if (const int other = labels.at<int>(v, u); other != label && other != 0) continue;
                 const double w = weight.at<std::uint8_t>(v, u);
                 row += w;
-                sum_u += w * u;
+                moment += w * u;
             }
+            sum_u += moment;
             sum_v += row * v;
             sum += row;
             rows.push_back(row);
+            moments.push_back(moment);
         }
         if (!(sum > 0.0)) continue;
         spot.u = sum_u / sum, spot.v = sum_v / sum, spot.mass = sum / 255.0;
@@ -63,7 +65,10 @@ std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width
         std::size_t  last = rows.size() - 1;
         while (last > 0 && rows[last] < half) --last;
         const double next = last + 1 < rows.size() ? rows[last + 1] : 0.0;
-        spot.bottom_edge = std::max(spot.top - 1, 0) + static_cast<double>(last) + (rows[last] > next ? std::clamp((rows[last] - half) / (rows[last] - next), 0.0, 1.0) : 0.0);
+        spot.foot_v = std::max(spot.top - 1, 0) + static_cast<double>(last) + (rows[last] > next ? std::clamp((rows[last] - half) / (rows[last] - next), 0.0, 1.0) : 0.0);
+        double foot = 0.0;
+        for (std::size_t i = last > 2 ? last - 2 : 0; i <= last; ++i) foot += rows[i], spot.foot_u += moments[i];
+        spot.foot_u = foot > 0.0 ? spot.foot_u / foot : spot.u;
         spots.push_back(spot);
     }
     std::sort(spots.begin(), spots.end(), [](const Spot& a, const Spot& b) { return a.mass > b.mass; });

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// Coloured things that stand on the ground, and where.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "vision/detect/ground.hpp"
+#include "vision/detect/spots.hpp"
+#include "vision/detect/tracks.hpp"
+
+namespace hal::vision {
+
+/// A kind of thing: an upright cylinder of one colour.
+struct BlobKind {
+    Hue    hue;
+    double radius = 0.033;  ///< m
+    bool   operator==(const BlobKind& o) const noexcept { return hue.degrees == o.hue.degrees && hue.tolerance == o.hue.tolerance && radius == o.radius; }
+};
+
+struct BlobRules {
+    int    threshold = 40;     ///< of the colour, of 255
+    int    least_area = 40;    ///< px
+    double most_distance = 3;  ///< m: farther away it is not told
+};
+
+/// What of each kind stands in the picture: its axis is `radius` behind the place where it ends below. One that goes beyond the picture's lower edge is not
+/// told, for where it stands is not seen. [any] takes memory
+std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground, std::span<const BlobKind> kinds, const BlobRules& rules);
+
+}  // namespace hal::vision

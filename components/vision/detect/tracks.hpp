@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Things on the ground that are seen in frame after frame.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace hal::vision {
+
+/// A thing in one frame.
+struct Sighting {
+    std::uint32_t kind = 0;
+    double        x = 0.0, y = 0.0;  ///< m
+    double        area = 0.0;        ///< px
+};
+
+/// The same thing over many frames.
+struct Track {
+    std::uint32_t id = 0;  ///< counts from 1; 0: this place is free
+    std::uint32_t kind = 0;
+    double        x = 0.0, y = 0.0, area = 0.0;
+    std::int64_t  first_ns = 0, last_ns = 0;  ///< stamps of the first and the last frame that showed it
+    std::uint32_t sightings = 0;
+};
+
+struct TrackRules {
+    double        gate = 0.15;         ///< m: farther from where a thing was, it is another one
+    double        gain = 0.5;          ///< how much of the way to a new sighting a track goes, 0 to 1
+    std::int64_t  forget_ns = 1'000'000'000;
+};
+
+constexpr std::size_t most_tracks = 32;
+
+/// Each track keeps its place in the row as long as it lives. Who belongs to whom: the nearest pair of one kind first, then the nearest of the rest.
+class Tracks {
+public:
+    explicit Tracks(std::size_t count) : count_(count < most_tracks ? count : most_tracks) {}
+    /// [any]
+    void see(std::span<const Sighting> sightings, std::int64_t stamp_ns, const TrackRules& rules);
+    std::span<const Track> all() const noexcept { return {tracks_.data(), count_}; }
+    /// Sightings that no place was left for. [any]
+    std::uint32_t crowded() const noexcept { return crowded_; }
+
+private:
+    std::array<Track, most_tracks> tracks_{};
+    std::size_t                    count_;
+    std::uint32_t                  next_ = 1, crowded_ = 0;
+};
+
+}  // namespace hal::vision
