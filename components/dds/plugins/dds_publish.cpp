@@ -11,6 +11,7 @@
 #include "dds/arguments.hpp"
 #include "dds/field_pins.hpp"
 #include "dds/outbox.hpp"
+#include "dds/status.hpp"
 
 namespace {
 
@@ -23,11 +24,13 @@ public:
     void start() {
         participant_ = open(settings_);
         writer_ = participant_->writer(topic_, quality_, this);
+        beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
         hal::dds::serve(*this);
     }
     void stop() noexcept {
         if (participant_) withdraw(*this);
         writer_.reset();
+        beacon_.reset();
         participant_.reset();
     }
 
@@ -153,6 +156,7 @@ private:
     std::int64_t expected_ = 0, since_ = 0;  // the cycle it is looking for, and since when
 
     std::shared_ptr<Participant> participant_;
+    std::shared_ptr<Beacon>      beacon_;  // tells hal top of this instance
     std::unique_ptr<Writer>      writer_;
 };
 

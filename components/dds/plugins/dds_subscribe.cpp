@@ -6,6 +6,7 @@
 
 #include "dds/arguments.hpp"
 #include "dds/field_pins.hpp"
+#include "dds/status.hpp"
 #include "hal/queue.hpp"
 
 namespace {
@@ -34,11 +35,13 @@ public:
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         participant_ = open(settings_);
         reader_ = participant_->reader(topic_, quality_, this);
+        beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
         hal::dds::serve(*this);
     }
     void stop() noexcept {
         if (participant_) withdraw(*this);
         reader_.reset();
+        beacon_.reset();
         participant_.reset();
     }
 
@@ -212,6 +215,7 @@ private:
     std::int64_t quiet_since_ = 0;
 
     std::shared_ptr<Participant> participant_;
+    std::shared_ptr<Beacon>      beacon_;  // tells hal top of this instance
     std::unique_ptr<Reader>      reader_;
 };
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <time.h>
-
 #include <algorithm>
 #include <atomic>
-#include <cmath>
+#include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <deque>
 #include <map>
 #include <memory>
@@ -92,8 +91,7 @@ public:
     }
 
     void start() {
-        hal::dds::Settings settings = arguments_.participant.settings();
-        participant_ = open(settings);
+        participant_ = open(settings_);
         Quality quality = status_quality();
         quality.depth = 64;
         reader_ = participant_->reader(status_topic(), quality, this);
@@ -101,7 +99,7 @@ public:
         // Whoever is there answers within a moment; who is not may come later.
         {
             std::unique_lock lock(mutex_);
-            const auto       until = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms_.operator std::int64_t());
+            const auto       until = std::chrono::steady_clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(patience_ms_));
             while (refusal_.empty() && greeted_.size() < others_.size() && changed_.wait_until(lock, until) != std::cv_status::timeout) {}
             started_ = true;
             if (!refusal_.empty()) {
@@ -154,7 +152,6 @@ private:
     }
 
     void twin(std::string_view text) {
-        const auto pid = values_of(text, "pid"), own = values_of(text, "host");
         if (started_) return;  // the one that comes later is refused; a status of our own comes back, too
         refusal_ = "node '" + self_.get() + "' of '" + cell_.get() + "' runs already: " + whom(text);
         changed_.notify_all();
@@ -180,13 +177,13 @@ private:
         if (!started_) {
             if (!why.empty()) refusal_ = why;
         } else if (why != other.said) {
-            arguments_.say(why.empty() ? "node '" + other.name + "' runs the same version again" : why);
+            std::fputs(("node: " + (why.empty() ? "node '" + other.name + "' runs the same version again" : why) + "\n").c_str(), stderr);
         }
         other.said = why;
         changed_.notify_all();
     }
 
-    Participation     arguments_{*this};
+    ParticipantArguments arguments_{*this};
     hal::TextArgument cell_{*this, "cell", "cell", "name of the netlist: nodes of others are not looked at"};
     hal::TextArgument self_{*this, "node", "node", "which of its nodes this is"};
     hal::TextArgument names_{*this, "others", "", "the other nodes"};
@@ -200,6 +197,8 @@ private:
         for (const std::string& name : list_of(names_.get())) all.emplace_back(*this, watch_, name);
         return all;
     }();
+
+    const hal::dds::Settings settings_ = arguments_.settings();
 
     // Between the engine's threads and start()
     std::mutex              mutex_;
