@@ -155,7 +155,7 @@ private:
         if (s == State::valid && said_ == State::stale) arguments_.say("topic '" + topic_.name + "' is valid again");
         said_ = s;
         const bool somebody = matched_.load(std::memory_order_relaxed) > 0;
-        if (!somebody) quiet_since_ = now;
+        if (!somebody || quiet_since_ == 0) quiet_since_ = now;
         const std::int64_t since = std::max(last_.load(std::memory_order_relaxed), quiet_since_);
         const bool         quiet = somebody && now - since > silence_ms_ * 1'000'000;
         if (quiet && !silent_.load(std::memory_order_relaxed))
