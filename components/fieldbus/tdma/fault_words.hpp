@@ -11,7 +11,8 @@
 namespace hal::tdma {
 
 struct FaultWords {
-    std::string                                   sync_lost, other_master, master_there, withdrew, babbling, uncalibrated, period;
+    std::string                                   sync_lost, other_master, master_there, withdrew, babbling, uncalibrated, period,
+        no_carrier = "the line has no carrier";
     std::vector<std::pair<unsigned, std::string>> foreign;  // by slot
 
     explicit FaultWords(const StationSetup& s) {

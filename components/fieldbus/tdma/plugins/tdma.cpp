@@ -72,7 +72,7 @@ public:
         const std::string& remark = port_->description().remark;
         if (!remark.empty()) std::fputs((name_ + ": " + remark + "\n").c_str(), stderr);
         beat_.lose();
-        told_period_ = was_reset_ = false;
+        told_period_ = was_reset_ = false, had_carrier_ = true;
         words_ = own_words_.get();
         if (service_) service_->begin();
         if (applicant_) applicant_->begin(), background_->start();
@@ -214,7 +214,7 @@ private:
     /// What `tunnel=` asks of the schedule.
     void look_at_tunnel(const std::string& file) const {
         if (tunnel_argument_.get().empty()) return;
-        if (auto problem = wrong_name(tunnel_argument_.get()); !problem.empty()) throw std::invalid_argument("tunnel=: " + problem);
+        if (auto problem = wrong_name(tunnel_argument_.get()); !problem.empty()) throw std::invalid_argument("tunnel=" + problem);
         if (!parse_prefix(netmask_argument_.get()))
             throw std::invalid_argument("netmask=" + netmask_argument_.get() + " is none; write 24 or 255.255.255.0");
         const auto is_tunnels = [](const SlotSetup& s) { return s.id == tunnel_slot; };
@@ -261,6 +261,10 @@ private:
         leading = s.leading;
         master_active = s.master_active;
         link_up = port.up;
+        if (port.up != had_carrier_) {
+            had_carrier_ = port.up;
+            on_event(port.up ? Event::carrier : Event::no_carrier, {}, 0);
+        }
         cycle_number = s.cycle;
         global_time = s.global;
         offset = s.offset;
@@ -322,6 +326,13 @@ private:
         case Event::uncalibrated:
             fault = true;
             raise(words_->uncalibrated, static_cast<double>(value));
+            break;
+        case Event::no_carrier:
+            fault = true;
+            raise(words_->no_carrier, not_a_number);
+            break;
+        case Event::carrier:
+            if (station_->ready()) fault = false;
             break;
         case Event::running:
             if (!station_->status().count.losses) break;
@@ -417,6 +428,7 @@ private:
     hal::Discipline                         beat_;
     const hal_faults*                       faults_ = nullptr;
     bool                                    leads_ = false, told_period_ = false, was_reset_ = false, was_beat_ = false;
+    bool                                    had_carrier_ = true;
 };
 
 }  // namespace
