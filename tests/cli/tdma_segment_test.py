@@ -42,6 +42,7 @@ class Tdma(Segment):
         self.lost = f"tdma.0: the sync of {self.mac('m')} is lost; this station is silent until there is one again\n"
         self.followed = f"tdma.0: the sync of {self.mac('m')} is followed\n"
         for name in self.names:
+            self.wait_for_words(name, RUNS)
             self.wait_for(name, "running", "TRUE")
 
     def tearDown(self):
@@ -90,6 +91,7 @@ class Tdma(Segment):
         self.assertEqual(["FALSE", "FALSE", "TRUE"], [self.pin("x", pin) for pin in ("link-up", "running", "fault")])
         self.cable("x", plugged=True)
         self.wait_for_words("x", CARRIER)
+        self.wait_for_words("x", RUNS, 2)
         self.wait_for("x", "running", "TRUE")
         self.wait_for("x", "fault", "FALSE")
         said = self.said("x")
