@@ -32,11 +32,11 @@ public:
         detector_.emplace(dictionary_.get(), std::move(camera));
     }
 
-    void detect(const Frame& frame, const Settings& wanted, Found& found) {
-        const std::vector<Marker> markers = detector_->find(frame, wanted.id, wanted.size_mm);
+    void detect(const Frame& frame, const Settings& of, Found& found) {
+        const std::vector<Marker> markers = detector_->find(frame, of.id, of.size_mm);
         const Marker*             best = nullptr;
         for (const Marker& marker : markers)
-            if (!best && (wanted.most_error <= 0.0 || marker.error_px <= wanted.most_error)) best = &marker;
+            if (!best && (of.most_error <= 0.0 || marker.error_px <= of.most_error)) best = &marker;
         found.count = static_cast<std::uint32_t>(markers.size());
         if (!best) return;
         found.found = true;
@@ -74,7 +74,7 @@ public:
 
 private:
     hal::TextArgument dictionary_{*this, "dictionary", "4x4_50", "which markers: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
-    hal::TextArgument camera_{*this, "camera", "", "calibration of the camera, a file beside the netlist; without it there is no pose"};
+    hal::TextArgument camera_{*this, "camera", "", "calibration of the camera, a file beside the netlist; without it there is no pose", {.per_instance = true}};
     std::optional<MarkerDetector> detector_;  // of the helper thread, once started
 };
 

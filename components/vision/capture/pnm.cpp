@@ -57,7 +57,7 @@ std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Fr
     // binary: one white space, then the samples; plain: at least a digit and a space each
     const std::size_t needed = plain ? 2 * samples : 1 + samples * wide;
     if (reader.left() < needed)
-        return damaged("it ends early: " + std::to_string(reader.left()) + " bytes of " + std::to_string(needed) + " are there");
+        return damaged("it ends early: " + std::to_string(reader.left()) + " of " + std::to_string(needed) + " bytes are there");
     frame.resize(width, height, colour ? Format::bgr : Format::grey);
     if (!plain) reader.take(1);
     for (std::size_t i = 0; i < samples; ++i) {

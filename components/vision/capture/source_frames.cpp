@@ -49,15 +49,15 @@ public:
         return true;
     }
     Got next(std::int64_t now, std::int64_t timeout, Frame& frame) override {
-        if (!loop_ && next_ >= files_.size()) {
-            fail(Trouble::ended, "all frames of " + shown_ + " were shown; to begin anew, write frames:" + shown_ + "?loop");
-            if (timeout > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(timeout));
-            return told_end_ ? Got::nothing : (told_end_ = true, Got::bad);
-        }
-        if (const std::int64_t wait = at(next_) - now; wait > 0) {
+        if (const std::int64_t wait = told_end_ ? INT64_MAX : at(next_) - now; wait > 0) {
             if (timeout > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(wait, timeout)));
             if (wait > timeout) return Got::nothing;
             now += wait;
+        }
+        if (!loop_ && next_ >= files_.size()) {
+            told_end_ = true;
+            fail(Trouble::ended, "all frames of " + shown_ + " were shown; to begin anew, write frames:" + shown_ + "?loop");
+            return Got::bad;
         }
         std::uint64_t newest = std::max(next_, due(now));
         if (!loop_) newest = std::min<std::uint64_t>(newest, files_.size() - 1);

@@ -67,8 +67,8 @@ std::string four_letters(std::uint32_t code) {
 class V4l2 final : public Source {
 public:
     V4l2(Address address, VideoSystem& system) : system_(system), device_(address.place()) {
-        width_ = address.whole("width", 640, 16, most_wide);
-        height_ = address.whole("height", 480, 16, most_high);
+        width_ = address.whole("width", 640, 2, most_wide);
+        height_ = address.whole("height", 480, 2, most_high);
         fps_ = address.number("fps", 30.0, 0.1, 1000.0);
         grey_ = address.flag("grey");
         address.finish();

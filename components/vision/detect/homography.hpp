@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// From a pixel to the place on a plane that is seen there.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vision/capture/camera.hpp"
+
+namespace hal::vision {
+
+/// A point of the plane, and where it is seen.
+struct GroundPoint {
+    double        u = 0, v = 0, x = 0, y = 0;
+    std::uint32_t begin = 0, end = 0;  ///< of its text
+};
+
+struct GroundText {
+    std::vector<GroundPoint>   points;
+    std::vector<CameraProblem> problems;
+};
+
+/// Rows of four numbers, u v x y; a row ends with the line or with `;`, between numbers there is a space, a comma or a colon, behind a `#`
+/// a comment. At least four rows, at most 1000. [setup]
+GroundText read_ground(std::string_view text);
+
+/// A homography (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd edition, 4.1): w (x, y, 1) = H (u', v', 1), with u', v' the pixel
+/// without the lens's distortion.
+class Ground {
+public:
+    /// The one that fits the points best. Points in a line, or two at one place, are problems, which are added to `text`; then the result
+    /// is of no use. [setup]
+    Ground(GroundText& text, const std::optional<Camera>& camera);
+    Ground() = default;
+
+    /// The place that is seen at the pixel. False: the pixel is no number, or shows the horizon or what is above it; `x`, `y` are left
+    /// as they are. [realtime]
+    bool map(double u, double v, double& x, double& y) const noexcept;
+    /// How far the points lie from where they should, root of the mean square, in their unit.
+    double error() const { return error_; }
+
+private:
+    void fit(GroundText& text, const std::optional<Camera>& camera);
+    void undistort(double& u, double& v) const noexcept;
+    std::array<double, 9> h_{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    Camera                camera_;
+    bool                  distorted_ = false;
+    double                error_ = 0, least_w_ = 0;  // w of pixels closer to the horizon than that is taken for 0
+};
+
+}  // namespace hal::vision
