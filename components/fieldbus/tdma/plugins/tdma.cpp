@@ -474,5 +474,8 @@ with `link = cane:enp3s0?slot=2` sends in slot 2. Where the station is not the m
 When no sync comes for as many cycles as `lost` says, the station is silent, `synchronous` and `running` become false and a fault is
 recorded. It returns by itself when there is a sync again. A master that finds a second one with a smaller address withdraws until `reset`.
 
+With `tunnel=hal0` the component makes an interface hal0, through which `ping`, `ssh` and all that speaks IP cross the segment in slot 1 and
+never in a real-time slot. It has the block's `ip`, the port's MAC address and an MTU of the slot's size less 4, and needs CAP_NET_ADMIN.
+
 `hal tdma plan cell.tdma` shows what a schedule comes to; docs/tdma.md is the whole story.
 )")
