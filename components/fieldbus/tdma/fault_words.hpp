@@ -11,7 +11,7 @@
 namespace hal::tdma {
 
 struct FaultWords {
-    std::string                                   sync_lost, other_master, master_there, withdrew, babbling, uncalibrated, period,
+    std::string sync_lost, other_master, master_there, withdrew, babbling, uncalibrated, period, other_schedule, out_of_step,
         no_carrier = "the line has no carrier";
     std::vector<std::pair<unsigned, std::string>> foreign;  // by slot
 
@@ -25,6 +25,9 @@ struct FaultWords {
         uncalibrated = "{} calibration requests were not answered; they are repeated";
         period = "the thread's period is {} us, the configuration's cycle is " + config::microseconds(s.cycle) +
                  "; nothing is sent: make them equal";
+        other_schedule =
+            "syncs come every {} us, this station's cycle is " + config::microseconds(s.cycle) + "; it follows nobody: give both the same";
+        out_of_step = "the sync is heard, but this thread is {} us off and comes no nearer";
         for (const SlotSetup& slot : s.slots)
             foreign.emplace_back(slot.id, "another station sends in slot " + std::to_string(slot.id) + " of this one");
     }

@@ -78,6 +78,10 @@ private:
         case Event::out_of_step:
             return "the sync of " + who + " is heard, but this thread is " + config::microseconds(h.value) +
                    " off and comes no nearer; do the threads of this process follow another instance?";
+        case Event::wrong_period:
+            return "the thread's period is " + config::microseconds(h.value) + ", the configuration's cycle is " +
+                   (schedule_.cycle != 0 ? config::microseconds(schedule_.cycle) : "another, as the master sent it") +
+                   "; nothing is sent: make them equal";
         case Event::unconfigured:
             return "has no schedule and waits for the master of the segment to send it one (RTcfg); the master's file must have a block "
                    "with '" +

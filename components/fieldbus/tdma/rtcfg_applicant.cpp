@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 namespace hal::tdma::rtcfg {
@@ -117,21 +118,24 @@ void Applicant::judge(const Offer& offer) {
     answers_.push(all_.back().get());
 }
 
-/// Whole or not at all: written beside it and renamed.
+/// Whole or not at all: written beside it and renamed; what is no file (a device, a pipe) is written as it is.
 void Applicant::write(const File& file) {
     const std::string server = ethernet::to_string(file.server);
     std::uint32_t     written = 0;
     if (file.length == 0) {
         say(server + " has no file (stage 2) for this station; '" + path_ + "' is not written");
     } else {
-        const std::string part = path_ + ".part";
+        std::error_code   ignored;
+        const auto        kind = std::filesystem::symlink_status(path_, ignored).type();
+        const bool        plain = kind == std::filesystem::file_type::not_found || kind == std::filesystem::file_type::regular;
+        const std::string into = plain ? path_ + ".part" : path_;
         errno = 0;
-        std::ofstream out(part, std::ios::binary | std::ios::trunc);
+        std::ofstream out(into, std::ios::binary | (plain ? std::ios::trunc : std::ios::app));
         out.write(reinterpret_cast<const char*>(spare_.data()), file.length);
         out.close();
-        if (!out || std::rename(part.c_str(), path_.c_str()) != 0) {
+        if (!out || (plain && std::rename(into.c_str(), path_.c_str()) != 0)) {
             say("the file from " + server + " cannot be written to '" + path_ + "': " + std::strerror(errno) + "; mend stage2=");
-            std::remove(part.c_str());
+            if (plain) std::remove(into.c_str());
         } else {
             written = file.length;
             say("the file from " + server + ", " + std::to_string(written) + " bytes, is in '" + path_ + "'");

@@ -72,6 +72,8 @@ enum class Event : std::uint8_t {
     carrier,        ///< and is back
     out_of_step,    ///< the sync is followed, but this thread does not come to it. who; value: ns it is off
 
+    wrong_period,   ///< the thread's period is not the cycle: nothing is done. value: ns
+
     // of RTcfg
     unconfigured,        ///< it waits for its schedule
     other_server,        ///< a second server; not listened to. who

@@ -77,7 +77,7 @@ void Station::begin() noexcept {
     calibration_.begin(setup_.rounds);
     recalibration_ = 0;
     claimants_ = {};
-    unfit_sync_ = 0, punctual_row_ = out_of_step_ = 0, told_schedule_ = false;
+    newcomer_row_ = 0, unfit_sync_ = 0, punctual_row_ = out_of_step_ = 0, told_schedule_ = false;
     limit_ = setup_.babble_limit != 0 ? setup_.babble_limit : 64;
     ready_.store(false, std::memory_order_relaxed);
 }

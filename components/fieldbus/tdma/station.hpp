@@ -92,19 +92,19 @@ private:
     }
 
     // station_receive.cpp
-    void take(const ethernet::Arrival&, Time now) noexcept;
-    void take_sync(const Decoded&, Time arrived, Time now) noexcept;
-    void take_foreign_sync(const Decoded&) noexcept;
-    void listen_to(const Decoded&, Time arrived, Time now) noexcept;
+    void            take(const ethernet::Arrival&, Time now) noexcept;
+    void            take_sync(const Decoded&, Time arrived, Time now) noexcept;
+    void            take_foreign_sync(const Decoded&) noexcept;
+    void            listen_to(const Decoded&, Time arrived, Time now) noexcept;
     const Claimant& claim(const Decoded&) noexcept;
-    void withdraw(Event why, const Address& who) noexcept;
-    void take_request(const Decoded&, Time arrived) noexcept;
-    void take_reply(const Decoded&, Time arrived, Time now) noexcept;
-    void look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
-    void advance(Time now) noexcept;
-    void count_silence(Time now) noexcept;
-    void start_leading(Time now) noexcept;
-    bool may_lead() const noexcept;
+    void            withdraw(Event why, const Address& who) noexcept;
+    void            take_request(const Decoded&, Time arrived) noexcept;
+    void            take_reply(const Decoded&, Time arrived, Time now) noexcept;
+    void            look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
+    void            advance(Time now) noexcept;
+    void            count_silence(Time now) noexcept;
+    void            start_leading(Time now) noexcept;
+    bool            may_lead() const noexcept;
 
     // station_transmit.cpp
     void send_sync(std::uint32_t cycle, Time global_at) noexcept;
@@ -135,32 +135,34 @@ private:
     std::atomic<bool>                 ready_{false};
     std::array<Pending, most_pending> pending_{};
 
-    bool          based_ = false;  // number_ and start_ are known
-    std::uint32_t number_ = 0;  // of a cycle …
-    Time          start_ = 0;  // … and its scheduled sync, global
-    bool          heard_ = false;  // a sync of this schedule since the last receive()
-    std::uint32_t heard_cycle_ = 0;  // the number of the newest
-    bool          heard_ever_ = false;
-    Time          last_sync_ = 0;  // local
-    Time          began_ = 0;  // local; 0: before the first cycle
-    Time          sent_until_ = 0;  // global; slots up to here have had their turn
-    bool          sent_any_ = false;
-    std::uint32_t lead_wait_ = 0;  // cycles before a returning master leads again
-    bool          own_schedule_ = false;  // nobody else's time is kept: this master was the first
-    std::uint32_t good_row_ = 0;  // syncs of one schedule in a row
-    std::uint32_t foreign_row_ = 0;  // syncs of another schedule since the last of this one
-    std::uint32_t intruder_row_ = 0;
-    std::uint32_t foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the same is said again
-    std::uint32_t recalibration_ = 0;  // requests only in each so-manieth cycle, beside frames; 0: in each
-    bool          told_uncalibrated_ = false;
+    bool                    based_ = false;  // number_ and start_ are known
+    std::uint32_t           number_ = 0;  // of a cycle …
+    Time                    start_ = 0;  // … and its scheduled sync, global
+    bool                    heard_ = false;  // a sync of this schedule since the last receive()
+    std::uint32_t           heard_cycle_ = 0;  // the number of the newest
+    bool                    heard_ever_ = false;
+    Time                    last_sync_ = 0;  // local
+    Time                    began_ = 0;  // local; 0: before the first cycle
+    Time                    sent_until_ = 0;  // global; slots up to here have had their turn
+    bool                    sent_any_ = false;
+    std::uint32_t           lead_wait_ = 0;  // cycles before a returning master leads again
+    bool                    own_schedule_ = false;  // nobody else's time is kept: this master was the first
+    std::uint32_t           good_row_ = 0;  // syncs of one schedule in a row
+    std::uint32_t           foreign_row_ = 0;  // syncs of another schedule since the last of this one
+    std::uint32_t           intruder_row_ = 0;
+    std::uint32_t           foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the same is said again
+    std::uint32_t           recalibration_ = 0;  // requests only in each so-manieth cycle, beside frames; 0: in each
+    bool                    told_uncalibrated_ = false;
     std::array<Claimant, 4> claimants_{};
-    std::size_t   next_claimant_ = 0;
-    Time          unfit_sync_ = 0;  // when the last came while it listened, local; 0: none
-    Address       punctual_{};
-    std::uint32_t punctual_row_ = 0;  // its syncs in a row that a master sent, not a backup
-    std::uint32_t out_of_step_ = 0;  // cycles it has been synchronising for
-    bool          told_schedule_ = false;
-    std::uint32_t limit_ = 32;  // frames of one station in a cycle
+    std::size_t             next_claimant_ = 0;
+    Address                 newcomer_{};
+    std::uint32_t           newcomer_row_ = 0;  // of its syncs, while another is the master
+    Time                    unfit_sync_ = 0;  // when the last came while it listened, local; 0: none
+    Address                 punctual_{};
+    std::uint32_t           punctual_row_ = 0;  // its syncs in a row that a master sent, not a backup
+    std::uint32_t           out_of_step_ = 0;  // cycles it has been synchronising for
+    bool                    told_schedule_ = false;
+    std::uint32_t           limit_ = 32;  // frames of one station in a cycle
 };
 
 }  // namespace hal::tdma

@@ -18,11 +18,13 @@ constexpr Time          too_long_out = 5'000'000'000;    // to come into phase t
 
 void Station::receive(Time now) noexcept {
     if (port_ == nullptr) return;
-    if (began_ == 0) began_ = now;
+    const bool first = began_ == 0;
+    if (first) began_ = now;
     heard_ = false;
     for (std::size_t i = 0; i < most_arrivals; ++i) {
         const auto arrival = port_->receive(now);
         if (!arrival) break;
+        if (first && arrival->time_ns < now - setup_.cycle) continue;  // from between the open and the thread's first cycle
         take(*arrival, now);
     }
     for (std::uint32_t* gap : {&foreign_gap_, &intruder_gap_, &babble_gap_})
@@ -94,6 +96,19 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     const bool fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
     if (!fits) return take_foreign_sync(d);
     if (heard_ever_ && static_cast<std::int32_t>(s.cycle - heard_cycle_) <= 0 && !(status_.leading && setup_.role == Role::master)) return;
+    // Who is new is believed the second time; until then its sync keeps the beat, so that a backup that takes over is not missed.
+    if (d.from != status_.master || status_.leading) {
+        const bool again = d.from == newcomer_ && newcomer_row_ != 0;
+        newcomer_ = d.from, newcomer_row_ = 1;
+        if (!again) {
+            if (status_.leading) return;
+            if (heard_ever_) status_.count.syncs_lost += s.cycle - heard_cycle_ - 1;
+            heard_cycle_ = s.cycle, heard_ = heard_ever_ = true, last_sync_ = arrived;
+            return;
+        }
+    } else {
+        newcomer_row_ = 0;
+    }
     if (status_.leading) {
         const Time own = setup_.role == Role::backup ? setup_.backup_offset : 0;
         if (setup_.role == Role::master) {
@@ -114,7 +129,7 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
         if (status_.calibrated && !setup_.slots.empty()) calibration_.begin(setup_.rounds), recalibration_ = 8;
     }
     heard_cycle_ = s.cycle, heard_ = heard_ever_ = true;
-    last_sync_ = now;
+    last_sync_ = arrived;
     ++status_.count.syncs;
     number_ = s.cycle, start_ = s.scheduled;
     clock_.take(s.stamp, arrived, status_.delay);
@@ -137,7 +152,7 @@ void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
     number_ = s.cycle, start_ = s.scheduled, based_ = true;
     clock_.take(s.stamp, arrived, status_.delay);
     heard_cycle_ = s.cycle, heard_ever_ = heard_ = true;
-    last_sync_ = now;
+    last_sync_ = arrived;
     status_.master = d.from;
     ++status_.count.syncs;
     if (good_row_ >= rows) become(State::synchronising, now);
@@ -232,7 +247,7 @@ void Station::take_reply(const Decoded& d, Time arrived, Time now) noexcept {
 /// Does somebody else use a slot of ours? Only a station that knows how long frames are on their way can tell.
 void Station::look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
     if (status_.state != State::running || !status_.calibrated || own_schedule_) return;
-    constexpr Time tolerance = 2'000;
+    const Time tolerance = std::max<Time>(2'000, setup_.guard / 2);  // no frame of another slot begins so near
     const Time     longer = 2 * (wire(frame.size()) - wire(0));  // stored and forwarded once
     const Time     into = clock_.global(arrived) - status_.delay - longer - start_;
     const Time     cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
