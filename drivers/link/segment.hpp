@@ -25,6 +25,8 @@ struct Disturbance {
     std::uint32_t every = 0;         ///< every n-th of those that match; 0: by probability
     double probability = 0.0;
     std::uint16_t type = 0;          ///< Ethertype; 0: all
+    std::uint16_t at = 0;            ///< place of 16 bits, big endian, that have to be `is`; 0: nothing is looked at
+    std::uint16_t is = 0;
     std::int32_t from = -1, to = -1; ///< ports, by number; -1: all
     std::uint64_t count = UINT64_MAX;///< ends after so many hits
     std::int64_t delay_ns = 0;

@@ -16,7 +16,10 @@ class SimulatedPort final : public Port, public Segment {
 public:
     /// `user` is on the segment already.
     SimulatedPort(std::shared_ptr<Switch> segment, std::unique_ptr<User> user, Description description)
-        : switch_(std::move(segment)), owned_(std::move(user)), user_(*owned_), station_(*user_.station),
+        : switch_(std::move(segment)),
+          owned_(std::move(user)),
+          user_(*owned_),
+          station_(*user_.station),
           description_(std::move(description)) {}
     ~SimulatedPort() override { switch_->remove(std::move(owned_)); }
 
@@ -105,12 +108,19 @@ public:
         });
     }
     void babble(int port, std::span<const std::uint8_t> frame, std::int64_t period_ns) override {
-        Options options;
-        options.send_capacity = babbled_places;
-        auto babbler = std::make_unique<User>(options);
+        std::unique_ptr<User> babbler;
+        const bool has_one = switch_->exclusively([&] {
+            const Station* s = switch_->station(port);
+            return s == nullptr || s->babbler != nullptr;
+        });
+        if (!has_one) {
+            Options options;
+            options.send_capacity = babbled_places;
+            babbler = std::make_unique<User>(options);
+        }
         switch_->exclusively([&] {
             Station* s = switch_->station(port);
-            if (s == nullptr) return;
+            if (s == nullptr || (!s->babbler && !babbler)) return;
             if (!s->babbler) s->babbler = std::move(babbler), s->babbler->station = s;
             s->babble.fill(0);
             const auto length = std::min(frame.size(), largest_frame);

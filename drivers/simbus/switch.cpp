@@ -28,8 +28,12 @@ unsigned type_of(const Bytes& b) { return static_cast<unsigned>(b[12] << 8U | b[
 }  // namespace
 
 User::User(const Options& o)
-    : places(Ring<std::uint32_t>(o.send_capacity).capacity()), unused(o.send_capacity), outgoing(o.send_capacity),
-      incoming(o.receive_capacity), types(o.types), promiscuous(o.promiscuous) {
+    : places(Ring<std::uint32_t>(o.send_capacity).capacity()),
+      unused(o.send_capacity),
+      outgoing(o.send_capacity),
+      incoming(o.receive_capacity),
+      types(o.types),
+      promiscuous(o.promiscuous) {
     for (std::uint32_t i = 0; i < places.size(); ++i) unused.push(i);
     waiting.reserve(places.size());
 }
@@ -283,6 +287,7 @@ bool Switch::disturbed(Event& e, bool only_one) noexcept {
         const Disturbance& w = d.what;
         if ((w.to >= 0) != only_one || (only_one && w.to != e.to)) continue;
         if ((w.type != 0 && w.type != type_of(bytes)) || (w.from >= 0 && w.from != e.from->station->number)) continue;
+        if (w.at != 0 && (w.at + std::size_t{2} > e.length || (bytes[w.at] << 8 | bytes[w.at + 1U]) != w.is)) continue;
         if (e.time_ns < w.from_ns || e.time_ns >= w.until_ns || d.hits >= w.count) continue;
         ++d.matched;
         const bool hit = w.every != 0 ? d.matched % w.every == 0 : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;

@@ -13,11 +13,24 @@ using namespace hal::ethernet;
 
 struct Row {
     const char* name;
-    Fault fault;
+    Fault       fault;
 };
 constexpr Row rows[] = {
     {"loss", Fault::loss}, {"duplicate", Fault::duplicate}, {"delay", Fault::delay}, {"cut", Fault::cut}, {"garble", Fault::garble},
 };
+
+/// Frames of TDMA 2.1a, by the identifier behind its version (RTnet, Documentation/TDMA).
+struct Kind {
+    std::string_view name;
+    std::uint16_t    id;
+};
+constexpr Kind          kinds[] = {{"sync", 0x0000}, {"request", 0x0010}, {"reply", 0x0011}};
+constexpr std::uint16_t kind_at = 20;
+const Kind*             kind_of(std::string_view name) {
+    for (const auto& kind : kinds)
+        if (kind.name == name) return &kind;
+    return nullptr;
+}
 
 [[noreturn]] void refuse(const std::string& part, const std::string& help) {
     throw std::invalid_argument("'" + part + "' is no fault of a segment; " + help);
@@ -33,22 +46,24 @@ double number(const std::string& part, std::string_view text, const char*& unit)
 
 /// 1s, 20ms, 500us.
 std::int64_t duration(const std::string& part, std::string_view text) {
-    const char* end = nullptr;
-    const double value = number(part, text, end);
+    const char*            end = nullptr;
+    const double           value = number(part, text, end);
     const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
-    const double scale = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : unit == "ns" ? 1.0 : 0.0;
+    const double           scale = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : unit == "ns" ? 1.0 : 0.0;
     if (scale == 0.0) refuse(part, "'" + std::string(text) + "' is no time; write 20ms");
     return std::llround(value * scale);
 }
 
 /// "loss:every=50:from=1s:until=2s".
 Disturbance parse(const std::string& part) {
-    const char* help = "write loss, duplicate, delay, cut or garble, and behind it :every=50:count=3:from=1s:until=2s:type=0x9023:time=2ms:length=30";
+    const char* help =
+        "write loss, duplicate, delay, cut or garble, and behind it "
+        ":every=50:count=3:from=1s:until=2s:type=0x9023:frame=reply:time=2ms:length=30";
     std::string_view rest(part);
-    const auto word = rest.substr(0, rest.find(':'));
+    const auto       word = rest.substr(0, rest.find(':'));
     rest.remove_prefix(std::min(word.size() + 1, rest.size()));
     Disturbance d;
-    bool known = false;
+    bool        known = false;
     for (const auto& row : rows)
         if (word == row.name) d.fault = row.fault, known = true;
     if (!known) refuse(part, help);
@@ -56,8 +71,8 @@ Disturbance parse(const std::string& part) {
     while (!rest.empty()) {
         const auto item = rest.substr(0, rest.find(':'));
         rest.remove_prefix(std::min(item.size() + 1, rest.size()));
-        const auto equals = std::min(item.find('='), item.size());
-        const auto key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
+        const auto  equals = std::min(item.find('='), item.size());
+        const auto  key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
         const char* end = nullptr;
         if (key == "from") d.from_ns = duration(part, value);
         else if (key == "until") d.until_ns = duration(part, value);
@@ -68,6 +83,7 @@ Disturbance parse(const std::string& part) {
         else if (key == "type" && value == "0x9021") d.type = 0x9021;
         else if (key == "type" && value == "0x9022") d.type = 0x9022;
         else if (key == "type" && value == "0x9023") d.type = 0x9023;
+        else if (const auto* kind = kind_of(key == "frame" ? value : ""); kind != nullptr) d.type = 0x9021, d.at = kind_at, d.is = kind->id;
         else refuse(part, help);
     }
     if (d.every == 0) refuse(part, "every counts from 1");
@@ -88,15 +104,18 @@ std::vector<Disturbance> parse_all(std::string_view text) {
 struct SegmentFaults final : hal::Component {
     using Component::Component;
 
-    hal::TextArgument link{*this, "link", "sim:net0/tester", "the segment; a station of its own on it, or one whose cable is to be cut, as in sim:cnc/x"};
+    hal::TextArgument link{*this, "link", "sim:net0/tester",
+                           "the segment; a station of its own on it, or one whose cable is to be cut, as in sim:cnc/x"};
     hal::TextArgument faults{*this, "faults", "", "what goes wrong, by commas: loss:every=50:from=1s:until=2s,duplicate:every=7"};
     const std::vector<Disturbance> list = parse_all(faults.get());
-    hal::Argument seed{*this, "seed", 1, "of what is drawn", {.min = 0, .max = 1'000'000'000}};
+    hal::Argument                  seed{*this, "seed", 1, "of what is drawn", {.min = 0, .max = 1'000'000'000}};
 
-    hal::Function run{*this, "update", &SegmentFaults::update, "cuts and joins the cable, shows how often faults struck"};
+    hal::Function run{*this, "update", &SegmentFaults::update, "cuts and joins the cable, babbles, shows how often faults struck"};
 
     hal::In<bool> cut{*this, "cut", "true: the cable of the station `link` names is cut"};
-    hal::Outs<std::uint64_t> hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames that fault # of the list has struck"};
+    hal::In<bool> babble{*this, "babble", "true: the station `link` names sends without asking anybody, broadcasts of Ethertype 0x9023"};
+    hal::Param<std::uint32_t> babble_period{*this, "babble-period", "between two frames that are babbled", {.initial = 100, .unit = "us"}};
+    hal::Outs<std::uint64_t>  hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames that fault # of the list has struck"};
 
     void start() {
         auto opened = hal::ethernet::open(link.get(), {.types = {0x88b5}});  // of none that anybody uses here: it receives nothing
@@ -106,24 +125,35 @@ struct SegmentFaults final : hal::Component {
         auto& segment = *port_->segment();
         segment.seed(static_cast<std::uint64_t>(seed));
         for (const auto& d : list) numbers_.push_back(segment.disturb(d));
+        babbled_.fill(0);
+        std::fill_n(babbled_.begin(), 6, std::uint8_t{0xff});
+        std::copy_n(port_->address().begin(), 6, babbled_.begin() + 6);
+        babbled_[12] = 0x90, babbled_[13] = 0x23;
+        segment.babble(segment.port(), babbled_, 0);  // takes its memory
     }
     void stop() noexcept {
         if (port_) port_->segment()->calm();
         port_.reset();
         numbers_.clear();
+        was_cut_ = was_babbling_ = false;
     }
 
     void update(hal::Cycle) noexcept {
         if (!port_) return;
         auto& segment = *port_->segment();
         if (cut != was_cut_) segment.cut(segment.port(), was_cut_ = cut);
+        if (babble != was_babbling_) {
+            was_babbling_ = babble;
+            segment.babble(segment.port(), babbled_, was_babbling_ ? std::int64_t{babble_period} * 1000 : 0);
+        }
         for (std::size_t n = 0; n < numbers_.size(); ++n) hits[n] = segment.hits(numbers_[n]);
     }
 
 private:
-    std::unique_ptr<Port> port_;
-    std::vector<int> numbers_;
-    bool was_cut_ = false;
+    std::unique_ptr<Port>                    port_;
+    std::vector<int>                         numbers_;
+    bool                                     was_cut_ = false, was_babbling_ = false;
+    std::array<std::uint8_t, smallest_frame> babbled_{};
 };
 
 }  // namespace
@@ -133,8 +163,11 @@ Frames of a `sim:` segment are lost, come twice, late, cut short or with a byte 
 threads, the same in every run.
 
 `faults` is a list by commas of loss, duplicate, delay, cut and garble, each with what it strikes: `every=50` (every 50th frame; without it
-all), `count=3` (then it is over), `from=1s`, `until=2s`, `type=0x9023` (of that Ethertype only), `time=2ms` (delay), `length=30` (cut:
+all), `count=3` (then it is over), `from=1s`, `until=2s`, `type=0x9023` (of that Ethertype only), `frame=reply` (of TDMA's sync,
+request or reply only), `time=2ms` (delay), `length=30` (cut:
 bytes that are left). `garble` is what a hostile station does: the check sequence of Ethernet is right.
+
+The station `link` names can also babble: while `babble` is true it sends a frame every `babble-period`, without asking anybody.
 
     loadrt segment_faults link=sim:net0/tester faults=loss:every=50:from=1s:until=2s,garble:every=7:type=0x9023
     addf segment-faults.0.update servo
