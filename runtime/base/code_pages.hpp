@@ -30,6 +30,10 @@ inline constexpr CodePage code_pages[] = {
      "An INI file consists of `[SECTION]` lines, `KEY = value` lines, comments (`#` or `;` as the first character of a line), and "
      "`#INCLUDE FILE`. A line that is none of these is ignored with this warning; a section name without its `]` too.\n\n"
      "Included files may include others, up to 16 deep; deeper means that a file includes itself."},
+    {"bad-node",
+     "A `node NAME...` line of a netlist begins the part of these nodes, which ends at the next such line; `node all` begins a part of all "
+     "nodes, as are the lines before the first. A name has letters, digits, - and _, at most 32 of them, and `all` stands alone.\n\n"
+     "`node cell`, `node robot1 robot2 rate=10ms deadline=100ms`. docs/tutorials/distributed.md has a whole example."},
     {"bad-period",
      "The period of a thread is a whole number of nanoseconds, at least 1000 (1 us): 1000000 is a millisecond.\n\n"
      "Example: `newthread servo-thread 1000000`, or `loadrt threads name1=base period1=50000 name2=servo period2=1000000`."},
@@ -58,6 +62,11 @@ inline constexpr CodePage code_pages[] = {
      "A netlist is plain text in UTF-8. This file contains a zero byte, or another control character outside of a comment, so it is "
      "something else: a program, a picture, a text in UTF-16. Nothing of it was used.\n\n"
      "`file FILE` says what it is; `iconv -f utf-16 -t utf-8` converts a text."},
+    {"camera-text",
+     "The calibration of a camera or of the ground that it sees cannot be read, or fits no camera. A camera's file is lines: `size 640 480`, `focal 600 600`, "
+     "`centre 319.5 239.5`, `distortion k1 k2 p1 p2 k3`; or the YAML that OpenCV's calibration writes. The ground's file has a line `u v x y` for each of four "
+     "points or more: pixel from the left, from the top, place in mm.\n\n"
+     "`hal doc vision_marker` and `hal doc vision_homography` have examples."},
     {"cannot-write",
      "`save` could not write the file; nothing else was changed. The reason is the system's.\n\n"
      "Without a file name `save` prints to the terminal."},
@@ -151,6 +160,10 @@ inline constexpr CodePage code_pages[] = {
      "A matrix can be read but does not do: its size does not go with the others', it should be symmetric or positive, or the plant that it "
      "is part of cannot be steered or observed. The sentence names the mode or the state.\n\n"
      "`hal doc COMPONENT` says what its matrices mean and which sizes they have."},
+    {"misplaced-node",
+     "`node` lines stand in the netlist that `hal run`, `hal sim` or `hal check` is given. They are not typed in the shell, and not written in "
+     "a file that is read by `source`: what that file holds belongs to the node that reads it.\n\n"
+     "Write `node NAME` above the `source` line."},
     {"model-text",
      "A file of a nonlinear model (`loadrt ekf model=FILE`) is lines of five kinds: `constant NAME = FORMULA`, `input NAME`, `state NAME = START sigma S noise N`, "
      "`NAME' = FORMULA` for the derivative of each state, `measure NAME = FORMULA sigma S`. One of them cannot be read, names what is not there, or is missing.\n\n"
@@ -163,6 +176,10 @@ inline constexpr CodePage code_pages[] = {
      "`names=` and `count=` (or `num_chan=`) both say how many instances there are; only one of them may be given."},
     {"no-alias",
      "unalias takes the alias of a pin; the named pin has none. `show alias` lists all aliases."},
+    {"no-dds",
+     "The nodes of this netlist exchange signals, for which DDS is used, and this build of Halcyon has none: Fast DDS was not there when it "
+     "was built, or it was built with -DHALCYON_DDS=OFF.\n\n"
+     "On Debian: `sudo apt install libfastrtps-dev`, and build again. `hal check` and `hal sim` take netlists with nodes without it."},
     {"no-program",
      "loadusr could not start the program: it is not in PATH, is not executable, or the system refused.\n\n"
      "A path with a / is taken as it stands; `~` is the home directory."},
@@ -176,6 +193,9 @@ inline constexpr CodePage code_pages[] = {
     {"no-such-function",
      "There is no function of this name. Functions come with instances: `show funct` lists them, `hal doc COMPONENT` says "
      "what each does."},
+    {"no-such-node",
+     "`--node NAME` chooses the part of the netlist that this machine loads, and no `node` line names that one.\n\n"
+     "The message lists the nodes there are. Lines before the first `node` line belong to all of them."},
     {"no-such-pin",
      "There is no pin or parameter of this name. Pins come with instances: `show pin INSTANCE` lists them, `hal doc "
      "COMPONENT` says what each does."},
@@ -192,6 +212,10 @@ inline constexpr CodePage code_pages[] = {
     {"no-transaction",
      "`commit` and `abort` end what `begin` started, and no `begin` came before in this shell or file.\n\n"
      "Outside begin … commit each line takes effect by itself, and in a file all edits up to the next command that acts on the machine."},
+    {"node-crossing",
+     "A signal whose writer and readers stand on different nodes is sent from one to the other. That needs one output on one node and inputs "
+     "on the others, a type other than port, and a thread on each of these nodes that sends and takes it.\n\n"
+     "Signals that several nodes have and none writes, or that each writes itself, are not sent: each node has its own."},
     {"not-a-program",
      "waitusr and unloadusr are about programs outside the runtime: those started by loadusr, and those that registered over "
      "the control socket.\n\n"
@@ -241,6 +265,9 @@ inline constexpr CodePage code_pages[] = {
      "A parameter or an input that had been set is not in the new version of the component, or has another type there. The reload took "
      "effect, and the value is lost.\n\n"
      "A `setp` of it in the netlist will fail the next time the netlist is loaded."},
+    {"several-nodes",
+     "The netlist has `node` lines: it is for several machines, each of which loads its own part of it.\n\n"
+     "`hal run FILE --node NAME` loads the part of one. `hal check FILE` checks all of them, `hal sim FILE` runs them together in one process."},
     {"signal-named-like-pin",
      "net takes the signal's name first, then pins. The first name is a pin's, so the signal's name was probably forgotten.\n\n"
      "`net SIGNAL pin pin …`"},
