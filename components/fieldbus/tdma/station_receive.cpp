@@ -350,7 +350,7 @@ void Station::count_silence(Time now) noexcept {
         ++status_.count.losses;
         status_.count.syncs_lost += status_.silent_cycles;
         const Address master = status_.master;
-        const Time    since = now - last_sync_;
+        const Time    since = (now - last_sync_ + 50'000) / 100'000 * 100'000;
         for (Slot& s : slots_) s.clear();
         begin();
         began_ = now;
