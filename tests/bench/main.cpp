@@ -10,6 +10,7 @@
 #include "linuxcnc.hpp"
 #include "machine.hpp"
 #include "sample.hpp"
+#include "tdma.hpp"
 
 namespace {
 
@@ -32,7 +33,10 @@ constexpr Section sections[] = {
     {"python", "a component of 100 pins in Python", python, true},
     {"can", "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the Python package", can, true},
     {"ethernet", "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program", raw_ethernet},
+    {"tdma", "slot jitter of a station whose clock is 200 ppm off, and a backup master that takes over", time_slots},
+    {"cnc", "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
     {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
+    {"vision", "markers in frames of 640 x 480: error and time", vision, true},
     {"size", "of the program; with --full its build from cold", size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };
