@@ -228,6 +228,11 @@ private:
             error(Topic::value, w[1].at, "'" + w[1].text + "' is no name", "letters, digits, '-', '_' and '.', at most 40");
             return;
         }
+        if (w[1].text == "auto") {
+            error(Topic::value, w[1].at, "'auto' is no name",
+                  "station=auto is a station that gets its block from the master; call it something else");
+            return;
+        }
         for (const StationEntry& s : out_.schedule.stations)
             if (&s != station_ && s.name == w[1].text)
                 error(Topic::value, w[1].at, "the station of line " + std::to_string(s.at.line) + " has this name, too");
