@@ -16,6 +16,7 @@ need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-d
     /usr/lib/python3/dist-packages/can=python3-can /usr/lib/python3/dist-packages/msgpack=python3-msgpack \
     /usr/lib/python3/dist-packages/serial=python3-serial "$(python3 -c 'import os; print(os.__file__[:-6])' 2>/dev/null)/ensurepip=python3-venv" \
     "/usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.rtsan-$(uname -m).a=libclang-rt-19-dev" \
+    /usr/include/opencv4/opencv2/aruco.hpp=libopencv-contrib-dev \
     linux.uml=user-mode-linux busybox=busybox-static ip=iproute2 candump=can-utils socat=socat tshark=tshark
 
 # The independent CANopen implementation that tests/peers talks to, pinned there, in a Python environment of its own.

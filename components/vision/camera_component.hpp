@@ -49,9 +49,10 @@ public:
           frames(*this, update_, "frames", "frames that were of use"),
           bad_frames(*this, update_, "bad-frames", "frames that were not: damaged, huge, black, frozen, of the wrong size"),
           source_ok(*this, update_, "source-ok", "the source is open and its last frame was of use"),
-          trouble(*this, update_, "trouble",
-                  "what is wrong: 0 nothing, 1 absent, 2 refused, 3 unplugged, 4 silent, 5 damaged, 6 huge, 7 black, 8 frozen, 9 not of the "
-                  "calibration's size, 10 ended"),
+          trouble(
+              *this, update_, "trouble",
+              "what is wrong: 0 nothing, 1 absent, 2 refused, 3 unplugged, 4 silent, 5 damaged, 6 huge, 7 black, 8 frozen, 9 not of the "
+              "calibration's size, 10 ended"),
           max_age_ms(*this, update_, "max-age-ms", "a result that is older is not valid", {.initial = 200.0, .unit = "ms"}),
           frozen_frames(*this, update_, "frozen-frames", "equal frames in a row that are a frozen camera; 0: never",
                         {.initial = worker_.source_frozen_after()}) {}
@@ -68,8 +69,8 @@ public:
 
     /// [realtime]
     void update(hal::Cycle cycle) noexcept {
-        Derived&       self = static_cast<Derived&>(*this);
-        const Ordered  order{true, frozen_frames, self.settings()};
+        Derived&      self = static_cast<Derived&>(*this);
+        const Ordered order{true, frozen_frames, self.settings()};
         if (!(order == ordered_)) {
             ordered_ = order;
             orders_.put(order);
@@ -162,20 +163,20 @@ private:
         faults_->raise(faults_, this, reasons[static_cast<std::size_t>(now)], std::numeric_limits<double>::quiet_NaN());
     }
 
-    const std::string  instance_;
-    const hal::Texts   texts_;
-    hal::TextArgument  source_;
-    Worker             worker_;                // of the helper thread
-    Delivery           next_;                  // of the helper thread
-    bool               measures_ = false;      // of the helper thread
+    const std::string      instance_;
+    const hal::Texts       texts_;
+    hal::TextArgument      source_;
+    Worker                 worker_;                // of the helper thread
+    Delivery               next_;                  // of the helper thread
+    bool                   measures_ = false;      // of the helper thread
     hal::Mailbox<Delivery> deliveries_;        // helper thread to cycle
     hal::Mailbox<Ordered>  orders_;            // cycle to helper thread
-    Ordered            ordered_;
-    std::int64_t       began_ns_ = no_time;
-    const hal_faults*  faults_ = nullptr;
-    Trouble            raised_ = Trouble::none;
-    hal::Background    background_;
-    hal::Function      update_;
+    Ordered                ordered_;
+    std::int64_t           began_ns_ = no_time;
+    const hal_faults*      faults_ = nullptr;
+    Trouble                raised_ = Trouble::none;
+    hal::Background        background_;
+    hal::Function          update_;
 
 public:
     hal::Out<std::uint32_t>   seq;

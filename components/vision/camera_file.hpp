@@ -17,7 +17,8 @@ inline std::string read_text(const hal::Texts& texts, const char* argument, cons
     std::ifstream     stream(path, std::ios::binary);
     std::string       text(65536, '\0');
     stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-    if (stream.gcount() == static_cast<std::streamsize>(text.size())) throw std::invalid_argument(path + " is longer than 64 KiB; " + argument + "= names a text file");
+    if (stream.gcount() == static_cast<std::streamsize>(text.size()))
+        throw std::invalid_argument(path + " is longer than 64 KiB; " + argument + "= names a text file");
     if (!stream.eof() || stream.bad())
         throw std::invalid_argument(std::string("cannot read ") + path + "; " + argument + "= is looked for beside the netlist");
     text.resize(static_cast<std::size_t>(stream.gcount()));

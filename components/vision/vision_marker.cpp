@@ -57,9 +57,11 @@ public:
         error = f.error_px;
     }
 
-    hal::In<std::int32_t>   wanted{*this, "wanted", "only the marker with this id; -1: the one with the smallest id that is seen", {.initial = -1}};
-    hal::In<double>         size{*this, "size", "length of a marker's black side", {.initial = 50.0, .unit = "mm"}};
-    hal::Param<double>      max_error{*this, "max-error", "a marker whose corners fit worse than that is not found; 0: any", {.initial = 2.0, .unit = "px"}};
+    hal::In<std::int32_t> wanted{
+        *this, "wanted", "only the marker with this id; -1: the one with the smallest id that is seen", {.initial = -1}};
+    hal::In<double>    size{*this, "size", "length of a marker's black side", {.initial = 50.0, .unit = "mm"}};
+    hal::Param<double> max_error{
+        *this, "max-error", "a marker whose corners fit worse than that is not found; 0: any", {.initial = 2.0, .unit = "px"}};
     hal::Out<std::int32_t>  id{*this, "id", "of the marker the pins below are about", {.initial = -1}};
     hal::Out<std::uint32_t> count{*this, "count", "markers in the frame that are wanted"};
     hal::Out<double>        x{*this, "x", "from the camera to the right", {.unit = "mm"}};
@@ -74,15 +76,16 @@ public:
 
 private:
     hal::TextArgument dictionary_{*this, "dictionary", "4x4_50", "which markers: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
-    hal::TextArgument camera_{*this, "camera", "", "calibration of the camera, a file beside the netlist; without it there is no pose", {.per_instance = true}};
+    hal::TextArgument camera_{
+        *this, "camera", "", "calibration of the camera, a file beside the netlist; without it there is no pose", {.per_instance = true}};
     std::optional<MarkerDetector> detector_;  // of the helper thread, once started
 };
 
 }  // namespace
 
 HAL_COMPONENT(VisionMarker, "vision_marker", "Finds a square marker and its pose before the camera", R"(
-Looks for ArUco markers in the frames of `source=`, and gives the pose of one of them: `x` to the right, `y` down, `z` ahead of the camera in
-mm; the turn from the marker (x right, y up, z out of its face) to the camera as R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. A marker that
+Looks for ArUco markers in the frames of `source=`, and gives the pose of one of them: `x` to the right, `y` down, `z` ahead of the
+camera in mm; the turn from the marker (x right, y up, z out of its face) to the camera as R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. A marker that
 faces the camera upright has roll 180.
 
 For a pose it needs the camera's calibration in a file, `camera=`:
@@ -92,11 +95,12 @@ For a pose it needs the camera's calibration in a file, `camera=`:
     centre 319.5 239.5
     distortion 0.05 -0.12 0 0 0     # k1 k2 p1 p2 k3
 
-or the YAML that OpenCV's calibration writes. And `size`, the length of a black side. Without a calibration only `id`, `u` and `v` are there.
+or the YAML that OpenCV's calibration writes. And `size`, the length of a black side. Without a calibration there are `id`, `u` and `v`
+only.
 
 The work is done in a thread of its own, of which the newest frame is the only one that counts; `update` copies the last result to the pins.
-What a controller acts on is `valid`: it is TRUE when the newest frame that was looked at shows the marker and is not older than `max-age-ms`.
-While it is FALSE the pins keep their last values. When the camera is unplugged, covered or hangs, one line says so, `valid` falls, and
+What a controller acts on is `valid`: it is TRUE when the newest frame that was looked at shows the marker and is not older than
+`max-age-ms`. While it is FALSE the pins keep their last values. When the camera is unplugged, covered or hangs, one line says so, `valid` falls, and
 everything goes on by itself when the frames are good again.
 
     loadrt threads name1=servo period1=1000000

@@ -15,7 +15,7 @@ constexpr double pi = 3.14159265358979323846;
 
 /// What vision_scene draws of one marker, side 50 mm, lens without distortion, focal length 600 px at 640 x 480.
 struct Shot {
-    int    id = 7;
+    int id = 7;
     double x = 0, y = 0, z = 0.4, roll = pi, pitch = 0, yaw = 0;  ///< m, rad
     double noise = 3.0;
 
@@ -47,7 +47,7 @@ double distance(const Shot& shot, const Pose& pose) {
 
 TEST(Marker, has_a_pose_in_millimetres_and_degrees) {
     MarkerDetector detector("4x4_50", camera());
-    Shot           shot;
+    Shot shot;
     shot.x = 0.06, shot.y = -0.04, shot.z = 0.35, shot.roll = pi - 0.3, shot.pitch = 0.35, shot.yaw = 0.6, shot.noise = 0;
     const auto found = detector.find(shot.frame(), -1, 50);
     ASSERT_EQ(found.size(), 1u);
@@ -65,10 +65,10 @@ TEST(Marker, has_a_pose_in_millimetres_and_degrees) {
 
 TEST(Marker, is_placed_to_1_5_mm_in_the_mean_with_noise) {
     MarkerDetector detector("4x4_50", camera());
-    std::mt19937   random(5);
-    const auto     between = [&](double least, double most) { return least + (most - least) * static_cast<double>(random()) / 4294967295.0; };
-    constexpr int  poses = 60;
-    double         sum = 0, most = 0;
+    std::mt19937 random(5);
+    const auto between = [&](double least, double most) { return least + (most - least) * static_cast<double>(random()) / 4294967295.0; };
+    constexpr int poses = 60;
+    double sum = 0, most = 0;
     for (int i = 0; i < poses; ++i) {
         Shot shot;
         shot.id = i % 50;
@@ -88,7 +88,7 @@ TEST(Marker, is_placed_to_1_5_mm_in_the_mean_with_noise) {
 
 TEST(Marker, is_found_in_much_noise_and_little_light) {
     MarkerDetector detector("4x4_50", camera());
-    Shot           shot;
+    Shot shot;
     shot.noise = 10;
     const auto found = detector.find(shot.frame(), -1, 50);
     ASSERT_EQ(found.size(), 1u);
@@ -97,7 +97,7 @@ TEST(Marker, is_found_in_much_noise_and_little_light) {
 
 TEST(Marker, of_another_id_or_dictionary_is_not_found) {
     MarkerDetector four("4x4_50", camera()), five("5x5_50", camera());
-    const Frame    frame = Shot().frame();
+    const Frame frame = Shot().frame();
     EXPECT_EQ(four.find(frame, 7, 50).size(), 1u);
     EXPECT_TRUE(four.find(frame, 8, 50).empty());
     EXPECT_TRUE(five.find(frame, -1, 50).empty());
@@ -106,7 +106,7 @@ TEST(Marker, of_another_id_or_dictionary_is_not_found) {
 
 TEST(Marker, without_calibration_has_a_place_in_the_frame_only) {
     MarkerDetector detector("4x4_50", std::nullopt);
-    const auto     found = detector.find(Shot().frame(), -1, 50);
+    const auto found = detector.find(Shot().frame(), -1, 50);
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ(found[0].pose.z_mm, 0.0);
     EXPECT_NEAR((found[0].corners[0][0] + found[0].corners[2][0]) / 2, 319.5, 0.5);
@@ -114,8 +114,8 @@ TEST(Marker, without_calibration_has_a_place_in_the_frame_only) {
 
 TEST(Marker, needs_no_sense_in_the_frame) {
     MarkerDetector detector("4x4_50", camera());
-    std::mt19937   random(3);
-    Frame          frame;
+    std::mt19937 random(3);
+    Frame frame;
     frame.resize(16, 16, Format::grey);
     for (auto& p : frame.pixels) p = static_cast<std::uint8_t>(random());
     EXPECT_TRUE(detector.find(frame, -1, 50).empty());

@@ -62,9 +62,7 @@ std::string refusal(const char* address) {
     try {
         make_source(address, {});
         return "";
-    } catch (const std::invalid_argument& e) {
-        return e.what();
-    }
+    } catch (const std::invalid_argument& e) { return e.what(); }
 }
 
 TEST(Address, that_is_wrong_says_what_to_type) {
@@ -76,14 +74,15 @@ TEST(Address, that_is_wrong_says_what_to_type) {
     EXPECT_EQ(refusal("frames:a?fps=3&fps=4"), "source=frames:a?fps=3&fps=4 has 'fps' twice; delete one of them");
     EXPECT_EQ(refusal("frames:a?fps=fast"), "source=frames:a?fps=fast: 'fast' is not a number; write fps=30");
     EXPECT_EQ(refusal("v4l2:/dev/video0?width=1"), "source=v4l2:/dev/video0?width=1: width=1 is outside 2 to 8192");
-    EXPECT_EQ(refusal("v4l2:/dev/video0?width=99.5"), "source=v4l2:/dev/video0?width=99.5: width=99.5 is not a whole number; write width=640");
+    EXPECT_EQ(refusal("v4l2:/dev/video0?width=99.5"),
+              "source=v4l2:/dev/video0?width=99.5: width=99.5 is not a whole number; write width=640");
     EXPECT_EQ(refusal("frames:a?loop=yes"), "source=frames:a?loop=yes: 'loop=yes' is neither 0 nor 1; write loop alone");
     EXPECT_EQ(refusal("frames:?loop"), "source=frames:?loop names no folder; write frames:FOLDER");
 }
 
 struct Folder : testing::Test {
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / ("halcyon-frames-" + std::to_string(::getpid()));
-    Frame                       frame;
+    Frame frame;
     Folder() { std::filesystem::create_directories(path); }
     ~Folder() override { std::filesystem::remove_all(path); }
 
@@ -110,7 +109,8 @@ TEST_F(Folder, of_frames_is_shown_in_the_order_of_names_at_its_rate) {
     ASSERT_TRUE(from->open(0));
     EXPECT_EQ(at(*from, {0, 5, 10, 19, 20, 29, 30, 31}), (std::vector<int>{10, -1, 20, -1, 30, -1, -2, -1}));
     EXPECT_EQ(from->problem().kind, Trouble::ended);
-    EXPECT_EQ(from->problem().text, "all frames of " + path.string() + " were shown; to begin anew, write frames:" + path.string() + "?loop");
+    EXPECT_EQ(from->problem().text,
+              "all frames of " + path.string() + " were shown; to begin anew, write frames:" + path.string() + "?loop");
 }
 
 TEST_F(Folder, of_frames_begins_anew_and_skips_what_is_too_old) {
@@ -160,7 +160,8 @@ TEST(Camera, is_read_from_a_file_of_our_own) {
 TEST(Camera, is_read_from_what_opencv_writes) {
     const auto read = read_camera(
         "%YAML:1.0\n---\ncalibration_time: \"x\"\nimage_width: 640\nimage_height: 480\n"
-        "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 6.0e+02, 0., 3.2e+02, 0.,\n       601., 240., 0., 0., 1. ]\n"
+        "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 6.0e+02, 0., 3.2e+02, 0.,\n       601., 240., 0., "
+        "0., 1. ]\n"
         "distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 1.e-01, 2.e-02, 0., 0., 3.e-03 ]\n");
     ASSERT_TRUE(read.problems.empty()) << read.problems[0].sentence;
     EXPECT_EQ(read.camera.fx, 600);
@@ -171,18 +172,20 @@ TEST(Camera, is_read_from_what_opencv_writes) {
 
 TEST(Camera, that_cannot_be_read_says_where_and_why) {
     const std::string own = "size 640\nfocal x\nzoom 3\n";
-    EXPECT_EQ(said(read_camera(own), own), "size 640|size has 1 number, it takes 2\nx|'x' is not a number\nzoom|'zoom' is no word of a calibration\n");
+    EXPECT_EQ(said(read_camera(own), own),
+              "size 640|size has 1 number, it takes 2\nx|'x' is not a number\nzoom|'zoom' is no word of a calibration\n");
     const std::string millimetres = "size 640 480\nfocal 4.5\n";
     EXPECT_EQ(said(read_camera(millimetres), millimetres), "focal 4.5|these focal lengths fit no picture 640 px wide\n");
     const std::string empty;
     EXPECT_EQ(said(read_camera(empty), empty), "|there is no size\n|there is no focal\n");
     const std::string yaml = "image_width: 640\nimage_height: -1\ncamera_matrix: !!opencv-matrix\n data: [ 1, 2 ]\n";
-    EXPECT_EQ(said(read_camera(yaml), yaml), "-1|'-1' is no width or height of a picture\ncamera_matrix|camera_matrix has 2 numbers, not 9\n");
+    EXPECT_EQ(said(read_camera(yaml), yaml),
+              "-1|'-1' is no width or height of a picture\ncamera_matrix|camera_matrix has 2 numbers, not 9\n");
 }
 
 Ground ground(const std::string& text, const std::optional<Camera>& camera = {}) {
     GroundText read = read_ground(text);
-    Ground     made(read, camera);
+    Ground made(read, camera);
     EXPECT_TRUE(read.problems.empty()) << read.problems[0].sentence;
     return made;
 }
@@ -214,7 +217,8 @@ TEST(Ground, is_straight_behind_a_lens_that_distorts) {
     camera.distortion = {-0.2, 0.03, 0.001, -0.002, 0};
     const auto pixel = [&](double x, double y) {  // seen straight down from 500 mm: x' = x / 500
         const double a = x / 500, b = y / 500, r2 = a * a + b * b, radial = 1 - 0.2 * r2 + 0.03 * r2 * r2;
-        const double u = a * radial + 2 * 0.001 * a * b - 0.002 * (r2 + 2 * a * a), v = b * radial + 0.001 * (r2 + 2 * b * b) + 2 * -0.002 * a * b;
+        const double u = a * radial + 2 * 0.001 * a * b - 0.002 * (r2 + 2 * a * a),
+                     v = b * radial + 0.001 * (r2 + 2 * b * b) + 2 * -0.002 * a * b;
         return std::pair{320 + 500 * u, 240 + 500 * v};
     };
     std::string text;
@@ -224,7 +228,7 @@ TEST(Ground, is_straight_behind_a_lens_that_distorts) {
     }
     const Ground made = ground(text, camera);
     for (const auto& [x, y] : {std::pair{0., 0.}, {100., -120.}, {-190., 10.}}) {
-        double     gx = 0, gy = 0;
+        double gx = 0, gy = 0;
         const auto [u, v] = pixel(x, y);
         ASSERT_TRUE(made.map(u, v, gx, gy));
         EXPECT_NEAR(gx, x, 0.01);
@@ -235,7 +239,7 @@ TEST(Ground, is_straight_behind_a_lens_that_distorts) {
 TEST(Ground, that_four_points_do_not_give_says_why) {
     const auto refusal = [](const char* text) {
         GroundText read = read_ground(text);
-        Ground     made(read, std::nullopt);
+        Ground made(read, std::nullopt);
         return read.problems.empty() ? "" : read.problems[0].sentence;
     };
     EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 2 0 2 0; 0 1 0 1"), "the pixels of these points lie in a line, or two at one place");

@@ -17,13 +17,13 @@ constexpr int width = 16, height = 4;
 class Kernel : public VideoSystem {
 public:
     std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
-    std::uint32_t              capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
-    std::uint32_t              gives_width = width, gives_height = height, line = 0;
-    int                        open_error = 0, format_error = 0, fail_call = -1, calls = 0;
-    bool                       gone = false, no_camera = false, monotonic = true;
-    std::uint32_t              bytes = width * height * 2;
-    int                        open_now = 0, mapped = 0;
-    bool                       streams = false;
+    std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
+    std::uint32_t gives_width = width, gives_height = height, line = 0;
+    int open_error = 0, format_error = 0, fail_call = -1, calls = 0;
+    bool gone = false, no_camera = false, monotonic = true;
+    std::uint32_t bytes = width * height * 2;
+    int open_now = 0, mapped = 0;
+    bool streams = false;
 
     /// A frame is in the next free buffer, all of it `value` and grey.
     void shoot(std::uint32_t sequence, std::uint8_t value, std::uint32_t flags = 0) {
@@ -47,7 +47,8 @@ public:
     int control(int fd, unsigned long request, void* argument) override {
         EXPECT_EQ(fd, 7);
         if (gone) return errno = ENODEV, -1;
-        if (request != VIDIOC_DQBUF && request != VIDIOC_STREAMOFF && request != VIDIOC_ENUM_FMT && request != VIDIOC_S_PARM && fails()) return -1;
+        if (request != VIDIOC_DQBUF && request != VIDIOC_STREAMOFF && request != VIDIOC_ENUM_FMT && request != VIDIOC_S_PARM && fails())
+            return -1;
         switch (request) {
         case VIDIOC_QUERYCAP:
             if (no_camera) return errno = ENOTTY, -1;
@@ -90,7 +91,7 @@ public:
         return memory.data();
     }
     void unmap(void*, std::size_t) override { --mapped; }
-    int  wait(int, int) override { return gone ? -1 : done_.empty() ? 0 : 1; }
+    int wait(int, int) override { return gone ? -1 : done_.empty() ? 0 : 1; }
     void close(int) override {
         --open_now;
         queued_.clear(), done_.clear();
@@ -104,13 +105,13 @@ private:
     }
     std::vector<std::uint8_t> memory_[8];
     std::deque<std::uint32_t> queued_;
-    std::deque<v4l2_buffer>   done_;
+    std::deque<v4l2_buffer> done_;
 };
 
 struct V4l2 : testing::Test {
-    Kernel                  kernel;
+    Kernel kernel;
     std::unique_ptr<Source> camera = make("v4l2:/dev/video0?width=16&height=4&fps=30");
-    Frame                   frame;
+    Frame frame;
 
     std::unique_ptr<Source> make(const char* address) { return v4l2_source(Address(address), kernel); }
     std::string refusal() {
@@ -239,7 +240,7 @@ TEST_F(V4l2, every_call_may_fail_and_nothing_is_left_open) {
 
 TEST(Yuyv, becomes_the_colours_of_bt_601) {
     const std::uint8_t yuyv[] = {81, 90, 145, 240, 16, 128, 235, 128};  // red; a mixture; black; white
-    std::uint8_t       bgr[12];
+    std::uint8_t bgr[12];
     yuyv_to_bgr(yuyv, bgr, 4);
     EXPECT_NEAR(bgr[0], 0, 1);
     EXPECT_NEAR(bgr[1], 0, 1);

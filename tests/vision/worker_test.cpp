@@ -13,10 +13,10 @@ constexpr std::int64_t ms = 1'000'000, second = 1000 * ms;
 /// A camera of 8 x 6 pixels at 100 frames a second that does as it is told.
 class Puppet : public Source {
 public:
-    bool         there = true, cut = false;
+    bool there = true, cut = false;
     std::uint8_t brightness = 100;
-    bool         still = false, gives = true, damaged = false;
-    int          width = 8, opened = 0, closed = 0;
+    bool still = false, gives = true, damaged = false;
+    int width = 8, opened = 0, closed = 0;
     std::int64_t taken = -1;
 
     bool open(std::int64_t) override {
@@ -43,19 +43,17 @@ public:
 };
 
 struct Rig : testing::Test {
-    Puppet*                  camera = new Puppet;
+    Puppet* camera = new Puppet;
     std::vector<std::string> lines;
-    std::vector<Status>      published;
-    int                      seen = 0;
-    bool                     throws = false;
-    std::int64_t             now = 0, stamp = -1;
-    Worker                   worker{"eye", std::unique_ptr<Source>(camera),
-                  [this](const Frame& frame) {
-                      if (throws) throw std::runtime_error("no memory");
-                      ++seen;
-                      stamp = frame.stamp_ns;
-                  },
-                  [this](const Status& status) { published.push_back(status); }};
+    std::vector<Status> published;
+    int seen = 0;
+    bool throws = false;
+    std::int64_t now = 0, stamp = -1;
+    Worker worker{"eye", std::unique_ptr<Source>(camera), [this](const Frame& frame) {
+        if (throws) throw std::runtime_error("no memory");
+        ++seen;
+        stamp = frame.stamp_ns;
+    }, [this](const Status& status) { published.push_back(status); }};
 
     Rig() {
         worker.say_to([this](const std::string& line) { lines.push_back(line); });
@@ -140,8 +138,9 @@ TEST_F(Rig, Worker_takes_equal_frames_for_a_frozen_camera_if_it_is_told) {
 TEST_F(Rig, Worker_refuses_frames_that_the_calibration_is_not_about) {
     worker.expect(640, 480, "room.camera");
     run(second);
-    EXPECT_EQ(lines, std::vector<std::string>{"eye: frames are 8 x 6 and the calibration room.camera is for 640 x 480; take the file of this "
-                                              "camera, or set the source's width and height"});
+    EXPECT_EQ(lines,
+              std::vector<std::string>{"eye: frames are 8 x 6 and the calibration room.camera is for 640 x 480; take the file of this "
+                                       "camera, or set the source's width and height"});
     EXPECT_EQ(status().trouble, Trouble::wrong_size);
     EXPECT_EQ(seen, 0);
 }

@@ -28,7 +28,8 @@ Address::Address(std::string_view text) : text_(text) {
         const std::string_view part = text.substr(at + 1, end == std::string_view::npos ? end : end - at - 1);
         const auto             equals = part.find('=');
         if (!part.empty())
-            options_.push_back({std::string(part.substr(0, equals)), std::string(equals == std::string_view::npos ? "" : part.substr(equals + 1)),
+            options_.push_back({std::string(part.substr(0, equals)),
+                                std::string(equals == std::string_view::npos ? "" : part.substr(equals + 1)),
                                 equals != std::string_view::npos});
         at = end;
     }
@@ -54,7 +55,8 @@ double Address::number(const char* name, double fallback, double least, double m
     if (option->value.empty() || *end != '\0' || !std::isfinite(value))
         throw std::invalid_argument("source=" + text_ + ": '" + option->value + "' is not a number; write " + name + "=" + plain(fallback));
     if (value < least || value > most)
-        throw std::invalid_argument("source=" + text_ + ": " + name + "=" + option->value + " is outside " + plain(least) + " to " + plain(most));
+        throw std::invalid_argument("source=" + text_ + ": " + name + "=" + option->value + " is outside " + plain(least) + " to " +
+                                    plain(most));
     return value;
 }
 
@@ -70,7 +72,8 @@ bool Address::flag(const char* name) {
     const Option* const option = find(name);
     if (!option) return false;
     if (option->has_value && option->value != "0" && option->value != "1")
-        throw std::invalid_argument("source=" + text_ + ": '" + name + "=" + option->value + "' is neither 0 nor 1; write " + name + " alone");
+        throw std::invalid_argument("source=" + text_ + ": '" + name + "=" + option->value + "' is neither 0 nor 1; write " + name +
+                                    " alone");
     return option->value != "0";
 }
 

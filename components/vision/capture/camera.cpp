@@ -25,7 +25,8 @@ public:
 protected:
     void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
         if (found_.problems.size() < 20)
-            found_.problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+            found_.problems.push_back(
+                {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
     }
     std::string of(Word w) const { return std::string(text_.substr(w.begin, std::min<std::size_t>(w.end - w.begin, 60))); }
 
@@ -53,14 +54,19 @@ protected:
     /// What no camera has: the usual reason is a file of another kind, or numbers in the wrong order.
     void check() {
         const Camera& c = found_.camera;
-        const auto    wrong = [&](Word at, const std::string& sentence, const std::string& help) { say(at.begin, std::max(at.end, at.begin + 1), sentence, help); };
-        if (!(c.fx > 0 && c.fy > 0)) return wrong(focal_, "a focal length is not positive", "focal lengths in px, often about the width of the picture");
+        const auto    wrong = [&](Word at, const std::string& sentence, const std::string& help) {
+            say(at.begin, std::max(at.end, at.begin + 1), sentence, help);
+        };
+        if (!(c.fx > 0 && c.fy > 0))
+            return wrong(focal_, "a focal length is not positive", "focal lengths in px, often about the width of the picture");
         if (c.fx > 100.0 * c.width || c.fx < 0.05 * c.width || c.fy > 2 * c.fx || c.fx > 2 * c.fy)
-            wrong(focal_, "these focal lengths fit no picture " + std::to_string(c.width) + " px wide", "in px, and the two alike; often about the width");
+            wrong(focal_, "these focal lengths fit no picture " + std::to_string(c.width) + " px wide",
+                  "in px, and the two alike; often about the width");
         if (c.cx < -c.width || c.cx > 2 * c.width || c.cy < -c.height || c.cy > 2 * c.height)
             wrong(centre_, "the centre is far outside of the picture", "in px, and near to half of the width and of the height");
         for (const double k : c.distortion)
-            if (std::fabs(k) > 1000.0) return wrong(distortion_, "this distortion bends the picture beyond use", "k1 k2 p1 p2 k3, of the order of 0.1");
+            if (std::fabs(k) > 1000.0)
+                return wrong(distortion_, "this distortion bends the picture beyond use", "k1 k2 p1 p2 k3, of the order of 0.1");
     }
 
     std::string_view text_;
@@ -127,7 +133,8 @@ private:
         const std::size_t count = words.size() - 1;
         if (count >= least && count <= most) return true;
         const std::string wants = least == most ? std::to_string(most) : std::to_string(least) + " to " + std::to_string(most);
-        say(words[0].begin, words.back().end, name + " has " + std::to_string(count) + (count == 1 ? " number" : " numbers") + ", it takes " + wants,
+        say(words[0].begin, words.back().end,
+            name + " has " + std::to_string(count) + (count == 1 ? " number" : " numbers") + ", it takes " + wants,
             std::string("as in: ") + example);
         return false;
     }
@@ -151,7 +158,9 @@ public:
             if (k.size() == 9 && (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1))
                 say(focal_.begin, focal_.end, "camera_matrix is no camera's matrix", "its rows are fx 0 cx, 0 fy cy, 0 0 1");
             else if (k.size() == 9) c.fx = k[0], c.cx = k[2], c.fy = k[4], c.cy = k[5];
-            else say(focal_.begin, focal_.end, "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9", "it has 3 rows and 3 columns");
+            else
+                say(focal_.begin, focal_.end, "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9",
+                    "it has 3 rows and 3 columns");
             centre_ = focal_;
         } else if (found_.problems.empty()) {
             missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
@@ -189,7 +198,8 @@ private:
         if (at == std::string_view::npos) return false;
         place = {at - std::string_view(name).size() - 1, at - 1};
         const std::size_t data = text_.find("data:", at), open = text_.find('[', at), close = text_.find(']', at);
-        if (data == std::string_view::npos || open == std::string_view::npos || close == std::string_view::npos || open < data || close < open) {
+        if (data == std::string_view::npos || open == std::string_view::npos || close == std::string_view::npos || open < data ||
+            close < open) {
             say(place.begin, place.end, std::string(name) + " has no data", "it is followed by rows:, cols:, dt: and data: [ numbers ]");
             return false;
         }
@@ -211,7 +221,8 @@ private:
 
 CameraText read_camera(std::string_view text) {
     const std::size_t first = text.find_first_not_of(" \t\r\n");
-    const bool        yaml = first != std::string_view::npos && (text.substr(first, 5) == "%YAML" || text.find("camera_matrix:") != std::string_view::npos);
+    const bool        yaml =
+        first != std::string_view::npos && (text.substr(first, 5) == "%YAML" || text.find("camera_matrix:") != std::string_view::npos);
     return yaml ? OpenCvText(text).read() : OwnText(text).read();
 }
 

@@ -10,7 +10,7 @@ namespace hal::vision {
 enum class Format : std::uint8_t { grey, bgr };  ///< 1 or 3 bytes per pixel
 
 /// The most a frame may have: 64 MiB of colour.
-constexpr int most_wide = 8192, most_high = 8192;
+constexpr int         most_wide = 8192, most_high = 8192;
 constexpr std::size_t most_pixels = 22'000'000;
 
 /// A picture and when it was taken. Owned by whoever made it; its memory is used again for the next one.
@@ -31,7 +31,8 @@ struct Frame {
         return true;
     }
     static bool fits(int w, int h) {
-        return w >= 1 && h >= 1 && w <= most_wide && h <= most_high && static_cast<std::size_t>(w) * static_cast<std::size_t>(h) <= most_pixels;
+        return w >= 1 && h >= 1 && w <= most_wide && h <= most_high &&
+               static_cast<std::size_t>(w) * static_cast<std::size_t>(h) <= most_pixels;
     }
     std::uint8_t*       row(int y) { return pixels.data() + stride() * static_cast<std::size_t>(y); }
     const std::uint8_t* row(int y) const { return pixels.data() + stride() * static_cast<std::size_t>(y); }

@@ -47,8 +47,7 @@ std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Fr
     Reader     reader(bytes + 2, count - 2);
     const int  width = reader.number(), height = width < 0 ? -1 : reader.number(), most = height < 0 ? -1 : reader.number();
     if (most < 0) return damaged("its header ends before width, height and largest value");
-    if (width == 0 || height == 0 || most == 0 || most > 65535)
-        return damaged("its header has a 0, or a largest value above 65535");
+    if (width == 0 || height == 0 || most == 0 || most > 65535) return damaged("its header has a 0, or a largest value above 65535");
     if (!Frame::fits(width, height))
         return Problem{Trouble::huge, "a frame of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than " +
                                           std::to_string(most_wide) + " x " + std::to_string(most_high) + " or 22 million pixels"};

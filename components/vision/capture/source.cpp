@@ -17,7 +17,7 @@ void to_grey(Frame& frame) {
 }
 
 const char* word(Trouble trouble) {
-    static constexpr const char* words[trouble_count] = {"none",  "absent", "refused", "unplugged",  "silent", "damaged",
+    static constexpr const char* words[trouble_count] = {"none", "absent", "refused", "unplugged",  "silent", "damaged",
                                                          "huge", "black",  "frozen",  "wrong size", "ended"};
     return words[static_cast<std::size_t>(trouble)];
 }

@@ -50,8 +50,8 @@ public:
     virtual bool open(std::int64_t now_ns) = 0;
     /// The newest frame that there is at `now_ns` and was not given yet; older ones are skipped and counted. Waits for it at most
     /// `timeout_ns`; 0: not at all, so that what comes depends on `now_ns` alone where a source can do that.
-    virtual Got next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) = 0;
-    virtual void close() noexcept = 0;
+    virtual Got    next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) = 0;
+    virtual void   close() noexcept = 0;
     const Problem& problem() const { return problem_; }
     /// Frames that were there and were not given, since open(). What the sender lost counts too.
     std::uint64_t skipped() const { return skipped_; }

@@ -77,7 +77,7 @@ public:
     double patience_s() const override { return 1.0 + 2e-9 * static_cast<double>(period_ns_); }
 
 private:
-    std::int64_t  at(std::uint64_t k) const { return begin_ns_ + delay_ns_ + static_cast<std::int64_t>(k) * period_ns_; }
+    std::int64_t at(std::uint64_t k) const { return begin_ns_ + delay_ns_ + static_cast<std::int64_t>(k) * period_ns_; }
     /// The newest that there is at `now`.
     std::uint64_t due(std::int64_t now) const {
         const std::int64_t since = now - begin_ns_ - delay_ns_;
@@ -86,12 +86,14 @@ private:
     bool read(const std::string& name) {
         const fs::path path = fs::path(folder_) / name;
         const auto     bad = [&](const char* why) { return fail(Trouble::damaged, shown_ + "/" + name + " cannot be read: " + why); };
-        const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), [](std::FILE* f) { return std::fclose(f); });
+        const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
+                                                                   [](std::FILE* f) { return std::fclose(f); });
         if (!file) return bad(std::strerror(errno));
         std::error_code error;
         const auto      size = fs::file_size(path, error);
         if (error) return bad(error.message().c_str());
-        if (size > most_bytes) return fail(Trouble::huge, shown_ + "/" + name + " has " + std::to_string(size) + " bytes, more than a frame may have");
+        if (size > most_bytes)
+            return fail(Trouble::huge, shown_ + "/" + name + " has " + std::to_string(size) + " bytes, more than a frame may have");
         bytes_.resize(static_cast<std::size_t>(size));
         bytes_.resize(std::fread(bytes_.data(), 1, bytes_.size(), file.get()));
         return true;

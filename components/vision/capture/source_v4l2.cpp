@@ -202,7 +202,8 @@ private:
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         line_ = std::max<std::size_t>(is.bytesperline, row);
         if (!Frame::fits(width_, height_) || line_ > 16u * most_wide || (is_yuyv_ && width_ % 2 != 0))
-            return fail(Trouble::huge, "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
+            return fail(Trouble::huge,
+                        "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
         return true;
     }
     bool choose_rate() {
@@ -243,7 +244,8 @@ private:
         const Map&        map = maps_[buffer.index];
         if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return fail(Trouble::damaged, device_ + " gives a frame that it says is damaged");
         if (std::min<std::size_t>(buffer.bytesused, map.bytes) < needed)
-            return fail(Trouble::damaged, device_ + " gives " + std::to_string(buffer.bytesused) + " bytes of a frame of " + std::to_string(needed));
+            return fail(Trouble::damaged,
+                        device_ + " gives " + std::to_string(buffer.bytesused) + " bytes of a frame of " + std::to_string(needed));
         frame.resize(width_, height_, is_yuyv_ && !grey_ ? Format::bgr : Format::grey);
         const auto* const bytes = static_cast<const std::uint8_t*>(map.at);
         for (int y = 0; y < height_; ++y) {
@@ -256,7 +258,8 @@ private:
         }
         frame.number = buffer.sequence;
         const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-        frame.stamp_ns = monotonic ? std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 + std::int64_t{buffer.timestamp.tv_usec} * 1000 : now;
+        frame.stamp_ns =
+            monotonic ? std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 + std::int64_t{buffer.timestamp.tv_usec} * 1000 : now;
         return true;
     }
 

@@ -18,8 +18,8 @@ public:
     virtual void* map(int fd, std::size_t bytes, std::int64_t offset) = 0;  ///< nullptr: failed
     virtual void  unmap(void* at, std::size_t bytes) = 0;
     /// 1: a frame may be there, 0: time-out, -1: the device is in an error or gone.
-    virtual int   wait(int fd, int timeout_ms) = 0;
-    virtual void  close(int fd) = 0;
+    virtual int  wait(int fd, int timeout_ms) = 0;
+    virtual void close(int fd) = 0;
 };
 VideoSystem& kernel();
 

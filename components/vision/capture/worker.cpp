@@ -116,8 +116,7 @@ void Worker::take(const Frame& frame, std::int64_t now) {
                                             size(width_, height_) + "; take the file of this camera, or set the source's width and height"};
     else if (frozen(frame))
         problem = {Trouble::frozen, std::to_string(frozen_after_) + " frames in a row are equal to the last bit; the camera is frozen"};
-    else if (black(frame))
-        problem = {Trouble::black, "frames are black; is there light, and no lid on the lens?"};
+    else if (black(frame)) problem = {Trouble::black, "frames are black; is there light, and no lid on the lens?"};
     if (problem.kind != Trouble::none) {
         ++status_.bad;
         trouble(std::move(problem), now);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From a source to a detector: opens, takes the newest frame, looks whether it is of use, has it worked on, says what is wrong, tries again.
+// From a source to a detector: opens, takes the newest frame, looks whether it is of use, has it worked on; says what is wrong and
+// tries again.
 #pragma once
 
 #include <functional>
@@ -12,12 +13,12 @@ namespace hal::vision {
 
 /// How the source does; goes to the cycle with every result and whenever it changes.
 struct Status {
-    std::uint32_t frames = 0;    ///< that came and were of use
-    std::uint32_t dropped = 0;   ///< that were not looked at, since a newer one was there or the sender lost them
-    std::uint32_t bad = 0;       ///< that were of no use: damaged, huge, black, frozen, of the wrong size
+    std::uint32_t frames = 0;  ///< that came and were of use
+    std::uint32_t dropped = 0;  ///< that were not looked at, since a newer one was there or the sender lost them
+    std::uint32_t bad = 0;  ///< that were of no use: damaged, huge, black, frozen, of the wrong size
     std::uint32_t openings = 0;  ///< times that the source was opened
     Trouble       trouble = Trouble::absent;
-    bool          ok = false;    ///< it is open and nothing is wrong
+    bool          ok = false;  ///< it is open and nothing is wrong
 };
 
 /// Not real time and without a thread: hal::Background calls turn().
@@ -25,12 +26,13 @@ class Worker {
 public:
     /// `detect` is called with each frame that is of use, `publish` after it and after each change of the status without one. Lines are
     /// about `instance`. [setup]
-    Worker(std::string instance, std::unique_ptr<Source> source, std::function<void(const Frame&)> detect, std::function<void(const Status&)> publish);
+    Worker(std::string instance, std::unique_ptr<Source> source, std::function<void(const Frame&)> detect,
+           std::function<void(const Status&)> publish);
 
     /// Only frames of this size are of use, because `file` (a calibration) is about such. [setup]
     void expect(int width, int height, std::string file);
     /// Equal frames in a row that are a frozen camera; 0: never. [helper thread]
-    void freeze_after(std::uint32_t frames) { frozen_after_ = frames; }
+    void          freeze_after(std::uint32_t frames) { frozen_after_ = frames; }
     std::uint32_t source_frozen_after() const { return source_->frozen_after(); }
     /// Where lines go instead of standard error: for tests. [setup]
     void say_to(std::function<void(const std::string&)> say) { say_ = std::move(say); }
@@ -38,7 +40,7 @@ public:
     /// A piece of work at `now_ns`; waits for a frame, at most 0.1 s, if it may. [helper thread]
     void turn(std::int64_t now_ns, bool may_wait);
     /// Closes the source. No turn runs, and the next one opens it again. [setup]
-    void close() noexcept;
+    void          close() noexcept;
     const Status& status() const { return status_; }
 
 private:

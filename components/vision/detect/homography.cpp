@@ -32,7 +32,8 @@ GroundText read_ground(std::string_view text) {
     GroundText result;
     const auto say = [&](std::size_t begin, std::size_t end, std::string sentence, std::string help) {
         if (result.problems.size() < 20)
-            result.problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+            result.problems.push_back(
+                {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
     };
     const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == ':'; };
     for (std::size_t at = 0; at < text.size();) {
@@ -51,16 +52,19 @@ GroundText read_ground(std::string_view text) {
             char*             rest = nullptr;
             const double      value = std::strtod(token.c_str(), &rest);
             good = *rest == '\0' && std::fabs(value) < 1e9;
-            if (!good) say(begin, i, "'" + token + "' is not a number", "a row is u v x y: pixel from the left and from the top, then the place");
+            if (!good)
+                say(begin, i, "'" + token + "' is not a number", "a row is u v x y: pixel from the left and from the top, then the place");
             numbers.push_back(value);
             if (numbers.size() > 4) break;
         }
         if (good && !numbers.empty()) {
             if (numbers.size() != 4)
-                say(first, last, "this point has " + (numbers.size() > 4 ? "more than 4 numbers" : plural(numbers.size(), "number") + ", not 4"),
+                say(first, last,
+                    "this point has " + (numbers.size() > 4 ? "more than 4 numbers" : plural(numbers.size(), "number") + ", not 4"),
                     "a row is u v x y: pixel from the left and from the top, then the place");
             else if (result.points.size() < most_points)
-                result.points.push_back({numbers[0], numbers[1], numbers[2], numbers[3], static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last)});
+                result.points.push_back(
+                    {numbers[0], numbers[1], numbers[2], numbers[3], static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last)});
         }
         at = end < line && text[end] == ';' ? end + 1 : line + 1;
     }
@@ -87,8 +91,8 @@ void Ground::fit(GroundText& text, const std::optional<Camera>& camera) {
         there.emplace_back(p.x, p.y);
     }
     const GroundPoint& any = text.points.front();
-    const auto         refuse = [&](const char* sentence, const char* help) { text.problems.push_back({any.begin, any.end, sentence, help}); };
-    const char* const  apart = "take the corners of a large square: of any three points none lies between the others";
+    const auto refuse = [&](const char* sentence, const char* help) { text.problems.push_back({any.begin, any.end, sentence, help}); };
+    const char* const apart = "take the corners of a large square: of any three points none lies between the others";
     // all pairs of a hundred are enough to see it
     const auto few = [](std::vector<cv::Point2d> all) { return all.resize(std::min<std::size_t>(all.size(), 100)), all; };
     if (!spread(few(seen))) return refuse("the pixels of these points lie in a line, or two at one place", apart);

@@ -44,8 +44,8 @@ public:
     double error() const { return error_; }
 
 private:
-    void fit(GroundText& text, const std::optional<Camera>& camera);
-    void undistort(double& u, double& v) const noexcept;
+    void                  fit(GroundText& text, const std::optional<Camera>& camera);
+    void                  undistort(double& u, double& v) const noexcept;
     std::array<double, 9> h_{1, 0, 0, 0, 1, 0, 0, 0, 1};
     Camera                camera_;
     bool                  distorted_ = false;

@@ -20,13 +20,14 @@ struct Named {
     const char* name;
     int         number;
 };
-constexpr Named dictionaries[] = {
-    {"4x4_50", cv::aruco::DICT_4X4_50},     {"4x4_100", cv::aruco::DICT_4X4_100}, {"4x4_250", cv::aruco::DICT_4X4_250},
-    {"4x4_1000", cv::aruco::DICT_4X4_1000}, {"5x5_50", cv::aruco::DICT_5X5_50},   {"5x5_100", cv::aruco::DICT_5X5_100},
-    {"5x5_250", cv::aruco::DICT_5X5_250},   {"5x5_1000", cv::aruco::DICT_5X5_1000}, {"6x6_50", cv::aruco::DICT_6X6_50},
-    {"6x6_100", cv::aruco::DICT_6X6_100},   {"6x6_250", cv::aruco::DICT_6X6_250}, {"6x6_1000", cv::aruco::DICT_6X6_1000},
-    {"7x7_50", cv::aruco::DICT_7X7_50},     {"7x7_1000", cv::aruco::DICT_7X7_1000}, {"original", cv::aruco::DICT_ARUCO_ORIGINAL},
-    {"apriltag_36h11", cv::aruco::DICT_APRILTAG_36h11}};
+constexpr Named dictionaries[] = {{"4x4_50", cv::aruco::DICT_4X4_50},           {"4x4_100", cv::aruco::DICT_4X4_100},
+                                  {"4x4_250", cv::aruco::DICT_4X4_250},         {"4x4_1000", cv::aruco::DICT_4X4_1000},
+                                  {"5x5_50", cv::aruco::DICT_5X5_50},           {"5x5_100", cv::aruco::DICT_5X5_100},
+                                  {"5x5_250", cv::aruco::DICT_5X5_250},         {"5x5_1000", cv::aruco::DICT_5X5_1000},
+                                  {"6x6_50", cv::aruco::DICT_6X6_50},           {"6x6_100", cv::aruco::DICT_6X6_100},
+                                  {"6x6_250", cv::aruco::DICT_6X6_250},         {"6x6_1000", cv::aruco::DICT_6X6_1000},
+                                  {"7x7_50", cv::aruco::DICT_7X7_50},           {"7x7_1000", cv::aruco::DICT_7X7_1000},
+                                  {"original", cv::aruco::DICT_ARUCO_ORIGINAL}, {"apriltag_36h11", cv::aruco::DICT_APRILTAG_36h11}};
 
 int number_of(const std::string& name) {
     std::string names;
@@ -83,7 +84,7 @@ MarkerDetector::~MarkerDetector() = default;
 int MarkerDetector::count() const { return inside_->dictionary->bytesList.rows; }
 
 std::vector<Marker> MarkerDetector::find(const Frame& frame, int id, double size_mm) {
-    Inside& in = *inside_;
+    Inside&      in = *inside_;
     const Frame* grey = &frame;
     if (frame.format != Format::grey) {
         in.grey = frame;
