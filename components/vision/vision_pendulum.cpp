@@ -12,7 +12,7 @@ struct Found {
 };
 
 struct Settings {
-    double        pivot_hue = 0.0, tip_hue = 0.0, tolerance = 0.0, residual = 0.0;
+    double        pivot_hue = 0.0, tip_hue = 0.0, tolerance = 0.0, residual = 0.0, sigma = 0.0;
     std::uint32_t threshold = 0, area = 0;
     bool          operator==(const Settings&) const = default;
 };
@@ -42,11 +42,18 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     hal::Param<double>        tolerance{*this, "hue-tolerance", "a colour may be off by so much", {.initial = 40.0, .unit = "deg"}};
     hal::Param<std::uint32_t> threshold{*this, "threshold", "how strong a ball's colour has to be, of 255", {.initial = 30}};
     hal::Param<std::uint32_t> least_area{*this, "least-area", "how many pixels of a ball have to be seen", {.initial = 12}};
+    hal::Param<double>        lost_time{
+        *this, "lost-time", "a pendulum that no frame showed for so long is told as a fault; 0: never", {.initial = 0.25, .unit = "s"}};
     hal::Param<double>        most_residual{*this, "most-residual", "a frame with a greater residual does not count", {.initial = 1.5, .unit = "px"}};
+    hal::Param<double>        most_sigma{
+        *this, "most-sigma", "nor one from which an angle follows worse than that, for balls known to 0.05 px", {.initial = 0.005, .unit = "rad"}};
 
     void start() {
         if (!(focal > 0.0 && distance > arm_length + rod_length && arm_length > 0.0 && rod_length > 0.0))
             throw std::invalid_argument("focal, arm_length and rod_length have to be above 0, and distance above arm_length + rod_length");
+        record_ = hal::extension<hal_faults>("hal.faults/1");
+        shown_ns_ = no_time;
+        lost_ = false;
         CameraComponent::start();
     }
 
@@ -59,12 +66,12 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         view.distance = distance, view.height = height, view.arm_length = arm_length, view.rod_length = rod_length;
         limits.pivot = {of.pivot_hue, of.tolerance}, limits.tip = {of.tip_hue, of.tolerance};
         limits.threshold = static_cast<int>(std::min(of.threshold, 254u)), limits.least_area = static_cast<int>(std::clamp(of.area, 1u, 1000000u));
-        limits.most_residual = of.residual;
+        limits.most_residual = of.residual, limits.most_sigma = of.sigma;
         const PendulumSeen seen = find_pendulum(frame, view, limits);
         result = {seen.found, seen.arm, seen.pendulum, seen.residual, seen.pivot_ball.u, seen.pivot_ball.v, seen.tip_ball.u, seen.tip_ball.v};
     }
 
-    Settings settings() const noexcept { return {finite(pivot_hue), finite(tip_hue), finite(tolerance), finite(most_residual), threshold, least_area}; }
+    Settings settings() const noexcept { return {finite(pivot_hue), finite(tip_hue), finite(tolerance), finite(most_residual), finite(most_sigma), threshold, least_area}; }
 
     void show(const Found& found, bool fresh, hal::Cycle cycle) noexcept {
         fresh_out = fresh && found.found && valid;
@@ -75,12 +82,19 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         }
         if (fresh) residual = std::isfinite(found.residual) ? found.residual : 0.0;
         if (fresh && !found.found) missed = missed + 1;
-        age = shown_ns_ < 0 ? 0.0 : static_cast<double>(cycle.start_ns() - shown_ns_) * 1e-9;
+        age = shown_ns_ == no_time ? 0.0 : static_cast<double>(cycle.start_ns() - shown_ns_) * 1e-9;
+        const bool lost = shown_ns_ != no_time && lost_time > 0.0 && age > lost_time;
+        if (lost && !lost_ && record_ != nullptr) record_->raise(record_, this, "no frame showed the pendulum for {} s; valid is FALSE", age);
+        lost_ = lost;
     }
 
 private:
     static double finite(double value) noexcept { return std::isfinite(value) ? value : 0.0; }
-    std::int64_t  shown_ns_ = -1;
+
+    static constexpr std::int64_t no_time = INT64_MIN;
+    std::int64_t                  shown_ns_ = no_time;  // stamp of the newest frame that showed it
+    const hal_faults*             record_ = nullptr;
+    bool                          lost_ = false;
 };
 
 }  // namespace
@@ -91,10 +105,12 @@ hundredths of a pixel; the angles are those that put both balls where they are s
 320 x 240 with noise of 3 of 255 both angles are right to 0.5 mrad (rms).
 
 The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above the arm, and looks at where axis and arm meet; the arm's zero
-points at it. Near an arm of 90 degrees the pendulum swings to and from the camera and is seen less well.
+points at it. Near an arm of 90 degrees the pendulum swings to and from the camera, and two attitudes look the same: such a frame does not count, nor does
+one from which an angle follows badly (`most-sigma`). The filter has to bridge them, with a `gate` against the last doubtful ones.
 
 For an ekf: link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`. `new` is TRUE in one cycle per frame; what a
-frame is late, the filter makes up for. `valid` falls when the newest frame does not show the pendulum, or is older than `max-age-ms`.
+frame is late, the filter makes up for. `valid` falls when the newest frame does not show the pendulum, or is older than `max-age-ms`; after
+`lost-time` without it there is a fault, once, for `show fault` and the safety chain.
 
     loadrt vision_scene show=furuta
     loadrt vision_pendulum source=sim:furuta

@@ -145,7 +145,7 @@ private:
 
 public:
     hal::In<double> light{*this, "light", "brightness of the lamps; 1: as it should be, 0: dark", {.initial = 1.0}};
-    hal::In<double> noise{*this, "noise", "standard deviation of the sensor's noise, of 255", {.initial = 3.0}};
+    hal::In<double> noise{*this, "noise", "standard deviation of the sensor's noise, of 255; without any, a scene at rest looks like a frozen camera", {.initial = 3.0}};
     hal::In<double> blur{*this, "blur", "standard deviation of the lens's blur", {.initial = 0.6, .unit = "px"}};
     hal::In<double> covered{*this, "covered", "what part of the picture something dark hides, from the left; 1: all"};
     hal::In<bool>   frozen{*this, "frozen", "TRUE: the camera gives the same picture again and again"};

@@ -33,36 +33,64 @@ double squared(const Middles& a, const Middles& b) {
     return sum;
 }
 
-}  // namespace
+struct Angles {
+    double arm = 0.0, pendulum = 0.0, residual = 1e300, sigma = 1e300;
+};
 
-bool fit_pendulum(const PendulumView& view, double pivot_u, double pivot_v, double tip_u, double tip_v, PendulumSeen& seen) {
-    const Middles   measured{pivot_u, pivot_v, tip_u, tip_v};
-    constexpr int   grid = 36;
-    constexpr double step = 2.0 * std::numbers::pi / grid, small = 1e-6;
-    double          best = 1e300, arm = 0.0, pendulum = 0.0;
-    for (int i = 0; i < grid; ++i)
-        for (int j = 0; j < grid; ++j)
-            if (const double off = squared(seen_at(view, i * step, j * step), measured); off < best) best = off, arm = i * step, pendulum = j * step;
+double turned(double a, double b) { return std::fabs(std::remainder(a - b, 2.0 * std::numbers::pi)); }
+
+/// Down the valley that `from` lies in.
+Angles descend(const PendulumView& view, const Middles& measured, Angles from) {
+    constexpr double small = 1e-6, middles_sigma = 0.05;
     for (int turn = 0; turn < 12; ++turn) {
-        const Middles at = seen_at(view, arm, pendulum), by_arm = seen_at(view, arm + small, pendulum), by_pendulum = seen_at(view, arm, pendulum + small);
+        const Middles at = seen_at(view, from.arm, from.pendulum), by_arm = seen_at(view, from.arm + small, from.pendulum),
+                      by_pendulum = seen_at(view, from.arm, from.pendulum + small);
         double        aa = 1e-9, ap = 0.0, pp = 1e-9, ra = 0.0, rp = 0.0;  // the normal equations
         for (std::size_t i = 0; i < at.size(); ++i) {
             const double da = (by_arm[i] - at[i]) / small, dp = (by_pendulum[i] - at[i]) / small, off = measured[i] - at[i];
             aa += da * da, ap += da * dp, pp += dp * dp, ra += da * off, rp += dp * off;
         }
         const double determinant = aa * pp - ap * ap;
-        if (!(determinant > 1e-9)) return false;
+        if (!(determinant > 1e-9)) return {};
+        from.sigma = middles_sigma * std::sqrt(std::fmax(aa, pp) / determinant);
         const double to_arm = (pp * ra - ap * rp) / determinant, to_pendulum = (aa * rp - ap * ra) / determinant;
         // half the step while it leads away
         double part = 1.0;
-        while (part > 0.01 && squared(seen_at(view, arm + part * to_arm, pendulum + part * to_pendulum), measured) > squared(at, measured)) part *= 0.5;
-        arm += part * to_arm, pendulum += part * to_pendulum;
-        if (std::fabs(to_arm) + std::fabs(to_pendulum) < 1e-7) break;
+        while (part > 0.01 && squared(seen_at(view, from.arm + part * to_arm, from.pendulum + part * to_pendulum), measured) > squared(at, measured)) part *= 0.5;
+        from.arm += part * to_arm, from.pendulum += part * to_pendulum;
+        if (std::fabs(to_arm) + std::fabs(to_pendulum) < 1e-6) break;
     }
-    seen.arm = std::remainder(arm, 2.0 * std::numbers::pi);
-    seen.pendulum = std::remainder(pendulum, 2.0 * std::numbers::pi);
-    seen.residual = std::sqrt(squared(seen_at(view, arm, pendulum), measured) / 4.0);
-    return std::isfinite(seen.arm + seen.pendulum + seen.residual);
+    from.arm = std::remainder(from.arm, 2.0 * std::numbers::pi), from.pendulum = std::remainder(from.pendulum, 2.0 * std::numbers::pi);
+    from.residual = std::sqrt(squared(seen_at(view, from.arm, from.pendulum), measured) / 4.0);
+    return from;
+}
+
+}  // namespace
+
+bool fit_pendulum(const PendulumView& view, double pivot_u, double pivot_v, double tip_u, double tip_v, PendulumSeen& seen) {
+    constexpr int         grid = 36;
+    constexpr double      step = 2.0 * std::numbers::pi / grid, same = 0.01;
+    const Middles         measured{pivot_u, pivot_v, tip_u, tip_v};
+    std::array<double, grid * grid> off{};
+    const auto            at = [&](int i, int j) -> double& { return off[static_cast<std::size_t>((i + grid) % grid * grid + (j + grid) % grid)]; };
+    for (int i = 0; i < grid; ++i)
+        for (int j = 0; j < grid; ++j) at(i, j) = squared(seen_at(view, i * step, j * step), measured);
+    Angles best, rival;
+    for (int i = 0; i < grid; ++i)
+        for (int j = 0; j < grid; ++j) {
+            bool valley = true;
+            for (int di = -1; di <= 1; ++di)
+                for (int dj = -1; dj <= 1; ++dj) valley = valley && at(i, j) <= at(i + di, j + dj);
+            if (!valley) continue;
+            const Angles found = descend(view, measured, {i * step, j * step});
+            if (turned(found.arm, best.arm) < same && turned(found.pendulum, best.pendulum) < same && best.residual < 1e300) {
+                if (found.residual < best.residual) best = found;
+            } else if (found.residual < best.residual) rival = best, best = found;
+            else if (found.residual < rival.residual) rival = found;
+        }
+    seen.arm = best.arm, seen.pendulum = best.pendulum;
+    seen.residual = best.residual, seen.rival = rival.residual, seen.sigma = best.sigma;
+    return std::isfinite(seen.arm + seen.pendulum) && seen.residual < 1e300;
 }
 
 PendulumSeen find_pendulum(const Frame& frame, const PendulumView& view, const PendulumLimits& limits) {
@@ -74,7 +102,9 @@ PendulumSeen find_pendulum(const Frame& frame, const PendulumView& view, const P
     const auto tips = find_spots(weights, frame.width, frame.height, limits.threshold, limits.least_area, 1);
     if (pivots.empty() || tips.empty()) return seen;
     seen.pivot_ball = pivots[0], seen.tip_ball = tips[0];
-    seen.found = fit_pendulum(view, pivots[0].u, pivots[0].v, tips[0].u, tips[0].v, seen) && seen.residual <= limits.most_residual;
+    constexpr double unlike = 0.5;  // px: ten times what the middles are off
+    seen.found = fit_pendulum(view, pivots[0].u, pivots[0].v, tips[0].u, tips[0].v, seen) && seen.residual <= limits.most_residual &&
+                 seen.rival > std::fmax(unlike, 3.0 * seen.residual) && seen.sigma <= limits.most_sigma;
     return seen;
 }
 
