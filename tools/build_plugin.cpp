@@ -37,12 +37,6 @@ std::string in_path(const std::string& name) {
     return {};
 }
 
-bool write_file(const std::string& path, std::string_view text) {
-    std::ofstream out(path, std::ios::binary | std::ios::trunc);
-    out.write(text.data(), static_cast<std::streamsize>(text.size()));
-    return out.flush().good();
-}
-
 /// Opens the plugin and constructs one instance, in a process of its own: the constructors are the user's code.
 bool try_plugin(const std::string& folder, const std::string& name, BuiltPlugin& built) {
     int ends[2];
@@ -199,11 +193,11 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
     std::string file = source.path;
     if (source.text) {
         file = workshop.file(source.name + (source.language == Language::cpp ? ".cpp" : ".c"));
-        if (!write_file(file, *source.text)) return fail(fmt::format("{} cannot be written: {}", file, std::strerror(errno)));
-        if (!options.keep.empty() && !write_file(options.keep, *source.text)) return fail(fmt::format("{} cannot be written: {}", options.keep, std::strerror(errno)));
+        if (const std::string why = write_file(file, *source.text); !why.empty()) return fail(why);
+        if (const std::string why = options.keep.empty() ? "" : write_file(options.keep, *source.text); !why.empty()) return fail(why);
     }
     const std::string map = workshop.file("plugin.map"), library = workshop.file(source.program ? source.name + ".program" : source.name + ".so");
-    if (!write_file(map, "{ global: hal_plugin; local: *; };\n")) return fail(fmt::format("{} cannot be written", map));
+    if (const std::string why = write_file(map, "{ global: hal_plugin; local: *; };\n"); !why.empty()) return fail(why);
 
     std::vector<std::string> words = split_words(compiler);
     std::string version;

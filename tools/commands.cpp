@@ -293,6 +293,7 @@ void declare_canopen_plan(CLI::App& app, Options& o) {
 void declare_tdma_plan(CLI::App& app, Options& o) {
     words(app, o, "FILE", "the schedule of the segment, NAME.tdma or RTnet's tdma.conf");
     app.add_flag("--json", o.json, "as JSON");
+    app.add_option("--svg", o.output, "a picture of a cycle into this file; -: standard output")->type_name("FILE");
 }
 
 void declare_canopen_check(CLI::App& app, Options& o) { words(app, o, "FILE", "configurations, NAME.canopen"); }
@@ -340,7 +341,7 @@ constexpr Subcommand table[] = {
     {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", ON_BUS(run_can_eds_check), declare_can_eds_check},
     {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", ON_BUS(run_canopen_check), declare_canopen_check},
     {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", ON_BUS(run_canopen_plan), declare_canopen_plan},
-    {"tdma plan", "FILE [--json]", "the slots of an Ethernet segment as a timeline, its load and the latency from input to output", ON_BUS(run_tdma_plan), declare_tdma_plan},
+    {"tdma plan", "FILE [--json | --svg FILE]", "the slots of an Ethernet segment as a timeline, its load and the latency from input to output", ON_BUS(run_tdma_plan), declare_tdma_plan},
     {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", ON_BUS(run_node_drive), declare_node_drive},
     {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", ON_BUS(run_node_io), declare_node_io},
     {"node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "a simulated axis whose loop is closed over the bus", ON_BUS(run_node_axis_io), declare_node_axis_io},

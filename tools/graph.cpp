@@ -41,14 +41,6 @@ std::string render_svg(const std::string& dot, const std::string& path) {
     return status == 0 ? "" : fmt::format("dot could not write '{}'", path);
 }
 
-std::string write_file(const std::string& path, const std::string& text) {
-    const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    const bool good = descriptor >= 0 && write_all(descriptor, text);
-    const int why = errno;
-    if (descriptor >= 0) ::close(descriptor);
-    return good ? "" : fmt::format("cannot write '{}': {}", path, std::strerror(why));
-}
-
 }  // namespace
 
 int run_graph(const Options& options) {

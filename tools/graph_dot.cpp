@@ -4,6 +4,7 @@
 #include <map>
 
 #include "base/types.hpp"
+#include "escaped.hpp"
 #include "graph.hpp"
 
 namespace hal::tools {
@@ -13,20 +14,6 @@ namespace {
 constexpr const char* type_colours[] = {"#b03030", "#2060a0", "#207040", "#507020",
                                         "#206868", "#6a5a10", "#703080"};  // in hal_type's order
 constexpr const char* thread_colours[] = {"#cfe3ff", "#ffe2b8", "#d8f0c8", "#f3d0ee", "#fff3a8", "#d5d5f5", "#c8efe9", "#f7cfc8"};
-
-std::string escaped(std::string_view text) {
-    std::string out;
-    for (const char c : text) {
-        switch (c) {
-        case '&': out += "&amp;"; break;
-        case '<': out += "&lt;"; break;
-        case '>': out += "&gt;"; break;
-        case '"': out += "&quot;"; break;
-        default: out += c;
-        }
-    }
-    return out;
-}
 
 std::string quoted(std::string_view text) {
     std::string out = "\"";

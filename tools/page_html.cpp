@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "base/types.hpp"
+#include "escaped.hpp"
 #include "markdown.hpp"
 #include "page.hpp"
 #include "page_walk.hpp"
@@ -11,20 +12,6 @@
 namespace hal::tools {
 
 namespace {
-
-std::string escaped(std::string_view text) {
-    std::string result;
-    for (const char c : text) {
-        switch (c) {
-        case '&': result += "&amp;"; break;
-        case '<': result += "&lt;"; break;
-        case '>': result += "&gt;"; break;
-        case '"': result += "&quot;"; break;
-        default: result += c;
-        }
-    }
-    return result;
-}
 
 constexpr std::string_view style = R"CSS(
 :root { color-scheme: light dark; --line: #8884; --link: #06c; --faint: #777; }

@@ -56,6 +56,14 @@ bool read_file(const std::string& path, std::string& text) {
     return false;
 }
 
+std::string write_file(const std::string& path, std::string_view text) {
+    const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    const bool good = descriptor >= 0 && write_all(descriptor, text);
+    const int why = errno;
+    if (descriptor >= 0) ::close(descriptor);
+    return good ? "" : "cannot write '" + path + "': " + std::strerror(why);
+}
+
 bool colours(int descriptor) {
     const char* no = std::getenv("NO_COLOR");
     const char* term = std::getenv("TERM");

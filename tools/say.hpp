@@ -22,6 +22,9 @@ bool print(std::string_view text);
 /// The text of a file ("-": standard input). On failure false, and `text` is the reason.
 bool read_file(const std::string& path, std::string& text);
 
+/// Into a file that is made or overwritten. What is wrong, or nothing.
+std::string write_file(const std::string& path, std::string_view text);
+
 /// Colours wanted on this descriptor: it is a terminal that is not dumb, and NO_COLOR is not set.
 bool colours(int descriptor);
 

@@ -2,8 +2,9 @@
 """hal tdma plan: schedules of an Ethernet segment."""
 import json
 import unittest
+import xml.etree.ElementTree
 
-from harness import Case
+from harness import ROOT, Case
 
 CELL = """master:
 cycle 1000
@@ -51,6 +52,26 @@ class Tdma(Case):
         plan = json.loads(self.good("tdma", "plan", "cell.tdma", "--json"))
         self.assertEqual(5, len(plan["entries"]))
         self.assertEqual({"station": "x", "worst_ns": 4000000, "cycles": 3}, plan["latency"][1])
+
+    def test_picture(self):
+        """The drawings beside the machines are what comes of their schedules."""
+        for machine in ("ethernet-cnc/cnc", "ethernet-furuta/furuta"):
+            folder, name = (ROOT / "halfiles" / machine).parent, machine.split("/")[1]
+            self.assertEqual((folder / "timing.svg").read_text(), self.good("tdma", "plan", folder / f"{name}.tdma", "--svg", "-"),
+                             f"make it anew: hal tdma plan halfiles/{machine}.tdma --svg halfiles/{machine.split('/')[0]}/timing.svg")
+
+    def test_picture_into_a_file(self):
+        self.write("cell.tdma", CELL)
+        self.assertEqual("", self.good("tdma", "plan", "cell.tdma", "--svg", "cell.svg"))
+        drawn = xml.etree.ElementTree.parse(self.folder / "cell.svg").getroot()
+        texts = [t.text for t in drawn.iter("{http://www.w3.org/2000/svg}text")]
+        for wanted in ("master", "spare", "x", "300, 1 of 2 cycles",
+                       "The line is 2.4 % full; an input of x is an output of it after 4000 us at worst"):
+            self.assertIn(wanted, texts)
+        self.assertEqual("hal tdma plan: cannot write 'none/cell.svg': No such file or directory\n",
+                         self.bad("tdma", "plan", "cell.tdma", "--svg", "none/cell.svg"))
+        self.assertEqual("hal tdma plan: --json and --svg are two answers; write one of them\n",
+                         self.bad("tdma", "plan", "cell.tdma", "--json", "--svg", "cell.svg"))
 
     def test_bad_plan(self):
         self.write("cell.tdma", CELL.replace("slot 0 200", "slot 0 110"))

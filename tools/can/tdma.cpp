@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// `hal tdma plan`: a schedule of an Ethernet segment as a timeline, how full the line is, how long an input takes to become an output.
+// `hal tdma plan`: a schedule of an Ethernet segment as a timeline, how full the line is, how long an input takes to become an output;
+// or as a picture.
 #include <algorithm>
 #include <fmt/core.h>
 #include <unistd.h>
 
 #include "base/diagnostic.hpp"
 #include "base/text.hpp"
+#include "can/tdma_picture.hpp"
 #include "fieldbus/tdma/plan.hpp"
 #include "say.hpp"
 
@@ -133,6 +135,13 @@ int run_tdma_plan(const Options& options) {
     write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
     if (found.failed()) return 1;
     const plan::Plan p = plan::plan_of(reading.schedule);
+    if (!options.output.empty()) {
+        if (options.json) return fail(options, "--json and --svg are two answers; write one of them");
+        const std::string picture = picture_of(reading.schedule, p);
+        if (options.output == "-") return print(picture) ? 0 : 1;
+        const std::string why = write_file(options.output, picture);
+        return why.empty() ? 0 : fail(options, why);
+    }
     return print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p)) ? 0 : 1;
 }
 

@@ -15,7 +15,7 @@ struct NodeOptions {
     std::uint16_t heartbeat_ms = 0;
     std::uint32_t serial = 1;
     bool starts_itself = false;
-    std::string tdma, station, skew, drift;                                       // of a TDMA station
+    std::string tdma, station, tunnel, skew, drift;                               // of a TDMA station
     std::string plant = "axis";                                                   // axis-io
     bool input_stops = false;
     unsigned axes = 1;                                                            // drive

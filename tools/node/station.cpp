@@ -14,7 +14,6 @@ namespace hal::tools {
 
 namespace {
 
-constexpr std::int64_t spin_ns = 40'000;  // a sleep ends so late at worst on a machine that is not busy
 constexpr int priority = 70;
 
 /// "200ppm", "-35.5ppm", or nothing.
@@ -58,6 +57,18 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, std
     if (link.find("slot=") == std::string::npos) link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', setup.slots.front().id);
     made.reset(new TdmaStation(setup, segment, std::move(opened.port), *skew, *drift));
     if (!ethernet::offer_discipline(segment, &made->station_)) return segment + " has a TDMA station already";
+    return options.tunnel.empty() ? std::string{} : made->open_tunnel(options, reading.schedule.stations[*which]);
+}
+
+std::string TdmaStation::open_tunnel(const NodeOptions& options, const tdma::config::StationEntry& entry) {
+    tunnel_ = std::make_unique<tdma::Tunnel>(station_);
+    if (tunnel_->mtu() == 0)
+        return fmt::format("--tunnel {}: ordinary packets leave in slot 1, and {} has none; write slot 1 OFFSET into its block of {}", options.tunnel,
+                           entry.name, options.tdma);
+    auto opened = tdma::open_tap(*tunnel_, {options.tunnel, station_.address(), entry.ip}, "hal node");
+    if (!opened.tap) return "--tunnel: " + opened.problem;
+    tap_ = std::move(opened.tap);
+    station_.accompany(nullptr, tunnel_.get());
     return {};
 }
 
@@ -68,15 +79,13 @@ TdmaStation::TdmaStation(const tdma::StationSetup& setup, std::string segment, s
 
 TdmaStation::~TdmaStation() { ethernet::withdraw_discipline(&station_); }
 
+/// Does not look at the clock for the last microseconds as the runtime's threads do: what has to be exact is when the frame leaves, and
+/// for that the port waits. Six nodes that look for 40 us each would take a quarter of a CPU.
 std::int64_t TdmaStation::sleep_until(std::int64_t local_ns) const noexcept {
     const auto due = clock_.from_local(local_ns);
-    if (const auto until = due - spin_ns; until > can::monotonic_ns()) {
-        const timespec at{until / 1'000'000'000, until % 1'000'000'000};
-        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
-    }
-    std::int64_t now = 0;
-    while ((now = can::monotonic_ns()) < due) {}
-    return clock_.local(now);
+    const timespec at{due / 1'000'000'000, due % 1'000'000'000};
+    while (can::monotonic_ns() < due) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+    return clock_.local(can::monotonic_ns());
 }
 
 void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
@@ -92,7 +101,11 @@ void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
         goes_on = turn(due, station_.status().synchronous);
         station_.transmit(due);
         due += cycle;
-        if (station_.status().synchronous) due += beat_.follow(station_.error(), cycle);
+        // From the first sync on: being in phase is a part of becoming synchronous.
+        const bool beat = station_.status().state != tdma::State::listening;
+        if (beat) due += beat_.follow(station_.error(), cycle);
+        else if (had_beat_) beat_.lose();
+        had_beat_ = beat;
     }
 }
 

@@ -8,6 +8,7 @@
 
 #include "fieldbus/tdma/config.hpp"
 #include "fieldbus/tdma/station.hpp"
+#include "fieldbus/tdma/tap.hpp"
 #include "hal/discipline.hpp"
 #include "node/node_options.hpp"
 #include "node/skewed_port.hpp"
@@ -27,13 +28,17 @@ public:
 
 private:
     TdmaStation(const tdma::StationSetup&, std::string segment, std::unique_ptr<ethernet::Port>, double skew, double drift);
-    std::int64_t sleep_until(std::int64_t local_ns) const noexcept;
+    std::string open_tunnel(const NodeOptions&, const tdma::config::StationEntry&);  ///< what is wrong, or nothing
+    std::int64_t sleep_until(std::int64_t local_ns) const noexcept;  ///< what time it is then
 
     const SkewedClock clock_;
     const std::string segment_;
     SkewedPort port_;
     tdma::Station station_;
+    std::unique_ptr<tdma::Tunnel> tunnel_;  // before tap_, which uses it
+    std::unique_ptr<tdma::Tap> tap_;
     hal::Discipline beat_;
+    bool had_beat_ = false;
     std::uint64_t cycles_ = 0, missed_ = 0;
 };
 
