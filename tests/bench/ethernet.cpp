@@ -10,7 +10,6 @@
 #include <fmt/core.h>
 #include <linux/if_packet.h>
 #include <net/if.h>
-#include <sched.h>
 #include <stdexcept>
 #include <sys/socket.h>
 #include <thread>
@@ -19,6 +18,7 @@
 #include "drivers/link/system.hpp"
 #include "machine.hpp"
 #include "sample.hpp"
+#include "segment.hpp"
 
 namespace hal::bench {
 namespace {
@@ -39,10 +39,6 @@ std::int64_t time_in(const std::uint8_t* f) {
     std::int64_t time = 0;
     std::memcpy(&time, f + 22, sizeof time);
     return time;
-}
-void sleep_until(std::int64_t time) {
-    const timespec t{time / 1'000'000'000, time % 1'000'000'000};
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
 }
 
 /// The floor: what a program of its own would write.
@@ -205,7 +201,6 @@ Rounds pacer(const std::string& interface, int cpu, int rounds, int count) {
 }
 
 void measure(const Options& options, Report& report) {
-    if (::unshare(CLONE_NEWNET) != 0) return report.note("no network namespace may be made here: run as root");
     const std::string a = "bench0", b = "bench1";
     if (std::system("ip link add bench0 type veth peer name bench1 2>/dev/null && ip link set bench0 up && ip link set bench1 up") != 0)
         return report.note("no veth pair can be made here (`ip` of iproute2)");
@@ -253,15 +248,7 @@ void measure(const Options& options, Report& report) {
 
 void raw_ethernet(const Options& options, Report& report) {
     report.section("Raw Ethernet over a veth pair");
-    std::exception_ptr problem;
-    std::thread([&] {  // the namespace is this thread's, and of those it starts
-        try {
-            measure(options, report);
-        } catch (...) {
-            problem = std::current_exception();
-        }
-    }).join();
-    if (problem) std::rethrow_exception(problem);
+    if (!in_own_network([&] { measure(options, report); })) report.note("no network namespace may be made here: run as root");
 }
 
 }  // namespace hal::bench
