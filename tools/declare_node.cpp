@@ -31,8 +31,11 @@ void declare_node(CLI::App& app, Options& o) {
     app.add_option("--heartbeat", n.heartbeat_ms, "ms between heartbeats until a master says otherwise (default 0: none)")->type_name("MS");
     app.add_option("--serial", n.serial, "its serial number (default 1)")->type_name("N");
     app.add_flag("--start", n.starts_itself, "operational after boot-up without a master");
-    app.add_option("--tdma", n.tdma, "a TDMA station on the interface of --link cane:IF, by this schedule")->type_name("FILE");
+    app.add_option("--tdma", n.tdma, "a TDMA station on the interface of --link cane:IF, by this schedule; auto: the master sends it (RTcfg)")
+        ->type_name("FILE");
     app.add_option("--station", n.station, "its name in the schedule (default: the one with the interface's address)")->type_name("NAME");
+    app.add_option("--tunnel", n.tunnel, "an interface for ordinary packets, which leave in slot 1, as in hal0; its address is the schedule's ip")
+        ->type_name("NAME");
     app.add_option("--skew", n.skew, "how much faster its clock is than this machine's, as in 200ppm")->type_name("PPM");
     app.add_option("--drift", n.drift, "how that changes in a second, as in 0.1ppm")->type_name("PPM");
     for_how_long(app, o, "end after 10s, 2min …; without it: until Ctrl-C");

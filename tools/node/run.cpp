@@ -146,8 +146,12 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
     how.receive_capacity = 16384;
     std::string link = options.node.link;
     std::unique_ptr<TdmaStation> station;
-    if (!options.node.tdma.empty())
-        if (const std::string problem = TdmaStation::make(options.node, link, station); !problem.empty()) return fail(options, problem);
+    const std::int64_t give_up = options.for_ns >= 0 ? now_ns() + options.for_ns : INT64_MAX;
+    const auto ended = [&] { return stop.wait_ns(5'000'000) || now_ns() >= give_up; };
+    if (!options.node.tdma.empty()) {
+        const std::string problem = TdmaStation::make(options.node, link, ended, station);
+        if (!problem.empty()) return fail(options, problem);
+    }
     can::Opened opened = can::open(link, how);
     if (!opened) return fail(options, opened.problem);
     const can::Description about = opened.link->description();

@@ -25,9 +25,14 @@ std::optional<double> parts_per_million(std::string_view text) {
     return value * 1e-6;
 }
 
+struct Quiet final : tdma::Events {
+    void on_event(tdma::Event, const tdma::Address&, tdma::Time) noexcept override {}
+};
+
 }  // namespace
 
-std::string TdmaStation::make(const NodeOptions& options, std::string& link, std::unique_ptr<TdmaStation>& made) {
+std::string TdmaStation::make(const NodeOptions& options, std::string& link, const std::function<bool()>& ended,
+                              std::unique_ptr<TdmaStation>& made) {
     const auto question = link.find('?');
     auto place = link.substr(0, question);
     if (!place.starts_with("cane:")) return "TDMA is on Ethernet; write --link cane:eth0 with --tdma, or leave --tdma out";
@@ -35,10 +40,12 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, std
     const auto skew = parts_per_million(options.skew.empty() ? "0ppm" : options.skew);
     const auto drift = parts_per_million(options.drift.empty() ? "0ppm" : options.drift);
     if (!skew) return fmt::format("'{}' is no skew of a clock; write --skew 200ppm, at most 500ppm", options.skew);
-    if (!drift) return fmt::format("'{}' is no drift of a clock; write --drift 0.1ppm, which is how its skew changes in a second", options.drift);
+    if (!drift)
+        return fmt::format("'{}' is no drift of a clock; write --drift 0.1ppm, which is how its skew changes in a second", options.drift);
+    const bool by_rtcfg = options.tdma == "auto";
     std::string text;
-    if (!tdma::config::read_from_disk(options.tdma, text)) return fmt::format("cannot read '{}': {}", options.tdma, text);
-    const auto reading = tdma::config::read(text);
+    if (!by_rtcfg && !tdma::config::read_from_disk(options.tdma, text)) return fmt::format("cannot read '{}': {}", options.tdma, text);
+    const auto reading = by_rtcfg ? tdma::config::Reading{} : tdma::config::read(text);
     if (!reading.good()) return tdma::config::to_string(reading, options.tdma);
 
     ethernet::Options how;
@@ -46,33 +53,69 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, std
     how.spin_ns = 200'000;
     auto opened = ethernet::open(segment, how);
     if (!opened) return opened.problem;
-    if (opened.port->description().simulated) return segment + " is in memory, and this process alone on it; write an interface, as in cane:eth0";
-    const auto which = tdma::config::find(reading.schedule, options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station);
-    if (!which)
-        return fmt::format("{} has no station '{}'; write --station with one of {}", options.tdma,
-                           options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station,
-                           tdma::config::names(reading.schedule));
-    const auto setup = tdma::config::setup_of(reading.schedule, *which);
-    if (setup.slots.empty()) return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", options.station, options.tdma);
-    if (link.find("slot=") == std::string::npos) link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', setup.slots.front().id);
-    made.reset(new TdmaStation(setup, segment, std::move(opened.port), *skew, *drift));
+    if (opened.port->description().simulated)
+        return segment + " is in memory, and this process alone on it; write an interface, as in cane:eth0";
+    const tdma::config::StationEntry* entry = nullptr;
+    if (by_rtcfg) {
+        tdma::StationSetup unknown;
+        unknown.configured = false, unknown.room_for_slots = tdma::most_slots;
+        made.reset(new TdmaStation(unknown, segment, std::move(opened.port), *skew, *drift));
+        if (std::string problem = made->take_schedule(options, ended); !problem.empty()) return problem;
+        entry = &made->applicant_->accepted()->schedule.stations.front();
+    } else {
+        const std::string who = options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station;
+        const auto which = tdma::config::find(reading.schedule, who);
+        if (!which)
+            return fmt::format("{} has no station '{}'; write --station with one of {}", options.tdma, who,
+                               tdma::config::names(reading.schedule));
+        entry = &reading.schedule.stations[*which];
+        if (entry->slots.empty())
+            return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", options.station, options.tdma);
+        made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which), segment, std::move(opened.port), *skew, *drift));
+    }
+    if (link.find("slot=") == std::string::npos)
+        link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', entry->slots.front().setup.id);
     if (!ethernet::offer_discipline(segment, &made->station_)) return segment + " has a TDMA station already";
-    return options.tunnel.empty() ? std::string{} : made->open_tunnel(options, reading.schedule.stations[*which]);
+    return options.tunnel.empty() ? std::string{} : made->open_tunnel(options, *entry);
+}
+
+std::string TdmaStation::take_schedule(const NodeOptions& options, const std::function<bool()>& ended) {
+    static Quiet quiet;
+    tdma::rtcfg::Logical own;
+    if (!options.station.empty()) {
+        const auto ip = tdma::config::parse_ip(options.station);
+        if (!ip) return "with --tdma auto, --station is the station's IP address, as in 10.0.0.3; without it its MAC address counts";
+        own = {true, *ip};
+    }
+    applicant_ = std::make_unique<tdma::rtcfg::Applicant>("hal node", station_, own, "", quiet);
+    station_.accompany(&applicant_->client(), nullptr);
+    const std::string who = own.by_ip ? "ip " + options.station : "mac " + ethernet::to_string(station_.address());
+    fmt::print(stderr,
+               "hal node: waits for the master of {} to send it its schedule (RTcfg); the master's file must have a block with '{}'\n",
+               segment_, who);
+    while (applicant_->accepted() == nullptr) {
+        if (ended()) return fmt::format("no master on {} had a schedule for '{}'", segment_, who);
+        station_.receive(clock_.local(can::monotonic_ns()));
+        applicant_->work();
+        applicant_->cycle();
+    }
+    return {};
 }
 
 std::string TdmaStation::open_tunnel(const NodeOptions& options, const tdma::config::StationEntry& entry) {
     tunnel_ = std::make_unique<tdma::Tunnel>(station_);
     if (tunnel_->mtu() == 0)
-        return fmt::format("--tunnel {}: ordinary packets leave in slot 1, and {} has none; write slot 1 OFFSET into its block of {}", options.tunnel,
-                           entry.name, options.tdma);
+        return fmt::format("--tunnel {}: ordinary packets leave in slot 1, and {} has none; write slot 1 OFFSET into its block of {}",
+                           options.tunnel, entry.name, options.tdma);
     auto opened = tdma::open_tap(*tunnel_, {options.tunnel, station_.address(), entry.ip}, "hal node");
     if (!opened.tap) return "--tunnel: " + opened.problem;
     tap_ = std::move(opened.tap);
-    station_.accompany(nullptr, tunnel_.get());
+    station_.accompany(applicant_ ? &applicant_->client() : nullptr, tunnel_.get());
     return {};
 }
 
-TdmaStation::TdmaStation(const tdma::StationSetup& setup, std::string segment, std::unique_ptr<ethernet::Port> port, double skew, double drift)
+TdmaStation::TdmaStation(const tdma::StationSetup& setup, std::string segment, std::unique_ptr<ethernet::Port> port, double skew,
+                         double drift)
     : clock_(can::monotonic_ns(), skew, drift), segment_(std::move(segment)), port_(std::move(port), clock_), station_(setup) {
     station_.attach(port_);
 }
@@ -111,10 +154,11 @@ void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
 
 std::string TdmaStation::summary() const {
     const auto& s = station_.status();
-    return fmt::format("TDMA: {}, {} cycles, {} missed; syncs {} received, {} lost; frames {} sent, {} late, {} dropped; clock {:+.1f} ppm, "
-                       "{} ns to the master, sync jitter {:.0f} ns\n",
-                       tdma::word(s.state), cycles_, missed_, s.count.syncs, s.count.syncs_lost, s.count.sent, s.count.late, s.count.dropped,
-                       s.drift * 1e6, s.delay, s.jitter);
+    return fmt::format(
+        "TDMA: {}, {} cycles, {} missed; syncs {} received, {} lost; frames {} sent, {} late, {} dropped; clock {:+.1f} ppm, "
+        "{} ns to the master, sync jitter {:.0f} ns\n",
+        tdma::word(s.state), cycles_, missed_, s.count.syncs, s.count.syncs_lost, s.count.sent, s.count.late, s.count.dropped,
+        s.drift * 1e6, s.delay, s.jitter);
 }
 
 }  // namespace hal::tools
