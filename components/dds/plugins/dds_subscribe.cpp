@@ -160,8 +160,8 @@ private:
         const bool         quiet = somebody && now - since > silence_ms_ * 1'000'000;
         if (quiet && !silent_.load(std::memory_order_relaxed))
             arguments_.say(
-                "topic '" + topic_.name + "' has a publisher and no sample has come for " + std::to_string(silence_ms_ / 1000) +
-                " s; is it enabled, does its type's representation fit (XCDR1, or XCDR2 of a final type), does a firewall stop data?");
+                "topic '" + topic_.name + "' has a publisher and no sample has come for " + std::to_string(silence_ms_) +
+                " ms; is it enabled, does its type's representation fit (XCDR1, or XCDR2 of a final type), does a firewall stop data?");
         silent_.store(quiet, std::memory_order_relaxed);
         return now + 20'000'000;
     }
