@@ -34,13 +34,21 @@ int slots_of(int axes) { return axes / slot_holds + 1; }
 int slot_id(int n) { return n == 0 ? 0 : n + 1; }
 
 std::string schedule(int axes, int cycle_us) {
-    const double cycle = cycle_us;
+    const double cycle = cycle_us, guard = std::max(4.0, cycle * 0.035);
     std::string text =
         fmt::format("speed 1000\nmaster:\nname control\ncycle {}\nguard {:g}\nslot 0 {:g} 1/1 1500\n\nslave:\nname nodes\nphase {:g}\n",
-                    cycle_us, std::max(4.0, cycle * 0.02), cycle * 0.25, cycle * 0.35);
-    const double each = std::max(18.0, cycle * 0.035);
-    for (int n = 0; n < slots_of(axes); ++n) text += fmt::format("slot {} {:g} 1/1 1500\n", slot_id(n), cycle * 0.5 + each * n);
+                    cycle_us, guard, cycle * 0.25, cycle * 0.35);
+    for (int n = 0; n < slots_of(axes); ++n)
+        text += fmt::format("slot {} {:g} 1/1 1500\n", slot_id(n), cycle * 0.5 + (14 + guard) * n);  // 1500 bytes take 12.3 us
     return text;
+}
+
+/// The thread sleeps to its cycle, its port looks at the clock before a slot: exact is only when frames leave.
+std::string station(const char* thread, const char* interface, const char* name, int cycle_us, int cpu) {
+    return fmt::format(
+        "loadrt threads name1={} period1={}000 cpu1={} spin1={}us\n"
+        "loadrt tdma link=eth:{}?cpu={}&priority=99&spin={}us config=net.tdma station={}\n",
+        thread, cycle_us, cpu, cycle_us < 500 ? cycle_us / 10 : 0, interface, cpu, std::min(120, cycle_us * 3 / 20), name);
 }
 
 std::string network(int axes, int cycle_us) {
@@ -68,11 +76,7 @@ std::string list(const char* stem, int axes) {
 
 /// As in the machine's own netlist: path, limits, loop, the other half of CiA 402; and a light that answers itself by way of the I/O node.
 std::string control(int axes, int cycle_us, int cpu) {
-    std::string text = fmt::format(
-        "loadrt threads name1=servo period1={}000 cpu1={} spin1={}us\n"
-        "loadrt tdma link=eth:bench0?cpu={}&spin={}us config=net.tdma station=control\n"
-        "loadrt canopen config=net.canopen\n",
-        cycle_us, cpu, std::min(50, cycle_us / 5), cpu, std::min(50, cycle_us / 5));
+    std::string text = station("servo", "bench0", "control", cycle_us, cpu) + "loadrt canopen config=net.canopen\n";
     text += fmt::format(
         "loadrt cia402 names={}\nloadrt pid names={}\nloadrt siggen names={}\nloadrt limit3 names={}\nloadrt not names=answer\nloadrt "
         "updown\n",
@@ -102,10 +106,7 @@ std::string control(int axes, int cycle_us, int cpu) {
 }
 
 std::string nodes(int axes, int cycle_us, int cpu) {
-    std::string text = fmt::format(
-        "loadrt threads name1=turn period1={}000 cpu1={} spin1={}us\n"
-        "loadrt tdma link=eth:bench1?cpu={}&spin={}us config=net.tdma station=nodes\n",
-        cycle_us, cpu, std::min(50, cycle_us / 5), cpu, std::min(50, cycle_us / 5));
+    std::string text = station("turn", "bench1", "nodes", cycle_us, cpu);
     std::string work = "addf tdma.0.receive turn 1\n";
     for (int slot = 0; slot < slots_of(axes); ++slot) {
         std::string names, ids;
