@@ -17,21 +17,22 @@ need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-d
     /usr/lib/python3/dist-packages/serial=python3-serial "$(python3 -c 'import os; print(os.__file__[:-6])' 2>/dev/null)/ensurepip=python3-venv" \
     "/usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.rtsan-$(uname -m).a=libclang-rt-19-dev" \
     /usr/include/opencv4/opencv2/aruco.hpp=libopencv-contrib-dev \
-    linux.uml=user-mode-linux busybox=busybox-static ip=iproute2 candump=can-utils socat=socat tshark=tshark
+    linux.uml=user-mode-linux busybox=busybox-static ip=iproute2 candump=can-utils socat=socat \
+    fastdds/dds/domain/DomainParticipant.hpp=libfastrtps-dev fast-discovery-server=fastdds-tools openssl=openssl tshark=tshark
 
 # The independent CANopen implementation that tests/peers talks to, pinned there, in a Python environment of its own.
 peers() {
     stamp_of_peers=$build/peers/installed
     wanted="$root $(cat "$root/tests/peers/requirements.txt")"
     if [ -f "$stamp_of_peers" ] && [ "$(cat "$stamp_of_peers")" = "$wanted" ]; then return; fi
-    say "installing the Python packages that tests/peers talks to (canopen, python-can) into build/peers"
+    say "installing the Python packages that tests/peers talks to (canopen, python-can, cyclonedds, rosbags) into build/peers"
     rm -rf "${build:?}/peers"
     if { python3 -m venv "$build/peers" && "$build/peers/bin/python" -m pip install --disable-pip-version-check --retries 1 --timeout 30 \
         -r "$root/tests/peers/requirements.txt"; } >"$build/peers.log" 2>&1 </dev/null; then
         echo "$wanted" >"$stamp_of_peers"
     else
         rm -rf "${build:?}/peers"
-        say "not installed, no network? (why: build/peers.log): the tests against the Python package canopen are skipped"
+        say "not installed, no network? (why: build/peers.log): the tests against these packages are skipped"
     fi
 }
 peers
