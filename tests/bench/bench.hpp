@@ -62,6 +62,7 @@ void coherence(const Options&, Report&);
 void python(const Options&, Report&);
 void can(const Options&, Report&);
 void estimation(const Options&, Report&);
+void dds(const Options&, Report&);
 void vision(const Options&, Report&);
 void size(const Options&, Report&);
 void canopen_boot(const Options&, Report&);

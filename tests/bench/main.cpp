@@ -37,6 +37,7 @@ constexpr Section sections[] = {
     {"cnc", "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
     {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
     {"vision", "markers in frames of 640 x 480: error and time", vision, true},
+    {"dds", "64 pins from process to process, against a bare Fast DDS writer", dds},
     {"size", "of the program; with --full its build from cold", size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };
