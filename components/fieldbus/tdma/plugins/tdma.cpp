@@ -101,6 +101,7 @@ public:
             told_period_ = true;
             fault = true;
             raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
+            reporter_->event(Event::wrong_period, {}, cycle.period_ns());
         }
         if (fits) {
             if (reset && !was_reset_) {
@@ -310,6 +311,14 @@ private:
             fault = true;
             raise(words_->master_there, not_a_number);
             break;
+        case Event::other_schedule:
+            fault = true;
+            raise(words_->other_schedule, static_cast<double>(value) * 1e-3);
+            break;
+        case Event::out_of_step:
+            fault = true;
+            raise(words_->out_of_step, static_cast<double>(value) * 1e-3);
+            break;
         case Event::withdrew:
             fault = true;
             raise(words_->withdrew, not_a_number);
@@ -335,7 +344,7 @@ private:
             if (station_->ready()) fault = false;
             break;
         case Event::running:
-            if (!station_->status().count.losses) break;
+            if (station_->status().count.losses + station_->status().count.unanswered == 0) break;
             fault = false;  // it recovered by itself
             break;
         default: break;
@@ -472,10 +481,14 @@ On a machine there is one station, `loadrt tdma link=eth:enp3s0 config=cell.tdma
 with `link = cane:enp3s0?slot=2` sends in slot 2. Where the station is not the master, all threads of the process follow the sync.
 
 When no sync comes for as many cycles as `lost` says, the station is silent, `synchronous` and `running` become false and a fault is
-recorded. It returns by itself when there is a sync again. A master that finds a second one with a smaller address withdraws until `reset`.
+recorded. It returns by itself when there is a sync again. A master that finds one there when it
+begins, or later a second one with a smaller address, is silent until `reset`.
 
 With `tunnel=hal0` the component makes an interface hal0, through which `ping`, `ssh` and all that speaks IP cross the segment in slot 1 and
 never in a real-time slot. It has the block's `ip`, the port's MAC address and an MTU of the slot's size less 4, and needs CAP_NET_ADMIN.
+
+A station may start without the file: `station=auto` gets its block from the master, whose file has its `mac` or `ip`, and into
+`stage2=FILE` the file that the master has for it (RTcfg).
 
 `hal tdma plan cell.tdma` shows what a schedule comes to; docs/tdma.md is the whole story.
 )")
