@@ -11,7 +11,9 @@
 
 #include "components/fieldbus/tdma/frames.hpp"
 #include "components/fieldbus/tdma/plan.hpp"
+#include "components/fieldbus/tdma/rtcfg_client.hpp"
 #include "components/fieldbus/tdma/rtcfg_frames.hpp"
+#include "components/fieldbus/tdma/rtcfg_server.hpp"
 #include "components/fieldbus/tdma/station.hpp"
 #include "components/fieldbus/tdma/tunnel.hpp"
 
@@ -48,6 +50,36 @@ void frames(std::span<const std::uint8_t> given) {
             "RTcfg is written as it was read");
 }
 
+struct Nothing final : rtcfg::ClientEvents {
+    void on_stage_1(std::span<const std::uint8_t> bytes, const Address&) noexcept override { require(bytes.size() <= 65535, "one frame"); }
+    void on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address&) noexcept override {
+        require(length <= file.size(), "what came has room");
+    }
+    void on_dead_station(const Address&) noexcept override {}
+    void on_other_server(const Address&) noexcept override {}
+};
+
+/// Both ends of RTcfg get it, when they know nobody and when they know each other.
+void configuration(std::span<const std::uint8_t> given) {
+    const std::vector<std::uint8_t> frame(given.begin(), given.end());
+    static Station station(StationSetup{.slots = {{.size = 200}}});
+    static Nothing nothing;
+    static rtcfg::Client client(station, {}, nothing);
+    rtcfg::Message m;
+    const bool read = rtcfg::decode(frame, m);
+    const auto before = client.foreign();
+    client.begin();
+    client.arrived(frame, 1);
+    require(read || client.foreign() == before + 1, "what cannot be read is counted");
+    require(!client.configured(), "a frame alone configures nothing");
+    client.accept(m.from, 100);
+    for (int i = 0; i < 3; ++i) client.arrived(frame, 2), client.before_slots(3);
+    rtcfg::Server server(station, {}, {{m.from, {}, "slave:\nslot 0 100\n", "a file"}, {{}, {true, {10, 0, 0, 3}}, "", ""}}, 100);
+    for (Time now = 1; now < 3'000'000'000; now += 700'000'000)
+        server.arrived(frame, now), server.heard(m.from, now), server.before_slots(now);
+    require(server.ready() <= server.clients(), "as many as there are");
+}
+
 void schedule(std::string_view text) {
     const config::Reading reading = config::read(text);
     for (const config::Message& m : reading.messages) {
@@ -68,7 +100,7 @@ void schedule(std::string_view text) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    if (size != 0 && data[0] < 0x20 && data[0] != '\n') frames({data, size});
+    if (size != 0 && data[0] < 0x20 && data[0] != '\n') frames({data, size}), configuration({data, size});
     else schedule({reinterpret_cast<const char*>(data), size});
     return 0;
 }
