@@ -26,7 +26,7 @@ namespace {
 
 constexpr int slot_holds = 12;   ///< nodes; the frame of each is one of the smallest
 constexpr int most_axes = 120;   ///< node-ids end at 127
-constexpr double boot_s = 25;
+constexpr double boot_s = 8, boot_s_per_axis = 0.15;
 
 /// Where the I/O node's frame leaves: behind the axes' of the last slot.
 int slots_of(int axes) { return axes / slot_holds + 1; }
@@ -35,9 +35,9 @@ int slot_id(int n) { return n == 0 ? 0 : n + 1; }
 
 std::string schedule(int axes, int cycle_us) {
     const double cycle = cycle_us, guard = std::max(4.0, cycle * 0.035);
-    std::string text =
-        fmt::format("speed 1000\nmaster:\nname control\ncycle {}\nguard {:g}\nslot 0 {:g} 1/1 1500\n\nslave:\nname nodes\nphase {:g}\n",
-                    cycle_us, guard, cycle * 0.25, cycle * 0.35);
+    std::string text = fmt::format(
+        "speed 1000\nlost {}\nmaster:\nname control\ncycle {}\nguard {:g}\nslot 0 {:g} 1/1 1500\n\nslave:\nname nodes\nphase {:g}\n",
+        std::max(4, 20'000 / cycle_us), cycle_us, guard, cycle * 0.25, cycle * 0.35);
     for (int n = 0; n < slots_of(axes); ++n)
         text += fmt::format("slot {} {:g} 1/1 1500\n", slot_id(n), cycle * 0.5 + (14 + guard) * n);  // 1500 bytes take 12.3 us
     return text;
@@ -155,7 +155,7 @@ Result machine(const Options& options, const TemporaryFolder& folder, int axes, 
     auto opened = ethernet::open("eth:bench0", {.types = {0x9023}, .receive_capacity = 16384});
     if (!opened) throw std::runtime_error(opened.problem);
     Result result;
-    for (const Stopwatch watch; watch.ms() < boot_s * 1e3 && here.alive() && there.alive() && !result.booted;) {
+    for (const Stopwatch watch; watch.ms() < (boot_s + boot_s_per_axis * axes) * 1e3 && here.alive() && there.alive() && !result.booted;) {
         sleep_until(can::monotonic_ns() + 300'000'000);
         result.booted = asked_hex(options, "canopen.0.nodes-operational") == axes + 1;
     }
