@@ -3,6 +3,8 @@
 #include <pthread.h>
 #include <sched.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -65,6 +67,7 @@ private:
     }
 
     void run() {
+        setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // as urgent as an ordinary thread may be, where that is allowed
         prctl(PR_SET_TIMERSLACK, 1UL);  // it is woken beside a cycle, which is not to wait 50 us for it
         std::unique_lock lock(mutex_);
         while (running_) {

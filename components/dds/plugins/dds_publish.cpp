@@ -24,7 +24,11 @@ public:
     void start() {
         participant_ = open(settings_);
         writer_ = participant_->writer(topic_, quality_, this);
-        beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
+        try {
+            beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
+        } catch (const std::exception& e) {  // permissions need not know of it
+            arguments_.say(std::string("hal top does not show this instance: ") + e.what());
+        }
         hal::dds::serve(*this);
     }
     void stop() noexcept {

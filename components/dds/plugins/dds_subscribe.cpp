@@ -35,7 +35,11 @@ public:
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         participant_ = open(settings_);
         reader_ = participant_->reader(topic_, quality_, this);
-        beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
+        try {
+            beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
+        } catch (const std::exception& e) {  // permissions need not know of it
+            arguments_.say(std::string("hal top does not show this instance: ") + e.what());
+        }
         hal::dds::serve(*this);
     }
     void stop() noexcept {

@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""What the network does: a partition and its healing, what leaves the machine, a discovery server; in network namespaces of its own. Skipped
+where those cannot be made."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import unittest
+
+if os.environ.get("DDS_OWN_NETWORK") != "1":
+    words = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "--net", "--map-root-user"]
+    if not shutil.which("ip") or subprocess.run([*words, "ip", "link", "set", "lo", "up"], capture_output=True).returncode != 0:
+        print("no network namespace of one's own here (unshare --net)")
+        sys.exit(77)
+    os.environ["DDS_OWN_NETWORK"] = "1"
+    os.execvp("unshare", [*words, sys.executable, *sys.argv])
+subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+
+from rig import DdsCase, wait_until  # noqa: E402
+
+
+def ip(*words):
+    subprocess.run(["ip", *words], check=True)
+
+
+def sent_packets(interface):
+    found = json.loads(subprocess.run(["ip", "-json", "-stats", "link", "show", interface], check=True, capture_output=True).stdout)
+    return found[0]["stats64"]["tx"]["packets"]
+
+
+class Network(DdsCase):
+    def test_a_partition_is_noticed_and_heals(self):
+        self.publisher(1.5)
+        self.subscriber(more="timeout_ms=300")
+        self.becomes("sub.valid", "TRUE")
+        ip("link", "set", "lo", "down")
+        self.addCleanup(ip, "link", "set", "lo", "up")
+        self.becomes("sub.valid", "FALSE")
+        self.assertEqual("-1", self.value("sub.angle", "subscriber"))
+        self.becomes("sub.matched", "0")  # both have forgotten each other
+        self.becomes("pub.matched", "0", "publisher")
+        ip("link", "set", "lo", "up")
+        self.becomes("sub.valid", "TRUE")
+        self.assertEqual("1.5", self.value("sub.angle", "subscriber"))
+        self.says("sub: topic 'arm/state' is valid again\n")
+
+    def test_nothing_leaves_the_machine_unless_asked(self):
+        ip("link", "add", "out0", "type", "veth", "peer", "name", "out1")
+        self.addCleanup(ip, "link", "del", "out0")
+        for command in (["link", "set", "out0", "address", "02:00:00:00:00:01"], ["addr", "add", "10.77.0.1/24", "dev", "out0"],
+                        ["link", "set", "out0", "up"], ["link", "set", "out1", "up"], ["route", "add", "default", "via", "10.77.0.2"]):
+            ip(*command)
+        with open("/proc/sys/net/ipv6/conf/out0/disable_ipv6", "w") as file:
+            file.write("1")  # its neighbour discovery is not ours
+        before = sent_packets("out0")
+        publisher = self.publisher()
+        self.subscriber()
+        self.becomes("sub.valid", "TRUE")
+        self.assertEqual(before, sent_packets("out0"))
+        self.end_quietly(publisher)
+        self.publisher(more="interfaces=out0")
+        wait_until(lambda: sent_packets("out0") > before, "it announces itself where it was told to")
+
+    def test_a_discovery_server_brings_them_together(self):
+        if not shutil.which("fast-discovery-server"):
+            self.skipTest("fast-discovery-server is not installed (fastdds-tools)")
+        server = subprocess.Popen(["fast-discovery-server", "-i", "0", "-l", "127.0.0.1", "-p", "11811"], stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder)
+        self.addCleanup(server.wait)
+        self.addCleanup(server.kill)
+        self.publisher(3.5, more="server=127.0.0.1:11811")
+        self.subscriber(more="server=127.0.0.1:11811")
+        self.becomes("sub.valid", "TRUE")
+        self.assertEqual("3.5", self.value("sub.angle", "subscriber"))
+
+
+if __name__ == "__main__":
+    unittest.main()
