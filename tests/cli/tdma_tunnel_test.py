@@ -71,7 +71,11 @@ class Tunnel(Segment):
             self.station(name, self.netlist(name))
         for name in self.names:
             self.wait_for(name, "tunnel-open", "TRUE")
-            wait_until(lambda: "NO-CARRIER" not in self.at(name, "ip", "link", "show", "hal0").stdout, f"hal0 of {name} has a carrier")
+            self.wait_for_carrier(name)
+
+    def wait_for_carrier(self, name):
+        """Packets may pass there."""
+        wait_until(lambda: ",LOWER_UP" in self.at(name, "ip", "link", "show", "hal0").stdout, f"hal0 of {name} has a carrier")
 
     def ping(self, name, to, *words):
         if not shutil.which("ping"):
@@ -90,8 +94,8 @@ class Tunnel(Segment):
         self.ping("x", "10.9.0.1", "-s", "4000")  # in three fragments
         given = os.urandom(120_000)
         (self.folder / "given").write_bytes(given)
-        server = subprocess.Popen(["ip", "netns", "exec", "m", sys.executable, "-c", SERVER.format(size=len(given))], stdout=subprocess.PIPE,
-                                  text=True)
+        server = subprocess.Popen(["ip", "netns", "exec", "m", sys.executable, "-c", SERVER.format(size=len(given))],
+                                  stdout=subprocess.PIPE, text=True)
         self.addCleanup(self.stop, server)
         self.assertEqual("listens\n", server.stdout.readline())
         self.assertEqual(hashlib.sha256(given).hexdigest() + "\n", self.at("x", sys.executable, "-c", CLIENT).stdout, "there and back")
@@ -99,7 +103,8 @@ class Tunnel(Segment):
         for name in self.names:
             print(name, {pin: self.number(name, pin) for pin in ("tunnel-sent", "tunnel-received", "tunnel-dropped", "frames-late",
                                                                  "frames-sent", "syncs-lost", "frames-intruding")}, file=sys.stderr)
-            self.assertEqual(("TRUE", "TRUE", "FALSE"), tuple(self.pin(name, pin) for pin in ("synchronous", "running", "fault")), self.said(name))
+            self.assertEqual(["TRUE", "TRUE", "FALSE"], [self.pin(name, pin) for pin in ("synchronous", "running", "fault")],
+                             self.said(name))
             self.assertEqual([0] * 3, [self.number(name, pin) for pin in ("losses", "tunnel-refused", "frames-foreign")], self.said(name))
             self.assertGreater(self.number(name, "tunnel-sent"), 90)  # 120 kB are 83 packets each way; five pings
             self.assertNotIn("babbles", self.said(name))
@@ -124,7 +129,7 @@ class Tunnel(Segment):
 
     def test_what_is_in_the_way_is_named(self):
         starts = "'tdma.0' (tdma) cannot start: tunnel: "
-        self.assertEqual(starts + "wire0 is another interface's name, and that is no TAP; give this one another name, or tunnel=hal%d "
+        self.assertEqual(starts + "wire0 is another interface's name, and that is no TAP; give this one another name, as in hal%d "
                          "[start-failed]", self.refused("tunnel=wire0"))
         by_hand = ("sudo ip tuntap add dev hal0 mode tap user $USER; sudo ip link set hal0 address " + self.mac("m") +
                    " mtu 1496 up; sudo ip addr add 10.9.0.1/16 dev hal0")
@@ -135,19 +140,34 @@ class Tunnel(Segment):
                          self.refused("tunnel=hal0", "unshare", "--mount", "sh", "-c", 'mount -t tmpfs tmpfs /dev/net && exec "$@"', "sh"))
         self.station("m", self.netlist("m"))
         wait_until(lambda: "running until" in self.said("m"), "the master runs")
-        self.assertEqual(starts + "the interface hal0 is another process's; give this one another name, or tunnel=hal%d [start-failed]",
+        self.assertEqual(starts + "the interface hal0 is another process's; give this one another name, as in hal%d [start-failed]",
                          self.refused("tunnel=hal0"))
 
     def test_what_cannot_be_is_named_before_anything_starts(self):
-        self.assertEqual("component 'tdma': tunnel=hal0: ordinary packets leave in slot 1, and x has none; write slot 1 OFFSET into its block of "
-                         "cell.tdma; `hal tdma plan` shows what is free [bad-argument]",
+        self.assertEqual("component 'tdma': tunnel=hal0: ordinary packets leave in slot 1, and x has none; write slot 1 OFFSET into its "
+                         "block of cell.tdma; `hal tdma plan` shows what is free [bad-argument]",
                          self.refused("tunnel=hal0", station="x", cell=CELL.replace("slot 1 3500 1/1 {size}", "")))
-        self.assertEqual("component 'tdma': tunnel='a/b' is no name of an interface: at most 15 letters and digits, as in hal0, or hal%d for "
-                         "the first that is free [bad-argument]", self.refused("tunnel=a/b"))
+        self.assertEqual("component 'tdma': tunnel='a/b' is no name of an interface: at most 15 letters and digits, as in hal0, or "
+                         "hal%d for the first that is free [bad-argument]", self.refused("tunnel=a/b"))
         self.assertEqual("component 'tdma': netmask=255.0.255.0 is none; write 24 or 255.255.255.0 [bad-argument]",
                          self.refused("tunnel=hal0 netmask=255.0.255.0"))
         self.assertEqual("slot 1 is that of ordinary packets, and 71 bytes are too few: IP needs 68 and the RTmac header 4 [tdma-schedule]",
                          self.refused("tunnel=hal0", cell=CELL.replace("1/1 1500", "1/1 71")))
+
+    def test_a_device_of_hal_node_has_one_too(self):
+        self.write("cell.tdma", CELL.format(size=300))
+        self.station("m", self.netlist("m"))
+        node = ["ip", "netns", "exec", "x", HAL, "node", "axis-io", "--id", "2", "--link", "cane:wire0?to=master",
+                "--tdma", "cell.tdma", "--station", "x"]
+        ended = subprocess.run([*node, "--tunnel", "wire0"], cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
+        self.assertEqual((1, "hal node axis-io: --tunnel: wire0 is another interface's name, and that is no TAP; give this one another "
+                          "name, as in hal%d\n"), (ended.returncode, ended.stderr))
+        process = subprocess.Popen([*node, "--tunnel", "hal%d"], cwd=self.folder, env=self.environment, stdout=subprocess.DEVNULL)
+        self.addCleanup(self.stop, process)
+        self.wait_for("m", "running", "TRUE")
+        self.wait_for_carrier("x")
+        self.ping("m", "10.9.0.2")
+        self.assertIn("mtu 296", self.at("x", "ip", "link", "show", "hal0").stdout)
 
     def test_an_interface_made_by_hand_needs_no_right(self):
         self.at("m", "ip", "tuntap", "add", "dev", "hal7", "mode", "tap", "user", "0")

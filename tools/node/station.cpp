@@ -51,6 +51,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
     ethernet::Options how;
     how.types = {tdma::Station::types.begin(), tdma::Station::types.end()};
     how.spin_ns = 200'000;
+    how.pacer = !options.tunnel.empty();  // a frame is due within 200 us behind the thread; slot 1 may be anywhere
     auto opened = ethernet::open(segment, how);
     if (!opened) return opened.problem;
     if (opened.port->description().simulated)

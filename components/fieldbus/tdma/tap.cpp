@@ -68,10 +68,9 @@ private:
         if (ioctl(device_.get(), TUNSETIFF, &request) != 0) {
             const int  error = errno;
             const bool there = if_nametoindex(setup_.name.c_str()) != 0;
-            if (error == EBUSY)
-                return "the interface " + setup_.name + " is another process's; give this one another name, or tunnel=hal%d";
+            if (error == EBUSY) return "the interface " + setup_.name + " is another process's; give this one another name, as in hal%d";
             if (there && error == EINVAL)
-                return setup_.name + " is another interface's name, and that is no TAP; give this one another name, or tunnel=hal%d";
+                return setup_.name + " is another interface's name, and that is no TAP; give this one another name, as in hal%d";
             if (is_refusal(error) && there) return "the interface " + setup_.name + " is another user's; " + by_hand();
             if (is_refusal(error))
                 return "the interface " + setup_.name +
