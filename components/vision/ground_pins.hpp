@@ -17,7 +17,8 @@ public:
           forward_(component, "forward", 0.0, "how far the camera is in front of the robot's middle, m"),
           h_(component, "h-#", 9, "homography from the picture to the ground, element # row by row; all 0: the load arguments say it") {
         if (!(focal_ > 0.0 && height_ > 0.0 && pitch_ > 0.0 && pitch_ < 1.6))
-            throw std::invalid_argument("focal and camera_height have to be above 0, and pitch between 0 and 1.6 rad: the camera looks down");
+            throw std::invalid_argument(
+                "focal and camera_height have to be above 0, and pitch between 0 and 1.6 rad: the camera looks down");
     }
     /// The homography of the pins. [realtime]
     Ground linked() const noexcept {

@@ -24,8 +24,8 @@ struct Settings {
     std::uint32_t                    threshold = 0, area = 0;
     double                           distance = 0.0;
     bool                             operator==(const Settings& o) const noexcept {
-        return ground == o.ground && kinds == o.kinds && track.gate == o.track.gate && track.gain == o.track.gain && track.forget_ns == o.track.forget_ns &&
-               threshold == o.threshold && area == o.area && distance == o.distance;
+        return ground == o.ground && kinds == o.kinds && track.gate == o.track.gate && track.gain == o.track.gain &&
+               track.forget_ns == o.track.forget_ns && threshold == o.threshold && area == o.area && distance == o.distance;
     }
 };
 
@@ -38,28 +38,33 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
 
     hal::Outs<std::uint32_t> id{*this, "track-#-id", count, "number of the thing in place #, counted from 1; 0: there is none"};
     hal::Outs<std::uint32_t> kind{*this, "track-#-kind", count, "what the thing in place # is"};
-    hal::Outs<double>        x{*this, "track-#-x", count, "where the thing in place # stands, in front of the robot's middle", {.unit = "m", .finite = true}};
-    hal::Outs<double>        y{*this, "track-#-y", count, "where the thing in place # stands, to the left", {.unit = "m", .finite = true}};
-    hal::Outs<double>        age{*this, "track-#-age", count, "time since the thing in place # was seen first", {.unit = "s", .finite = true}};
-    hal::Outs<double>        unseen{*this, "track-#-unseen", count, "time since the frame that showed it last was taken", {.unit = "s", .finite = true}};
+    hal::Outs<double>        x{
+        *this, "track-#-x", count, "where the thing in place # stands, in front of the robot's middle", {.unit = "m", .finite = true}};
+    hal::Outs<double> y{*this, "track-#-y", count, "where the thing in place # stands, to the left", {.unit = "m", .finite = true}};
+    hal::Outs<double> age{*this, "track-#-age", count, "time since the thing in place # was seen first", {.unit = "s", .finite = true}};
+    hal::Outs<double> unseen{
+        *this, "track-#-unseen", count, "time since the frame that showed it last was taken", {.unit = "s", .finite = true}};
     hal::Outs<std::uint32_t> sightings{*this, "track-#-sightings", count, "frames that showed the thing in place #"};
     hal::Out<std::uint32_t>  things{*this, "count", "things that are known"};
     hal::Out<std::uint32_t>  crowded{*this, "crowded", "sightings for which no place was left"};
 
     hal::Params<double> hue{*this, "kind-#-hue", kinds, "colour of kind #: 0 red, 120 green, 240 blue", {.unit = "deg"}};
-    hal::Params<double> tolerance{*this, "kind-#-tolerance", kinds, "the colour of kind # may be off by so much", {.initial = 35.0, .unit = "deg"}};
+    hal::Params<double> tolerance{
+        *this, "kind-#-tolerance", kinds, "the colour of kind # may be off by so much", {.initial = 35.0, .unit = "deg"}};
     hal::Params<double> radius{*this, "kind-#-radius", kinds, "of kind #, on the ground", {.initial = 0.033, .unit = "m"}};
 
     hal::Param<std::uint32_t> threshold{*this, "threshold", "how strong a colour has to be, of 255", {.initial = 40}};
     hal::Param<std::uint32_t> least_area{*this, "least-area", "how many pixels of a thing have to be seen", {.initial = 40}};
     hal::Param<double>        most_distance{*this, "most-distance", "what is farther away is not told", {.initial = 3.0, .unit = "m"}};
-    hal::Param<double>        gate{*this, "gate", "farther than that from where a thing was seen, it is another one", {.initial = 0.15, .unit = "m"}};
-    hal::Param<double>        gain{*this, "gain", "how much of the way to where it is seen a thing's place goes, 0 to 1", {.initial = 0.5}};
-    hal::Param<double>        forget{*this, "forget", "a thing that was not seen for so long is gone", {.initial = 1.0, .unit = "s"}};
+    hal::Param<double>        gate{
+        *this, "gate", "farther than that from where a thing was seen, it is another one", {.initial = 0.15, .unit = "m"}};
+    hal::Param<double> gain{*this, "gain", "how much of the way to where it is seen a thing's place goes, 0 to 1", {.initial = 0.5}};
+    hal::Param<double> forget{*this, "forget", "a thing that was not seen for so long is gone", {.initial = 1.0, .unit = "s"}};
 
     void detect(const Frame& frame, const Settings& of, Found& result) {
         if (frame.format != Format::bgr) throw std::runtime_error("things are told by their colours and this camera sees none");
-        const BlobRules rules{static_cast<int>(std::min(of.threshold, 254u)), static_cast<int>(std::clamp(of.area, 1u, 10'000'000u)), of.distance};
+        const BlobRules rules{static_cast<int>(std::min(of.threshold, 254u)), static_cast<int>(std::clamp(of.area, 1u, 10'000'000u)),
+                              of.distance};
         const auto      seen = find_blobs(frame, ground.of(frame, of.ground), {of.kinds.data(), static_cast<std::size_t>(kinds)}, rules);
         tracks_.see(seen, frame.stamp_ns, of.track);
         std::copy(tracks_.all().begin(), tracks_.all().end(), result.tracks.begin());

@@ -25,16 +25,19 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
 
     GroundPins ground{*this};
 
-    hal::Out<double> offset{*this, "offset", "of the line from the robot's middle, `ahead` of it; positive: to the left", {.unit = "m", .finite = true}};
-    hal::Out<double> heading{*this, "heading", "of the line there, seen from the robot; positive: it leads to the left", {.unit = "rad", .finite = true}};
+    hal::Out<double> offset{
+        *this, "offset", "of the line from the robot's middle, `ahead` of it; positive: to the left", {.unit = "m", .finite = true}};
+    hal::Out<double> heading{
+        *this, "heading", "of the line there, seen from the robot; positive: it leads to the left", {.unit = "rad", .finite = true}};
     hal::Out<double> curvature{*this, "curvature", "of the line there; positive: it bends to the left", {.unit = "1/m", .finite = true}};
     hal::Out<double> quality{*this, "quality", "part of the bands of the newest frame that agree on it", {.finite = true}};
     hal::Out<bool>   fresh_out{*this, "new", "TRUE in the cycle in which there are new values, and only then"};
     hal::Out<std::uint32_t> missed{*this, "missed", "frames without a line"};
 
-    hal::Param<bool>          light{*this, "light-line", "TRUE: the line is lighter than the floor; FALSE: darker"};
-    hal::Param<double>        width{*this, "width", "of the line; what is half or twice as wide is none", {.initial = 0.02, .unit = "m"}};
-    hal::Param<double>        ahead{*this, "ahead", "how far in front of the robot's middle offset and heading are told", {.initial = 0.3, .unit = "m"}};
+    hal::Param<bool>   light{*this, "light-line", "TRUE: the line is lighter than the floor; FALSE: darker"};
+    hal::Param<double> width{*this, "width", "of the line; what is half or twice as wide is none", {.initial = 0.02, .unit = "m"}};
+    hal::Param<double> ahead{
+        *this, "ahead", "how far in front of the robot's middle offset and heading are told", {.initial = 0.3, .unit = "m"}};
     hal::Param<double>        reach{*this, "reach", "what is farther away is not looked at", {.initial = 0.6, .unit = "m"}};
     hal::Param<double>        contrast{*this, "contrast", "least difference from the floor, of 255", {.initial = 20.0}};
     hal::Param<double>        least_quality{*this, "least-quality", "with less it is not found", {.initial = 0.4}};
@@ -43,14 +46,22 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
     void detect(const Frame& frame, const Settings& of, Found& result) {
         LineRules rules;
         rules.dark = !of.light;
-        rules.width = of.width, rules.ahead = of.ahead, rules.reach = of.reach, rules.contrast = of.contrast, rules.least_quality = of.quality;
+        rules.width = of.width, rules.ahead = of.ahead, rules.reach = of.reach, rules.contrast = of.contrast,
+        rules.least_quality = of.quality;
         rules.bands = static_cast<int>(std::clamp(of.bands, 3u, 32u));
         const LineSeen seen = find_line(frame, ground.of(frame, of.ground), rules);
         result = {seen.found, seen.offset, seen.heading, seen.curvature, seen.quality};
     }
 
     Settings settings() const noexcept {
-        return {ground.linked(), std::isfinite(width) ? std::fmax(width, 1e-4) : 0.02, finite(ahead), finite(reach), finite(contrast), finite(least_quality), bands, light};
+        return {ground.linked(),
+                std::isfinite(width) ? std::fmax(width, 1e-4) : 0.02,
+                finite(ahead),
+                finite(reach),
+                finite(contrast),
+                finite(least_quality),
+                bands,
+                light};
     }
 
     void show(const Found& found, bool fresh, hal::Cycle) noexcept {

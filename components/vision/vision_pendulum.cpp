@@ -26,8 +26,10 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     hal::RealArgument arm_length{*this, "arm_length", 0.2, "from the motor's axis to the ball at the pendulum's pivot, m"};
     hal::RealArgument rod_length{*this, "rod_length", 0.3, "from there to the ball at the pendulum's end, m"};
 
-    hal::Out<double> pendulum{*this, "pendulum-angle", "of the pendulum in the newest frame that showed it; 0 hangs, -pi to pi", {.unit = "rad", .finite = true}};
-    hal::Out<double> arm{*this, "arm-angle", "of the arm in that frame; 0 points at the camera, -pi to pi", {.unit = "rad", .finite = true}};
+    hal::Out<double> pendulum{
+        *this, "pendulum-angle", "of the pendulum in the newest frame that showed it; 0 hangs, -pi to pi", {.unit = "rad", .finite = true}};
+    hal::Out<double> arm{
+        *this, "arm-angle", "of the arm in that frame; 0 points at the camera, -pi to pi", {.unit = "rad", .finite = true}};
     hal::Out<bool>   fresh_out{*this, "new", "TRUE in the cycle in which there are new angles, and only then"};
     hal::Out<double> age{*this, "age", "how old they are; the age of a measurement of an ekf", {.unit = "s", .finite = true}};
     hal::Out<double> residual{*this, "residual", "how far the balls are from where these angles put them", {.unit = "px", .finite = true}};
@@ -37,16 +39,20 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     hal::Out<double> tip_v{*this, "tip-v", "where the ball at the end is", {.unit = "px"}};
     hal::Out<std::uint32_t> missed{*this, "missed", "frames that did not show it, or not so that the angles fit"};
 
-    hal::Param<double>        pivot_hue{*this, "pivot-hue", "colour of the ball at the pivot: 0 red, 120 green, 240 blue", {.initial = 0.0, .unit = "deg"}};
+    hal::Param<double> pivot_hue{
+        *this, "pivot-hue", "colour of the ball at the pivot: 0 red, 120 green, 240 blue", {.initial = 0.0, .unit = "deg"}};
     hal::Param<double>        tip_hue{*this, "tip-hue", "colour of the ball at the end", {.initial = 120.0, .unit = "deg"}};
     hal::Param<double>        tolerance{*this, "hue-tolerance", "a colour may be off by so much", {.initial = 40.0, .unit = "deg"}};
     hal::Param<std::uint32_t> threshold{*this, "threshold", "how strong a ball's colour has to be, of 255", {.initial = 30}};
     hal::Param<std::uint32_t> least_area{*this, "least-area", "how many pixels of a ball have to be seen", {.initial = 12}};
     hal::Param<double>        lost_time{
         *this, "lost-time", "a pendulum that no frame showed for so long is told as a fault; 0: never", {.initial = 0.25, .unit = "s"}};
-    hal::Param<double>        most_residual{*this, "most-residual", "a frame with a greater residual does not count", {.initial = 1.5, .unit = "px"}};
-    hal::Param<double>        most_sigma{
-        *this, "most-sigma", "nor one from which an angle follows worse than that, for balls known to 0.05 px", {.initial = 0.005, .unit = "rad"}};
+    hal::Param<double> most_residual{
+        *this, "most-residual", "a frame with a greater residual does not count", {.initial = 1.5, .unit = "px"}};
+    hal::Param<double> most_sigma{*this,
+                                  "most-sigma",
+                                  "nor one from which an angle follows worse than that, for balls known to 0.05 px",
+                                  {.initial = 0.005, .unit = "rad"}};
 
     void start() {
         if (!(focal > 0.0 && distance > arm_length + rod_length && arm_length > 0.0 && rod_length > 0.0))
@@ -65,13 +71,17 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         view.middle_u = 0.5 * (frame.width - 1), view.middle_v = 0.5 * (frame.height - 1);
         view.distance = distance, view.height = height, view.arm_length = arm_length, view.rod_length = rod_length;
         limits.pivot = {of.pivot_hue, of.tolerance}, limits.tip = {of.tip_hue, of.tolerance};
-        limits.threshold = static_cast<int>(std::min(of.threshold, 254u)), limits.least_area = static_cast<int>(std::clamp(of.area, 1u, 1000000u));
+        limits.threshold = static_cast<int>(std::min(of.threshold, 254u)),
+        limits.least_area = static_cast<int>(std::clamp(of.area, 1u, 1000000u));
         limits.most_residual = of.residual, limits.most_sigma = of.sigma;
         const PendulumSeen seen = find_pendulum(frame, view, limits);
-        result = {seen.found, seen.arm, seen.pendulum, seen.residual, seen.pivot_ball.u, seen.pivot_ball.v, seen.tip_ball.u, seen.tip_ball.v};
+        result = {seen.found,        seen.arm,          seen.pendulum,   seen.residual,
+                  seen.pivot_ball.u, seen.pivot_ball.v, seen.tip_ball.u, seen.tip_ball.v};
     }
 
-    Settings settings() const noexcept { return {finite(pivot_hue), finite(tip_hue), finite(tolerance), finite(most_residual), finite(most_sigma), threshold, least_area}; }
+    Settings settings() const noexcept {
+        return {finite(pivot_hue), finite(tip_hue), finite(tolerance), finite(most_residual), finite(most_sigma), threshold, least_area};
+    }
 
     void show(const Found& found, bool fresh, hal::Cycle cycle) noexcept {
         fresh_out = fresh && found.found && valid;
@@ -84,7 +94,8 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         if (fresh && !found.found) missed = missed + 1;
         age = shown_ns_ == no_time ? 0.0 : static_cast<double>(cycle.start_ns() - shown_ns_) * 1e-9;
         const bool lost = shown_ns_ != no_time && lost_time > 0.0 && age > lost_time;
-        if (lost && !lost_ && record_ != nullptr) record_->raise(record_, this, "no frame showed the pendulum for {} s; valid is FALSE", age);
+        if (lost && !lost_ && record_ != nullptr)
+            record_->raise(record_, this, "no frame showed the pendulum for {} s; valid is FALSE", age);
         lost_ = lost;
     }
 
@@ -106,7 +117,7 @@ hundredths of a pixel; the angles are those that put both balls where they are s
 
 The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above the arm, and looks at where axis and arm meet; the arm's zero
 points at it. Near an arm of 90 degrees the pendulum swings to and from the camera, and two attitudes look the same: such a frame does not count, nor does
-one from which an angle follows badly (`most-sigma`). The filter has to bridge them, with a `gate` against the last doubtful ones.
+one from which an angle follows badly (`most-sigma`). The filter has to bridge them.
 
 For an ekf: link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`. `new` is TRUE in one cycle per frame; what a
 frame is late, the filter makes up for. `valid` falls when the newest frame does not show the pendulum, or is older than `max-age-ms`; after

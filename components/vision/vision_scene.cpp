@@ -54,7 +54,7 @@ public:
         values_[at::unplugged] = unplugged ? 1.0 : 0.0;
         values_[at::exposure] = exposure;
         values_[at::delay] = delay;
-        std::size_t i = at::poses;
+        std::size_t i = first_pose();
         for (const auto& pose : poses_) {
             if (const double value = pose; std::isfinite(value)) values_[i] = value;
             ++i;
@@ -84,7 +84,8 @@ private:
     }
     static double within(const char* name, double value, double least, double most) {
         if (value >= least && value <= most) return value;
-        throw std::invalid_argument(std::string(name) + "=" + short_text(value) + " is outside " + short_text(least) + " to " + short_text(most));
+        throw std::invalid_argument(std::string(name) + "=" + short_text(value) + " is outside " + short_text(least) + " to " +
+                                    short_text(most));
     }
     static std::string short_text(double value) {
         std::string text = std::to_string(value);
@@ -92,7 +93,8 @@ private:
         if (text.back() == '.') text.pop_back();
         return text;
     }
-    void pose(const std::string& name, const std::string& doc, const char* unit, double initial = 0.0) {
+    std::size_t first_pose() const noexcept { return settings_.kind == Kind::markers ? at::markers : at::poses; }
+    void        pose(const std::string& name, const std::string& doc, const char* unit, double initial = 0.0) {
         poses_.emplace_back(*this, name.c_str(), doc.c_str(), hal::PinOptions<double>{.initial = initial, .unit = unit});
     }
     void declare_furuta() {
@@ -138,26 +140,31 @@ private:
     std::string       name_;
     Settings          settings_;
 
-    std::deque<hal::In<double>>      poses_;
-    std::array<double, most_values>  values_{};
-    std::shared_ptr<Stage>           stage_;
-    bool                             opened_ = false;
+    std::deque<hal::In<double>>     poses_;
+    std::array<double, most_values> values_{};
+    std::shared_ptr<Stage>          stage_;
+    bool                            opened_ = false;
 
 public:
     hal::In<double> light{*this, "light", "brightness of the lamps; 1: as it should be, 0: dark", {.initial = 1.0}};
-    hal::In<double> noise{*this, "noise", "standard deviation of the sensor's noise, of 255; without any, a scene at rest looks like a frozen camera", {.initial = 3.0}};
+    hal::In<double> noise{*this,
+                          "noise",
+                          "standard deviation of the sensor's noise, of 255; without any, a scene at rest looks like a frozen camera",
+                          {.initial = 3.0}};
     hal::In<double> blur{*this, "blur", "standard deviation of the lens's blur", {.initial = 0.6, .unit = "px"}};
     hal::In<double> covered{*this, "covered", "what part of the picture something dark hides, from the left; 1: all"};
     hal::In<bool>   frozen{*this, "frozen", "TRUE: the camera gives the same picture again and again"};
     hal::In<bool>   unplugged{*this, "unplugged", "TRUE: the camera is not there"};
     hal::In<double> exposure{*this, "exposure", "how long the shutter is open: what moves is smeared", {.initial = 0.002, .unit = "s"}};
-    hal::In<double> delay{*this, "delay", "from the end of the exposure until the picture is in the computer", {.initial = 0.01, .unit = "s"}};
-    hal::Function   run{*this, "update", &VisionScene::update, "shows the camera the state of this cycle"};
+    hal::In<double> delay{
+        *this, "delay", "from the end of the exposure until the picture is in the computer", {.initial = 0.01, .unit = "s"}};
+    hal::Function run{*this, "update", &VisionScene::update, "shows the camera the state of this cycle"};
 };
 
 }  // namespace
 
-HAL_COMPONENT(VisionScene, "vision_scene", "What a simulated camera sees: a Furuta pendulum, a floor with bottles, cans and a line, or markers", R"(
+HAL_COMPONENT(VisionScene, "vision_scene",
+              "What a simulated camera sees: a Furuta pendulum, a floor with bottles, cans and a line, or markers", R"(
 Stands in for camera and world. Link the pins to the plant of the netlist; the vision components take their pictures with `source=sim:NAME`, where NAME
 is `camera=`, or what `show=` says. All is a function of the runtime's clock and of `seed`: on the virtual clock the same netlist gives the same pictures.
 

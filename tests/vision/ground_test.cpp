@@ -4,16 +4,16 @@
 #include <cstdio>
 #include <numbers>
 
+#include "scene_views.hpp"
 #include "vision/detect/blob.hpp"
 #include "vision/detect/line.hpp"
-#include "scene_views.hpp"
 
 namespace {
 
 using namespace hal::vision;
 using namespace hal::vision::test;
 
-const Ground             ground = mounted(280.0, 159.5, 119.5, 0.3, 0.6, 0.0);
+const Ground ground = mounted(280.0, 159.5, 119.5, 0.3, 0.6, 0.0);
 const std::array<BlobKind, 2> bottle_and_can{BlobKind{{120.0, 35.0}, 0.030}, BlobKind{{0.0, 35.0}, 0.033}};
 
 scene::Settings floor_settings(int objects) {
@@ -49,13 +49,14 @@ struct Truth {
 
 TEST(Line, offset_and_heading_are_right) {
     const auto settings = floor_settings(0);
-    double     offset = 0.0, heading = 0.0, curvature = 0.0, squares = 0.0;
-    int        found = 0;
+    double offset = 0.0, heading = 0.0, curvature = 0.0, squares = 0.0;
+    int found = 0;
     for (int i = 0; i < 60; ++i) {
-        const double y = spread(i, 2.0, -0.08, 0.08), h = spread(i, 3.0, -0.25, 0.25), amplitude = i % 2 ? 0.0 : 0.08, x = spread(i, 5.0, 0.0, 4.0);
-        const auto   state = line_state(y, h, amplitude, x);
-        const auto   seen = find_line(frame_of(settings, state, state, static_cast<std::uint64_t>(i)), ground, {});
-        const Truth  truth(y, h, amplitude, x);
+        const double y = spread(i, 2.0, -0.08, 0.08), h = spread(i, 3.0, -0.25, 0.25), amplitude = i % 2 ? 0.0 : 0.08,
+                     x = spread(i, 5.0, 0.0, 4.0);
+        const auto state = line_state(y, h, amplitude, x);
+        const auto seen = find_line(frame_of(settings, state, state, static_cast<std::uint64_t>(i)), ground, {});
+        const Truth truth(y, h, amplitude, x);
         if (std::fabs(truth.offset) > 0.16) continue;  // leaves the picture
         ASSERT_TRUE(seen.found) << y << ' ' << h << ' ' << x;
         ++found;
@@ -64,8 +65,8 @@ TEST(Line, offset_and_heading_are_right) {
         heading = std::fmax(heading, std::fabs(seen.heading - truth.heading));
         curvature = std::fmax(curvature, std::fabs(seen.curvature - truth.curvature));
     }
-    std::printf("%d lines: offset %.2f mm rms, %.2f mm at most; heading %.1f mrad at most; curvature %.2f 1/m at most\n", found, 1e3 * std::sqrt(squares / found),
-                1e3 * offset, 1e3 * heading, curvature);
+    std::printf("%d lines: offset %.2f mm rms, %.2f mm at most; heading %.1f mrad at most; curvature %.2f 1/m at most\n", found,
+                1e3 * std::sqrt(squares / found), 1e3 * offset, 1e3 * heading, curvature);
     EXPECT_GT(found, 40);
     EXPECT_LT(offset, 1.5e-3);
     EXPECT_LT(heading, 0.025);
@@ -76,8 +77,8 @@ TEST(Line, light_lines_gaps_and_things_beside_it_do_not_matter) {
     auto settings = floor_settings(1);
     auto state = line_state(0.03, 0.1, 0.0, 0.0);
     const Truth truth(0.03, 0.1, 0.0, 0.0);
-    LineRules   rules;
-    const auto  check = [&](const char* what) {
+    LineRules rules;
+    const auto check = [&](const char* what) {
         const auto seen = find_line(frame_of(settings, state, state, 3), ground, rules);
         EXPECT_TRUE(seen.found) << what;
         EXPECT_NEAR(seen.offset, truth.offset, 2e-3) << what;
@@ -100,7 +101,7 @@ TEST(Line, light_lines_gaps_and_things_beside_it_do_not_matter) {
 
 TEST(Line, no_line_is_not_found) {
     const auto settings = floor_settings(0);
-    auto       state = line_state(0.0, 0.0, 0.0, 0.0);
+    auto state = line_state(0.0, 0.0, 0.0, 0.0);
     state.values[scene::at::line_width] = 0.0;
     EXPECT_FALSE(find_line(frame_of(settings, state, state, 1), ground, {}).found);
     state.values[scene::at::line_width] = 0.06;  // three times as wide
@@ -115,8 +116,8 @@ TEST(Line, no_line_is_not_found) {
 
 TEST(Blob, bottles_and_cans_are_where_they_stand) {
     const auto settings = floor_settings(2);
-    double     squares = 0.0, worst = 0.0;
-    int        found = 0;
+    double squares = 0.0, worst = 0.0;
+    int found = 0;
     for (int i = 0; i < 80; ++i) {
         // one on each side, so that neither hides the other
         const double bottle_x = spread(i, 2.0, 0.35, 1.1), bottle_y = bottle_x * spread(i, 3.0, 0.12, 0.35);
@@ -138,7 +139,7 @@ TEST(Blob, bottles_and_cans_are_where_they_stand) {
 }
 
 TEST(Blob, what_the_lower_edge_cuts_is_not_told) {
-    const auto   settings = floor_settings(1);
+    const auto settings = floor_settings(1);
     scene::State state = usual_state();
     const double thing[] = {1.0, 0.2, 0.0};
     std::copy(std::begin(thing), std::end(thing), state.values.begin() + scene::at::objects);
@@ -151,7 +152,7 @@ TEST(Blob, what_the_lower_edge_cuts_is_not_told) {
 Sighting thing(double x, double y, std::uint32_t kind = 0) { return {kind, x, y, 100.0}; }
 
 TEST(Tracks, a_thing_keeps_its_id_and_its_place) {
-    Tracks           tracks(3);
+    Tracks tracks(3);
     const TrackRules rules{.gate = 0.1, .gain = 1.0, .forget_ns = 1000};
     const std::array first{thing(1.0, 0.0), thing(2.0, 0.0)}, swapped{thing(2.05, 0.0), thing(1.05, 0.0)};
     tracks.see(first, 0, rules);
@@ -165,7 +166,7 @@ TEST(Tracks, a_thing_keeps_its_id_and_its_place) {
 }
 
 TEST(Tracks, unseen_things_are_kept_for_a_while_then_gone) {
-    Tracks           tracks(2);
+    Tracks tracks(2);
     const TrackRules rules{.gate = 0.1, .gain = 1.0, .forget_ns = 1000};
     const std::array one{thing(1.0, 0.0)};
     tracks.see(one, 0, rules);
@@ -178,9 +179,10 @@ TEST(Tracks, unseen_things_are_kept_for_a_while_then_gone) {
 }
 
 TEST(Tracks, another_kind_or_too_far_is_another_thing_and_a_full_row_counts) {
-    Tracks           tracks(2);
+    Tracks tracks(2);
     const TrackRules rules{.gate = 0.1, .gain = 1.0, .forget_ns = 1000};
-    const std::array one{thing(1.0, 0.0)}, others{thing(1.0, 0.0, 1), thing(1.5, 0.0)};
+    const std::array one{thing(1.0, 0.0)};
+    const std::array others{thing(1.0, 0.0, 1), thing(1.5, 0.0)};
     tracks.see(one, 0, rules);
     tracks.see(others, 10, rules);
     EXPECT_EQ(tracks.all()[0].kind, 0u);

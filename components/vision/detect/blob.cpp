@@ -3,7 +3,8 @@
 
 namespace hal::vision {
 
-std::vector<Sighting> find_blobs(const Frame& frame, const Ground& unsigned_ground, std::span<const BlobKind> kinds, const BlobRules& rules) {
+std::vector<Sighting> find_blobs(const Frame& frame, const Ground& unsigned_ground, std::span<const BlobKind> kinds,
+                                 const BlobRules& rules) {
     constexpr double          half_width = 0.8660254;  // where an ellipse is half as wide as it can be, in half axes
     const Ground              ground = unsigned_ground.signed_at(0.5 * frame.width, frame.height - 1.0);
     std::vector<Sighting>     sightings;
@@ -12,12 +13,15 @@ std::vector<Sighting> find_blobs(const Frame& frame, const Ground& unsigned_grou
         weigh(frame, kinds[kind].hue, weights);
         for (const Spot& spot : find_spots(weights, frame.width, frame.height, rules.threshold, rules.least_area, most_tracks)) {
             double x = 0.0, y = 0.0, x_above = 0.0, y_above = 0.0;
-            if (spot.bottom >= frame.height - 2 || !ground.place(spot.foot_u, spot.foot_v, x, y) || !ground.place(spot.foot_u, spot.foot_v - 1.0, x_above, y_above)) continue;
+            if (spot.bottom >= frame.height - 2 || !ground.place(spot.foot_u, spot.foot_v, x, y) ||
+                !ground.place(spot.foot_u, spot.foot_v - 1.0, x_above, y_above))
+                continue;
             // away from the camera is where the ground of the row above is
             const double away = std::hypot(x_above - x, y_above - y);
             if (!(away > 0.0)) continue;
             x += half_width * kinds[kind].radius * (x_above - x) / away, y += half_width * kinds[kind].radius * (y_above - y) / away;
-            if (std::hypot(x, y) <= rules.most_distance) sightings.push_back({static_cast<std::uint32_t>(kind), x, y, static_cast<double>(spot.area)});
+            if (std::hypot(x, y) <= rules.most_distance)
+                sightings.push_back({static_cast<std::uint32_t>(kind), x, y, static_cast<double>(spot.area)});
         }
     }
     return sightings;

@@ -15,7 +15,9 @@ namespace hal::vision {
 struct BlobKind {
     Hue    hue;
     double radius = 0.033;  ///< m
-    bool   operator==(const BlobKind& o) const noexcept { return hue.degrees == o.hue.degrees && hue.tolerance == o.hue.tolerance && radius == o.radius; }
+    bool   operator==(const BlobKind& o) const noexcept {
+        return hue.degrees == o.hue.degrees && hue.tolerance == o.hue.tolerance && radius == o.radius;
+    }
 };
 
 struct BlobRules {

@@ -34,7 +34,7 @@ inline Ground mounted(double focal, double middle_u, double middle_v, double hei
     // w = sin + (v - mv) / f cos,  x w = height (cos - (v - mv) / f sin) + forward w,  y w = -height (u - mu) / f
     const double w_v = cos / focal, w_0 = sin - middle_v * cos / focal;
     return {{0.0, -height * sin / focal + forward * w_v, height * (cos + middle_v * sin / focal) + forward * w_0,  //
-             -height / focal, 0.0, height * middle_u / focal,                                                      //
+             -height / focal, 0.0, height * middle_u / focal,  //
              0.0, w_v, w_0}};
 }
 

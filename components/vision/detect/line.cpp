@@ -43,7 +43,8 @@ void look(const std::vector<float>& row, double v, int band, const Ground& groun
         LinePoint    point{0.5 * (left + right), v, 0.0, 0.0, band};
         double       x = 0.0, y = 0.0, x2 = 0.0, y2 = 0.0;
         if (whole && ground.place(left, v, x, y) && ground.place(right, v, x2, y2) && ground.place(point.u, v, point.x, point.y))
-            if (const double width = std::hypot(x2 - x, y2 - y); width > 0.5 * rules.width && width < 2.0 * rules.width) found.push_back(point);
+            if (const double width = std::hypot(x2 - x, y2 - y); width > 0.5 * rules.width && width < 2.0 * rules.width)
+                found.push_back(point);
         u = end;
     }
     std::sort(found.begin(), found.end(), [](const LinePoint& a, const LinePoint& b) { return std::fabs(a.y) < std::fabs(b.y); });
@@ -83,7 +84,8 @@ std::vector<LinePoint> agreeing(const std::vector<LinePoint>& points, const Para
 
 LineSeen find_line(const Frame& frame, const Ground& unsigned_ground, const LineRules& rules) {
     LineSeen      seen;
-    const cv::Mat picture(frame.height, frame.width, frame.format == Format::grey ? CV_8UC1 : CV_8UC3, const_cast<std::uint8_t*>(frame.pixels.data()));
+    const cv::Mat picture(frame.height, frame.width, frame.format == Format::grey ? CV_8UC1 : CV_8UC3,
+                          const_cast<std::uint8_t*>(frame.pixels.data()));
     cv::Mat       grey = picture;
     if (frame.format == Format::bgr) cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
     const Ground ground = unsigned_ground.signed_at(0.5 * frame.width, frame.height - 1.0);
@@ -92,8 +94,8 @@ LineSeen find_line(const Frame& frame, const Ground& unsigned_ground, const Line
     const int bands = std::clamp(rules.bands, 3, 32);
     int       top = frame.height - 1;
     double    x = 0.0, y = 0.0, x2 = 0.0, y2 = 0.0;
-    while (top > 0 && ground.place(0.5 * frame.width, top - 1, x, y) && ground.place(0.5 * frame.width + 3.0, top - 1, x2, y2) && std::hypot(x2 - x, y2 - y) < rules.width &&
-           x < rules.reach)
+    while (top > 0 && ground.place(0.5 * frame.width, top - 1, x, y) && ground.place(0.5 * frame.width + 3.0, top - 1, x2, y2) &&
+           std::hypot(x2 - x, y2 - y) < rules.width && x < rules.reach)
         --top;
     const int each = (frame.height - top) / bands;
     if (each < 1) return seen;
@@ -103,7 +105,8 @@ LineSeen find_line(const Frame& frame, const Ground& unsigned_ground, const Line
         const int          first = std::max(middle - half, 0), last = std::min(middle + half, frame.height - 1);
         std::vector<float> row(static_cast<std::size_t>(frame.width), 0.0F);
         for (int v = first; v <= last; ++v)
-            for (int u = 0; u < frame.width; ++u) row[static_cast<std::size_t>(u)] += static_cast<float>(grey.at<std::uint8_t>(v, u)) / static_cast<float>(last - first + 1);
+            for (int u = 0; u < frame.width; ++u)
+                row[static_cast<std::size_t>(u)] += static_cast<float>(grey.at<std::uint8_t>(v, u)) / static_cast<float>(last - first + 1);
         look(row, 0.5 * (first + last), band, ground, rules, points);
     }
 
@@ -114,7 +117,9 @@ LineSeen find_line(const Frame& frame, const Ground& unsigned_ground, const Line
         for (std::size_t j = i + 1; j < points.size(); ++j)
             for (std::size_t k = j + 1; k < points.size(); ++k) {
                 if (points[i].band == points[j].band || points[j].band == points[k].band) continue;
-                if (!fit({points[i], points[j], points[k]}, rules.ahead, through) || std::fabs(through.c) > 5.0 || std::fabs(through.b) > 3.0) continue;
+                if (!fit({points[i], points[j], points[k]}, rules.ahead, through) || std::fabs(through.c) > 5.0 ||
+                    std::fabs(through.b) > 3.0)
+                    continue;
                 if (auto those = agreeing(points, through, rules.ahead, tolerance); those.size() > best.size()) best = std::move(those);
             }
     seen.quality = static_cast<double>(best.size()) / bands;

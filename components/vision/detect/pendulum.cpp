@@ -15,8 +15,9 @@ using Middles = std::array<double, 4>;  // u and v of the pivot's ball, then of 
 /// (sin tilt, 0, -cos tilt) with tilt the angle it looks down.
 Middles seen_at(const PendulumView& view, double arm, double pendulum) {
     const double cos = std::cos(arm), sin = std::sin(arm), swing = view.rod_length * std::sin(pendulum);
-    const double place[2][3] = {{view.arm_length * cos, view.arm_length * sin, 0.0},
-                                {view.arm_length * cos - swing * sin, view.arm_length * sin + swing * cos, -view.rod_length * std::cos(pendulum)}};
+    const double place[2][3] = {
+        {view.arm_length * cos, view.arm_length * sin, 0.0},
+        {view.arm_length * cos - swing * sin, view.arm_length * sin + swing * cos, -view.rod_length * std::cos(pendulum)}};
     const double tilt = std::atan2(view.height, view.distance), far = std::hypot(view.height, view.distance);
     Middles      middles{};
     for (std::size_t i = 0; i < 2; ++i) {
@@ -45,7 +46,7 @@ Angles descend(const PendulumView& view, const Middles& measured, Angles from) {
     for (int turn = 0; turn < 12; ++turn) {
         const Middles at = seen_at(view, from.arm, from.pendulum), by_arm = seen_at(view, from.arm + small, from.pendulum),
                       by_pendulum = seen_at(view, from.arm, from.pendulum + small);
-        double        aa = 1e-9, ap = 0.0, pp = 1e-9, ra = 0.0, rp = 0.0;  // the normal equations
+        double aa = 1e-9, ap = 0.0, pp = 1e-9, ra = 0.0, rp = 0.0;  // the normal equations
         for (std::size_t i = 0; i < at.size(); ++i) {
             const double da = (by_arm[i] - at[i]) / small, dp = (by_pendulum[i] - at[i]) / small, off = measured[i] - at[i];
             aa += da * da, ap += da * dp, pp += dp * dp, ra += da * off, rp += dp * off;
@@ -56,7 +57,9 @@ Angles descend(const PendulumView& view, const Middles& measured, Angles from) {
         const double to_arm = (pp * ra - ap * rp) / determinant, to_pendulum = (aa * rp - ap * ra) / determinant;
         // half the step while it leads away
         double part = 1.0;
-        while (part > 0.01 && squared(seen_at(view, from.arm + part * to_arm, from.pendulum + part * to_pendulum), measured) > squared(at, measured)) part *= 0.5;
+        while (part > 0.01 &&
+               squared(seen_at(view, from.arm + part * to_arm, from.pendulum + part * to_pendulum), measured) > squared(at, measured))
+            part *= 0.5;
         from.arm += part * to_arm, from.pendulum += part * to_pendulum;
         if (std::fabs(to_arm) + std::fabs(to_pendulum) < 1e-6) break;
     }
@@ -68,21 +71,21 @@ Angles descend(const PendulumView& view, const Middles& measured, Angles from) {
 }  // namespace
 
 bool fit_pendulum(const PendulumView& view, double pivot_u, double pivot_v, double tip_u, double tip_v, PendulumSeen& seen) {
-    constexpr int         grid = 36;
-    constexpr double      step = 2.0 * std::numbers::pi / grid, same = 0.01;
-    const Middles         measured{pivot_u, pivot_v, tip_u, tip_v};
+    constexpr int                   grid = 36;
+    constexpr double                step = 2.0 * std::numbers::pi / grid, same = 0.01;
+    const Middles                   measured{pivot_u, pivot_v, tip_u, tip_v};
     std::array<double, grid * grid> off{};
-    const auto            at = [&](int i, int j) -> double& { return off[static_cast<std::size_t>((i + grid) % grid * grid + (j + grid) % grid)]; };
+    const auto at = [&](int i, int j) -> double& { return off[static_cast<std::size_t>((i + grid) % grid * grid + (j + grid) % grid)]; };
     for (int i = 0; i < grid; ++i)
         for (int j = 0; j < grid; ++j) at(i, j) = squared(seen_at(view, i * step, j * step), measured);
     Angles best, rival;
     for (int i = 0; i < grid; ++i)
         for (int j = 0; j < grid; ++j) {
-            bool valley = true;
-            for (int di = -1; di <= 1; ++di)
-                for (int dj = -1; dj <= 1; ++dj) valley = valley && at(i, j) <= at(i + di, j + dj);
-            if (!valley) continue;
+            // a valley that lies askew is none of the grid's in both directions
+            const double here = at(i, j);
+            if (!(here <= at(i, j - 1) && here <= at(i, j + 1)) && !(here <= at(i - 1, j) && here <= at(i + 1, j))) continue;
             const Angles found = descend(view, measured, {i * step, j * step});
+            if (found.residual >= rival.residual) continue;
             if (turned(found.arm, best.arm) < same && turned(found.pendulum, best.pendulum) < same && best.residual < 1e300) {
                 if (found.residual < best.residual) best = found;
             } else if (found.residual < best.residual) rival = best, best = found;

@@ -14,11 +14,13 @@ void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights) {
     weights.assign(count, 0);
     if (frame.format != Format::bgr) return;
     // chroma of a pixel: a = red - (green + blue) / 2, b = sqrt(3) / 2 (green - blue); in 1/4096
-    const double angle = hue.degrees * std::numbers::pi / 180.0, narrow = 1.0 / std::tan(std::clamp(hue.tolerance, 5.0, 85.0) * std::numbers::pi / 180.0);
+    const double angle = hue.degrees * std::numbers::pi / 180.0,
+                 narrow = 1.0 / std::tan(std::clamp(hue.tolerance, 5.0, 85.0) * std::numbers::pi / 180.0);
     const double cos = std::cos(angle), sin = std::sin(angle), root = std::sqrt(3.0) / 2.0;
     const auto   fixed = [](double value) { return static_cast<int>(std::lround(value * 4096.0)); };
     const int    along_b = fixed(-0.5 * cos - root * sin), along_g = fixed(-0.5 * cos + root * sin), along_r = fixed(cos);
-    const int    across_b = fixed((0.5 * sin - root * cos) * narrow), across_g = fixed((0.5 * sin + root * cos) * narrow), across_r = fixed(-sin * narrow);
+    const int    across_b = fixed((0.5 * sin - root * cos) * narrow), across_g = fixed((0.5 * sin + root * cos) * narrow),
+              across_r = fixed(-sin * narrow);
     const std::uint8_t* pixel = frame.pixels.data();
     for (std::size_t i = 0; i < count; ++i, pixel += 3) {
         const int along = along_b * pixel[0] + along_g * pixel[1] + along_r * pixel[2];
@@ -27,10 +29,11 @@ void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights) {
     }
 }
 
-std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height, int threshold, int least_area, std::size_t most) {
-    const cv::Mat weight(height, width, CV_8UC1, const_cast<std::uint8_t*>(weights.data()));  // is only read
-    cv::Mat       labels, stats, middles;
-    const int     count = cv::connectedComponentsWithStats(weight > threshold, labels, stats, middles, 8, CV_32S);
+std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height, int threshold, int least_area,
+                             std::size_t most) {
+    const cv::Mat     weight(height, width, CV_8UC1, const_cast<std::uint8_t*>(weights.data()));  // is only read
+    cv::Mat           labels, stats, middles;
+    const int         count = cv::connectedComponentsWithStats(weight > threshold, labels, stats, middles, 8, CV_32S);
     std::vector<Spot> spots;
     for (int label = 1; label < count; ++label) {
         const int* const s = stats.ptr<int>(label);
@@ -65,7 +68,8 @@ std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width
         std::size_t  last = rows.size() - 1;
         while (last > 0 && rows[last] < half) --last;
         const double next = last + 1 < rows.size() ? rows[last + 1] : 0.0;
-        spot.foot_v = std::max(spot.top - 1, 0) + static_cast<double>(last) + (rows[last] > next ? std::clamp((rows[last] - half) / (rows[last] - next), 0.0, 1.0) : 0.0);
+        spot.foot_v = std::max(spot.top - 1, 0) + static_cast<double>(last) +
+                      (rows[last] > next ? std::clamp((rows[last] - half) / (rows[last] - next), 0.0, 1.0) : 0.0);
         double foot = 0.0;
         for (std::size_t i = last > 2 ? last - 2 : 0; i <= last; ++i) foot += rows[i], spot.foot_u += moments[i];
         spot.foot_u = foot > 0.0 ? spot.foot_u / foot : spot.u;

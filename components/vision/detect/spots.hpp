@@ -13,14 +13,14 @@ namespace hal::vision {
 ///     along - |across| / tan(tolerance)
 /// which is linear in how much of the pixel the colour covers (on grey), and in the light: a middle weighted with it does not move with either.
 struct Hue {
-    double degrees = 0.0;     ///< 0 red, 120 green, 240 blue
+    double degrees = 0.0;  ///< 0 red, 120 green, 240 blue
     double tolerance = 40.0;  ///< degrees to either side, 5 to 85
 };
 
 struct Spot {
-    double u = 0.0, v = 0.0;          ///< its middle, px
-    double mass = 0.0;                ///< sum of weights / 255: px of full colour
-    int    area = 0;                  ///< px beyond the threshold
+    double u = 0.0, v = 0.0;  ///< its middle, px
+    double mass = 0.0;  ///< sum of weights / 255: px of full colour
+    int    area = 0;  ///< px beyond the threshold
     int    left = 0, top = 0, right = 0, bottom = 0;  ///< first and last px
     double foot_u = 0.0, foot_v = 0.0;  ///< where it ends below: the middle of its last rows, and where half of its usual width is left
 };
@@ -29,6 +29,7 @@ struct Spot {
 void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights);
 
 /// Connected spots of at least `least_area` px beyond `threshold`, heaviest first, at most `most`. [any] takes memory
-std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height, int threshold, int least_area, std::size_t most);
+std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height, int threshold, int least_area,
+                             std::size_t most);
 
 }  // namespace hal::vision

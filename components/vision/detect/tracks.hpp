@@ -25,9 +25,9 @@ struct Track {
 };
 
 struct TrackRules {
-    double        gate = 0.15;         ///< m: farther from where a thing was, it is another one
-    double        gain = 0.5;          ///< how much of the way to a new sighting a track goes, 0 to 1
-    std::int64_t  forget_ns = 1'000'000'000;
+    double       gate = 0.15;         ///< m: farther from where a thing was, it is another one
+    double       gain = 0.5;          ///< how much of the way to a new sighting a track goes, 0 to 1
+    std::int64_t forget_ns = 1'000'000'000;
 };
 
 constexpr std::size_t most_tracks = 32;
@@ -37,7 +37,7 @@ class Tracks {
 public:
     explicit Tracks(std::size_t count) : count_(count < most_tracks ? count : most_tracks) {}
     /// [any]
-    void see(std::span<const Sighting> sightings, std::int64_t stamp_ns, const TrackRules& rules);
+    void                   see(std::span<const Sighting> sightings, std::int64_t stamp_ns, const TrackRules& rules);
     std::span<const Track> all() const noexcept { return {tracks_.data(), count_}; }
     /// Sightings that no place was left for. [any]
     std::uint32_t crowded() const noexcept { return crowded_; }

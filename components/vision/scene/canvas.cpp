@@ -51,7 +51,8 @@ void Canvas::polygon(std::span<const Point> corners, Colour colour) {
     for (std::size_t i = 0; i < corners.size(); ++i) {
         const Point a = corners[i], b = corners[(i + 1) % corners.size()];
         if (!std::isfinite(a.u + a.v)) return;
-        left = std::min(left, a.u - 1.0), right = std::max(right, a.u + 1.0), top = std::min(top, a.v - 1.0), bottom = std::max(bottom, a.v + 1.0);
+        left = std::min(left, a.u - 1.0), right = std::max(right, a.u + 1.0), top = std::min(top, a.v - 1.0),
+        bottom = std::max(bottom, a.v + 1.0);
         const double du = b.u - a.u, dv = b.v - a.v, length = std::hypot(du, dv);
         if (length > 1e-9) edges.push_back({-dv / length, du / length, (dv * a.u - du * a.v) / length});
     }

@@ -57,8 +57,12 @@ public:
     }
 
 private:
-    static int at_least(double from, int size) noexcept { return static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(size))); }
-    static int at_most(double to, int size) noexcept { return static_cast<int>(std::clamp(std::ceil(to), -1.0, static_cast<double>(size - 1))); }
+    static int at_least(double from, int size) noexcept {
+        return static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(size)));
+    }
+    static int at_most(double to, int size) noexcept {
+        return static_cast<int>(std::clamp(std::ceil(to), -1.0, static_cast<double>(size - 1)));
+    }
 
     int                       width_, height_;
     std::vector<std::uint8_t> pixels_;

@@ -13,7 +13,11 @@ namespace {
 /// A camera above the robot's middle that looks forward and down.
 struct Lookout {
     explicit Lookout(const Settings& s)
-        : middle{0.5 * (s.width - 1), 0.5 * (s.height - 1)}, focal(s.focal), height(s.camera_height), cos(std::cos(s.pitch)), sin(std::sin(s.pitch)) {}
+        : middle{0.5 * (s.width - 1), 0.5 * (s.height - 1)},
+          focal(s.focal),
+          height(s.camera_height),
+          cos(std::cos(s.pitch)),
+          sin(std::sin(s.pitch)) {}
     /// x forward, y left, z up from below the camera. False: not in front of it.
     bool point(double x, double y, double z, Point& to) const noexcept {
         const double ahead = x * cos + (height - z) * sin, down = -x * sin + (height - z) * cos;
@@ -40,7 +44,8 @@ struct Cylinder {
 constexpr Cylinder bottle{0.030, 0.200, {50, 170, 40}}, can{0.033, 0.115, {40, 30, 200}};
 
 void draw_line(Canvas& canvas, const Lookout& camera, const State& state) {
-    const double width = state[at::line_width], amplitude = state[at::line_amplitude], wave = 2.0 * std::numbers::pi / std::max(state[at::line_length], 0.01);
+    const double width = state[at::line_width], amplitude = state[at::line_amplitude],
+                 wave = 2.0 * std::numbers::pi / std::max(state[at::line_length], 0.01);
     const double robot_x = state[at::x], robot_y = state[at::y], cos = std::cos(state[at::heading]), sin = std::sin(state[at::heading]);
     const bool   dark = state[at::line_dark] != 0.0;
     const double gap = state[at::line_gap];
@@ -99,7 +104,8 @@ void draw_floor(Canvas& canvas, const Settings& settings, const State& state) {
         if (kind != 0) standing.push_back({kind == 1 ? &bottle : &can, dx * cos + dy * sin, -dx * sin + dy * cos});
     }
     // the farthest first: a nearer one hides it
-    std::sort(standing.begin(), standing.end(), [](const Standing& a, const Standing& b) { return std::hypot(a.x, a.y) > std::hypot(b.x, b.y); });
+    std::sort(standing.begin(), standing.end(),
+              [](const Standing& a, const Standing& b) { return std::hypot(a.x, a.y) > std::hypot(b.x, b.y); });
     for (const Standing& s : standing) draw_object(canvas, camera, *s.what, s.x, s.y);
 }
 

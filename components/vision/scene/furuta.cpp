@@ -19,7 +19,7 @@ struct View {
         const double down = (p.x * z - p.z * x) / far, d = std::max(depth(p), 0.01);
         return {middle.u + focal * p.y / d, middle.v + focal * down / d};
     }
-    double size(double of, Place where) const noexcept { return focal * of / std::max(depth(where), 0.01); }
+    double  size(double of, Place where) const noexcept { return focal * of / std::max(depth(where), 0.01); }
     Capsule rod(Place a, Place b, double radius) const noexcept { return {point(a), point(b), size(radius, a), size(radius, b)}; }
 
     Point  middle;
@@ -42,7 +42,8 @@ void draw_furuta(Canvas& canvas, const Settings& settings, const State& from, co
         const double q = between(at::arm), a = between(at::pendulum);
         // the arm turns about z; the pendulum swings in the plane across it, 0 hanging
         const Place pivot{arm_length * std::cos(q), arm_length * std::sin(q), 0.0};
-        const Place tip{pivot.x - rod_length * std::sin(a) * std::sin(q), pivot.y + rod_length * std::sin(a) * std::cos(q), -rod_length * std::cos(a)};
+        const Place tip{pivot.x - rod_length * std::sin(a) * std::sin(q), pivot.y + rod_length * std::sin(a) * std::cos(q),
+                        -rod_length * std::cos(a)};
         const auto  n = static_cast<std::size_t>(i);
         arm[n] = view.rod({0.0, 0.0, 0.0}, pivot, 0.008);
         rod[n] = view.rod(pivot, tip, 0.004);

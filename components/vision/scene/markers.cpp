@@ -39,7 +39,9 @@ void draw_markers(Canvas& canvas, const Settings& settings, const State& state) 
         const std::size_t from = at::markers + at::of_marker * i;
         const double      id = std::round(state[from]), size = state[from + 1];
         if (id >= 0.0 && id < 50.0 && size > 0.0)
-            placed.push_back({static_cast<int>(id), size, {state[from + 2], state[from + 3], state[from + 4]},
+            placed.push_back({static_cast<int>(id),
+                              size,
+                              {state[from + 2], state[from + 3], state[from + 4]},
                               turned(state[from + 5], state[from + 6], state[from + 7])});
     }
     std::sort(placed.begin(), placed.end(), [](const Placed& a, const Placed& b) { return a.middle[2] > b.middle[2]; });
@@ -50,16 +52,18 @@ void draw_markers(Canvas& canvas, const Settings& settings, const State& state) 
         double        left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
         bool          whole = true;
         for (int corner = 0; corner < 4; ++corner) {
-            const cv::Vec3d on((corner & 1 ? half : -half) * marker.size, (corner & 2 ? half : -half) * marker.size, 0.0), p = marker.turn * on + marker.middle;
+            const cv::Vec3d on((corner & 1 ? half : -half) * marker.size, (corner & 2 ? half : -half) * marker.size, 0.0),
+                p = marker.turn * on + marker.middle;
             whole = whole && p[2] > 0.01;
             const double u = middle_u + settings.focal * p[0] / p[2], v = middle_v + settings.focal * p[1] / p[2];
-            left = std::min(left, u - 1.0), right = std::max(right, u + 1.0), top = std::min(top, v - 1.0), bottom = std::max(bottom, v + 1.0);
+            left = std::min(left, u - 1.0), right = std::max(right, u + 1.0), top = std::min(top, v - 1.0),
+            bottom = std::max(bottom, v + 1.0);
         }
         if (!whole) continue;  // partly behind the camera
         // from a pixel to the marker's plane: the inverse of its homography
         const cv::Matx33d to_picture(settings.focal, 0, middle_u, 0, settings.focal, middle_v, 0, 0, 1);
-        const cv::Matx33d plane(marker.turn(0, 0), marker.turn(0, 1), marker.middle[0], marker.turn(1, 0), marker.turn(1, 1), marker.middle[1], marker.turn(2, 0),
-                                marker.turn(2, 1), marker.middle[2]);
+        const cv::Matx33d plane(marker.turn(0, 0), marker.turn(0, 1), marker.middle[0], marker.turn(1, 0), marker.turn(1, 1),
+                                marker.middle[1], marker.turn(2, 0), marker.turn(2, 1), marker.middle[2]);
         const cv::Matx33d back = (to_picture * plane).inv();
         const cv::Matx33d step = cv::Matx33d::diag({1.0 / marker.size, 1.0 / marker.size, 1.0}) * back;
         canvas.shade(left, top, right, bottom, [&](double u, double v, Colour& colour) {
@@ -69,7 +73,8 @@ void draw_markers(Canvas& canvas, const Settings& settings, const State& state) 
                 const double    at_x = p[0] / p[2], at_y = p[1] / p[2];
                 if (std::fabs(at_x) > half || std::fabs(at_y) > half) continue;
                 // the pattern's rows go down as the marker's y goes up
-                const int column = static_cast<int>(std::floor((at_x + 0.5) * cells)), row = static_cast<int>(std::floor((0.5 - at_y) * cells));
+                const int column = static_cast<int>(std::floor((at_x + 0.5) * cells)),
+                          row = static_cast<int>(std::floor((0.5 - at_y) * cells));
                 ++hits;
                 white += column < 0 || column >= cells || row < 0 || row >= cells || pattern.at<std::uint8_t>(row, column) >= 128;
             }

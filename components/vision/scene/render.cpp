@@ -32,8 +32,9 @@ const std::vector<std::int16_t>& bell() {
 
 /// Light and noise of the sensor: each row begins somewhere else in the table.
 void develop(std::vector<std::uint8_t>& pixels, int height, double light, double noise, std::uint64_t seed) {
-    const auto&       table = bell();
-    const int         gain = static_cast<int>(std::clamp(light, 0.0, 16.0) * 256.0 + 0.5), sigma = static_cast<int>(std::clamp(noise, 0.0, 64.0) * 4.0 + 0.5);
+    const auto& table = bell();
+    const int   gain = static_cast<int>(std::clamp(light, 0.0, 16.0) * 256.0 + 0.5),
+              sigma = static_cast<int>(std::clamp(noise, 0.0, 64.0) * 4.0 + 0.5);
     const std::size_t row = pixels.size() / static_cast<std::size_t>(height);
     for (std::size_t v = 0; v < static_cast<std::size_t>(height); ++v) {
         std::size_t         at = mixed(seed + v) % table.size();

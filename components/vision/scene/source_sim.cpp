@@ -29,7 +29,7 @@ public:
         if (const auto stage = scene::find(name_); stage && is_unplugged(*stage)) return unplugged();
         return true;
     }
-    void close() noexcept override { picture_.clear(); }
+    void          close() noexcept override { picture_.clear(); }
     std::uint32_t frozen_after() const override { return 10; }  // a sensor without noise and a scene at rest look the same
 
     Got next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) override {
@@ -60,8 +60,8 @@ private:
         if (!stage->newest(newest)) return Got::nothing;
         if (newest[scene::at::unplugged] != 0.0) return unplugged(), Got::lost;
         const scene::Settings& of = stage->settings();
-        const std::int64_t     period = std::max<std::int64_t>(std::llround(1e9 / of.fps), 1), exposure = nanoseconds(newest[scene::at::exposure]),
-                           delay = nanoseconds(newest[scene::at::delay]);
+        const std::int64_t     period = std::max<std::int64_t>(std::llround(1e9 / of.fps), 1),
+                           exposure = nanoseconds(newest[scene::at::exposure]), delay = nanoseconds(newest[scene::at::delay]);
         const std::int64_t ready = now_ns - exposure - delay, n = ready < 0 ? -1 : ready / period;
         due_ns_ = (std::max(n, last_) + 1) * period + exposure + delay;
         if (n <= last_) return Got::nothing;

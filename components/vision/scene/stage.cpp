@@ -47,8 +47,9 @@ bool Stage::when(std::int64_t stamp_ns, State& to) const noexcept {
         (stamp(middle) > stamp_ns ? late : early) = middle;
     }
     if (!read(late, after) || !read(early, to) || after.stamp_ns <= to.stamp_ns) return read(late, to);
-    const double part = std::clamp(static_cast<double>(stamp_ns - to.stamp_ns) / static_cast<double>(after.stamp_ns - to.stamp_ns), 0.0, 1.0);
-    for (std::size_t i = at::poses; i < most_values; ++i) to.values[i] += part * (after.values[i] - to.values[i]);
+    const double part =
+        std::clamp(static_cast<double>(stamp_ns - to.stamp_ns) / static_cast<double>(after.stamp_ns - to.stamp_ns), 0.0, 1.0);
+    for (std::size_t i = at::poses; i < at::poses + at::smooth; ++i) to.values[i] += part * (after.values[i] - to.values[i]);
     to.stamp_ns = stamp_ns;
     return true;
 }

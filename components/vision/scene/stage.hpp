@@ -31,11 +31,13 @@ struct Settings {
 /// Where in a state what stands. Poses begin at `poses`.
 namespace at {
 constexpr std::size_t light = 0, noise = 1, blur = 2, covered = 3, frozen = 4, unplugged = 5, exposure = 6, delay = 7, poses = 8;
+constexpr std::size_t smooth = 3;  // poses that move and do not jump: they lie between two states
 constexpr std::size_t arm = poses, pendulum = poses + 1;                                       // furuta
 constexpr std::size_t x = poses, y = poses + 1, heading = poses + 2;                            // floor: the robot with the camera
-constexpr std::size_t line_width = poses + 3, line_amplitude = poses + 4, line_length = poses + 5, line_dark = poses + 6, line_gap = poses + 7;
-constexpr std::size_t objects = poses + 8, of_object = 3;                                       // floor: kind (0 none, 1 bottle, 2 can), x, y
-constexpr std::size_t markers = poses, of_marker = 8;                                           // markers: id size x y z roll pitch yaw
+constexpr std::size_t line_width = poses + 3, line_amplitude = poses + 4, line_length = poses + 5, line_dark = poses + 6,
+                      line_gap = poses + 7;
+constexpr std::size_t objects = poses + 8, of_object = 3;  // floor: kind (0 none, 1 bottle, 2 can), x, y
+constexpr std::size_t markers = poses + smooth, of_marker = 8;  // markers: id size x y z roll pitch yaw
 }  // namespace at
 
 constexpr std::size_t most_values = 72, most_objects = 16, most_markers = 8;
@@ -62,14 +64,14 @@ public:
     /// The newest state. False: there is none yet. [any]
     bool newest(State& to) const noexcept;
     /// The state at `stamp_ns`, between its two neighbours in a straight line; the oldest or the newest that is known where it lies outside.
-    /// Only poses lie between; of the conditions the earlier are taken. False: there is none yet. [any]
+    /// Only the first poses (at::smooth) lie between; of all else the earlier is taken. False: there is none yet. [any]
     bool when(std::int64_t stamp_ns, State& to) const noexcept;
 
 private:
     static constexpr std::size_t kept = 512;
     struct Slot {
-        std::atomic<std::uint64_t>                            number{0};
-        std::atomic<std::int64_t>                             stamp{0};
+        std::atomic<std::uint64_t>                   number{0};
+        std::atomic<std::int64_t>                    stamp{0};
         std::array<std::atomic<double>, most_values> values{};
     };
     bool read(std::uint64_t n, State& to) const noexcept;
