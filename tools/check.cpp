@@ -2,12 +2,16 @@
 // `hal check`: everything wrong with netlists that can be known without running them.
 #include <unistd.h>
 
+#include "nodes.hpp"
 #include "offline.hpp"
 #include "say.hpp"
 
 namespace hal::tools {
 
 int run_check(const Options& options) {
+    auto nodes = nodes_asked_for(options);
+    if (!nodes) return 1;
+    if (!nodes->empty()) return check_cell(options, std::move(*nodes));
     Session session(offline());
     ShellOptions how;
     how.check = how.keep_going = how.notes = true;

@@ -50,6 +50,8 @@ void declare_run(CLI::App& app, Options& o) {
     named(app, o, "of this instance, when several run on one machine (default: default)");
     netlists(app, o);
     app.add_flag("--no-picture", o.no_picture, "no live picture in the terminal");
+    app.add_option("--node", o.part, "of a netlist for several machines: load the part of this one")->type_name("NAME");
+    app.add_option("--dds", o.dds, "how nodes meet: interfaces=ADDRESS domain=N peers=… (default: on this machine only)")->type_name("SETTINGS");
 }
 
 void declare_sim(CLI::App& app, Options& o) {
@@ -59,6 +61,10 @@ void declare_sim(CLI::App& app, Options& o) {
     named(app, o, "of the instance");
     netlists(app, o);
     app.add_flag("--report", o.report, "print the timing report on stderr at the end");
+    app.add_option("--node", o.part, "of a netlist for several machines: this one alone; without it all of them together")->type_name("NAME");
+    app.add_option("-e,--execute", o.execute, "execute this command at the end; of several machines: 'NODE: COMMAND'; may be repeated")
+        ->type_name("COMMAND")
+        ->allow_extra_args(false);
 }
 
 void declare_shell(CLI::App& app, Options& o) {
@@ -136,6 +142,13 @@ void declare_play(CLI::App& app, Options& o) {
 void declare_doctor(CLI::App& app, Options& o) {
     app.add_option("--seconds", o.seconds, "how long each measurement takes (default 2)")->type_name("S")->check(CLI::Range(0.0, 3600.0));
     app.add_flag("--json", o.json, "as JSON");
+}
+
+void declare_top(CLI::App& app, Options& o) {
+    for_how_long(app, o, "in a terminal: end after 10s …; without it: until Ctrl-C");
+    app.add_flag("--once", o.once, "the table once, as it is when the output is no terminal");
+    app.add_flag("--json", o.json, "once, as JSON");
+    app.add_option("--dds", o.dds, "how to meet others: interfaces=ADDRESS domain=N peers=… (default: on this machine only)")->type_name("SETTINGS");
 }
 
 void declare_completion(CLI::App& app, Options& o) { words(app, o, "SHELL", "bash"); }
@@ -349,6 +362,7 @@ constexpr Subcommand table[] = {
     {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", ON_BUS(run_node_jr3), declare_node_jr3},
     {"node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus", ON_BUS(run_node_bootloader), declare_node_bootloader},
     {"node faults", "", "what simulated devices can do wrong on purpose", ON_BUS(run_node_faults), declare_node_faults},
+    {"top", "", "all instances on this machine and the network, their threads and faults", run_top, declare_top},
     {"doctor", "", "what on this machine spoils real time", run_doctor, declare_doctor},
     {"completion", "SHELL", "print a completion script: source <(hal completion bash)", run_completion, declare_completion},
 };

@@ -21,12 +21,15 @@ SessionOptions session_options(const std::string& name, bool virtual_clock) {
     return options;
 }
 
+}  // namespace
+
 ShellOptions shell_options(const Options& options) {
     ShellOptions how;
     how.keep_going = options.keep_going;
     how.echo = options.echo;
     how.script = options.script;
     how.color = colours(STDERR_FILENO);
+    how.node = options.part;
     how.level = options.loudness == Loudness::nothing   ? Level::nothing
                 : options.loudness == Loudness::results ? Level::results
                                                         : Level::errors;
@@ -48,6 +51,8 @@ void export_variables(const Options& options, const std::string& instance) {
             ::setenv(argument.substr(0, equals).c_str(), argument.substr(equals + 1).c_str(), 1);
     }
 }
+
+namespace {
 
 class OwnShell final : public Listener {
 public:
@@ -73,6 +78,7 @@ private:
 
 std::string own_name(const Options& options) {
     if (!options.name.empty()) return options.name;
+    if (!options.part.empty()) return options.part;
     const char* variable = std::getenv("HALCYON_INSTANCE");
     return variable && *variable ? variable : "default";
 }

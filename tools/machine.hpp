@@ -46,6 +46,10 @@ private:
     std::unique_ptr<Server> server_;
 };
 
+/// For netlists and the programs they start: $1 $2 … and NAME=VALUE from behind `--`, $HALCYON_INSTANCE, PATH.
+void export_variables(const Options& options, const std::string& instance);
+ShellOptions shell_options(const Options& options);
+
 /// The instance `hal run` makes: --name, else $HALCYON_INSTANCE, else "default".
 std::string own_name(const Options& options);
 

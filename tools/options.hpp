@@ -16,6 +16,8 @@ struct Options {
     std::string program = "hal";         ///< how messages begin: "hal run", "halcmd"
     std::vector<std::string> words;      ///< the positional arguments: files, a shell command, a component, a code
     std::vector<std::string> arguments;  ///< behind `--`: $1 $2 … and NAME=VALUE of the netlists
+    std::string part;                    ///< --node: whose part of the netlists
+    std::string dds;                     ///< --dds: arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
     std::string name;                    ///< --name: of the instance; empty: not given
     std::string ini;
     std::string output;                  ///< -o
@@ -25,6 +27,7 @@ struct Options {
     std::uint64_t count = 0;             ///< -n; 0: without end
     std::string channel;                 ///< of record and play, when it is not among the words: a number or an instance
     std::string name_as_component;       ///< halsampler -N
+    bool once = false;                   ///< of top
     bool interactive = false, keep_going = false, no_picture = false, report = false;
     bool from_file = false;              ///< -f: the first word is a file of commands; without one, standard input
     std::vector<std::string> execute;    ///< -e COMMAND
@@ -65,6 +68,7 @@ int run_explain(const Options&);
 int run_record(const Options&);
 int run_play(const Options&);
 int run_doctor(const Options&);
+int run_top(const Options&);
 int run_can_dump(const Options&);
 int run_can_send(const Options&);
 int run_can_record(const Options&);

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "machine.hpp"
+#include "nodes.hpp"
 #include "picture.hpp"
 #include "report.hpp"
 #include "say.hpp"
@@ -22,8 +23,8 @@ int run_classic(Machine& machine, const Options& options) {
     return options.interactive || options.words.empty() ? std::max(status, machine.talk({"halcmd: ", "halcmd+: "})) : status;
 }
 
-int run_plain(Machine& machine, const Options& options) {
-    int status = machine.load();
+int run_plain(Machine& machine, const Options& options, std::vector<NodeLine> nodes) {
+    int status = options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
     machine.start_threads();
     const std::string& name = machine.session.options().name;
@@ -49,9 +50,11 @@ int run_run(const Options& options) {
     if (options.words.empty() && !options.interactive && !options.classic)
         return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
     if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
+    const auto nodes = nodes_asked_for(options);
+    if (!nodes) return 1;
     Machine machine(options, own_name(options), false);
     if (!machine.serve(true)) return 1;
-    return options.classic ? run_classic(machine, options) : run_plain(machine, options);
+    return options.classic ? run_classic(machine, options) : run_plain(machine, options, *nodes);
 }
 
 }  // namespace hal::tools

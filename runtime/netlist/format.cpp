@@ -64,8 +64,14 @@ private:
             flush();
             begin_line();
             end_line(remark);
+            after_comment_ = true;
             return;
         }
+        if (words[0] == "node" && (words.size() < 2 || words[1] != "=")) {  // a new part: its title stands apart
+            flush();
+            if (!after_comment_) blank_lines_ = std::max<std::size_t>(blank_lines_, 1);
+        }
+        after_comment_ = false;
         if (continued && long_command(words, remark)) return;
         const std::string kind(words.size() > 1 && words[1] == "=" ? words[1] : words[0]);
         if (kind != kind_) flush();
@@ -213,6 +219,7 @@ private:
     std::vector<Row> rows_;  ///< commands of one kind that follow each other
     std::string kind_;
     std::size_t blank_lines_ = 0;
+    bool after_comment_ = false;  ///< the line before is one
 };
 
 }  // namespace

@@ -411,6 +411,7 @@ struct Starting {
     Instance& instance;
     const Model& model;
     Executor& executor;
+    const hal_status& status;
     std::string failure;
 
     bool fail(const char* reason) noexcept {
@@ -457,8 +458,8 @@ const Instance* clock_leader(const Model& model) {
     return nullptr;
 }
 
-std::string start_instance(Instance& instance, const Model& model, Executor& executor) {
-    Starting starting{instance, model, executor, {}};
+std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status) {
+    Starting starting{instance, model, executor, status, {}};
     executor.clock().claim = claim_clock;
     const hal_host host{
         sizeof host, &starting,
@@ -470,6 +471,7 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
         [](const hal_host* h, const char* id) -> const void* {
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
             if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
+            if (std::strcmp(id, HAL_STATUS) == 0) return &static_cast<Starting*>(h->data)->status;
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;

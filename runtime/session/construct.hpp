@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/diagnostic.hpp"
+#include "hal/status.h"
 #include "model/edit.hpp"
 #include "model/model.hpp"
 
@@ -40,7 +41,7 @@ std::string dashed(std::string component);
 bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics);
 
 /// Starts one instance: it may acquire hardware. The reason of a refusal, or empty.
-std::string start_instance(Instance& instance, const Model& model, Executor& executor);
+std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);
 /// The instance that makes the threads follow an outside beat, or nullptr.
 const Instance* clock_leader(const Model& model);
 /// [setup] Not while a thread runs its functions.

@@ -22,7 +22,7 @@ bool Session::State::start_replaced(Diagnostics& diagnostics) {
     const auto start = [&](const Component& component) {
         for (const auto& instance : component.instances) {
             if (instance->started) continue;
-            if (const std::string why = start_instance(*instance, model, *executor); !why.empty())
+            if (const std::string why = start_instance(*instance, model, *executor, status); !why.empty())
                 diagnostics.error("start-failed", instance->loaded,
                                   "'" + instance->name + "' (" + component.name + ") cannot start in its new version: " + why,
                                   "loaded here", "the old version goes on");
@@ -68,7 +68,7 @@ void Session::State::restart_replaced(Diagnostics& diagnostics) {
         for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) stop_instance(**it);
         for (const auto& instance : one.component->instances) {
             if (instance->started || !one.stopped) continue;
-            const std::string why = start_instance(*instance, model, *executor);
+            const std::string why = start_instance(*instance, model, *executor, status);
             if (why.empty()) continue;
             for (Function* const function : instance->functions) function->halted = true;
             diagnostics.error("start-failed", instance->loaded,

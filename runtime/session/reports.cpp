@@ -177,8 +177,10 @@ std::vector<std::string> Session::missing_privileges() const {
     return missing;
 }
 
+void Session::note_latencies(std::vector<std::string> lines) { state_->latencies = std::move(lines); }
+
 std::vector<std::string> Session::latency_lines() const {
-    std::vector<std::string> lines;
+    std::vector<std::string> lines = state_->latencies;
     for (const Delay& delay : delays(model())) {
         std::string line = delay.signal->name + ": ";
         const std::string reader = delay.reader->name;

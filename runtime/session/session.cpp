@@ -17,6 +17,8 @@ Session::State::State(SessionOptions o) : options(std::move(o)), plugins(options
 Session::State::~State() = default;
 
 Session::Session(SessionOptions options) : state_(std::make_unique<State>(std::move(options))) {
+    state_->status.text = status_for_plugins;
+    state_->status.data = this;
     if (!state_->options.check_only) watch_for_crashes(state_.get());
 }
 
@@ -97,12 +99,15 @@ bool Session::State::carry_out(Diagnostics& diagnostics) {
         if (one.severity == Severity::error || reported.insert(one.message).second) diagnostics.add(one);
     }
     if (diagnostics.failed()) return false;
-    if (options.check_only) return close_edit(), true;
+    if (options.check_only) {  // no thread takes them
+        for (const auto& [signal, value] : edit->signal_values) signal->value = value;
+        return close_edit(), true;
+    }
     if (!all_answer(diagnostics)) return false;
 
     for (Instance* const instance : edit->added_instances()) {
         if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
-        if (const std::string why = start_instance(*instance, model, *executor); !why.empty())
+        if (const std::string why = start_instance(*instance, model, *executor, status); !why.empty())
             diagnostics.error("start-failed", instance->loaded, "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
     }
     if (diagnostics.failed()) return false;

@@ -131,6 +131,10 @@ public:
     std::vector<std::string> missing_privileges() const;
     /// One line per signal: writer -> reader, cycles of delay and why (`show latency`).
     std::vector<std::string> latency_lines() const;
+    /// The instance, its threads and faults as lines "KEY VALUE" (hal/status.h).
+    std::string status_text() const;
+    /// Lines for it about signals that pass between machines, which the model of this one does not show.
+    void note_latencies(std::vector<std::string> lines);
 
     // --- locks, streams, processes ----------------------------------------------------------------------------------
     unsigned lock = 0;               ///< bits of Lock

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "execute/executor.hpp"
+#include "hal/status.h"
 #include "model/compile.hpp"
 #include "session/elaborate.hpp"
 #include "session/plugins.hpp"
@@ -47,6 +48,8 @@ struct Session::State {
 
     std::deque<FaultRecord> fault_log;
     std::uint64_t fault_number = 0;          ///< of the newest
+    hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
+    std::vector<std::string> latencies;      ///< of signals that pass between machines
     std::vector<std::string> refused;        ///< by the system: "memory locking"
     bool shut = false;
     bool abandoned = false;                  ///< a thread hangs and may go on using everything here
@@ -81,6 +84,9 @@ private:
     void collect_faults(const Thread& thread);
     void silent_thread(const Core* core, Diagnostics& diagnostics) const;
 };
+
+/// hal_status::text; its data is the Session.
+std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t room);
 
 /// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any more.
 void watch_for_crashes(Session::State* state);

@@ -82,7 +82,7 @@ constexpr CommandRow rows[] = {
      "signal, and why. fault: what went wrong at run time.",
      command_show, 0, command_plain},
     {"list", "", "comp|pin|sig|signal|param|parameter|funct|function|thread [PATTERN]...", "names on one line", "", command_list, 0, command_plain},
-    {"status", "", "[lock|mem|all]", "locks, and how many things there are", "", command_status, 0, command_plain},
+    {"status", "", "[lock|mem|instance|all]", "locks, and how many things there are", "instance: threads and faults as lines, as hal top reads them.", command_status, 0, command_plain},
     {"save", "", "[comp|alias|sig|signal|sigu|link|linka|net|neta|netl|netla|netal|param|parameter|thread|unconnectedinpins|signalvalues|all|allu] [FILE]",
      "the state as commands, to the terminal or a file",
      "all (or nothing): comp, alias, sigu, netla, param, thread; allu also sets unlinked inputs and signals without writer.",
@@ -93,6 +93,11 @@ constexpr CommandRow rows[] = {
     {"unlock", "", "[all|tune]", "take the locks off, or those of tune only", "", command_unlock, 0, command_plain},
     // --- the shell itself
     {"source", "", "FILE", "run the commands of a file, as if they stood here", "", command_source, 0, command_apart | command_waits | command_checked},
+    {"node", "", "NAME... [rate=TIME] [deadline=TIME]", "in a netlist: what follows belongs to these nodes, until the next such line",
+     "`hal run FILE --node NAME` loads the part of NAME, with the lines before the first node line and those behind `node all`.\n"
+     "A signal that one node writes and others read is sent over DDS: every rate= (10ms), and without it for deadline= the readers\n"
+     "take the value that `sets` gave the signal in their own part, else 0. $NODE is the node's name.",
+     command_node, 0, command_apart | command_checked},
     {"echo", "", "", "print each line before it is run", "", command_echo, 0, command_apart},
     {"unecho", "", "", "the end of echo", "", command_unecho, 0, command_apart},
     {"debug", "", "LEVEL", "how much is said: 0 nothing, 1 errors, 2 also results, 3 to 5 everything", "", command_debug, 0, command_apart},

@@ -124,5 +124,6 @@ void command_help(Context&);
 void command_explain(Context&);
 void command_quit(Context&);
 void command_nothing(Context&);
+void command_node(Context&);
 
 }  // namespace hal

@@ -19,6 +19,13 @@ std::string usage(const CommandRow& row) { return *row.arguments ? std::string(r
 
 void command_source(Context& context) { context.script.source(context); }
 
+// Those of the file that is run are gone by now: its nodes' parts are taken before the first command.
+void command_node(Context& context) {
+    const bool typed = context.session.sources.get(context.command.span.source).name.starts_with('<');
+    context.diagnostics.error("misplaced-node", context.command.name.span, std::string("`node` lines ") + (typed ? "are not typed" : "do not stand in a file that another one reads"), "",
+                              typed ? "write them in a netlist, and type: hal run FILE --node " + context.argument(0) : "write `node " + context.argument(0) + "` above the `source` line");
+}
+
 void command_print(Context& context) {
     std::string text = context.session.sources.location(context.command.span, false) + ": HALCMD MSG:";
     for (const auto& token : context.command.args) text += " " + token.text;

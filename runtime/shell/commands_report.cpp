@@ -71,8 +71,9 @@ std::string figures(double p50, double p99, double max) {
 
 void command_status(Context& context) {
     const std::string_view what = context.argument_or(0, "all");
+    if (what == "instance") return context.output.out(context.session.status_text());
     if (what != "all" && what != "lock" && what != "mem") {
-        context.diagnostics.error("unknown-word", context.span(0), "there is no status of '" + std::string(what) + "'", "", "the choices are: lock, mem, all");
+        context.diagnostics.error("unknown-word", context.span(0), "there is no status of '" + std::string(what) + "'", "", "the choices are: lock, mem, instance, all");
         return;
     }
     if (context.options().json) return context.output.out(status_json(context.session));

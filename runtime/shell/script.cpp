@@ -2,8 +2,10 @@
 #include "shell/script.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
+#include "netlist/nodes.hpp"
 #include "shell/files.hpp"
 
 namespace hal {
@@ -61,8 +63,34 @@ std::string Script::own_path(std::uint32_t source) const {
 
 Script::Parsed Script::parse_text(std::uint32_t source) {
     Parsed parsed;
-    parsed.commands = parse(session_.sources, source, {&session_.ini, state_.variable}, parsed.problems);
+    auto variable = state_.variable;
+    if (!shell_.options.node.empty())
+        variable = [this](const std::string& name) -> std::optional<std::string> {
+            if (name == "NODE") return shell_.options.node;
+            if (state_.variable) return state_.variable(name);
+            const char* const value = std::getenv(name.c_str());
+            return value ? std::optional<std::string>(value) : std::nullopt;
+        };
+    parsed.commands = parse(session_.sources, source, {&session_.ini, std::move(variable)}, parsed.problems);
+    const auto files = std::count_if(files_.begin(), files_.end(), [](const Open& open) { return !open.path.empty(); });
+    if (files <= 1 && !session_.sources.get(source).name.starts_with('<')) take_part(source, parsed);
     return parsed;
+}
+
+// Of a netlist for several machines: the part of this one.
+void Script::take_part(std::uint32_t source, Parsed& parsed) {
+    const auto line = std::find_if(parsed.commands.begin(), parsed.commands.end(), is_node_line);
+    if (line == parsed.commands.end()) return;
+    std::vector<NodeLine> nodes;
+    collect_nodes(parsed.commands, nodes, parsed.problems);
+    if (!shell_.options.node.empty()) return keep_part(shell_.options.node, parsed.commands);
+    if (!nodes.empty()) {
+        std::vector<std::string> names;
+        for (const NodeLine& node : nodes) names.push_back(node.name);
+        parsed.problems.error("several-nodes", line->span, "this netlist is for " + counted(nodes.size(), "machine") + ": " + listed(names, 100), "",
+                              "hal run " + session_.sources.get(source).name + " --node " + names.front() + " loads the part of one");
+    }
+    parsed.commands.clear();
 }
 
 int Script::run(std::uint32_t source) {

@@ -46,6 +46,7 @@ private:
     /// The canonical path of a text that is a file, else "".
     std::string own_path(std::uint32_t source) const;
     Parsed parse_text(std::uint32_t source);
+    void take_part(std::uint32_t source, Parsed& parsed);
     void run_commands(std::uint32_t source);
     void run_line(const Command& command);
     void edit(const Command& command, const CommandRow& row);

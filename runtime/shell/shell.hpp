@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "shell/completion.hpp"
 
@@ -56,6 +57,7 @@ struct ShellOptions {
     bool notes = false;       ///< print notes (stale reads …) as well as errors and warnings
     bool check = false;       ///< `hal check`: a file is one transaction, commands that act are only looked at
     Level level = Level::errors;
+    std::string node = {};    ///< of a netlist with `node` lines: whose part is loaded; `$NODE` in it
     std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
 };
 

@@ -18,8 +18,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-# No command line provokes these alike on every machine; tests/unit/session_memory.cpp does.
-ELSEWHERE = {"out-of-memory", "thread-refused"}
+# No command line provokes these alike on every machine; tests/unit/session_memory.cpp and tests/cli/cell_test.py do.
+ELSEWHERE = {"out-of-memory", "thread-refused", "no-dds"}
 TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
 
 

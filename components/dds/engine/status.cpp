@@ -67,6 +67,10 @@ private:
             next_ = now + status_period_ns;
             const std::size_t length = host_ != nullptr ? host_->text(host_, buffer_.data(), buffer_.size()) : 0;
             if (length != 0) last_.assign(buffer_.data(), length);
+            if (host_ != nullptr && last_.empty()) {  // being loaded: nobody is to hear of it without its name
+                next_ = 0;
+                return now + 10'000'000;
+            }
             std::string text = last_;
             for (const auto& [owner, lines] : added_) text += lines;
             writer_->write(status_bytes(text));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -12,6 +13,8 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <unistd.h>
 
 #include "dds/arguments.hpp"
 #include "dds/status.hpp"
@@ -94,13 +97,22 @@ public:
         participant_ = open(settings_);
         Quality quality = status_quality();
         quality.depth = 64;
+        own_ = this_process();
         reader_ = participant_->reader(status_topic(), quality, this);
         beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
         // Whoever is there answers within a moment; who is not may come later.
         {
             std::unique_lock lock(mutex_);
-            const auto       until = std::chrono::steady_clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(patience_ms_));
-            while (refusal_.empty() && greeted_.size() < others_.size() && changed_.wait_until(lock, until) != std::cv_status::timeout) {}
+            const auto       patience = std::chrono::milliseconds(static_cast<std::int64_t>(patience_ms_));
+            const auto       begin = std::chrono::steady_clock::now();
+            while (refusal_.empty() && greeted_.size() < others_.size()) {
+                // who is there and has not said who it is will do so soon
+                const auto known = participant_->known();
+                const auto instances = std::count_if(known.begin(), known.end(), [](const Known& one) { return one.name == "halcyon"; });
+                const bool silent = static_cast<std::size_t>(instances) > told_.size();
+                if (std::chrono::steady_clock::now() - begin > (silent ? 5 * patience : patience)) break;
+                changed_.wait_for(lock, std::chrono::milliseconds(20));
+            }
             started_ = true;
             if (!refusal_.empty()) {
                 const std::string why = refusal_;
@@ -132,10 +144,22 @@ public:
     }
 
 private:
+    /// Host and process, as the host words them in its status.
+    static std::string this_process() {
+        char name[256] = "";
+        ::gethostname(name, sizeof name - 1);
+        return std::string(name) + ":" + std::to_string(::getpid());
+    }
     void on_sample(const Sample& sample) noexcept override {
         try {
             const std::string_view text = status_text(sample.bytes);
             const auto             cell = values_of(text, "cell"), node = values_of(text, "node");
+            {
+                const std::lock_guard        lock(mutex_);
+                std::array<std::uint8_t, 12> prefix;
+                std::copy_n(sample.writer.begin(), prefix.size(), prefix.begin());
+                if (told_.size() < 1000) told_.insert(prefix);
+            }
             if (cell.empty() || node.empty() || cell[0] != cell_.get()) return;
             const std::lock_guard lock(mutex_);
             if (node[0] == self_.get()) return twin(text);
@@ -151,9 +175,17 @@ private:
         return "instance '" + (instance.empty() ? "?" : instance[0]) + "' on " + (host.empty() ? "?" : host[0]) + ", process " + (pid.empty() ? "?" : pid[0]);
     }
 
+    static std::string process(std::string_view text) {
+        const auto host = values_of(text, "host"), pid = values_of(text, "pid");
+        return (host.empty() ? "?" : host[0]) + ":" + (pid.empty() ? "?" : pid[0]);
+    }
+
+    /// Of our name: our own status comes back, too.
     void twin(std::string_view text) {
-        if (started_) return;  // the one that comes later is refused; a status of our own comes back, too
-        refusal_ = "node '" + self_.get() + "' of '" + cell_.get() + "' runs already: " + whom(text);
+        if (process(text) == own_) return;
+        if (!started_) refusal_ = "node '" + self_.get() + "' of '" + cell_.get() + "' runs already: " + whom(text);
+        else if (whom(text) != twin_) std::fputs(("node: node '" + self_.get() + "' of '" + cell_.get() + "' runs twice: here and as " + whom(text) + "\n").c_str(), stderr);
+        twin_ = whom(text);
         changed_.notify_all();
     }
 
@@ -204,7 +236,8 @@ private:
     std::mutex              mutex_;
     std::condition_variable changed_;
     std::set<std::string>   greeted_;
-    std::string             refusal_;
+    std::string             refusal_, own_, twin_;
+    std::set<std::array<std::uint8_t, 12>> told_;  ///< participants whose status came
     bool                    started_ = false;
 
     std::shared_ptr<Participant> participant_;

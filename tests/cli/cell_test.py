@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""Netlists for several machines: hal check, hal sim, and hal run --node with a process for each node on loopback; hal top."""
+import json
+import os
+import subprocess
+import unittest
+
+from harness import HAL, PATIENCE, ROOT, Case, wait_until
+
+HAVE_DDS = any("dds_publish.so" in names for _, _, names in os.walk(HAL.parent.parent / "lib")) or \
+    any("dds_publish.so" in names for _, _, names in os.walk(HAL.parent.parent / "components"))
+
+# `sender` counts up, `taker` sends back twice of it. The deadline is long: this machine may be busy.
+CELL = """loadrt threads name1=servo period1=1000000
+
+node sender rate=5ms deadline=1s
+loadrt integ names=clock
+loadrt sum2  names=back
+addf clock servo
+addf back  servo
+setp clock.in 1
+net count   clock.out
+net doubled => back.in0
+loadrt and2 names=alive
+addf alive servo
+net there   node.taker.online => alive.in0
+
+node taker rate=5ms deadline=1s
+loadrt scale names=twice
+addf twice servo
+setp twice.gain 2
+net count   => twice.in
+sets count -1
+net doubled twice.out
+"""
+
+
+class Language(Case):
+    def test_check_takes_all_nodes_at_once(self):
+        path = self.write("cell.hal", CELL)
+        done = self.run_program("check", path)
+        self.assertEqual((0, ""), (done.returncode, done.stdout), done.stderr)
+        self.assertEqual(f"{path}: no errors\nnodes: sender, taker\n  sender -> taker: count:float\n  taker -> sender: doubled:float\n", done.stderr)
+
+    def test_check_says_errors_of_all_nodes_and_those_of_common_lines_once(self):
+        path = self.write("cell.hal", CELL.replace("period1=1000000\n", "period1=1000000\nsetp nowhere 1\n", 1).replace("net doubled twice.out", "net doubled twice.outt")
+                          .replace("addf back  servo", "addf bakc  servo"))
+        said = self.bad("check", path)
+        self.assertEqual(1, said.count("there is no pin 'nowhere'"), said)
+        self.assertIn("did you mean 'twice.out'?", said)
+        self.assertIn("there is no function 'bakc'", said)
+
+    def test_sim_passes_the_signals_and_comes_out_the_same(self):
+        path = self.write("cell.hal", CELL)
+        words = ("sim", path, "--for", "1s", "-e", "taker: getp twice.in", "-e", "sender: getp back.in0", "-e", "sender: getp alive.in0")
+        first = self.good(*words)
+        count, doubled, alive = first.split()
+        self.assertTrue(0.98 <= float(count) <= 1.0, first)     # sent every 5 ms
+        self.assertTrue(1.95 <= float(doubled) <= 2.0, first)   # there and back
+        self.assertEqual("TRUE", alive)
+        self.assertEqual(first, self.good(*words))
+
+    def test_sim_of_one_node_has_safe_values_for_the_others(self):
+        path = self.write("cell.hal", CELL)
+        self.assertEqual("-1\n", self.good("sim", path, "--node", "taker", "--for", "1s", "-e", "taker: getp twice.in"))
+
+    def test_a_signal_that_each_node_writes_itself_stays_there(self):
+        path = self.write("two.hal", "loadrt threads name1=servo period1=1000000\nloadrt sum2 names=a\naddf a servo\nnode x y\nsetp a.in0 1\nnet own a.out\n"
+                          "node y\nsetp a.in1 5\n")
+        self.assertEqual("1\n6\n", self.good("sim", path, "--for", "5ms", "-e", "x: gets own", "-e", "y: gets own"))
+        self.assertNotIn("->", self.run_program("check", path).stderr)
+
+    def test_node_name_in_names(self):
+        path = self.write("two.hal", "loadrt threads name1=servo period1=1000000\nloadrt sum2 names=a\naddf a servo\nnode robot[1..2]\nnet $(NODE)-x a.out\n"
+                          "node robot2\nsetp a.in0 7\nnode desk\nnet robot1-x a.in0\nnet robot2-x a.in1\n")
+        self.assertEqual("7\n", self.good("sim", path, "--for", "50ms", "-e", "desk: getp a.in1"))
+
+    def test_fmt_sets_parts_apart(self):
+        path = self.write("cell.hal", "net  a b.c\nnode  x   rate=5ms\nnet a b.d\n# of all\nnode all\n")
+        self.good("fmt", path)
+        with open(path, encoding="utf-8") as file:
+            self.assertEqual("net a b.c\n\nnode x rate=5ms\nnet a b.d\n# of all\nnode all\n", file.read())
+
+    def test_execute_says_which_node(self):
+        path = self.write("cell.hal", CELL)
+        self.assertIn("write --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
+
+    @unittest.skipIf(HAVE_DDS, "DDS is there")
+    def test_run_without_dds_says_which_package(self):
+        self.assertIn("sudo apt install libfastrtps-dev", self.bad("run", self.write("cell.hal", CELL), "--node", "taker", "--for", "1s"))
+
+
+@unittest.skipUnless(HAVE_DDS, "built without Fast DDS")
+class Running(Case):
+    def setUp(self):
+        super().setUp()
+        # a domain that other tests at the same time hardly have
+        self.environment["HALCYON_DDS"] = f"domain={1 + os.getpid() % 230}"
+        self.environment["SKIP_DEFAULT_XML_FILE"] = "1"
+        self.environment["ASAN_OPTIONS"] = self.environment.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0"
+        self.path = self.write("cell.hal", CELL)
+
+    def node(self, name, path=None):
+        return self.start("run", path or self.path, "--node", name, instance=name)
+
+    def until(self, node, pin, good, what):
+        return wait_until(lambda: good(self.value(pin, instance=node)), f"{what} ({pin} of {node} is {self.value(pin, instance=node)})")
+
+    def test_signals_pass_a_lost_node_is_noticed_and_comes_back(self):
+        taker = self.node("taker")
+        self.assertEqual("-1", self.value("twice.in", instance="taker"))
+        self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
+        sender = self.node("sender")
+        self.until("taker", "node.sender.online", lambda v: v == "TRUE", "the sender is there")
+        self.until("taker", "twice.in", lambda v: float(v or 0) > 0, "the count comes")
+        self.until("sender", "back.in0", lambda v: float(v or 0) > 0, "twice of it comes back")
+        self.until("sender", "alive.in0", lambda v: v == "TRUE", "a linked online pin")
+        self.assertLess(float(self.value("node.sender.age-ms", instance="taker")), 1000 * PATIENCE)
+
+        latency = self.shell("show", "latency", instance="taker").stdout
+        self.assertIn("count: node sender => twice.in  over DDS every 5 ms, deadline 1 s, then -1", latency)
+        self.assertIn("doubled: twice.out => node sender  over DDS every 5 ms, deadline 1 s (sent by servo)", latency)
+
+        sender.kill()
+        sender.wait()
+        self.until("taker", "node.sender.online", lambda v: v == "FALSE", "the loss is noticed")
+        self.assertEqual("-1", self.value("twice.in", instance="taker"))
+        self.assertIn("no sample of topic 'halcyon/cell/sender/servo'", self.shell("show", "fault", instance="taker").stdout)
+
+        again = self.node("sender")
+        self.until("taker", "node.sender.online", lambda v: v == "TRUE", "it is back")
+        self.until("taker", "twice.in", lambda v: float(v or -1) > 0, "the count comes again")
+
+        # hal top sees both, from outside and as a table
+        def top():
+            seen = {one["node"]: one for one in json.loads(self.good("top", "--json"))}
+            return seen if {"sender", "taker"} <= set(seen) else None
+        seen = wait_until(top, "hal top sees both")
+        self.assertEqual(("cell", "sender", again.pid), tuple(seen["sender"][key] for key in ("cell", "instance", "pid")))
+        self.assertEqual(["servo"], [thread["name"] for thread in seen["sender"]["threads"]])
+        self.assertGreaterEqual(seen["taker"]["faults"], 1)
+        self.assertIn("cell/taker", self.good("top"))
+        self.end(again)
+        out, err = self.end(taker)
+        self.assertNotIn("ERROR", err)
+
+    def test_another_version_is_refused_by_name(self):
+        self.node("taker")
+        other = self.write("other.hal", CELL.replace("loadrt integ names=clock", "loadrt conv_float_s32 names=clock\nloadrt integ names=t").replace("addf clock servo", "addf t servo\naddf clock servo\nnet t t.out => clock.in")
+                           .replace("setp clock.in 1", "setp t.in 1").replace("loadrt scale names=twice", "loadrt conv_s32_float names=int\nloadrt scale names=twice\naddf int servo")
+                           .replace("net count   => twice.in", "net count   => int.in\nnet f int.out => twice.in"))
+        os.mkdir(self.folder / "new")
+        path = self.folder / "new" / "cell.hal"
+        os.rename(other, path)
+        # on a machine that is very busy the two meet later than in the second that the start waits; then it is said, and nothing passes
+        done = self.run_program("run", path, "--node", "sender", "--for", "5s")
+        self.assertIn("runs another version of netlist 'cell' than node 'sender': signal 'count' is s32 on node 'sender' and float on node 'taker'; run the same file on both", done.stderr)
+        self.assertIn("node 'taker' (instance 'taker' on ", done.stderr)
+        self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
+
+    def test_a_node_runs_once(self):
+        self.node("taker")
+        done = self.run_program("run", self.path, "--node", "taker", "--name", "twin", "--for", "5s")
+        self.assertRegex(done.stderr, "node 'taker' of 'cell' runs (already:|twice: here and as) instance 'taker' on ")
+
+
+@unittest.skipUnless(HAVE_DDS, "built without Fast DDS")
+class Namespaces(Case):
+    """halfiles/cell: a network namespace and a process for each node."""
+
+    def bring_up(self, *words):
+        done = subprocess.run([ROOT / "halfiles/cell/bring-up", *words], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder), "SKIP_DEFAULT_XML_FILE": "1",
+                                   "ASAN_OPTIONS": self.environment.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0"}, text=True, timeout=8 * PATIENCE)
+        if done.returncode == 77 or "not to be had" in done.stdout:
+            self.skipTest("no network namespaces here: " + done.stdout.strip())
+        logs = "".join(f"--- {log.name}\n{log.read_text()}" for log in self.folder.glob("hal-cell.*/*.log"))
+        self.assertEqual(0, done.returncode, done.stdout + logs)
+        self.assertIn("all are there; the robots drive", done.stdout)
+        self.assertNotIn("hal-cell-", subprocess.run(["ip", "netns", "list"], stdout=subprocess.PIPE, text=True).stdout)
+        return done.stdout
+
+    def test_the_controller_is_killed_and_comes_back(self):
+        self.assertIn("all are there again", self.bring_up("2", "--kill", "cell"))
+
+    def test_a_robot_is_killed_and_comes_back(self):
+        said = self.bring_up("2", "--kill", "robot2")
+        self.assertIn("the robots that are left stand still; node robot2 starts again", said)
+        self.assertIn("cell/robot2", said)
+
+    def test_the_camera_is_killed_and_comes_back(self):
+        self.assertIn("all are there again", self.bring_up("2", "--kill", "camera"))
+
+    def test_wrong_words_are_named(self):
+        done = subprocess.run([ROOT / "halfiles/cell/bring-up", "--kill", "nobody"], env={**self.environment, "HAL": str(HAL)}, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        if done.returncode == 77:
+            self.skipTest("no network namespaces here")
+        self.assertEqual((1, True), (done.returncode, "there is no node 'nobody'; the nodes are: cell robot1 robot2 camera" in done.stdout), done.stdout)
+
+
+class Cell(Case):
+    """halfiles/cell on the virtual clock."""
+
+    def test_both_robots_follow_their_bottles(self):
+        said = self.good("sim", ROOT / "halfiles/cell/cell.hal", "--for", "15s", "-e", "robot1: getp pilot.distance", "-e", "robot2: getp pilot.distance",
+                         "-e", "cell: getp apart.out")
+        first, second, apart = map(float, said.split())
+        self.assertLess(max(first, second), 0.03, said)
+        self.assertGreater(apart, 0.3, said)
+
+
+class Top(Case):
+    def test_local_instances_without_a_network(self):
+        path = self.write("a.hal", "loadrt threads name1=servo period1=1000000\n")
+        machine = self.start("run", path, "--name", "alone", instance="alone")
+        seen = [one for one in json.loads(self.good("top", "--json")) if one["pid"] == machine.pid]
+        self.assertEqual(["alone"], [one["instance"] for one in seen])
+        self.assertEqual(1_000_000, seen[0]["threads"][0]["period_ns"])
+        self.assertIn("alone", self.good("top", "--once"))
+
+    def test_nobody(self):
+        self.environment["HALCYON_DDS"] = f"domain={1 + os.getpid() % 230}"
+        self.assertEqual("[]\n", self.good("top", "--json"))
+
+
+if __name__ == "__main__":
+    unittest.main()

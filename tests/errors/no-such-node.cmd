@@ -1,0 +1,1 @@
+hal run no-such-node.hal --node finger

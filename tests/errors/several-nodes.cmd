@@ -1,0 +1,1 @@
+hal run several-nodes.hal --for 1ms

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+#include "nodes.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "base/diagnostic.hpp"
+#include "offline.hpp"
+#include "report.hpp"
+#include "say.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+int say(const Options& options, Diagnostics& diagnostics) {
+    if (options.loudness != Loudness::nothing) write_all(STDERR_FILENO, render(diagnostics, Sources{}, colours(STDERR_FILENO)));
+    return 1;
+}
+
+std::vector<std::string> names_of(const std::vector<NodeLine>& nodes) {
+    std::vector<std::string> names;
+    for (const NodeLine& node : nodes) names.push_back(node.name);
+    return names;
+}
+
+ShellOptions for_check() {
+    ShellOptions how;
+    how.check = how.keep_going = how.notes = true;
+    how.color = colours(STDERR_FILENO);
+    return how;
+}
+
+/// "NODE: COMMAND" of --execute.
+int execute(const Options& options, Cell& cell, const std::string& command, Output& output) {
+    const auto colon = command.find(':');
+    const std::size_t node = colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
+    if (node == cell.size()) return fail(options, fmt::format("in which node? write --execute '{}: {}'", cell.nodes().front().name, command));
+    return cell.shell(node).execute(command.substr(colon + 1), output, "<commandline>");
+}
+
+}  // namespace
+
+std::optional<std::vector<NodeLine>> nodes_asked_for(const Options& options) {
+    std::vector<NodeLine> nodes = nodes_of(options.words, options.ini);
+    const std::vector<std::string> names = names_of(nodes);
+    if (options.part.empty() || std::find(names.begin(), names.end(), options.part) != names.end()) return nodes;
+    Diagnostics found;
+    std::string files;
+    for (const std::string& word : options.words) files += (files.empty() ? "" : " ") + word;
+    found.error("no-such-node", {}, "'" + files + "' has no node '" + options.part + "'", did_you_mean(options.part, names),
+                names.empty() ? "it is for one machine: leave --node out" : "its nodes: " + listed(names, 100));
+    say(options, found);
+    return std::nullopt;
+}
+
+int check_cell(const Options& options, std::vector<NodeLine> nodes) {
+    Cell cell(cell_name(options.words), std::move(nodes), offline(), for_check());
+    ErrorsOnly output;
+    if (!cell.load(options.words, options.ini, output)) return 1;
+    for (const std::string& path : options.words) write_all(STDERR_FILENO, path + ": no errors\n");
+    write_all(STDERR_FILENO, fmt::format("nodes: {}\n", listed(names_of(cell.nodes()), 100)));
+    for (const NodeTopic& topic : cell.topics()) {
+        std::vector<std::string> readers;
+        for (std::size_t i = 0; i < cell.size(); ++i)
+            if (topic.read_by(i)) readers.push_back(cell.nodes()[i].name);
+        write_all(STDERR_FILENO, fmt::format("  {} -> {}: {}\n", cell.nodes()[topic.from].name, listed(readers, 100), topic.layout()));
+    }
+    return 0;
+}
+
+int sim_cell(const Options& options, std::vector<NodeLine> nodes) {
+    if (options.cycles != 0) return fail(options, "--cycles counts the cycles of one machine; of several: --for 10s");
+    if (!options.name.empty()) return fail(options, "--name is of one machine; choose it: --node " + nodes.front().name);
+    export_variables(options, "sim");
+    StopRequest stop;
+    SessionOptions session;
+    session.name = fmt::format("sim-{}", ::getpid());
+    session.virtual_clock = true;
+    ProcessOutput output;
+    Cell cell(cell_name(options.words), std::move(nodes), session, shell_options(options));
+    stop.listen();
+    int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
+    constexpr std::int64_t slice_ns = 100'000'000;
+    if (!options.part.empty()) cell.leave_alone(cell.find(options.part));
+    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested(); left -= slice_ns) cell.advance(std::min(left, slice_ns));
+    for (const std::string& command : options.execute)
+        if (status == 0 && !stop.requested()) status = execute(options, cell, command, output);
+    for (std::size_t i = 0; i < cell.size(); ++i) {
+        const auto reports = cell.session(i).thread_reports();
+        if (std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted; })) status = 1;
+        if (options.report) write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell.nodes()[i].name, timing_report(cell.session(i))));
+    }
+    stop.release();
+    return stop.requested() ? 1 : status;
+}
+
+int load_node(Machine& machine, const Options& options, std::vector<NodeLine> nodes) {
+    ProcessOutput output;
+    Cell cell(cell_name(options.words), std::move(nodes), offline(), for_check());
+    {
+        ErrorsOnly errors;
+        if (!cell.load(options.words, options.ini, errors)) return 1;
+    }
+    const std::size_t own = cell.find(options.part);
+    const auto available = machine.session.available_components();
+    if (std::find(available.begin(), available.end(), "dds_publish") == available.end() && !cell.topics().empty()) {
+        Diagnostics found;
+        found.error("no-dds", {}, "the nodes of this netlist exchange signals over DDS, and this Halcyon was built without it", "",
+                    "sudo apt install libfastrtps-dev, and build again; hal sim runs all nodes in one process without it");
+        return say(options, found);
+    }
+    std::string participant = options.dds;
+    if (const char* const usual = std::getenv("HALCYON_DDS"); participant.empty() && usual) participant = usual;
+    const NodeLinks links = node_links(cell, own, participant.empty() ? "" : " " + participant);
+    machine.session.note_latencies(node_latencies(cell, own, false));
+    const std::string name = fmt::format("<links of node {}>", options.part);
+    const auto plain = [](const std::string& path) {  // a word that means itself
+        return path.ends_with(".hal") && path.find_first_of(" \t'\"#$[]{}\\") == path.npos;
+    };
+    if (options.ini.empty() && std::all_of(options.words.begin(), options.words.end(), plain)) {  // all of it takes effect together
+        std::string text = links.before;
+        for (const std::string& path : options.words) text += "source " + path + "\n";
+        return machine.shell.run_text(name, text + links.behind, output);
+    }
+    int status = machine.shell.run_text(name, links.before, output);
+    if (status != 0) return status;
+    status = machine.load();
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    return std::max(status, machine.shell.run_text(name, links.behind, output));
+}
+
+}  // namespace hal::tools

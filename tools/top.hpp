@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// What `hal top` knows of an instance, and how it shows it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hal::tools {
+
+struct SeenThread {
+    std::string name;
+    std::int64_t period_ns = 0;
+    std::uint64_t cycles = 0, missed = 0;
+    bool faulted = false;
+};
+
+/// One instance, as its status says (hal/status.h): from its control socket, or from the network.
+struct SeenInstance {
+    std::string instance, host, cell, node;
+    std::int64_t pid = 0;
+    bool running = false;
+    std::vector<SeenThread> threads;
+    std::uint64_t faults = 0;
+    std::string fault;              ///< the newest, a sentence
+    double silent_s = 0;            ///< since its status came
+
+    bool same(const SeenInstance& other) const { return pid == other.pid && instance == other.instance && host == other.host; }
+};
+
+/// Of a status text. False when it is none.
+bool read_status(std::string_view text, SeenInstance& seen);
+
+/// A table for people, sorted as given.
+std::string top_table(const std::vector<SeenInstance>& all);
+/// An array of objects, a line.
+std::string top_json(const std::vector<SeenInstance>& all);
+
+}  // namespace hal::tools
