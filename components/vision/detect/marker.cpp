@@ -61,6 +61,7 @@ struct MarkerDetector::Inside {
     Frame                                  grey;
     cv::Mat                                smooth;
 
+    void refine(const cv::Mat& picture, std::vector<cv::Point2f>& corners) const;
     Pose pose(Marker& marker, double size) const;
 };
 
@@ -68,10 +69,7 @@ MarkerDetector::MarkerDetector(const std::string& dictionary, std::optional<Came
     cv::setNumThreads(1);  // a second one gains nothing, and would be where real-time threads are
     Inside& in = *inside_;
     in.dictionary = cv::aruco::getPredefinedDictionary(number_of(dictionary));
-    in.parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-    in.parameters->cornerRefinementWinSize = 5;
-    in.parameters->cornerRefinementMaxIterations = 40;
-    in.parameters->cornerRefinementMinAccuracy = 0.005;
+    in.parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;  // refine() does it
     in.camera = std::move(camera);
     if (const auto& c = in.camera) {
         in.k = cv::Matx33d(c->fx, 0, c->cx, 0, c->fy, c->cy, 0, 0, 1);
@@ -92,14 +90,14 @@ std::vector<Marker> MarkerDetector::find(const Frame& frame, int id, double size
         grey = &in.grey;
     }
     const cv::Mat picture(grey->height, grey->width, CV_8UC1, const_cast<std::uint8_t*>(grey->pixels.data()));
-    // Much noise floods the search for contours: it is smoothed before the search.
-    const bool noisy = noise(picture) > 5.0;
+    // Noise floods the search for contours, so the search is in a smoothed picture; the corners are then placed in the one that was taken.
+    const bool noisy = noise(picture) > 2.0;
     if (noisy) cv::GaussianBlur(picture, in.smooth, {5, 5}, 1.2);
-    const cv::Mat& seen = noisy ? in.smooth : picture;
 
     std::vector<std::vector<cv::Point2f>> corners;
     std::vector<int>                      ids;
-    cv::aruco::detectMarkers(seen, in.dictionary, corners, ids, in.parameters);
+    cv::aruco::detectMarkers(noisy ? in.smooth : picture, in.dictionary, corners, ids, in.parameters);
+    for (auto& four : corners) in.refine(picture, four);
     std::vector<Marker> found;
     for (std::size_t i = 0; i < ids.size(); ++i) {
         if (id >= 0 && ids[i] != id) continue;
@@ -111,6 +109,17 @@ std::vector<Marker> MarkerDetector::find(const Frame& frame, int id, double size
     }
     std::sort(found.begin(), found.end(), [](const Marker& a, const Marker& b) { return a.id < b.id; });
     return found;
+}
+
+// The window about a corner reaches as far as the black rim is wide, so that it sees two edges and no other corner.
+void MarkerDetector::Inside::refine(const cv::Mat& picture, std::vector<cv::Point2f>& corners) const {
+    double shortest = 1e9;
+    for (std::size_t i = 0; i < 4; ++i) shortest = std::min(shortest, cv::norm(corners[(i + 1) % 4] - corners[i]));
+    const double cell = shortest / (dictionary->markerSize + 2);
+    const int    reach = std::clamp(static_cast<int>(std::lround(0.9 * cell)), 2, 12);
+    const int    across = 2 * reach + 6;  // cornerSubPix wants some room
+    if (picture.cols < across || picture.rows < across) return;
+    cv::cornerSubPix(picture, corners, {reach, reach}, {-1, -1}, {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.005});
 }
 
 Pose MarkerDetector::Inside::pose(Marker& marker, double size) const {
