@@ -12,7 +12,7 @@ speed 1000
 guard 400
 lost 200
 rounds 10
-heartbeat 500
+heartbeat 1500
 
 master:
 name m
@@ -61,7 +61,7 @@ class Rtcfg(Segment):
 
         # Switched off and on again.
         Segment.stop(x, signal.SIGKILL)
-        self.wait_for_words("m", f"tdma.0: station x ({self.mac('x')}) is dead: no heartbeat for 1000 ms; all were told, and it is invited again\n")
+        self.wait_for_words("m", f"tdma.0: station x ({self.mac('x')}) is dead: no heartbeat for 3000 ms; all were told, and it is invited again\n")
         self.station("x", NETLIST.format("station=auto stage2=received"))
         self.wait_for_words("x", written, 2)
         self.wait_for("m", "stations-dead", "0")

@@ -43,6 +43,9 @@ StationSetup setup_of(const Schedule& s, std::size_t index) {
         most = std::max(most, share);
     }
     out.babble_limit = static_cast<std::uint32_t>(std::max<Time>(64, 2 * most));
+    out.backup_from = s.cycle;
+    for (const StationEntry& other : s.stations)
+        if (other.role == Role::backup) out.backup_from = std::min(out.backup_from, other.backup_offset);
     for (const SlotEntry& slot : e.slots) out.slots.push_back(slot.setup);
     return out;
 }

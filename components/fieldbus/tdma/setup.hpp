@@ -28,6 +28,7 @@ struct StationSetup {
     Role                   role = Role::slave;
     Time                   cycle = 1'000'000;
     Time                   backup_offset = 0;   ///< backup: from the sync that did not come to its own
+    Time                   backup_from = 0;     ///< smallest backup offset of the segment: half as late, and it is a backup's; 0: the guard
     Time                   phase = 0;           ///< of the thread: its cycles begin that much after the sync
     Time                   lead = 0;            ///< between the beginning of the thread's cycle and its transmit at most
     Time                   guard = 10'000;      ///< a frame that would leave later than that after its time is dropped

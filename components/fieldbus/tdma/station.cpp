@@ -58,6 +58,7 @@ bool Station::reconfigure(const StationSetup& s) noexcept {
     setup_.role = s.role, setup_.cycle = s.cycle, setup_.backup_offset = s.backup_offset, setup_.phase = s.phase, setup_.lead = s.lead,
     setup_.guard = s.guard;
     setup_.lost_limit = s.lost_limit, setup_.rounds = s.rounds, setup_.speed = s.speed, setup_.babble_limit = s.babble_limit;
+    setup_.backup_from = s.backup_from;
     setup_.slots.assign(s.slots.begin(), s.slots.end());  // its memory was reserved
     setup_.configured = true;
     begin();

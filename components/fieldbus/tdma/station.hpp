@@ -113,6 +113,11 @@ private:
     bool send_request(const Slot&, std::uint32_t cycle, Time local_at) noexcept;
     bool launch(std::span<const std::uint8_t> frame, const ethernet::Launch&) noexcept;
 
+    /// A master's sync, not a backup's.
+    bool is_punctual(Time lateness) const noexcept {
+        const Time limit = setup_.backup_from != 0 ? setup_.backup_from / 2 : setup_.guard;
+        return lateness <= limit && lateness >= -limit;
+    }
     /// How far ahead transmit() sends. More than a cycle: the next sync is just a cycle away, and the thread is never quite in step.
     Time reach() const noexcept { return setup_.lead + setup_.cycle + setup_.cycle / 32; }
     Time start_of(std::uint32_t cycle) const noexcept {  // global; numbers wrap

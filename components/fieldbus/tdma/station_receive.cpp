@@ -87,8 +87,7 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     }
     if (setup_.role == Role::master && !status_.leading) {
         // A backup's syncs are late by its offset: whose are not is another master, and there is nothing to take over from it.
-        const bool punctual = std::abs(lateness) <= setup_.guard;
-        punctual_row_ = !punctual ? 0 : d.from == punctual_ ? punctual_row_ + 1 : 1;
+        punctual_row_ = !is_punctual(lateness) ? 0 : d.from == punctual_ ? punctual_row_ + 1 : 1;
         punctual_ = d.from;
         if (punctual_row_ >= rows) return withdraw(Event::master_there, d.from);
     }
@@ -113,10 +112,11 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
         const Time own = setup_.role == Role::backup ? setup_.backup_offset : 0;
         if (setup_.role == Role::master) {
             // A backup that missed one of ours does no harm; a second master as punctual as this one does.
-            if (std::abs(lateness) > setup_.guard) return;
+            if (!is_punctual(lateness)) return;
             return take_foreign_sync(d);
         }
-        if (lateness >= own - setup_.guard / 2) return;  // another backup, behind this one
+        const Time apart = setup_.backup_from != 0 ? std::min(setup_.guard, setup_.backup_from) : setup_.guard;
+        if (lateness >= own - apart / 2) return;  // another backup, behind this one
         status_.leading = false;
         say(Event::yielded, d.from);
     }

@@ -162,6 +162,29 @@ TEST(Master_that_begins, does_not_send_where_there_is_one_with_another_cycle) {
     EXPECT_TRUE(b.status().leading) << "when the other is gone";
 }
 
+TEST(Master_that_returns, knows_its_backup_though_the_guard_is_longer_than_the_backup_offset) {
+    const auto cell = [](StationSetup s) {
+        s.guard = 150'000, s.backup_from = 100'000;
+        return s;
+    };
+    Bed bed;
+    Machine& m = bed.add(1, cell(master()));
+    Machine& b = bed.add(2, cell(backup(100'000, 500'000)));
+    Machine& s = bed.add(3, cell(slave(300'000)));
+    bed.run(800 * ms);
+    ASSERT_TRUE(b.station.ready() && s.station.ready());
+    m.off = m.port.cut = true;
+    bed.run(50 * ms);
+    ASSERT_TRUE(b.status().leading);
+    m.off = m.port.cut = false;
+    m.station.attach(m.port);
+    m.next = m.port.clock().local(bed.now);
+    bed.run(800 * ms);
+    EXPECT_TRUE(m.status().leading);
+    EXPECT_FALSE(b.status().leading);
+    EXPECT_EQ(0, m.events[Event::master_there] + m.events[Event::other_master] + s.events[Event::sync_lost]);
+}
+
 TEST(Station_in_another_cycle, says_so_once_and_follows_nobody) {
     Bed bed;
     bed.add(1, master(2'000'000));
