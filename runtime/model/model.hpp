@@ -83,6 +83,14 @@ struct Function {
     std::uint32_t id = 0;
 };
 
+/// Where the value of a pin goes to or comes from, outside of this machine; hal/way.h.
+struct Way {
+    const Pin* pin = nullptr;
+    std::string far;
+    std::uint32_t cycles = 0, round_trip = 0;
+    std::int64_t worst_ns = 0;
+};
+
 struct Instance {
     std::string name;
     Component* component = nullptr;
@@ -98,6 +106,7 @@ struct Instance {
     bool leads_clock = false;        ///< it makes the threads follow an outside beat
     Span loaded;
     std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances
+    std::vector<Way> ways;           ///< while it is started
 };
 
 /// What one loadrt gave its instances beside their names.

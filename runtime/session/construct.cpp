@@ -10,6 +10,7 @@
 #include "execute/executor.hpp"
 #include "hal/naming.h"
 #include "hal/texts.h"
+#include "hal/way.h"
 
 namespace hal {
 
@@ -434,6 +435,20 @@ bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) 
 }
 constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};
 
+bool tell_way(const hal_way*, const hal_host* host, const char* pin, const char* far, std::uint32_t cycles, std::uint32_t round_trip,
+              std::int64_t worst_ns) {
+    Instance& instance = static_cast<Starting*>(host->data)->instance;
+    try {
+        const std::string name = instance.name + "." + pin;
+        for (const auto& one : instance.pins)
+            if (one->name == name) instance.ways.push_back({one.get(), far, cycles, round_trip, worst_ns});
+        return true;
+    } catch (const std::bad_alloc&) {
+        return false;
+    }
+}
+constexpr hal_way way_host{sizeof way_host, tell_way};
+
 bool claim_clock(const hal_clock*, const hal_host* host) {
     Starting& starting = *static_cast<Starting*>(host->data);
     if (const Instance* const other = clock_leader(starting.model); other && other != &starting.instance) {
@@ -473,12 +488,14 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
             if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
             if (std::strcmp(id, HAL_STATUS) == 0) return &static_cast<Starting*>(h->data)->status;
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
+            if (std::strcmp(id, HAL_WAY) == 0) return &way_host;
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
         }};
     instance.started = instance.component->plugin->start(instance.memory, &host);
     if (instance.started) return {};
     instance.streams.clear();
+    instance.ways.clear();
     instance.leads_clock = false;
     return starting.failure.empty() ? "it gave no reason" : starting.failure;
 }
@@ -489,6 +506,7 @@ void stop_instance(Instance& instance) noexcept {
     for (const plan::Step& step : instance.emergency) step.step(step.self, &none);
     instance.component->plugin->stop(instance.memory);
     instance.streams.clear();
+    instance.ways.clear();
     instance.leads_clock = false;
     instance.started = false;
 }

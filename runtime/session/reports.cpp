@@ -85,6 +85,15 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
     return {"fault", thread.name + ": a fault" + at};
 }
 
+std::string worded(const Way& way) {
+    const std::string& pin = way.pin->name;
+    std::string line = way.pin->signal->name + ": " + (way.pin->dir == HAL_DIR_OUT ? way.far + " => " + pin : pin + " => " + way.far);
+    line += "  " + std::to_string(way.cycles) + (way.cycles == 1 ? " cycle" : " cycles") + " on the wire, " +
+            format_duration(static_cast<double>(way.worst_ns)) + " at worst";
+    if (way.round_trip != 0) line += "; there and back " + std::to_string(way.round_trip) + (way.round_trip == 1 ? " cycle" : " cycles");
+    return line;
+}
+
 }  // namespace
 
 void Session::State::collect_faults() {
@@ -195,6 +204,10 @@ std::vector<std::string> Session::latency_lines() const {
         }
         lines.push_back(std::move(line));
     }
+    for (const auto& component : model().components)
+        for (const auto& instance : component->instances)
+            for (const Way& way : instance->ways)
+                if (way.pin->signal) lines.push_back(worded(way));
     std::sort(lines.begin(), lines.end());
     return lines;
 }

@@ -30,7 +30,8 @@ public:
     void node(const NodeStatus& s) noexcept { told_.tell({Event::node, s, {}, {}, {}, 0}); }
     void network(const NetworkStatus& n, const NodeStatus& s) noexcept { told_.tell({Event::network, s, n, {}, {}, 0}); }
     void emergency(const NodeStatus& s, const Emergency& e) noexcept { told_.tell({Event::emergency, s, {}, e, {}, 0}); }
-    void bus(can::State state) noexcept { told_.tell({Event::bus, {}, {}, {}, state, 0}); }
+    /// `had`: it was in order, now or earlier.
+    void bus(can::State state, bool had) noexcept { told_.tell({had ? Event::bus : Event::waiting, {}, {}, {}, state, 0}); }
     void cycle(Time period) noexcept { told_.tell({Event::cycle, {}, {}, {}, {}, period}); }
     void flying(const FlyingMaster& f) noexcept {
         if (f.master() != 0) told_.tell({Event::flying, {}, {}, {}, {}, 0, f.master()});
@@ -38,7 +39,7 @@ public:
 
 private:
     struct Event {
-        enum Kind : std::uint8_t { node, network, emergency, bus, cycle, flying } kind = node;
+        enum Kind : std::uint8_t { node, network, emergency, bus, waiting, cycle, flying } kind = node;
         NodeStatus    of_node{};
         NetworkStatus of_network{};
         Emergency     of_emergency{};
@@ -81,6 +82,7 @@ private:
         case Event::bus:
             return std::string("the bus is ") + can::word(e.of_bus) +
                    (e.of_bus == can::State::bus_off ? "; it is tried again by itself" : "");
+        case Event::waiting: return "waits for the bus: its interface is off, or its slots may not be used yet";
         case Event::flying:
             return e.master == config_.node_id ? "is the NMT master now"
                                                : "node " + std::to_string(e.master) + " is the NMT master; this one is ready to take over";

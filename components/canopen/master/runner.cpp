@@ -67,6 +67,7 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
 void Runner::open(can::Link& link) noexcept {
     link_ = &link;
     bus_state_ = can::State::active;
+    had_bus_ = false;
     boots_.store(true);
 }
 
@@ -131,8 +132,9 @@ void Runner::receive(Time now) noexcept {
         if (count < frames.size()) break;
     }
     statistics_ = link_->statistics();
+    const auto out_of_order = [](can::State s) { return s == can::State::bus_off || s == can::State::down; };
+    had_bus_ = had_bus_ || !out_of_order(statistics_.state);
     if (statistics_.state != bus_state_) {
-        const auto out_of_order = [](can::State s) { return s == can::State::bus_off || s == can::State::down; };
         if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) device_.bus_off(now);
         if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) device_.bus_back();
         bus_state_ = statistics_.state;

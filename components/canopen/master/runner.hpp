@@ -85,6 +85,8 @@ public:
     const FlyingMaster&         flying() const noexcept { return flying_; }
     /// It is the NMT master: the only one, or the active one of several.
     bool                        active() const noexcept { return !config_.flying.enabled || flying_.active(); }
+    /// The bus was in order, now or earlier: before that it is only waited for.
+    bool                        had_bus() const noexcept { return had_bus_; }
     const OwnNode&              own() const noexcept { return own_; }
     Master&                     master() noexcept { return master_; }
     Device&                     device() noexcept { return device_; }
@@ -146,7 +148,7 @@ private:
     Time                           sync_came_ = 0;
     std::uint64_t                  sent_before_ = 0, withheld_ = 0;  // for is_stuck()
     Time                           moved_ = 0;
-    bool                           sync_ours_ = false, was_active_ = false;
+    bool                           sync_ours_ = false, was_active_ = false, had_bus_ = false;
     FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
     bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
     std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()

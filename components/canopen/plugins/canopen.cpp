@@ -15,6 +15,8 @@
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
+#include "hal/way.hpp"
+#include "link/ways.hpp"
 
 namespace {
 
@@ -93,6 +95,7 @@ public:
         period_ = 0;
         reporter_->start();
         runner_->open(*link_);
+        tell_ways(description.address);
     }
 
     void stop() noexcept {
@@ -139,6 +142,31 @@ private:
         return naming != nullptr ? naming->name(host) : "canopen.0";
     }
     bool by_index() const { return slave_ != 0; }
+
+    /// How long the values of the pins are on the wire, where its schedule is known: to the station called as the node, or at most. [setup]
+    void tell_ways(const std::string& link) {
+        const std::vector<hal::can::Way> ways = hal::can::ways_of(link);
+        if (ways.empty()) return;
+        hal::can::Way most = ways.front();
+        for (const hal::can::Way& w : ways) {
+            most.there_ns = std::max(most.there_ns, w.there_ns), most.back_ns = std::max(most.back_ns, w.back_ns);
+            most.there_cycles = std::max(most.there_cycles, w.there_cycles), most.back_cycles = std::max(most.back_cycles, w.back_cycles);
+            most.round_trip = std::max(most.round_trip, w.round_trip);
+        }
+        for (const Slot& s : runner_->slots()) {
+            const config::Node& node = config_.nodes[s.node];
+            const auto          own = std::find_if(ways.begin(), ways.end(), [&](const auto& w) { return w.station == node.name; });
+            const auto&         way = own == ways.end() ? most : *own;
+            const std::string   far = "node " + std::to_string(node.setup.id) + " (" + node.name + ")";
+            const auto          tell = [&](const std::string& pin) {
+                hal::tell_way(((by_index() ? "" : node.name + ".") + pin).c_str(), far.c_str(),
+                              s.to_node ? way.there_cycles : way.back_cycles, s.to_node ? 0 : way.round_trip,
+                              s.to_node ? way.there_ns : way.back_ns);
+            };
+            if (s.object->bit_pins.empty()) tell(s.object->pin);
+            for (const config::BitPin& b : s.object->bit_pins) tell(b.name);
+        }
+    }
 
     void load() {
         const hal::Texts texts(*this);
@@ -254,9 +282,9 @@ private:
     void on_bus_state(hal::can::State state) noexcept override {
         if (state == hal::can::State::bus_off)
             raise("the controller is off the bus: too many errors; it is tried again by itself", not_a_number);
-        if (state == hal::can::State::down)
+        if (state == hal::can::State::down && runner_->had_bus())
             raise("the bus is down: the interface is off or was taken away; it is tried again by itself", not_a_number);
-        reporter_->bus(state);
+        reporter_->bus(state, runner_->had_bus());
     }
     void on_flying() noexcept override { reporter_->flying(runner_->flying()); }
     void on_sync_overrun() noexcept override {

@@ -43,14 +43,16 @@ Time next(Time phase, Time cycle, Time t) {
 }
 
 /// When a frame leaves that was handed over by the transmit of a thread that began at `begun`.
-Time leaves(const Schedule& s, const StationEntry& e, Time begun) {
-    const SlotSetup& slot = e.slots.front().setup;
+Time leaves(const Schedule& s, const StationEntry& e, Time begun, std::size_t place = 0) {
+    const SlotSetup& slot = e.slots[place].setup;
     const Time       at = e.role == Role::master ? std::max(slot.offset, s.wire(60)) : slot.offset;
     Time             t = next(at, s.cycle, begun + e.lead + 1);
     return t + static_cast<Time>(slot.period - 1) * s.cycle;
 }
 
-std::size_t longest(const StationEntry& e) { return ethernet::header_bytes + std::max<std::size_t>(e.slots.front().setup.size, 46); }
+std::size_t longest(const StationEntry& e, std::size_t place = 0) {
+    return ethernet::header_bytes + std::max<std::size_t>(e.slots[place].setup.size, 46);
+}
 
 }  // namespace
 
@@ -79,6 +81,27 @@ Plan plan_of(const Schedule& s) {
         plan.trips.push_back(t);
     }
     return plan;
+}
+
+std::vector<Way> ways_of(const Schedule& s, std::size_t here, std::size_t slot) {
+    std::vector<Way>    ways;
+    const StationEntry& own = s.stations[here];
+    // Back at this station's thread, in a cycle's first moment, with what the other's thread read.
+    const auto back_from = [&](const StationEntry& e, Time read) {
+        return next(own.phase, s.cycle, leaves(s, e, read) + s.path(longest(e)));
+    };
+    for (std::size_t i = 0; i < s.stations.size(); ++i) {
+        const StationEntry& e = s.stations[i];
+        if (i == here || e.slots.empty()) continue;
+        const Time begun = own.phase;
+        const Time taken = next(e.phase, s.cycle, leaves(s, own, begun, slot) + s.path(longest(own, slot)));
+        const Time home = back_from(e, taken + s.cycle);  // what was taken is at a terminal; the next cycle there reads it back
+        const Time read = e.phase, came = back_from(e, read);
+        ways.push_back({i, taken - begun, came - read + s.cycle, static_cast<std::uint32_t>((taken - begun) / s.cycle),
+                        static_cast<std::uint32_t>((came - read + s.cycle - 1) / s.cycle),
+                        static_cast<std::uint32_t>((home - begun) / s.cycle)});
+    }
+    return ways;
 }
 
 }  // namespace hal::tdma::plan

@@ -45,4 +45,15 @@ struct Plan {
 };
 Plan plan_of(const config::Schedule&);
 
+/// Between two stations, both with threads and slots, at worst. Times from the beginning of the thread's cycle of `here`.
+struct Way {
+    std::size_t   other = 0;
+    Time          there = 0;         ///< until the other's thread takes what this one's has written
+    Time          back = 0;          ///< from a change of an input of the other, just after it was read, to the thread's cycle here
+    std::uint32_t there_cycles = 0, back_cycles = 0;  ///< of this station's thread that begin meanwhile
+    std::uint32_t round_trip = 0;    ///< cycles until an input there that follows an output there is here
+};
+/// From the slot of that number (place in the station's list) to all others that have one, and from their first slots back.
+std::vector<Way> ways_of(const config::Schedule&, std::size_t here, std::size_t slot);
+
 }  // namespace hal::tdma::plan

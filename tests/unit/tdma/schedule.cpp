@@ -110,4 +110,22 @@ TEST(Plan, adds_up_load_and_latency) {
     EXPECT_EQ(2'150'000, p.trips[1].output);
 }
 
+TEST(Ways, are_what_the_schedule_leaves) {
+    const auto r = config::read(
+        "cycle 1000\nmaster:\nphase 80\nslot 0 220 1/1 400\nslot 2 900 1/1 46\nslave:\nname x\nphase 300\nslot 0 420 1/1 250\n"
+        "slave:\nname y\nslot 0 500 1/1 250\nslave:\nname silent\n");
+    ASSERT_TRUE(r.good()) << said(r);
+    const auto ways = plan::ways_of(r.schedule, 0, 0);
+    ASSERT_EQ(2U, ways.size()) << "a station without a slot answers nobody";
+    EXPECT_EQ(1U, ways[0].other);
+    EXPECT_EQ(220'000, ways[0].there) << "from the thread at 80 to x's at 300, where the frame is at 292";
+    EXPECT_EQ(0U, ways[0].there_cycles);
+    EXPECT_EQ(1'780'000, ways[0].back) << "changed just after 300, read at 1300, here at 2080";
+    EXPECT_EQ(1U, ways[0].back_cycles);
+    EXPECT_EQ(2U, ways[0].round_trip);
+    EXPECT_EQ(920'000, ways[1].there) << "y's thread begins before the frame comes: in the next cycle";
+    EXPECT_EQ(3U, ways[1].round_trip);
+    EXPECT_EQ(1'220'000, plan::ways_of(r.schedule, 0, 1)[0].there) << "by the later slot";
+}
+
 }  // namespace

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "fieldbus/tdma/config.hpp"
+#include "fieldbus/tdma/plan.hpp"
 #include "fieldbus/tdma/reporter.hpp"
 #include "fieldbus/tdma/rtcfg_applicant.hpp"
 #include "fieldbus/tdma/rtcfg_service.hpp"
@@ -16,6 +17,7 @@
 #include "hal/discipline.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
+#include "link/ways.hpp"
 
 namespace {
 
@@ -76,6 +78,7 @@ public:
         words_ = own_words_.get();
         if (service_) service_->begin();
         if (applicant_) applicant_->begin(), background_->start();
+        offer_ways(key);
         reporter_->start();
         station_->accompany(companion(), tunnel_.get());
         station_->attach(*port_);
@@ -84,6 +87,8 @@ public:
 
     void stop() noexcept {
         ethernet::withdraw_discipline(station_.get());
+        for (const std::string& link : ways_offered_) hal::can::withdraw_ways(link);
+        ways_offered_.clear();
         station_->detach();
         if (leads_) leading_instance.store(nullptr);
         leads_ = false;
@@ -122,6 +127,20 @@ public:
     }
 
 private:
+    /// How long values are on their way by our slots, under the addresses of the links that use them. [setup]
+    void offer_ways(const std::string& segment) {
+        const auto which = entry_ ? config::find(schedule_, entry_->name) : std::nullopt;
+        if (!which) return;
+        const std::string link = "cane:" + segment.substr(segment.starts_with("eth:") ? 4 : 0) + "?slot=";
+        for (std::size_t n = 0; n < entry_->slots.size(); ++n) {
+            std::vector<hal::can::Way> ways;
+            for (const plan::Way& w : plan::ways_of(schedule_, *which, n))
+                ways.push_back({schedule_.stations[w.other].name, w.there, w.back, w.there_cycles, w.back_cycles, w.round_trip});
+            ways_offered_.push_back(link + std::to_string(entry_->slots[n].setup.id));
+            hal::can::offer_ways(ways_offered_.back(), std::move(ways));
+        }
+    }
+
     bool turns_in(hal::Cycle cycle) const noexcept { return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle; }
     Companion* companion() const noexcept {
         return service_ ? static_cast<Companion*>(&service_->server()) : applicant_ ? &applicant_->client() : nullptr;
@@ -431,6 +450,7 @@ private:
     std::unique_ptr<hal::Background>        background_;  // the applicant's helper
     std::unique_ptr<Reporter>               reporter_;
     std::unique_ptr<ethernet::Port>         port_;
+    std::vector<std::string>                ways_offered_;
     std::unique_ptr<Tunnel>                 tunnel_;  // before tap_, which uses it
     std::unique_ptr<Tap>                    tap_;
     hal::DisciplinedClock                   clock_;
