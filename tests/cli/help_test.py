@@ -104,7 +104,7 @@ class CompletionScript(Case):
         self.assertEqual(["record"], self.complete("hal rec"))
 
     def test_options(self):
-        self.assertEqual(["--no-picture"], self.complete("hal run --no"))
+        self.assertEqual(["--no-picture"], self.complete("hal run --no-"))
 
     def test_codes(self):
         self.assertEqual(["two-writers"], self.complete("hal explain two-w"))
