@@ -3,7 +3,7 @@
 
 #include "vision/camera_component.hpp"
 #include "vision/detect/blob.hpp"
-#include "vision/ground_pins.hpp"
+#include "vision/ground_arguments.hpp"
 
 namespace {
 
@@ -18,23 +18,22 @@ struct Found {
 };
 
 struct Settings {
-    Ground                           ground;
     std::array<BlobKind, most_kinds> kinds{};
     TrackRules                       track;
     std::uint32_t                    threshold = 0, area = 0;
     double                           distance = 0.0;
     bool                             operator==(const Settings& o) const noexcept {
-        return ground == o.ground && kinds == o.kinds && track.gate == o.track.gate && track.gain == o.track.gain &&
-               track.forget_ns == o.track.forget_ns && threshold == o.threshold && area == o.area && distance == o.distance;
+        return kinds == o.kinds && track.gate == o.track.gate && track.gain == o.track.gain && track.forget_ns == o.track.forget_ns &&
+               threshold == o.threshold && area == o.area && distance == o.distance;
     }
 };
 
 struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
     using CameraComponent::CameraComponent;
 
-    GroundPins    ground{*this};
-    hal::Argument kinds{*this, "kinds", 2, "kinds of things, each of one colour", {.min = 1, .max = most_kinds}};
-    hal::Argument count{*this, "tracks", 8, "things at a time", {.min = 1, .max = static_cast<std::int64_t>(most_tracks)}};
+    GroundArguments ground{*this, texts()};
+    hal::Argument   kinds{*this, "kinds", 2, "kinds of things, each of one colour", {.min = 1, .max = most_kinds}};
+    hal::Argument   count{*this, "tracks", 8, "things at a time", {.min = 1, .max = static_cast<std::int64_t>(most_tracks)}};
 
     hal::Outs<std::uint32_t> id{*this, "track-#-id", count, "number of the thing in place #, counted from 1; 0: there is none"};
     hal::Outs<std::uint32_t> kind{*this, "track-#-kind", count, "what the thing in place # is"};
@@ -65,7 +64,7 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
         if (frame.format != Format::bgr) throw std::runtime_error("things are told by their colours and this camera sees none");
         const BlobRules rules{static_cast<int>(std::min(of.threshold, 254u)), static_cast<int>(std::clamp(of.area, 1u, 10'000'000u)),
                               of.distance};
-        const auto      seen = find_blobs(frame, ground.of(frame, of.ground), {of.kinds.data(), static_cast<std::size_t>(kinds)}, rules);
+        const auto      seen = find_blobs(frame, ground.in(frame), {of.kinds.data(), static_cast<std::size_t>(kinds)}, rules);
         tracks_.see(seen, frame.stamp_ns, of.track);
         std::copy(tracks_.all().begin(), tracks_.all().end(), result.tracks.begin());
         result.crowded = tracks_.crowded();
@@ -74,7 +73,6 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
 
     Settings settings() const noexcept {
         Settings of;
-        of.ground = ground.linked();
         for (std::size_t i = 0; i < hue.size(); ++i) of.kinds[i] = {{finite(hue[i]), finite(tolerance[i])}, finite(radius[i])};
         of.track = {finite(gate), finite(gain), static_cast<std::int64_t>(std::clamp(finite(forget), 0.0, 1e6) * 1e9)};
         of.threshold = threshold, of.area = least_area, of.distance = finite(most_distance);
@@ -103,12 +101,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(VisionBlob, "vision_blob", "Coloured things on the ground, told apart and followed: bottles and cans", R"(
-A thing is an upright cylinder of one colour; each kind has a hue and a radius. It stands where its picture ends below, half a thing behind that on the
-ground. Where a pixel is on the ground follows from how the camera is mounted (`focal`, `camera_height`, `pitch`, `forward`), or from a homography linked to
-`h-0` to `h-8`, as vision_homography gives it.
+A thing is an upright cylinder of one colour; each kind has a hue and a radius. It stands where its picture ends below, half a thing
+behind that on the ground. Where a pixel is on the ground follows from how the camera is mounted (`focal`, `camera_height`, `pitch`,
+`forward`), or from points that were measured (`ground=`, a file as vision_homography's).
 
-A thing keeps its place in the row of tracks, and its id, while it is seen again within `forget` and within `gate` of where it was; of two things that could be
-the same the nearer is. In the meantime `track-#-unseen` grows. `valid` says that frames come and are of use, not that there is a thing: that is `count`.
+A thing keeps its place in the row of tracks, and its id, while it is seen again within `forget` and within `gate` of where it was; of two
+things that could be the same the nearer is. In the meantime `track-#-unseen` grows. `valid` says that frames come and are of use, not
+that there is a thing: that is `count`.
 
 Two things of one kind that touch in the picture are one; a thing that goes beyond the lower edge of the picture is not told.
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "vision/camera_component.hpp"
 #include "vision/detect/line.hpp"
-#include "vision/ground_pins.hpp"
+#include "vision/ground_arguments.hpp"
 
 namespace {
 
@@ -13,7 +13,6 @@ struct Found {
 };
 
 struct Settings {
-    Ground        ground;
     double        width = 0.0, ahead = 0.0, reach = 0.0, contrast = 0.0, quality = 0.0;
     std::uint32_t bands = 0;
     bool          light = false;
@@ -23,7 +22,7 @@ struct Settings {
 struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
     using CameraComponent::CameraComponent;
 
-    GroundPins ground{*this};
+    GroundArguments ground{*this, texts()};
 
     hal::Out<double> offset{
         *this, "offset", "of the line from the robot's middle, `ahead` of it; positive: to the left", {.unit = "m", .finite = true}};
@@ -49,13 +48,12 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
         rules.width = of.width, rules.ahead = of.ahead, rules.reach = of.reach, rules.contrast = of.contrast,
         rules.least_quality = of.quality;
         rules.bands = static_cast<int>(std::clamp(of.bands, 3u, 32u));
-        const LineSeen seen = find_line(frame, ground.of(frame, of.ground), rules);
+        const LineSeen seen = find_line(frame, ground.in(frame), rules);
         result = {seen.found, seen.offset, seen.heading, seen.curvature, seen.quality};
     }
 
     Settings settings() const noexcept {
-        return {ground.linked(),
-                std::isfinite(width) ? std::fmax(width, 1e-4) : 0.02,
+        return {std::isfinite(width) ? std::fmax(width, 1e-4) : 0.02,
                 finite(ahead),
                 finite(reach),
                 finite(contrast),
@@ -79,12 +77,12 @@ private:
 }  // namespace
 
 HAL_COMPONENT(VisionLine, "vision_line", "A line on the floor, for a robot that follows it", R"(
-The picture is cut into `bands`. In each, what stands out from the floor by `contrast` and is about as wide as the line may be the line; the parabola on the
-ground that most bands agree on is it. `offset`, `heading` and `curvature` are those of the parabola `ahead` of the robot's middle. Gaps, shadows and
-things beside the line are bands that do not agree; below `least-quality` of them that do, `valid` falls.
+The picture is cut into `bands`. In each, what stands out from the floor by `contrast` and is about as wide as the line may be the line;
+the parabola on the ground that most bands agree on is it. `offset`, `heading` and `curvature` are those of the parabola `ahead` of the
+robot's middle. Gaps, shadows and things beside the line are bands that do not agree; below `least-quality` of them that do, `valid` falls.
 
-Where a pixel is on the ground follows from how the camera is mounted (`focal`, `camera_height`, `pitch`, `forward`), or from a homography linked
-to `h-0` to `h-8`, as vision_homography gives it. A robot that turns with angular speed = k1 offset + k2 heading follows the line.
+Where a pixel is on the ground follows from how the camera is mounted (`focal`, `camera_height`, `pitch`, `forward`), or from points
+that were measured (`ground=`, a file as vision_homography's). A robot that turns with angular speed = k1 offset + k2 heading follows the line.
 
     loadrt vision_scene show=floor
     loadrt vision_line source=sim:floor camera_height=0.3 pitch=0.6

@@ -111,13 +111,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(VisionPendulum, "vision_pendulum", "Both angles of a Furuta pendulum from a camera", R"(
-A red ball marks the pendulum's pivot, a green one its end (other colours: `pivot-hue`, `tip-hue`). Their middles, weighted by colour, are known to a few
-hundredths of a pixel; the angles are those that put both balls where they are seen, by least squares. What is left is `residual`. At
-320 x 240 with noise of 3 of 255 both angles are right to 0.5 mrad (rms).
+A red ball marks the pendulum's pivot, a green one its end (other colours: `pivot-hue`, `tip-hue`). Their middles, weighted by colour, are
+known to a few hundredths of a pixel; the angles are those that put both balls where they are seen, by least squares. What is left is
+`residual`. At 320 x 240 with noise of 3 of 255 both angles are right to 0.5 mrad (rms).
 
-The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above the arm, and looks at where axis and arm meet; the arm's zero
-points at it. Near an arm of 90 degrees the pendulum swings to and from the camera, and two attitudes look the same: such a frame does not count, nor does
-one from which an angle follows badly (`most-sigma`). The filter has to bridge them.
+The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above the arm, and looks at where axis and arm
+meet; the arm's zero points at it. Near an arm of 90 degrees the pendulum swings to and from the camera, and two attitudes look the same:
+such a frame does not count, nor does one from which an angle follows badly (`most-sigma`). The filter has to bridge them.
 
 For an ekf: link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`. `new` is TRUE in one cycle per frame; what a
 frame is late, the filter makes up for. `valid` falls when the newest frame does not show the pendulum, or is older than `max-age-ms`; after

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include "vision/detect/blob.hpp"
 
+#include <cmath>
+
 namespace hal::vision {
 
-std::vector<Sighting> find_blobs(const Frame& frame, const Ground& unsigned_ground, std::span<const BlobKind> kinds,
-                                 const BlobRules& rules) {
+std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground, std::span<const BlobKind> kinds, const BlobRules& rules) {
     constexpr double          half_width = 0.8660254;  // where an ellipse is half as wide as it can be, in half axes
-    const Ground              ground = unsigned_ground.signed_at(0.5 * frame.width, frame.height - 1.0);
     std::vector<Sighting>     sightings;
     std::vector<std::uint8_t> weights;
     for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
         weigh(frame, kinds[kind].hue, weights);
         for (const Spot& spot : find_spots(weights, frame.width, frame.height, rules.threshold, rules.least_area, most_tracks)) {
             double x = 0.0, y = 0.0, x_above = 0.0, y_above = 0.0;
-            if (spot.bottom >= frame.height - 2 || !ground.place(spot.foot_u, spot.foot_v, x, y) ||
-                !ground.place(spot.foot_u, spot.foot_v - 1.0, x_above, y_above))
+            if (spot.bottom >= frame.height - 2 || !place(ground, spot.foot_u, spot.foot_v, x, y) ||
+                !place(ground, spot.foot_u, spot.foot_v - 1.0, x_above, y_above))
                 continue;
             // away from the camera is where the ground of the row above is
             const double away = std::hypot(x_above - x, y_above - y);

@@ -26,8 +26,8 @@ struct BlobRules {
     double most_distance = 3;  ///< m: farther away it is not told
 };
 
-/// What of each kind stands in the picture: its axis is `radius` behind the place where it ends below. One that goes beyond the picture's lower edge is not
-/// told, for where it stands is not seen. [any] takes memory
+/// What of each kind stands in the picture: its axis is `radius` behind the place where it ends below. One that goes beyond the picture's
+/// lower edge is not told, for where it stands is not seen. [any] takes memory
 std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground, std::span<const BlobKind> kinds, const BlobRules& rules);
 
 }  // namespace hal::vision

@@ -42,7 +42,7 @@ void look(const std::vector<float>& row, double v, int band, const Ground& groun
         const double right = whole ? static_cast<double>(end - 1) + (out[end - 1] - threshold) / (out[end - 1] - out[end]) : 0.0;
         LinePoint    point{0.5 * (left + right), v, 0.0, 0.0, band};
         double       x = 0.0, y = 0.0, x2 = 0.0, y2 = 0.0;
-        if (whole && ground.place(left, v, x, y) && ground.place(right, v, x2, y2) && ground.place(point.u, v, point.x, point.y))
+        if (whole && place(ground, left, v, x, y) && place(ground, right, v, x2, y2) && place(ground, point.u, v, point.x, point.y))
             if (const double width = std::hypot(x2 - x, y2 - y); width > 0.5 * rules.width && width < 2.0 * rules.width)
                 found.push_back(point);
         u = end;
@@ -82,19 +82,18 @@ std::vector<LinePoint> agreeing(const std::vector<LinePoint>& points, const Para
 
 }  // namespace
 
-LineSeen find_line(const Frame& frame, const Ground& unsigned_ground, const LineRules& rules) {
+LineSeen find_line(const Frame& frame, const Ground& ground, const LineRules& rules) {
     LineSeen      seen;
     const cv::Mat picture(frame.height, frame.width, frame.format == Format::grey ? CV_8UC1 : CV_8UC3,
                           const_cast<std::uint8_t*>(frame.pixels.data()));
     cv::Mat       grey = picture;
     if (frame.format == Format::bgr) cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
-    const Ground ground = unsigned_ground.signed_at(0.5 * frame.width, frame.height - 1.0);
 
     // from the lowest row to where the reach ends, or a line of the width has fewer than three pixels
     const int bands = std::clamp(rules.bands, 3, 32);
     int       top = frame.height - 1;
     double    x = 0.0, y = 0.0, x2 = 0.0, y2 = 0.0;
-    while (top > 0 && ground.place(0.5 * frame.width, top - 1, x, y) && ground.place(0.5 * frame.width + 3.0, top - 1, x2, y2) &&
+    while (top > 0 && place(ground, 0.5 * frame.width, top - 1, x, y) && place(ground, 0.5 * frame.width + 3.0, top - 1, x2, y2) &&
            std::hypot(x2 - x, y2 - y) < rules.width && x < rules.reach)
         --top;
     const int each = (frame.height - top) / bands;

@@ -35,8 +35,8 @@ struct LineSeen {
 
 /// In each band the middles of what stands out from the floor and is as wide as the line; through them the parabola
 ///     y = offset + slope (x - ahead) + bend (x - ahead)²
-/// that most bands agree with (M. Fischler and R. Bolles, *Random sample consensus*, CACM 24, 1981, with all triples in place of random ones), then least
-/// squares over those. [any] takes memory
+/// that most bands agree with (M. Fischler and R. Bolles, *Random sample consensus*, CACM 24, 1981, with all triples in place of random
+/// ones), then least squares over those. [any] takes memory
 LineSeen find_line(const Frame& frame, const Ground& ground, const LineRules& rules);
 
 }  // namespace hal::vision

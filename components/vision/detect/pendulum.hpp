@@ -34,8 +34,8 @@ struct PendulumSeen {
 
 /// Two angles from two middles: from the valleys of a grid, P. Gauss's and I. Newton's steps on
 ///     sum |middle - seen(arm, pendulum)|²
-/// `found` when both balls are there and fit, no other angles fit as well (an arm across the camera's axis, where a pendulum that swings to the camera
-/// and one that swings away look the same), and they follow well from the middles. [any] takes memory
+/// `found` when both balls are there and fit, no other angles fit as well (an arm across the camera's axis, where a pendulum that swings
+/// to the camera and one that swings away look the same), and they follow well from the middles. [any] takes memory
 PendulumSeen find_pendulum(const Frame& frame, const PendulumView& view, const PendulumLimits& limits);
 
 /// The angles that put the balls where they are; false: no such angles. [any]

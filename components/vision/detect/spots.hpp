@@ -11,7 +11,8 @@ namespace hal::vision {
 
 /// How much a pixel is of a colour, 0 to 255. With the hue h and the pixel's chroma as a vector (along, across) seen from h, it is
 ///     along - |across| / tan(tolerance)
-/// which is linear in how much of the pixel the colour covers (on grey), and in the light: a middle weighted with it does not move with either.
+/// which is linear in how much of the pixel the colour covers (on grey), and in the light: a middle weighted with it does not move with
+/// either.
 struct Hue {
     double degrees = 0.0;  ///< 0 red, 120 green, 240 blue
     double tolerance = 40.0;  ///< degrees to either side, 5 to 85

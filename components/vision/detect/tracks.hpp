@@ -32,7 +32,8 @@ struct TrackRules {
 
 constexpr std::size_t most_tracks = 32;
 
-/// Each track keeps its place in the row as long as it lives. Who belongs to whom: the nearest pair of one kind first, then the nearest of the rest.
+/// Each track keeps its place in the row as long as it lives. Who belongs to whom: the nearest pair of one kind first, then the nearest
+/// of the rest.
 class Tracks {
 public:
     explicit Tracks(std::size_t count) : count_(count < most_tracks ? count : most_tracks) {}

@@ -4,7 +4,8 @@
 namespace hal::vision::scene {
 
 namespace {
-/// How much of a pixel a straight edge covers that is `inside` px beyond its centre: right for an edge along the pixels, and off by at most 0.06 for others.
+/// How much of a pixel a straight edge covers that is `inside` px beyond its centre: right for an edge along the pixels, and off by at
+/// most 0.06 for others.
 double covered(double inside) noexcept { return std::clamp(inside + 0.5, 0.0, 1.0); }
 }  // namespace
 

@@ -10,8 +10,8 @@
 
 namespace hal::vision::scene {
 
-/// The picture (8 bit, blue green red) of an exposure that begins with `from` and ends with `to`; the light, the noise and what is in the way are those of
-/// `to`. The same settings, states and `number` give the same bytes on any machine. [any] takes memory
+/// The picture (8 bit, blue green red) of an exposure that begins with `from` and ends with `to`; the light, the noise and what is in the
+/// way are those of `to`. The same settings, states and `number` give the same bytes on any machine. [any] takes memory
 std::vector<std::uint8_t> render(const Settings& settings, const State& from, const State& to, std::uint64_t number);
 
 /// The parts of it: see the manual of vision_scene for what stands where.

@@ -52,8 +52,9 @@ struct State {
 
 /// The newest states. One writer, any number of readers.
 ///
-/// Each slot is a sequence lock: (1) the writer makes its number odd, (2) writes, (3) makes it even; a reader that sees an odd number, or another
-/// one after it has copied than before, takes the slot as gone. All words are atomic, so a copy that is thrown away is no data race.
+/// Each slot is a sequence lock: (1) the writer makes its number odd, (2) writes, (3) makes it even; a reader that sees an odd number, or
+/// another one after it has copied than before, takes the slot as gone. All words are atomic, so a copy that is thrown away is no data
+/// race.
 class Stage {
 public:
     explicit Stage(const Settings& settings) : settings_(settings) {}
@@ -63,8 +64,8 @@ public:
     void put(std::int64_t stamp_ns, std::span<const double> values) noexcept;
     /// The newest state. False: there is none yet. [any]
     bool newest(State& to) const noexcept;
-    /// The state at `stamp_ns`, between its two neighbours in a straight line; the oldest or the newest that is known where it lies outside.
-    /// Only the first poses (at::smooth) lie between; of all else the earlier is taken. False: there is none yet. [any]
+    /// The state at `stamp_ns`, between its two neighbours in a straight line; the oldest or the newest that is known where it lies
+    /// outside. Only the first poses (at::smooth) lie between; of all else the earlier is taken. False: there is none yet. [any]
     bool when(std::int64_t stamp_ns, State& to) const noexcept;
 
 private:

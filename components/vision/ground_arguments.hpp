@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// Where the ground is, for components that look at it: a camera on a mast, or points that were measured.
+#pragma once
+
+#include <optional>
+
+#include "hal/component.hpp"
+#include "vision/camera_file.hpp"
+#include "vision/capture/frame.hpp"
+#include "vision/detect/ground.hpp"
+
+namespace hal::vision {
+
+class GroundArguments {
+public:
+    GroundArguments(hal::Component& component, const hal::Texts& texts)
+        : focal_(component, "focal", 280.0, "focal length of the camera, px"),
+          height_(component, "camera_height", 0.3, "of the camera above the ground, m"),
+          pitch_(component, "pitch", 0.6, "how far the camera looks down, rad"),
+          forward_(component, "forward", 0.0, "how far the camera is in front of the robot's middle, m"),
+          file_(component, "ground", "",
+                "file beside the netlist with points of the ground, u v x y with x forward and y to the left in mm, as of "
+                "vision_homography; in "
+                "place of focal, camera_height, pitch and forward") {
+        if (!(focal_ > 0.0 && height_ > 0.0 && pitch_ > 0.0 && pitch_ < 1.6))
+            throw std::invalid_argument(
+                "focal and camera_height have to be above 0, and pitch above 0 and below 1.6 rad: the camera looks down");
+        if (file_.get().empty()) return;
+        const std::string text = read_text(texts, "ground", file_.get());
+        GroundText        read = read_ground(text);
+        measured_.emplace(read, std::nullopt);
+        refuse(texts, file_.get(), text, "camera-text", read.problems);
+    }
+    /// [helper thread]
+    const Ground& in(const Frame& frame) {
+        if (measured_) return *measured_;
+        if (frame.width != width_ || frame.height != high_)
+            mast_ = ground_before({focal_, height_, pitch_, forward_}, width_ = frame.width, high_ = frame.height);
+        return mast_;
+    }
+
+private:
+    hal::RealArgument     focal_, height_, pitch_, forward_;
+    hal::TextArgument     file_;
+    std::optional<Ground> measured_;
+    Ground                mast_;                   // of the helper thread
+    int                   width_ = 0, high_ = 0;   // of the frames that mast_ is about
+};
+
+}  // namespace hal::vision
