@@ -130,5 +130,4 @@ protected:
 
 HAL_EXPORT void serve(Served&);  ///< from now on [setup]
 HAL_EXPORT void withdraw(Served&) noexcept;  ///< it is not being called, and never will be, when this returns [setup]
-
 }  // namespace hal::dds

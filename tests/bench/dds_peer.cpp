@@ -86,7 +86,7 @@ class Figures {
 public:
     explicit Figures(long wanted) : wanted_(wanted) { us_.reserve(static_cast<std::size_t>(wanted)); }
     void add(std::uint64_t sequence, std::int64_t source_ns, std::int64_t here_ns) {
-        if (count_.load(std::memory_order_relaxed) >= wanted_) return;
+        if (count_.load(std::memory_order_relaxed) >= wanted_ || ++seen_ <= settling) return;
         if (last_ != 0) lost_ += sequence - last_ - 1;
         last_ = sequence;
         us_.push_back(static_cast<double>(here_ns - source_ns) / 1000);
@@ -111,7 +111,10 @@ public:
     }
 
 private:
+    static constexpr long settling = 200;  // both sides have just found each other
+
     const long wanted_;
+    long seen_ = 0;
     std::vector<double> us_;
     std::uint64_t last_ = 0, lost_ = 0;
     std::atomic<long> count_{0};
@@ -149,7 +152,7 @@ public:
         sched_setscheduler(0, SCHED_FIFO, &fifo);
         Sample64 sample{};
         std::int64_t due = now(CLOCK_MONOTONIC) + 1'000'000;
-        for (long i = 0; i < count + 100; ++i, due += 1'000'000) {
+        for (long i = 0; i < count + 300; ++i, due += 1'000'000) {
             const timespec at{due / 1'000'000'000, due % 1'000'000'000};
             clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
             sample.values[0] = static_cast<double>(i);

@@ -48,7 +48,6 @@ public:
         }
         if (left_-- > 0) return;
         left_ = every_ - 1;
-        due_.store(cycle.start_ns() + every_ * period_, std::memory_order_relaxed);
         if (enable) {
             if (std::uint8_t* to = outbox_.begin()) {
                 fields_.store(to);
@@ -57,6 +56,7 @@ public:
                 dropped = dropped + 1;
             }
         }
+        due_.store(cycle.start_ns() + every_ * period_, std::memory_order_release);  // after the sample: who sees this sees it
         sent = sent_.load(std::memory_order_relaxed);
         refused = refused_.load(std::memory_order_relaxed);
         matched = matched_.load(std::memory_order_relaxed);
@@ -73,19 +73,21 @@ private:
     /// Writes what waits, and says when the next is to be expected: shortly before the cycle that makes it, so that a short look into the
     /// outbox every now and then replaces being woken by the cycle, which would cost it a system call.
     std::int64_t serve(std::int64_t now) noexcept override {
-        bool         found = false;
-        std::int64_t made = 0;
+        const std::int64_t due = due_.load(std::memory_order_acquire);
+        bool               found = false;
+        std::int64_t       made = 0;
         for (std::span<std::uint8_t> bytes; !(bytes = outbox_.front(made)).empty(); outbox_.take()) {
             found = true;
             write(bytes, made);
         }
-        const std::int64_t due = due_.load(std::memory_order_relaxed);
         if (found) {
             // Waiting for a sample costs time of a processor, coming after it delays it: it is aimed at looking for 15 us.
             const std::int64_t looked = expected_ == made ? now - since_ : 0;
             if (looked <= 0) lead_ -= 4'000;
             else lead_ += (looked - 15'000) / 8;
             lead_ = std::clamp<std::int64_t>(lead_, -150'000, 150'000);
+            expected_ = 0;
+            return now;  // once more, as `due` may be of before the sample
         }
         const bool ours = std::abs(due - now) < 2'000'000'000;  // else it is not this machine's clock, but a virtual one
         if (!ours) return now + 1'000'000;
