@@ -28,7 +28,7 @@ std::vector<std::string> names_of(const std::vector<NodeLine>& nodes) {
 
 ShellOptions for_check() {
     ShellOptions how;
-    how.check = how.keep_going = how.notes = true;
+    how.check = how.keep_going = true;
     how.color = colours(STDERR_FILENO);
     return how;
 }
@@ -57,7 +57,9 @@ std::optional<std::vector<NodeLine>> nodes_asked_for(const Options& options) {
 }
 
 int check_cell(const Options& options, std::vector<NodeLine> nodes) {
-    Cell cell(cell_name(options.words), std::move(nodes), offline(), for_check());
+    ShellOptions how = for_check();
+    how.notes = true;
+    Cell cell(cell_name(options.words), std::move(nodes), offline(), how);
     ErrorsOnly output;
     if (!cell.load(options.words, options.ini, output)) return 1;
     for (const std::string& path : options.words) write_all(STDERR_FILENO, path + ": no errors\n");
@@ -101,8 +103,11 @@ int load_node(Machine& machine, const Options& options, std::vector<NodeLine> no
     ProcessOutput output;
     Cell cell(cell_name(options.words), std::move(nodes), offline(), for_check());
     {
-        ErrorsOnly errors;
-        if (!cell.load(options.words, options.ini, errors)) return 1;
+        TextOutput said;  // what is no error the part itself says when it is loaded
+        if (!cell.load(options.words, options.ini, said)) {
+            write_all(STDERR_FILENO, said.err_text);
+            return 1;
+        }
     }
     const std::size_t own = cell.find(options.part);
     const auto available = machine.session.available_components();

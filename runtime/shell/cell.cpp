@@ -139,6 +139,7 @@ bool Cell::start(Output& output) {
         if (!links[i].empty()) good = machines_[i].shell->run_text("<links of node " + nodes_[i].name + ">", links[i], output) == 0 && good;
         const std::lock_guard lock(machines_[i].session->mutex);
         if (!machines_[i].session->running() && !machines_[i].session->model().threads.empty()) machines_[i].session->start_threads();
+        machines_[i].session->note_latencies(node_latencies(*this, i, true));
         for (const auto& thread : machines_[i].session->model().threads) step_ns_ = std::gcd(step_ns_, thread->options.period_ns);
     }
     if (step_ns_ == 0) step_ns_ = 1'000'000;
