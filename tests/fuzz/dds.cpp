@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// DDS: whatever comes as a sample is decoded within its bytes or refused with nothing changed; what was decoded of plain fields is encoded the
+// same again. Whatever is given as fields is refused with a sentence or makes a type whose own sample can be decoded.
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+#include "components/dds/schema.hpp"
+
+namespace {
+
+using namespace hal::dds;
+
+void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "broken: %s\n", what);
+    std::abort();
+}
+
+void sample(const Schema& schema, std::span<const std::uint8_t> given) {
+    const std::vector<std::uint8_t> bytes(given.begin(), given.end());  // so that a byte too far is seen
+    std::vector<hal_value> values(schema.fields.size());
+    for (hal_value& v : values) v.raw = 0x0123456789abcdef;
+    if (!decode(schema, bytes, values)) {
+        for (const hal_value& v : values) require(v.raw == 0x0123456789abcdef, "what is refused changes nothing");
+        return;
+    }
+    if (!schema.ros.empty()) return;
+    std::vector<std::uint8_t> again = schema.sample;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const hal_type type = schema.places[i].type;
+        const std::size_t size = type == HAL_TYPE_BIT ? 1 : type == HAL_TYPE_S32 || type == HAL_TYPE_U32 ? 4 : 8;
+        std::memcpy(again.data() + schema.places[i].offset, &values[i], size);
+    }
+    std::vector<hal_value> twice(values.size());
+    require(decode(schema, again, twice), "what was decoded can be encoded");
+    for (std::size_t i = 0; i < values.size(); ++i) require(std::memcmp(&values[i], &twice[i], sizeof values[i]) == 0, "and is the same");
+}
+
+void fields(std::string_view text) {
+    try {
+        const Schema schema = Schema::of_fields(text);
+        std::vector<hal_value> values(schema.fields.size());
+        require(schema.fields.size() == schema.places.size(), "a place for each field");
+        require(decode(schema, schema.sample, values), "a type's own sample is of the type");
+    } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a refusal says why"); }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    static const Schema schemas[] = {Schema::of_fields("b:bit,f:float,i:s32,u:u32,l:s64,k:u64*3"), Schema::of_ros("std_msgs/Bool"),
+                                     Schema::of_ros("geometry_msgs/WrenchStamped", {}, "base"),
+                                     Schema::of_ros("sensor_msgs/JointState", {"a", "elbow"}, "base"),
+                                     Schema::of_ros("sensor_msgs/Image", {}, "camera")};
+    if (size == 0) return 0;
+    if (data[0] < std::size(schemas)) sample(schemas[data[0]], {data + 1, size - 1});
+    else fields({reinterpret_cast<const char*>(data), size});
+    return 0;
+}
