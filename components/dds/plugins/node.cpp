@@ -255,8 +255,11 @@ HAL_COMPONENT(Node, "node", "Watches over the other nodes of a netlist for sever
 * `node.OTHER.refused`: it runs a version of the netlist in which a signal between the two is another one. Nothing of it is taken, and a line
   on standard error says which signal, and who the two are. A node that starts and finds such a one, or its own twin, does not start.
 
-A part of the netlist may link them like any other pins:
+A part of the netlist links them like any other pins. By hand, as the loader does it for the node `motor`, whose netlist has a part `desk`, too:
 
-    node cell
-    net robot-there node.robot.online => interlock.guard
+    loadrt node cell=conveyor node=motor others=desk
+    loadrt not names=alarm
+    addf node.watch servo
+    addf alarm servo
+    net desk-there node.desk.online => alarm.in
 )")
