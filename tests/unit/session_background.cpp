@@ -16,10 +16,10 @@ TEST(Background, Work_is_done_after_each_instant_of_the_virtual_clock) {
     EXPECT_EQ(machine.number("a.turns"), 1);
     EXPECT_EQ(machine.number("a.answer"), 42);
     EXPECT_EQ(machine.get("a.waits"), "FALSE");
-    const double first = machine.number("a.at");
+    const auto first = machine.number("a.at");
     machine.cycles(100);
     EXPECT_EQ(machine.number("a.turns"), 101);
-    EXPECT_EQ(machine.number("a.at"), first + 100e6);
+    EXPECT_EQ(machine.number("a.at"), first + 100'000'000);
     EXPECT_EQ(machine.number("b.answer"), 8) << "once for an instant, whichever threads ran in it";
     EXPECT_LE(machine.number("a.turns") - machine.number("b.turns"), 2);
 }
