@@ -95,6 +95,7 @@ void declare_fmt(CLI::App& app, Options& o) {
 void declare_graph(CLI::App& app, Options& o) {
     words(app, o, "FILE", "netlists, in the order they would be loaded");
     app.add_option("-o,--output", o.output, "a .svg or .dot file; without it DOT goes to standard output")->type_name("FILE");
+    app.add_option("--node", o.part, "of a netlist for several machines: the part of this one")->type_name("NAME");
     app.add_option("-i,--ini", o.ini, "where [SECTION]KEY is looked up")->type_name("FILE");
 }
 

@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "nodes.hpp"
 #include "offline.hpp"
 #include "say.hpp"
 
@@ -47,18 +48,22 @@ int run_graph(const Options& options) {
     const bool svg = options.output.ends_with(".svg");
     if (!options.output.empty() && !svg && !options.output.ends_with(".dot") && !options.output.ends_with(".gv"))
         return fail(options, fmt::format("'{}' is neither .svg nor .dot; type: -o {}.svg", options.output, options.words.front()));
+    auto nodes = nodes_asked_for(options);
+    if (!nodes) return 1;
     Session session(offline());
     ShellOptions how;
     how.check = true;
     how.color = colours(STDERR_FILENO);
     Shell shell(session, how);
     TextOutput output;
-    if (load_offline(shell, options, output) != 0) {
+    Cell cell(cell_name(options.words), options.part.empty() ? std::vector<NodeLine>{} : std::move(*nodes), offline(), how);
+    const bool good = options.part.empty() ? load_offline(shell, options, output) == 0 : cell.load(options.words, options.ini, output);
+    if (!good) {
         write_all(STDERR_FILENO, output.err_text);
         return 1;
     }
-    const std::lock_guard lock(session.mutex);
-    const std::string dot = as_dot(session.model(), options.words.front());
+    const Session& drawn = options.part.empty() ? session : cell.session(cell.find(options.part));
+    const std::string dot = as_dot(drawn.model(), options.words.front());
     if (options.output.empty()) return print(dot) ? 0 : 1;
     const std::string why = svg ? render_svg(dot, options.output) : write_file(options.output, dot);
     return why.empty() ? 0 : fail(options, why);

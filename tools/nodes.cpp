@@ -2,8 +2,9 @@
 #include "nodes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "base/diagnostic.hpp"
@@ -31,6 +32,21 @@ ShellOptions for_check() {
     how.check = how.keep_going = true;
     how.color = colours(STDERR_FILENO);
     return how;
+}
+
+/// Words KEY=VALUE that the components of DDS take. False after saying which is none.
+bool good_settings(const Options& options, const std::string& settings) {
+    static constexpr std::array<std::string_view, 7> keys{"domain", "interfaces", "peers", "server", "shared_memory", "profile", "security"};
+    for (std::size_t at = settings.find_first_not_of(' '); at < settings.size(); at = settings.find_first_not_of(' ', at)) {
+        const std::size_t end = std::min(settings.find(' ', at), settings.size());
+        const std::string word = settings.substr(at, end - at);
+        const std::string key = word.substr(0, word.find('='));
+        at = end;
+        if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() && word.find_first_of("\"'#$[]{}\\\n") == word.npos) continue;
+        fail(options, fmt::format("--dds: '{}' is no setting; write KEY=VALUE, the keys are: {}", word, fmt::join(keys, " ")));
+        return false;
+    }
+    return true;
 }
 
 /// "NODE: COMMAND" of --execute.
@@ -119,6 +135,7 @@ int load_node(Machine& machine, const Options& options, std::vector<NodeLine> no
     }
     std::string participant = options.dds;
     if (const char* const usual = std::getenv("HALCYON_DDS"); participant.empty() && usual) participant = usual;
+    if (!good_settings(options, participant)) return 1;
     const NodeLinks links = node_links(cell, own, participant.empty() ? "" : " " + participant);
     machine.session.note_latencies(node_latencies(cell, own, false));
     const std::string name = fmt::format("<links of node {}>", options.part);

@@ -85,8 +85,10 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
                 if (other.name == nodes_[i].name) continue;
                 std::string problem;
                 OutsidePin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
+                OutsidePin refused{"node." + other.name + ".refused", HAL_TYPE_BIT, HAL_DIR_OUT};
                 OutsidePin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
                 machine.pins[other.name + ".online"] = machine.session->add_outside_pin(watch, online, problem);
+                machine.pins[other.name + ".refused"] = machine.session->add_outside_pin(watch, refused, problem);
                 machine.pins[other.name + ".age-ms"] = machine.session->add_outside_pin(watch, age, problem);
             }
         }

@@ -81,6 +81,14 @@ class Language(Case):
         with open(path, encoding="utf-8") as file:
             self.assertEqual("net a b.c\n\nnode x rate=5ms\nnet a b.d\n# of all\nnode all\n", file.read())
 
+    def test_graph_draws_one_node(self):
+        path = self.write("cell.hal", CELL)
+        drawn = self.good("graph", path, "--node", "taker")
+        self.assertIn("twice", drawn)
+        self.assertNotIn("clock", drawn)
+        self.assertIn("taker.online", self.good("graph", path, "--node", "sender"))
+        self.assertIn("[several-nodes]", self.bad("graph", path))
+
     def test_execute_says_which_node(self):
         path = self.write("cell.hal", CELL)
         self.assertIn("write --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
@@ -157,6 +165,9 @@ class Running(Case):
         self.assertIn("runs another version of netlist 'cell' than node 'sender': signal 'count' is s32 on node 'sender' and float on node 'taker'; run the same file on both", done.stderr)
         self.assertIn("node 'taker' (instance 'taker' on ", done.stderr)
         self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
+
+    def test_settings_that_are_none_are_named(self):
+        self.assertIn("--dds: 'foo' is no setting; write KEY=VALUE, the keys are: domain", self.bad("run", self.path, "--node", "taker", "--dds", "domain=3 foo"))
 
     def test_a_node_runs_once(self):
         self.node("taker")
