@@ -12,7 +12,16 @@ namespace hal::tdma::rtcfg {
 
 namespace {
 
-constexpr std::size_t most_accepted = 1000;  // a server that changes its mind for ever
+constexpr std::size_t   most_accepted = 1000;  // a server that changes its mind for ever
+constexpr std::uint32_t most_refusals = 3, most_dead = 100;  // that are said; a hostile station could go on and on
+
+/// The first error, without what a terminal would take as a command: the text is a stranger's.
+std::string first_error(const config::Reading& reading) {
+    std::string text = config::to_string(reading, "stage 1");
+    text.resize(std::min(text.find('\n'), text.size()));
+    std::replace_if(text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+    return text;
+}
 
 }  // namespace
 
@@ -28,7 +37,7 @@ void Applicant::begin() noexcept {
     client_.begin();
     accepted_ = nullptr;
     offered_ = writing_ = told_server_ = told_other_ = false;
-    file_bytes_ = 0;
+    file_bytes_ = dead_told_ = refusals_ = 0;
     Offer           offer;
     const Accepted* answer = nullptr;
     File            file;
@@ -63,7 +72,9 @@ void Applicant::on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length
     writing_ = files_.push({server, length});
 }
 
-void Applicant::on_dead_station(const Address& who) noexcept { events_.on_event(Event::reported_dead, who, 0); }
+void Applicant::on_dead_station(const Address& who) noexcept {
+    if (dead_told_ < most_dead) ++dead_told_, events_.on_event(Event::reported_dead, who, 0);
+}
 
 void Applicant::on_other_server(const Address& who) noexcept {
     if (!told_server_) told_server_ = true, events_.on_event(Event::other_server, who, 0);
@@ -100,13 +111,15 @@ void Applicant::judge(const Offer& offer) {
     const bool        one = reading.good() && reading.schedule.stations.size() == 1 && !reading.schedule.stations[0].slots.empty();
     if (!one || all_.size() >= most_accepted) {
         refused_ = text;
-        say("what " + server + " sent as this station's configuration cannot be used" +
-            (reading.good() ? one ? ", it was changed too often" : ": it is not the block of one station, with a slot"
-                            : "; " + config::to_string(reading, "stage 1")) +
-            "; this station waits for another");
+        if (++refusals_ <= most_refusals)
+            say("what " + server + " sent as this station's configuration cannot be used" +
+                (reading.good() ? one ? ", it was changed too often" : ": it is not the block of one station, with a slot"
+                                : "; " + first_error(reading)) +
+                "; this station waits for another" + (refusals_ == most_refusals ? ", and says no more of such" : ""));
         answers_.push(nullptr);
         return;
     }
+    refusals_ = 0;
     StationSetup setup = config::setup_of(reading.schedule, 0);
     const auto&  entry = reading.schedule.stations[0];
     const auto   count = std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");

@@ -66,7 +66,7 @@ private:
     const Accepted* accepted_ = nullptr;
     bool            offered_ = false, writing_ = false, told_server_ = false, told_other_ = false;
     std::uint64_t   foreign_ = 0;
-    std::uint32_t   file_bytes_ = 0;
+    std::uint32_t   file_bytes_ = 0, dead_told_ = 0;
     // between both
     hal::Queue<Offer>           offers_{2};
     hal::Queue<const Accepted*> answers_{2};   // nullptr: refused
@@ -76,6 +76,7 @@ private:
     // the helper's
     std::vector<std::unique_ptr<Accepted>> all_;
     std::string                            refused_;  // the last, so that it is said once
+    std::uint32_t                          refusals_ = 0;  // in a row
 };
 
 }  // namespace hal::tdma::rtcfg

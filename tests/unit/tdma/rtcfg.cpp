@@ -245,6 +245,27 @@ TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
     again.text();
 }
 
+TEST(Rtcfg_client, is_not_made_to_talk_for_ever) {
+    Cell cell;
+    Said said;
+    cell.m.off = true;
+    for (int i = 0; i < 50; ++i) {
+        const std::string wrong = "cy\x1b[2Jcle " + std::to_string(i) + "\nslave:\nslott 0 900\n";
+        rtcfg::Message m;
+        m.id = rtcfg::Id::stage_1, m.to = mac(2);
+        m.data = std::span(reinterpret_cast<const std::uint8_t*>(wrong.data()), wrong.size());
+        cell.inject(m, 9, 10 * ms + i * 5 * ms);
+    }
+    cell.run(400 * ms);
+    const std::string text = said.text();
+    EXPECT_EQ(3, std::count(text.begin(), text.end(), '\n')) << text;
+    EXPECT_TRUE(text.ends_with("; this station waits for another, and says no more of such\n")) << text;
+    EXPECT_TRUE(text.starts_with("tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:1:1: error: there is "
+                                 "no key 'cy?[2Jcle'; "))
+        << text;
+    EXPECT_EQ(50U, cell.at_x.applicant.foreign());
+}
+
 TEST(Rtcfg_client, survives_whatever_comes) {
     Cell cell;
     Said said;
