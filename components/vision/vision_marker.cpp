@@ -101,7 +101,7 @@ only.
 The work is done in a thread of its own, of which the newest frame is the only one that counts; `update` copies the last result to the pins.
 What a controller acts on is `valid`: it is TRUE when the newest frame that was looked at shows the marker and is not older than
 `max-age-ms`. While it is FALSE the pins keep their last values. When the camera is unplugged, covered or hangs, one line says so, `valid` falls, and
-everything goes on by itself when the frames are good again.
+everything goes on by itself when the frames are good again. Several components may name the same camera, all with the same options.
 
     loadrt threads name1=servo period1=1000000
     loadrt vision_marker names=dock source=v4l2:/dev/video0?width=640&height=480

@@ -93,8 +93,7 @@ public:
     void unmap(void*, std::size_t) override { --mapped; }
     int wait(int, int) override { return gone ? -1 : done_.empty() ? 0 : 1; }
     void close(int) override {
-        --open_now;
-        queued_.clear(), done_.clear();
+        if (--open_now == 0) queued_.clear(), done_.clear();
     }
 
 private:
@@ -236,6 +235,74 @@ TEST_F(V4l2, every_call_may_fail_and_nothing_is_left_open) {
         EXPECT_EQ(kernel.mapped, 0) << nth;
     }
     FAIL() << "it never opens";
+}
+
+struct SharedCamera : testing::Test {
+    Kernel kernel;
+    std::unique_ptr<Source> a = make("v4l2:/dev/video0?width=16&height=4"), b = make("v4l2:/dev/video0?width=16&height=4");
+    Frame frame;
+
+    std::unique_ptr<Source> make(const char* address) { return shared_camera(Address(address), kernel); }
+};
+
+TEST_F(SharedCamera, gives_each_frame_to_all_who_opened_it) {
+    ASSERT_TRUE(a->open(0));
+    ASSERT_TRUE(b->open(0));
+    EXPECT_EQ(kernel.open_now, 1);
+    for (std::uint32_t i = 0; i < 5; ++i) {
+        kernel.shoot(i, static_cast<std::uint8_t>(50 + i));
+        ASSERT_EQ(a->next(0, 0, frame), Got::frame);
+        EXPECT_EQ(a->next(0, 0, frame), Got::nothing);
+        if (i == 2) continue;  // b is busy
+        ASSERT_EQ(b->next(0, 0, frame), Got::frame);
+        EXPECT_EQ(frame.number, i);
+        EXPECT_EQ(b->next(0, 0, frame), Got::nothing);
+    }
+    EXPECT_EQ(a->skipped(), 0u);
+    EXPECT_EQ(b->skipped(), 1u);
+    a->close();
+    EXPECT_EQ(kernel.open_now, 1);
+    b->close();
+    EXPECT_EQ(kernel.open_now, 0);
+    EXPECT_EQ(kernel.mapped, 0);
+}
+
+TEST_F(SharedCamera, is_opened_in_one_way_only) {
+    ASSERT_TRUE(a->open(0));
+    b = make("v4l2:/dev/video0?width=16&height=4&grey");
+    EXPECT_FALSE(b->open(0));
+    EXPECT_EQ(b->problem().text,
+              "another component has opened v4l2:/dev/video0?width=16&height=4; a camera is opened in one way: give both "
+              "that source=");
+    a->close();
+    EXPECT_TRUE(b->open(0));
+}
+
+TEST_F(SharedCamera, that_is_unplugged_is_lost_to_all_and_comes_back_to_all) {
+    ASSERT_TRUE(a->open(0));
+    ASSERT_TRUE(b->open(0));
+    kernel.gone = true;
+    EXPECT_EQ(a->next(0, 0, frame), Got::lost);
+    EXPECT_EQ(a->problem().text, "/dev/video0 was unplugged");
+    a->close();
+    kernel.gone = false;
+    ASSERT_TRUE(a->open(0));
+    EXPECT_EQ(b->next(0, 0, frame), Got::lost) << "what it had open was the camera before";
+    EXPECT_EQ(b->problem().text, "/dev/video0 was unplugged");
+    b->close();
+    ASSERT_TRUE(b->open(0));
+    EXPECT_EQ(kernel.open_now, 1);
+    kernel.shoot(0, 50);
+    EXPECT_EQ(a->next(0, 0, frame), Got::frame);
+    EXPECT_EQ(b->next(0, 0, frame), Got::frame);
+}
+
+TEST_F(SharedCamera, that_cannot_be_opened_says_why_to_each) {
+    kernel.open_error = ENOENT;
+    EXPECT_FALSE(a->open(0));
+    EXPECT_FALSE(b->open(0));
+    EXPECT_EQ(b->problem().text, "there is no camera /dev/video0");
+    EXPECT_EQ(kernel.open_now, 0);
 }
 
 TEST(Yuyv, becomes_the_colours_of_bt_601) {

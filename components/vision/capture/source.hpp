@@ -75,7 +75,7 @@ private:
 /// netlist (hal::Texts::find). [setup]
 std::unique_ptr<Source> make_source(const std::string& address, const std::function<std::string(const std::string&)>& find);
 
-std::unique_ptr<Source> v4l2_source(Address);
+std::unique_ptr<Source> v4l2_source(Address);  ///< shared by all that name the camera
 std::unique_ptr<Source> frames_source(Address, const std::function<std::string(const std::string&)>& find);
 std::unique_ptr<Source> sim_source(Address);  ///< scene/source_sim.cpp
 

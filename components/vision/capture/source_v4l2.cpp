@@ -281,6 +281,5 @@ VideoSystem& kernel() {
 }
 
 std::unique_ptr<Source> v4l2_source(Address address, VideoSystem& system) { return std::make_unique<V4l2>(std::move(address), system); }
-std::unique_ptr<Source> v4l2_source(Address address) { return v4l2_source(std::move(address), kernel()); }
 
 }  // namespace hal::vision

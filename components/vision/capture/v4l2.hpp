@@ -23,7 +23,10 @@ public:
 };
 VideoSystem& kernel();
 
+/// Alone with its camera.
 std::unique_ptr<Source> v4l2_source(Address, VideoSystem&);
+/// The same camera may be opened by several, all in one way: each gets each frame. Their helper threads meet at a lock, no cycle does.
+std::unique_ptr<Source> shared_camera(Address, VideoSystem&);
 
 /// YUYV (4:2:2, ITU-R BT.601 limited range) to BGR, `pixels` even. [any]
 void yuyv_to_bgr(const std::uint8_t* yuyv, std::uint8_t* bgr, std::size_t pixels);
