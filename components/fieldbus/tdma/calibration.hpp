@@ -17,6 +17,7 @@ public:
 
     /// [realtime]
     void begin(std::uint32_t rounds) noexcept;
+    void end() noexcept { active_ = waiting_ = false; }  ///< what was measured by now counts nothing. [realtime]
     bool active() const noexcept { return active_; }
     /// A request may go out in this cycle: none is on its way, or the last was not answered. [realtime]
     bool due(std::uint32_t cycle, std::uint32_t period) noexcept;

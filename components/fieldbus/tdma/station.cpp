@@ -75,6 +75,7 @@ void Station::begin() noexcept {
     for (Pending& p : pending_) p.used = false;
     based_ = heard_ever_ = sent_any_ = own_schedule_ = false;
     began_ = 0, good_row_ = foreign_row_ = intruder_row_ = 0, lead_wait_ = 0;
+    measured_ = {};
     calibration_.begin(setup_.rounds);
     recalibration_ = 0;
     claimants_ = {};

@@ -157,6 +157,8 @@ private:
     std::uint32_t           intruder_row_ = 0;
     std::uint32_t           foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the same is said again
     std::uint32_t           recalibration_ = 0;  // requests only in each so-manieth cycle, beside frames; 0: in each
+    Address                 measured_{};  // the master that the delay is of …
+    std::uint32_t           measured_heard_ = 0;  // … and the cycle of its newest sync
     bool                    told_uncalibrated_ = false;
     std::array<Claimant, 4> claimants_{};
     std::size_t             next_claimant_ = 0;

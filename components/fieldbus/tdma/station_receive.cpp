@@ -11,6 +11,7 @@ namespace {
 constexpr std::size_t   most_arrivals = 1024;  // in a cycle: a babbling station must not hold the thread
 constexpr std::uint32_t rows = 3;              // that often in a row makes it a fact
 constexpr std::uint32_t silence_after = 1000;  // cycles until the same complaint is repeated
+constexpr std::uint32_t soon_back = 100;       // cycles that a master may be away without being measured again
 constexpr Time          unfit_for = 100'000'000;         // a master does not begin so soon after another's sync
 constexpr Time          too_long_out = 5'000'000'000;    // to come into phase takes a fraction of it
 
@@ -126,8 +127,11 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
         status_.master = d.from;
         calibration_.forget();
         say(Event::master_changed, d.from);
-        if (status_.calibrated && !setup_.slots.empty()) calibration_.begin(setup_.rounds), recalibration_ = 8;
+        // One that was away for a few cycles is measured already: a backup that led for one must not cost all stations a hundred requests.
+        if (d.from == measured_ && s.cycle - measured_heard_ <= soon_back) calibration_.end(), recalibration_ = 0;
+        else if (status_.calibrated && !setup_.slots.empty()) calibration_.begin(setup_.rounds), recalibration_ = 8;
     }
+    if (d.from == measured_) measured_heard_ = s.cycle;
     heard_cycle_ = s.cycle, heard_ = heard_ever_ = true;
     last_sync_ = arrived;
     ++status_.count.syncs;
@@ -236,6 +240,7 @@ void Station::take_reply(const Decoded& d, Time arrived, Time now) noexcept {
     recalibration_ = 0;
     clock_.delay_changed(calibration_.delay() - status_.delay);
     status_.delay = calibration_.delay();
+    measured_ = d.from, measured_heard_ = heard_cycle_;
     status_.calibrated = true;
     say(Event::calibrated, d.from, status_.delay);
     if (status_.state == State::calibrating) {

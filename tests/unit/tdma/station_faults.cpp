@@ -87,6 +87,26 @@ TEST(Backup_is_quiet_again, when_the_master_returns) {
         }
 }
 
+TEST(Master_that_was_away_for_a_few_cycles, is_not_measured_again) {
+    Network n;
+    ASSERT_TRUE(n.all_ready());
+    const auto before = n.station.status().count.requests;
+    n.first.port.cut = true;
+    n.run(3 * ms);
+    EXPECT_EQ(mac(2), n.station.status().master);
+    n.first.port.cut = false;
+    n.run(900 * ms);
+    EXPECT_EQ(mac(1), n.station.status().master);
+    EXPECT_LE(n.station.status().count.requests - before, 2U) << "the station's slot is for its frames";
+    EXPECT_EQ(1, n.station.events[Event::calibrated]);
+    n.first.port.cut = true;
+    n.run(200 * ms);
+    n.first.port.cut = false;
+    n.run(1700 * ms);
+    EXPECT_EQ(mac(1), n.station.status().master);
+    EXPECT_GE(n.station.status().count.requests - before, 100U) << "after a longer time its cable may be another";
+}
+
 TEST(Station_follows_a_restarted_master, that_begins_with_another_time) {
     Bed bed;
     Machine& m = bed.add(1, master());
