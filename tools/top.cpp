@@ -57,10 +57,12 @@ public:
     ~Network() {
         if (ear_ != nullptr) close_(ear_);
     }
+    bool absent() const { return absent_; }
     /// False: `problem` says why not.
     bool open(const std::string& settings, std::string& problem) {
         void* const library = ::dlopen("libhalcyon_dds.so", RTLD_NOW | RTLD_LOCAL);
         if (library == nullptr) {
+            absent_ = true;
             problem = "this Halcyon was built without DDS; type: sudo apt install libfastrtps-dev, and build again";
             return false;
         }
@@ -104,6 +106,7 @@ private:
 
     std::mutex mutex_;
     std::vector<Seen> seen_;
+    bool absent_ = false;  ///< there is no DDS here
     void* ear_ = nullptr;
     void (*close_)(void*) = nullptr;
 };
@@ -197,7 +200,7 @@ int run_top(const Options& options) {
     if (const char* const usual = std::getenv("HALCYON_DDS"); settings.empty() && usual != nullptr) settings = usual;
     Network network;
     const bool there = network.open(settings, problem);
-    if (!there && !settings.empty()) return fail(options, problem);
+    if (!there && (!network.absent() || !options.dds.empty())) return fail(options, problem);
     Network* const over = there ? &network : nullptr;
     const bool live = ::isatty(STDOUT_FILENO) != 0 && !options.json && !options.once;
     if (there && !live) std::this_thread::sleep_for(3 * status_period);  // everybody has said something by then

@@ -18,7 +18,8 @@ std::string Session::status_text() const {
         text += "thread " + thread.name + " " + std::to_string(thread.period_ns) + " " + std::to_string(thread.cycles) + " " + std::to_string(thread.missed) + " " +
                 (thread.faulted ? "1" : "0") + "\n";
     text += "faults " + std::to_string(fault_count()) + "\n";
-    if (const auto records = faults(); !records.empty()) text += "fault " + records.back().sentence + "\n";
+    state_->collect_faults();
+    if (!state_->fault_log.empty()) text += "fault " + state_->fault_log.back().sentence + "\n";
     return text;
 }
 
