@@ -22,19 +22,19 @@ constexpr double pi = 3.14159265358979323846;
 
 struct Measured {
     double mean_mm = 0, most_mm = 0, median_ms = 0;
-    int    missed = 0;
+    int missed = 0;
 };
 
 Measured markers(double noise, int poses) {
     Camera camera;
     camera.width = 640, camera.height = 480, camera.fx = camera.fy = 600, camera.cx = 319.5, camera.cy = 239.5;
     MarkerDetector detector("4x4_50", camera);
-    std::mt19937   random(1);
-    const auto     between = [&](double least, double most) { return least + (most - least) * static_cast<double>(random()) / 4294967295.0; };
+    std::mt19937 random(1);
+    const auto between = [&](double least, double most) { return least + (most - least) * static_cast<double>(random()) / 4294967295.0; };
     scene::Settings of;
     of.kind = scene::Kind::markers;
     of.width = 640, of.height = 480, of.focal = 600, of.markers = 1;
-    Measured            m;
+    Measured m;
     std::vector<double> times;
     for (int i = 0; i < poses; ++i) {
         const double z = between(0.25, 0.5), x = between(-0.25, 0.25) * z, y = between(-0.2, 0.2) * z;
@@ -48,13 +48,13 @@ Measured markers(double noise, int poses) {
         frame.pixels = scene::render(of, state, state, static_cast<std::uint64_t>(i));
         to_grey(frame);
         const auto begin = std::chrono::steady_clock::now();
-        const auto         found = detector.find(frame, -1, 50);
+        const auto found = detector.find(frame, -1, 50);
         times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
         if (found.size() != 1) {
             ++m.missed;
             continue;
         }
-        const Pose&  p = found[0].pose;
+        const Pose& p = found[0].pose;
         const double error = std::hypot(x * 1000 - p.x_mm, y * 1000 - p.y_mm, z * 1000 - p.z_mm);
         m.mean_mm += error;
         m.most_mm = std::max(m.most_mm, error);
@@ -77,7 +77,9 @@ void vision(const Options& options, Report& report) {
                     .ours = m.mean_mm,
                     .goal = noise == 3.0 ? limit(1.5) : Goal{}});
         report.row({.what = "  the largest", .unit = "mm", .ours = m.most_mm});
-        report.row({.what = fmt::format("  time for a frame, median; {} of {} were not found", m.missed, poses), .unit = "ms", .ours = m.median_ms});
+        report.row({.what = fmt::format("  time for a frame, median; {} of {} were not found", m.missed, poses),
+                    .unit = "ms",
+                    .ours = m.median_ms});
     }
 }
 
