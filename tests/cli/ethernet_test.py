@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The machines at the other end of a wire, as processes in network namespaces. Figures are printed, none is asserted: the machine may be
-busy. What is asserted is that it comes up, that the stations are synchronous by clocks that differ, and that nothing is left behind."""
+busy. What is asserted is that it comes up, that all stations find the master's clock by clocks that differ, that the backup master takes
+over, what the way takes by the schedule, and that nothing is left behind."""
 import os
 import re
 import subprocess
@@ -42,7 +43,11 @@ class Segment(Case):
         done, logs = self.bring_up("ethernet-cnc", "--lose-clock", SECONDS)
         self.assertEqual(0, done.returncode, done.stdout)
         self.stations(logs, {"x": 200, "y": -150, "z": 80, "a": -200, "c": 35, "io": -60})
-        self.assertIn("the control sends the syncs: TRUE", done.stdout, "the backup master took over")
+        self.assertRegex(done.stdout, r"at the end: .* the control sends the syncs: TRUE", "the backup master took over")
+        self.assertRegex(done.stdout, r"axis c: enabled (TRUE|FALSE), following error [-\d.]+ mm")
+        self.assertIn("x-pwm: canopen.0.x.pwm-set-point => node 1 (x)  0 cycles on the wire, 260 us at worst\n", done.stdout)
+        self.assertIn("x-count: node 1 (x) => canopen.0.x.encoder-count  1 cycle on the wire, 1.74 ms at worst; there and back 2 cycles\n",
+                      done.stdout)
         left = subprocess.run(["ip", "netns", "list"], stdout=subprocess.PIPE, text=True).stdout
         self.assertNotIn("hal-cnc-", left)
 
