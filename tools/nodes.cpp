@@ -127,7 +127,7 @@ int load_node(Machine& machine, const Options& options, std::vector<NodeLine> no
     }
     const std::size_t own = cell.find(options.part);
     const auto available = machine.session.available_components();
-    if (std::find(available.begin(), available.end(), "dds_publish") == available.end() && !cell.topics().empty()) {
+    if (std::find(available.begin(), available.end(), "dds_publish") == available.end() && cell.size() > 1) {
         Diagnostics found;
         found.error("no-dds", {}, "the nodes of this netlist exchange signals over DDS, and this Halcyon was built without it", "",
                     "sudo apt install libfastrtps-dev, and build again; hal sim runs all nodes in one process without it");
@@ -136,7 +136,7 @@ int load_node(Machine& machine, const Options& options, std::vector<NodeLine> no
     std::string participant = options.dds;
     if (const char* const usual = std::getenv("HALCYON_DDS"); participant.empty() && usual) participant = usual;
     if (!good_settings(options, participant)) return 1;
-    const NodeLinks links = node_links(cell, own, participant.empty() ? "" : " " + participant);
+    const NodeLinks links = cell.size() > 1 ? node_links(cell, own, participant.empty() ? "" : " " + participant) : NodeLinks{};
     machine.session.note_latencies(node_latencies(cell, own, false));
     const std::string name = fmt::format("<links of node {}>", options.part);
     const auto plain = [](const std::string& path) {  // a word that means itself

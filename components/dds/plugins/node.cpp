@@ -58,6 +58,14 @@ std::string difference(const std::string& sends, const std::string& sender, cons
     return "their signals stand in another order";
 }
 
+/// Words that came over the network, on their way to a terminal.
+std::string shown(std::string words) {
+    words.resize(std::min<std::size_t>(words.size(), 600));
+    for (char& c : words)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
+    return words;
+}
+
 /// Another node, as its cycle and the engine's threads know it.
 struct Other {
     Other(hal::Component& c, const hal::Function& f, std::string node)
@@ -80,7 +88,8 @@ struct Other {
     std::atomic<std::int64_t> told{0};  ///< when its status came last, CLOCK_MONOTONIC
     std::atomic<bool>         differs{false};
     // The engine's
-    std::string said;
+    std::string  said;
+    std::int64_t said_at = 0;
 };
 
 class Node : public hal::Component, private Listener {
@@ -172,7 +181,7 @@ private:
 
     static std::string whom(std::string_view text) {
         const auto instance = values_of(text, "instance"), host = values_of(text, "host"), pid = values_of(text, "pid");
-        return "instance '" + (instance.empty() ? "?" : instance[0]) + "' on " + (host.empty() ? "?" : host[0]) + ", process " + (pid.empty() ? "?" : pid[0]);
+        return shown("instance '" + (instance.empty() ? "?" : instance[0]) + "' on " + (host.empty() ? "?" : host[0]) + ", process " + (pid.empty() ? "?" : pid[0]));
     }
 
     static std::string process(std::string_view text) {
@@ -184,7 +193,7 @@ private:
     void twin(std::string_view text) {
         if (process(text) == own_) return;
         if (!started_) refusal_ = "node '" + self_.get() + "' of '" + cell_.get() + "' runs already: " + whom(text);
-        else if (whom(text) != twin_) std::fputs(("node: node '" + self_.get() + "' of '" + cell_.get() + "' runs twice: here and as " + whom(text) + "\n").c_str(), stderr);
+        else if (twin_.empty()) std::fputs(("node: node '" + self_.get() + "' of '" + cell_.get() + "' runs twice: here and as " + whom(text) + "\n").c_str(), stderr);
         twin_ = whom(text);
         changed_.notify_all();
     }
@@ -206,9 +215,13 @@ private:
         if (!why.empty())
             why = "node '" + other.name + "' (" + whom(text) + ") runs another version of netlist '" + cell_.get() + "' than node '" + self_.get() + "': " + why +
                   "; run the same file on both";
+        why = shown(why);
         if (!started_) {
             if (!why.empty()) refusal_ = why;
         } else if (why != other.said) {
+            // not more often than anybody reads it, whatever is sent
+            if (when - other.said_at < 1'000'000'000) return;
+            other.said_at = when;
             std::fputs(("node: " + (why.empty() ? "node '" + other.name + "' runs the same version again" : why) + "\n").c_str(), stderr);
         }
         other.said = why;
