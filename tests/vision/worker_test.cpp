@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <new>
 #include <stdexcept>
 
 namespace hal::vision {
@@ -13,7 +14,7 @@ constexpr std::int64_t ms = 1'000'000, second = 1000 * ms;
 /// A camera of 8 x 6 pixels at 100 frames a second that does as it is told.
 class Puppet : public Source {
 public:
-    bool there = true, cut = false;
+    bool there = true, cut = false, starved = false;
     std::uint8_t brightness = 100;
     bool still = false, gives = true, damaged = false;
     int width = 8, opened = 0, closed = 0;
@@ -27,6 +28,7 @@ public:
         return true;
     }
     Got next(std::int64_t now, std::int64_t, Frame& frame) override {
+        if (starved) throw std::bad_alloc();
         if (cut) return fail(Trouble::unplugged, "/dev/video9 was unplugged"), Got::lost;
         const std::int64_t n = now / (10 * ms);
         if (!gives || n == taken) return Got::nothing;
@@ -164,6 +166,18 @@ TEST_F(Rig, Worker_outlives_a_detector_that_throws) {
     EXPECT_EQ(status().bad, 100u);
     throws = false;
     run(10 * ms);
+    EXPECT_TRUE(status().ok);
+}
+
+TEST_F(Rig, Worker_outlives_a_source_that_finds_no_memory) {
+    run(second);
+    camera->starved = true;
+    run(3 * second);
+    EXPECT_EQ(lines, std::vector<std::string>{"eye: no frames can be taken: std::bad_alloc; it is tried again every second"});
+    EXPECT_FALSE(status().ok);
+    EXPECT_FALSE(published.back().ok);
+    camera->starved = false;
+    run(second + 10 * ms);
     EXPECT_TRUE(status().ok);
 }
 

@@ -52,7 +52,21 @@ void Worker::expect(int width, int height, std::string file) {
     file_ = std::move(file);
 }
 
-void Worker::turn(std::int64_t now, bool may_wait) {
+void Worker::turn(std::int64_t now, bool may_wait) noexcept {
+    try {
+        step(now, may_wait);
+    } catch (const std::exception& e) {  // a source that finds no memory is opened anew
+        close();
+        try_again_ns_ = now + again_after;
+        try {
+            trouble(tried_again({Trouble::silent, std::string("no frames can be taken: ") + e.what()}), now);
+            publish();
+        } catch (const std::exception&) {  // nor for a sentence
+        }
+    }
+}
+
+void Worker::step(std::int64_t now, bool may_wait) {
     if (!open_ && now >= try_again_ns_) open(now);
     if (!open_) {
         if (may_wait) std::this_thread::sleep_for(std::chrono::nanoseconds(most_wait / 2));

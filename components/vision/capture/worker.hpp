@@ -38,12 +38,13 @@ public:
     void say_to(std::function<void(const std::string&)> say) { say_ = std::move(say); }
 
     /// A piece of work at `now_ns`; waits for a frame, at most 0.1 s, if it may. [helper thread]
-    void turn(std::int64_t now_ns, bool may_wait);
+    void turn(std::int64_t now_ns, bool may_wait) noexcept;
     /// Closes the source. No turn runs, and the next one opens it again. [setup]
     void          close() noexcept;
     const Status& status() const { return status_; }
 
 private:
+    void step(std::int64_t now_ns, bool may_wait);
     void open(std::int64_t now_ns);
     void take(const Frame& frame, std::int64_t now_ns);
     bool black(const Frame& frame) const;
