@@ -172,7 +172,7 @@ HAL_COMPONENT(DdsPublish, "dds_publish", "Publishes a group of pins as a DDS top
 The values of all fields, taken in one cycle, are one sample of a typed topic: final, without a key, XCDR1. The cycle only stores them into a
 queue; a thread of the process, not a real-time one, writes them. `hal doc dds_subscribe` is the other side.
 
-    loadrt dds_publish names=state topic=arm/state fields=angle:float,ready:bit,joint:float*6 rate=0 deadline_ms=20
+    loadrt dds_publish topic=arm/state names=state fields=angle:float,ready:bit,joint:float*6 rate=0 deadline_ms=20
     addf state servo-thread
     net angle  => state.angle
     net j0     => state.joint-0

@@ -229,7 +229,7 @@ HAL_COMPONENT(DdsSubscribe, "dds_subscribe", "Shows the newest sample of a DDS t
 The other side of `dds_publish`: `topic`, `fields` and `domain` as there. Samples arrive in threads that are not real-time; the cycle takes the
 newest, whole.
 
-    loadrt dds_subscribe names=state topic=arm/state fields=angle:float=0,ready:bit=0,joint:float*6 timeout_ms=50
+    loadrt dds_subscribe topic=arm/state names=state fields=angle:float=0,ready:bit=0,joint:float*6 timeout_ms=50
     addf state servo-thread
     net angle  <= state.angle
     net ok     <= state.valid
