@@ -2,6 +2,8 @@
 // Frames of scenes whose truth is known.
 #pragma once
 
+#include <cmath>
+
 #include "vision/capture/frame.hpp"
 #include "vision/scene/render.hpp"
 
