@@ -46,19 +46,16 @@ public:
 
     void update(hal::Cycle cycle) noexcept {
         if (!stage_) return;
-        values_[at::light] = light;
-        values_[at::noise] = noise;
-        values_[at::blur] = blur;
-        values_[at::covered] = covered;
-        values_[at::frozen] = frozen ? 1.0 : 0.0;
-        values_[at::unplugged] = unplugged ? 1.0 : 0.0;
-        values_[at::exposure] = exposure;
-        values_[at::delay] = delay;
+        take(at::light, light);
+        take(at::noise, noise);
+        take(at::blur, blur);
+        take(at::covered, covered);
+        take(at::frozen, frozen ? 1.0 : 0.0);
+        take(at::unplugged, unplugged ? 1.0 : 0.0);
+        take(at::exposure, exposure);
+        take(at::delay, delay);
         std::size_t i = first_pose();
-        for (const auto& pose : poses_) {
-            if (const double value = pose; std::isfinite(value)) values_[i] = value;
-            ++i;
-        }
+        for (const auto& pose : poses_) take(i++, pose);
         stage_->put(cycle.start_ns(), values_);
     }
 
@@ -92,6 +89,9 @@ private:
         text.erase(text.find_last_not_of('0') + 1);
         if (text.back() == '.') text.pop_back();
         return text;
+    }
+    void take(std::size_t i, double value) noexcept {  // what is no number changes nothing
+        if (std::isfinite(value)) values_[i] = value;
     }
     std::size_t first_pose() const noexcept { return settings_.kind == Kind::markers ? at::markers : at::poses; }
     void        pose(const std::string& name, const std::string& doc, const char* unit, double initial = 0.0) {
