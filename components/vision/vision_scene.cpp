@@ -14,7 +14,7 @@ public:
     explicit VisionScene(const hal_host* host)
         : Component(host),
           show_(*this, "show", "furuta", "furuta, floor or markers"),
-          camera_(*this, "camera", "", "what the camera is called: sim:NAME; usually what it shows"),
+          camera_(*this, "camera", "", "what the camera is called: sim:NAME; usually what it shows", {.per_instance = true}),
           width_(*this, "width", 320, "of a picture, px", {.min = 16, .max = 4096}),
           height_(*this, "height", 240, "of a picture, px", {.min = 16, .max = 4096}),
           fps_(*this, "fps", 100.0, "pictures in a second"),

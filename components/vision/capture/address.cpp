@@ -87,7 +87,8 @@ void Address::finish() const {
         if (option.asked) continue;
         std::string names;
         for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-        throw std::invalid_argument("source=" + text_ + ": " + driver_ + ": has no option '" + option.name + "'; it has " + names);
+        throw std::invalid_argument("source=" + text_ + ": " + driver_ + ": has no option '" + option.name + "'; it has " +
+                                    (names.empty() ? "none" : names));
     }
 }
 
