@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <dlfcn.h>
+#include <filesystem>
 #include <fmt/core.h>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -60,7 +61,11 @@ public:
     bool absent() const { return absent_; }
     /// False: `problem` says why not.
     bool open(const std::string& settings, std::string& problem) {
-        void* const library = ::dlopen("libhalcyon_dds.so", RTLD_NOW | RTLD_LOCAL);
+        // Beside the program, as it was built; else where the loader looks. (Under the address sanitizer it does not know whose path counts.)
+        std::error_code unknown;
+        const auto beside = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path() / "../lib/libhalcyon_dds.so";
+        void* library = ::dlopen(beside.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (library == nullptr) library = ::dlopen("libhalcyon_dds.so", RTLD_NOW | RTLD_LOCAL);
         if (library == nullptr) {
             absent_ = true;
             problem = "this Halcyon was built without DDS; type: sudo apt install libfastrtps-dev, and build again";

@@ -105,7 +105,7 @@ class Running(Case):
         # a domain that other tests at the same time hardly have
         self.environment["HALCYON_DDS"] = f"domain={1 + os.getpid() % 230}"
         self.environment["SKIP_DEFAULT_XML_FILE"] = "1"
-        self.environment["ASAN_OPTIONS"] = self.environment.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0"
+        self.environment["ASAN_OPTIONS"] = self.environment.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0:detect_leaks=0"
         self.path = self.write("cell.hal", CELL)
 
     def node(self, name, path=None):
@@ -182,7 +182,7 @@ class Namespaces(Case):
     def bring_up(self, *words):
         done = subprocess.run([ROOT / "halfiles/cell/bring-up", *words], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder), "SKIP_DEFAULT_XML_FILE": "1",
-                                   "ASAN_OPTIONS": self.environment.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0"}, text=True, timeout=16 * PATIENCE)
+                                   "ASAN_OPTIONS": self.environment.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0:detect_leaks=0"}, text=True, timeout=16 * PATIENCE)
         if done.returncode == 77 or "not to be had" in done.stdout:
             self.skipTest("no network namespaces here: " + done.stdout.strip())
         logs = "".join(f"--- {log.name}\n{log.read_text()}" for log in self.folder.glob("hal-cell.*/*.log"))
