@@ -257,12 +257,12 @@ TEST(Rtcfg_client, is_not_made_to_talk_for_ever) {
         cell.inject(m, 9, 10 * ms + i * 5 * ms);
     }
     cell.run(400 * ms);
-    const std::string text = said.text();
-    EXPECT_EQ(3, std::count(text.begin(), text.end(), '\n')) << text;
-    EXPECT_TRUE(text.ends_with("; this station waits for another, and says no more of such\n")) << text;
-    EXPECT_TRUE(text.starts_with("tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:1:1: error: there is "
+    const std::string words = said.text();
+    EXPECT_EQ(3, std::count(words.begin(), words.end(), '\n')) << words;
+    EXPECT_TRUE(words.ends_with("; this station waits for another, and says no more of such\n")) << words;
+    EXPECT_TRUE(words.starts_with("tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:1:1: error: there is "
                                  "no key 'cy?[2Jcle'; "))
-        << text;
+        << words;
     EXPECT_EQ(50U, cell.at_x.applicant.foreign());
 }
 
