@@ -263,6 +263,7 @@ void Core::make_safe() noexcept {
 }
 
 void Core::raise(FaultEvent event) noexcept {
+    if (measure_) event.time_ns = monotonic_ns();
     board_.count(event, id_);
     faults_.push(event);  // when full the newest is lost but counted
 }

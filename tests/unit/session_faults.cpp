@@ -84,6 +84,16 @@ TEST_F(Faulty, A_component_raises_faults_of_its_own) {
     EXPECT_NE(faults[0].sentence.find("a finger in the gear (3) at cycle 0"), std::string::npos) << faults[0].sentence;
 }
 
+TEST(FaultsOnTheRealClock, Have_an_age_that_grows) {
+    Machine machine(Clock::real);
+    machine.must("loadrt threads name1=t period1=1000000\nloadrt test-faulty names=f\naddf f.run t\nsetp f.raises 1");
+    machine.start();
+    ASSERT_TRUE(eventually([&] { return !machine.session.faults().empty(); }));
+    const auto age = machine.session.faults()[0].age_ns;
+    EXPECT_GT(age, 0);
+    EXPECT_TRUE(eventually([&] { return machine.session.faults()[0].age_ns > age; }));
+}
+
 TEST_F(Faulty, The_faults_of_a_deleted_thread_are_still_told) {
     machine.must("setp f.throws 1");
     machine.start();
