@@ -36,13 +36,16 @@ ShellOptions for_check() {
 
 /// Words KEY=VALUE that the components of DDS take. False after saying which is none.
 bool good_settings(const Options& options, const std::string& settings) {
-    static constexpr std::array<std::string_view, 7> keys{"domain", "interfaces", "peers", "server", "shared_memory", "profile", "security"};
+    static constexpr std::array<std::string_view, 7> keys{"domain",        "interfaces", "peers",   "server",
+                                                          "shared_memory", "profile",    "security"};
     for (std::size_t at = settings.find_first_not_of(' '); at < settings.size(); at = settings.find_first_not_of(' ', at)) {
         const std::size_t end = std::min(settings.find(' ', at), settings.size());
         const std::string word = settings.substr(at, end - at);
         const std::string key = word.substr(0, word.find('='));
         at = end;
-        if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() && word.find_first_of("\"'#$[]{}\\\n") == word.npos) continue;
+        if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() &&
+            word.find_first_of("\"'#$[]{}\\\n") == word.npos)
+            continue;
         fail(options, fmt::format("--dds: '{}' is no setting; write KEY=VALUE, the keys are: {}", word, fmt::join(keys, " ")));
         return false;
     }
@@ -53,7 +56,8 @@ bool good_settings(const Options& options, const std::string& settings) {
 int execute(const Options& options, Cell& cell, const std::string& command, Output& output) {
     const auto colon = command.find(':');
     const std::size_t node = colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
-    if (node == cell.size()) return fail(options, fmt::format("in which node? write --execute '{}: {}'", cell.nodes().front().name, command));
+    if (node == cell.size())
+        return fail(options, fmt::format("in which node? write --execute '{}: {}'", cell.nodes().front().name, command));
     return cell.shell(node).execute(command.substr(colon + 1), output, "<commandline>");
 }
 
@@ -103,7 +107,8 @@ int sim_cell(const Options& options, std::vector<NodeLine> nodes) {
     int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
     constexpr std::int64_t slice_ns = 100'000'000;
     if (!options.part.empty()) cell.leave_alone(cell.find(options.part));
-    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested(); left -= slice_ns) cell.advance(std::min(left, slice_ns));
+    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested(); left -= slice_ns)
+        cell.advance(std::min(left, slice_ns));
     for (const std::string& command : options.execute)
         if (status == 0 && !stop.requested()) status = execute(options, cell, command, output);
     for (std::size_t i = 0; i < cell.size(); ++i) {

@@ -61,7 +61,8 @@ public:
     bool absent() const { return absent_; }
     /// False: `problem` says why not.
     bool open(const std::string& settings, std::string& problem) {
-        // Beside the program, as it was built; else where the loader looks. (Under the address sanitizer it does not know whose path counts.)
+        // Beside the program, as it was built; else where the loader looks.
+        // (Under the address sanitizer that does not know whose path counts.)
         std::error_code unknown;
         const auto beside = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path() / "../lib/libhalcyon_dds.so";
         void* library = ::dlopen(beside.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -164,7 +165,8 @@ bool read_status(std::string_view text, SeenInstance& seen) {
         else if (key == "fault") seen.fault = printable(value);
         else if (key == "thread" && seen.threads.size() < 100) {
             if (const auto words = words_of(value); words.size() >= 5)
-                seen.threads.push_back({printable(words[0]), number<std::int64_t>(words[1]), number<std::uint64_t>(words[2]), number<std::uint64_t>(words[3]), words[4] == "1"});
+                seen.threads.push_back({printable(words[0]), number<std::int64_t>(words[1]), number<std::uint64_t>(words[2]),
+                                        number<std::uint64_t>(words[3]), words[4] == "1"});
         }
     }
     return !seen.instance.empty();
@@ -172,16 +174,22 @@ bool read_status(std::string_view text, SeenInstance& seen) {
 
 std::string top_table(const std::vector<SeenInstance>& all) {
     if (all.empty()) return "no instance runs; start one: hal run FILE.hal\n";
-    std::string text = fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST", "NODE", "THREAD", "PERIOD", "CYCLES", "MISSED", "FAULTS");
+    std::string text = fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST", "NODE", "THREAD", "PERIOD",
+                                   "CYCLES", "MISSED", "FAULTS");
     for (const SeenInstance& one : all) {
         const std::string node = one.node.empty() ? "" : one.cell + "/" + one.node;
         const bool silent = one.silent_s > silent_after_s;
         for (std::size_t i = 0; i < std::max<std::size_t>(one.threads.size(), 1); ++i) {
             const SeenThread thread = i < one.threads.size() ? one.threads[i] : SeenThread{"-", 0, 0, 0, false};
-            const std::string state = i != 0 ? "" : silent ? fmt::format("  silent for {:.0f} s", one.silent_s) : one.running ? "" : "  stopped";
-            text += fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n", i == 0 ? one.instance : "", i == 0 ? one.host : "", i == 0 ? node : "", thread.name,
-                                thread.period_ns == 0 ? "-" : format_duration(static_cast<double>(thread.period_ns)), thread.cycles, thread.missed,
-                                i == 0 ? std::to_string(one.faults) : "", thread.faulted ? "  stopped by a fault" : "", state);
+            const std::string state = i != 0        ? ""
+                                      : silent      ? fmt::format("  silent for {:.0f} s", one.silent_s)
+                                      : one.running ? ""
+                                                    : "  stopped";
+            text +=
+                fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n", i == 0 ? one.instance : "",
+                            i == 0 ? one.host : "", i == 0 ? node : "", thread.name,
+                            thread.period_ns == 0 ? "-" : format_duration(static_cast<double>(thread.period_ns)), thread.cycles,
+                            thread.missed, i == 0 ? std::to_string(one.faults) : "", thread.faulted ? "  stopped by a fault" : "", state);
         }
         if (!one.fault.empty()) text += fmt::format("{:<16} newest fault: {}\n", "", one.fault);
     }
@@ -193,9 +201,21 @@ std::string top_json(const std::vector<SeenInstance>& all) {
     for (const SeenInstance& one : all) {
         nlohmann::json threads = nlohmann::json::array();
         for (const SeenThread& thread : one.threads)
-            threads.push_back({{"name", thread.name}, {"period_ns", thread.period_ns}, {"cycles", thread.cycles}, {"missed", thread.missed}, {"faulted", thread.faulted}});
-        list.push_back({{"instance", one.instance}, {"host", one.host}, {"pid", one.pid}, {"cell", one.cell}, {"node", one.node}, {"running", one.running},
-                        {"silent_s", one.silent_s}, {"threads", threads}, {"faults", one.faults}, {"fault", one.fault}});
+            threads.push_back({{"name", thread.name},
+                               {"period_ns", thread.period_ns},
+                               {"cycles", thread.cycles},
+                               {"missed", thread.missed},
+                               {"faulted", thread.faulted}});
+        list.push_back({{"instance", one.instance},
+                        {"host", one.host},
+                        {"pid", one.pid},
+                        {"cell", one.cell},
+                        {"node", one.node},
+                        {"running", one.running},
+                        {"silent_s", one.silent_s},
+                        {"threads", threads},
+                        {"faults", one.faults},
+                        {"fault", one.fault}});
     }
     return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

@@ -45,6 +45,7 @@ HAL_EXPORT std::shared_ptr<Beacon> beacon(const std::shared_ptr<Participant>&, c
 /// For `hal top`, which finds this library when it is there: calls `heard` with each status that comes, in a thread of the engine, until
 /// halcyon_status_close. `settings` are words KEY=VALUE: domain, interfaces, peers, server. nullptr: `problem` (256 bytes) says why.
 extern "C" {
-HAL_EXPORT void* halcyon_status_open(const char* settings, void (*heard)(void* user, const char* text, size_t length), void* user, char* problem);
+HAL_EXPORT void* halcyon_status_open(const char* settings, void (*heard)(void* user, const char* text, size_t length), void* user,
+                                     char* problem);
 HAL_EXPORT void  halcyon_status_close(void*);
 }

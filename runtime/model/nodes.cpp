@@ -50,19 +50,25 @@ private:
         const std::string signal = "signal '" + writers[0].signal->name + "'";
         const Pin& writer = *writers[0].signal->writer;
         if (writers.size() > 1)
-            return refuse("two-writers", signal + " is written by nodes '" + node(writers[0]) + "' and '" + node(writers[1]) + "', and read by '" +
-                                             node(readers.empty() ? shared[0] : readers[0]) + "'",
+            return refuse("two-writers",
+                          signal + " is written by nodes '" + node(writers[0]) + "' and '" + node(writers[1]) + "', and read by '" +
+                              node(readers.empty() ? shared[0] : readers[0]) + "'",
                           {{place(writers[1], writers[1].signal->writer->linked_at), "output of " + node(writers[1])},
                            {place(writers[0], writer.linked_at), "output of " + node(writers[0])}},
-                          "a signal has one output pin; in a part of several nodes $(NODE) makes its name different: $(NODE)-" + writers[0].signal->name);
+                          "a signal has one output pin; in a part of several nodes $(NODE) makes its name different: $(NODE)-" +
+                              writers[0].signal->name);
         if (!shared.empty())
-            return refuse("node-crossing", signal + " cannot pass from node '" + node(writers[0]) + "' to an I/O pin of node '" + node(shared[0]) + "'",
-                          {{place(shared[0], shared[0].signal->pins[0]->linked_at), "I/O pin"}, {place(writers[0], writer.linked_at), "output"}},
-                          "only outputs and inputs may stand on different nodes");
+            return refuse(
+                "node-crossing",
+                signal + " cannot pass from node '" + node(writers[0]) + "' to an I/O pin of node '" + node(shared[0]) + "'",
+                {{place(shared[0], shared[0].signal->pins[0]->linked_at), "I/O pin"}, {place(writers[0], writer.linked_at), "output"}},
+                "only outputs and inputs may stand on different nodes");
         if (writer.type == HAL_TYPE_PORT)
-            return refuse("node-crossing", signal + " is a byte stream and cannot pass from node '" + node(writers[0]) + "' to node '" + node(readers[0]) + "'",
-                          {{place(readers[0], readers[0].signal->pins[0]->linked_at), "input"}, {place(writers[0], writer.linked_at), "output"}},
-                          "port signals stay on one node");
+            return refuse(
+                "node-crossing",
+                signal + " is a byte stream and cannot pass from node '" + node(writers[0]) + "' to node '" + node(readers[0]) + "'",
+                {{place(readers[0], readers[0].signal->pins[0]->linked_at), "input"}, {place(writers[0], writer.linked_at), "output"}},
+                "port signals stay on one node");
         cross(writers[0], readers);
     }
 
@@ -76,29 +82,40 @@ private:
             places.emplace(at.source, at.begin);
         }
         if (places.size() < 2) return;
-        Diagnostic d{Severity::warning, "node-crossing", "signal '" + all[0].signal->name + "' is on nodes '" + node(all[0]) + "' and '" + node(all[1]) +
-                                                         "', and no node writes it: each has its own", {}, {}};
-        d.labels = {{place(all[0], all[0].signal->pins[0]->linked_at), "on " + node(all[0])}, {place(all[1], all[1].signal->pins[0]->linked_at), "on " + node(all[1])}};
+        Diagnostic d{Severity::warning,
+                     "node-crossing",
+                     "signal '" + all[0].signal->name + "' is on nodes '" + node(all[0]) + "' and '" + node(all[1]) +
+                         "', and no node writes it: each has its own",
+                     {},
+                     {}};
+        d.labels = {{place(all[0], all[0].signal->pins[0]->linked_at), "on " + node(all[0])},
+                    {place(all[1], all[1].signal->pins[0]->linked_at), "on " + node(all[1])}};
         d.help.emplace_back("link an output to it on one node, or give the signals different names");
         diagnostics_.add(std::move(d));
     }
 
     void cross(const Seen& writer, const std::vector<Seen>& readers) {
         const Signal& written = *writer.signal;
-        const auto sendable = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.'; };
+        const auto sendable = [](char c) {
+            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+        };
         if (!std::all_of(written.name.begin(), written.name.end(), sendable))
-            return refuse("node-crossing", "signal '" + written.name + "' passes from node '" + node(writer) + "' to node '" + node(readers[0]) + "', and its name cannot",
-                          {{place(readers[0], readers[0].signal->pins[0]->linked_at), "input"}, {place(writer, written.writer->linked_at), "output"}},
-                          "give it a name of letters, digits, -, _ and .");
+            return refuse(
+                "node-crossing",
+                "signal '" + written.name + "' passes from node '" + node(writer) + "' to node '" + node(readers[0]) +
+                    "', and its name cannot",
+                {{place(readers[0], readers[0].signal->pins[0]->linked_at), "input"}, {place(writer, written.writer->linked_at), "output"}},
+                "give it a name of letters, digits, -, _ and .");
         NodeField field{written.name, written.type, written.writer, {}};
         for (const Seen& reader : readers) {
             const Signal& read = *reader.signal;
             if (read.type != written.type) {
                 const std::string convert = conversion(written.type, read.type);
                 refuse("type-mismatch",
-                       "signal '" + written.name + "' carries " + name(written.type) + " on node '" + node(writer) + "' and " + name(read.type) + " on node '" +
-                           node(reader) + "'",
-                       {{place(reader, read.pins[0]->linked_at), name(read.type)}, {place(writer, written.writer->linked_at), name(written.type)}},
+                       "signal '" + written.name + "' carries " + name(written.type) + " on node '" + node(writer) + "' and " +
+                           name(read.type) + " on node '" + node(reader) + "'",
+                       {{place(reader, read.pins[0]->linked_at), name(read.type)},
+                        {place(writer, written.writer->linked_at), name(written.type)}},
                        convert.empty() ? "link it to pins of one type" : "convert with " + convert + " on one of the two nodes");
                 return;
             }
@@ -121,9 +138,10 @@ private:
     bool has_thread(const Seen& on, const Pin& pin) {
         if (!nodes_[on.node].model->threads.empty()) return true;
         if (said_.insert(on.node).second)
-            diagnostics_.error("node-crossing", place(on, pin.linked_at),
-                               "node '" + node(on) + "' has no thread to send and take signals in; '" + on.signal->name + "' is of another node", "",
-                               "make one: newthread servo 1000000");
+            diagnostics_.error(
+                "node-crossing", place(on, pin.linked_at),
+                "node '" + node(on) + "' has no thread to send and take signals in; '" + on.signal->name + "' is of another node", "",
+                "make one: newthread servo 1000000");
         return false;
     }
 
@@ -150,10 +168,13 @@ std::string NodeTopic::layout() const {
 const Thread* thread_for(const Model& model, const std::vector<const Pin*>& pins) {
     const Thread* found = nullptr;
     for (const Pin* const pin : pins)
-        if (const Thread* const thread = thread_of(*pin); thread && (!found || thread->options.period_ns < found->options.period_ns)) found = thread;
+        if (const Thread* const thread = thread_of(*pin); thread && (!found || thread->options.period_ns < found->options.period_ns))
+            found = thread;
     return found || model.threads.empty() ? found : model.threads.front().get();
 }
 
-std::vector<NodeTopic> topics_between(const std::vector<NodePart>& nodes, Diagnostics& diagnostics) { return Sorter(nodes, diagnostics).run(); }
+std::vector<NodeTopic> topics_between(const std::vector<NodePart>& nodes, Diagnostics& diagnostics) {
+    return Sorter(nodes, diagnostics).run();
+}
 
 }  // namespace hal

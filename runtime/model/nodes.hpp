@@ -50,7 +50,8 @@ struct NodeTopic {
 /// The topics between the nodes, in order of their writers' names. Reports what cannot pass.
 std::vector<NodeTopic> topics_between(const std::vector<NodePart>& nodes, Diagnostics& diagnostics);
 
-/// The thread that sends or takes what these pins write or read: the fastest of theirs; without one the node's fastest. nullptr: it has none.
+/// The thread that sends or takes what these pins write or read: the fastest of theirs; without one the node's fastest. nullptr: it has
+/// none.
 const Thread* thread_for(const Model& model, const std::vector<const Pin*>& pins);
 
 }  // namespace hal

@@ -14,7 +14,9 @@ constexpr std::size_t most_nodes = 100;
 constexpr std::int64_t shortest_ns = 100'000, longest_ns = 60'000'000'000;
 
 bool good_name(std::string_view name) {
-    const auto good = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_'; };
+    const auto good = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    };
     return !name.empty() && name.size() <= longest_name && std::all_of(name.begin(), name.end(), good);
 }
 
@@ -28,12 +30,14 @@ struct Line {
 bool read_option(const Token& token, std::size_t equals, Line& line, Diagnostics& diagnostics) {
     const std::string key = token.text.substr(0, equals), value = token.text.substr(equals + 1);
     if (key != "rate" && key != "deadline") {
-        diagnostics.error("unknown-argument", token.span, "node has no option '" + key + "'", did_you_mean(key, {"rate", "deadline"}), std::string(usage));
+        diagnostics.error("unknown-argument", token.span, "node has no option '" + key + "'", did_you_mean(key, {"rate", "deadline"}),
+                          std::string(usage));
         return false;
     }
     const auto ns = parse_duration_ns(value, false);
     if (!ns || *ns < shortest_ns || *ns > longest_ns) {
-        diagnostics.error("bad-argument", token.span, "'" + value + "' is not a time between two sendings", "", "write 5ms, 0.1s: from 100us to 60s");
+        diagnostics.error("bad-argument", token.span, "'" + value + "' is not a time between two sendings", "",
+                          "write 5ms, 0.1s: from 100us to 60s");
         return false;
     }
     (key == "rate" ? line.rate_ns : line.deadline_ns) = *ns;
@@ -60,7 +64,8 @@ bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
     }
     const bool all = std::any_of(line.names.begin(), line.names.end(), [](const Token* t) { return t->text == "all"; });
     if (all && (line.names.size() > 1 || line.options_at.known())) {
-        diagnostics.error("bad-node", line.names.size() > 1 ? line.names[1]->span : line.options_at, "'all' stands alone: it means every node", "", "node all");
+        diagnostics.error("bad-node", line.names.size() > 1 ? line.names[1]->span : line.options_at,
+                          "'all' stands alone: it means every node", "", "node all");
         return false;
     }
     return good;
@@ -71,7 +76,11 @@ void take_options(NodeLine& node, const Line& line, Diagnostics& diagnostics) {
     const bool again = (line.rate_ns != 0 && node.rate_ns != 0 && line.rate_ns != node.rate_ns) ||
                        (line.deadline_ns != 0 && node.deadline_ns != 0 && line.deadline_ns != node.deadline_ns);
     if (again) {
-        Diagnostic d{Severity::error, "bad-argument", "node '" + node.name + "' is given two different times", {{line.options_at, "second time"}}, {}};
+        Diagnostic d{Severity::error,
+                     "bad-argument",
+                     "node '" + node.name + "' is given two different times",
+                     {{line.options_at, "second time"}},
+                     {}};
         d.labels.push_back({node.options_at, "first time"});
         d.help.emplace_back("say rate= and deadline= in one of its lines");
         diagnostics.add(std::move(d));
@@ -109,8 +118,8 @@ void collect_nodes(const std::vector<Command>& commands, std::vector<NodeLine>& 
     for (const NodeLine& node : nodes)
         if (node.deadline() < 2 * node.rate())
             diagnostics.error("bad-argument", node.options_at,
-                              "node '" + node.name + "' sends every " + format_duration(static_cast<double>(node.rate())) + ", its readers wait only " +
-                                  format_duration(static_cast<double>(node.deadline())),
+                              "node '" + node.name + "' sends every " + format_duration(static_cast<double>(node.rate())) +
+                                  ", its readers wait only " + format_duration(static_cast<double>(node.deadline())),
                               "", "a deadline is at least two sendings: one may be late");
 }
 

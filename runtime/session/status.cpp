@@ -13,10 +13,11 @@ namespace hal {
 std::string Session::status_text() const {
     char host[256] = "";
     ::gethostname(host, sizeof host - 1);
-    std::string text = "instance " + options().name + "\nhost " + host + "\npid " + std::to_string(::getpid()) + "\nrunning " + (running() ? "1" : "0") + "\n";
+    std::string text = "instance " + options().name + "\nhost " + host + "\npid " + std::to_string(::getpid()) + "\nrunning " +
+                       (running() ? "1" : "0") + "\n";
     for (const ThreadReport& thread : thread_reports())
-        text += "thread " + thread.name + " " + std::to_string(thread.period_ns) + " " + std::to_string(thread.cycles) + " " + std::to_string(thread.missed) + " " +
-                (thread.faulted ? "1" : "0") + "\n";
+        text += "thread " + thread.name + " " + std::to_string(thread.period_ns) + " " + std::to_string(thread.cycles) + " " +
+                std::to_string(thread.missed) + " " + (thread.faulted ? "1" : "0") + "\n";
     text += "faults " + std::to_string(fault_count()) + "\n";
     state_->collect_faults();
     if (!state_->fault_log.empty()) text += "fault " + state_->fault_log.back().sentence + "\n";
@@ -32,9 +33,7 @@ std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t roo
         const std::size_t length = std::min(room, text.size());
         std::memcpy(to, text.data(), length);
         return length;
-    } catch (const std::bad_alloc&) {
-        return 0;
-    }
+    } catch (const std::bad_alloc&) { return 0; }
 }
 
 }  // namespace hal

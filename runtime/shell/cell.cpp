@@ -70,7 +70,8 @@ Cell::~Cell() {
 }
 
 std::size_t Cell::find(std::string_view node) const {
-    return static_cast<std::size_t>(std::find_if(nodes_.begin(), nodes_.end(), [&](const NodeLine& n) { return n.name == node; }) - nodes_.begin());
+    return static_cast<std::size_t>(std::find_if(nodes_.begin(), nodes_.end(), [&](const NodeLine& n) { return n.name == node; }) -
+                                    nodes_.begin());
 }
 
 bool Cell::load(const std::vector<std::string>& files, const std::string& ini, Output& output) {
@@ -113,7 +114,8 @@ void Cell::report(Diagnostics& found, Output& output) const {
 bool Cell::connect(Output& output) {
     std::vector<NodePart> parts;
     for (std::size_t i = 0; i < size(); ++i)
-        parts.push_back({nodes_[i].name, &machines_[i].session->model(), nodes_[i].rate(), nodes_[i].deadline(), [this, i](Span span) { return place(i, span); }});
+        parts.push_back({nodes_[i].name, &machines_[i].session->model(), nodes_[i].rate(), nodes_[i].deadline(),
+                         [this, i](Span span) { return place(i, span); }});
     Diagnostics found;
     topics_ = topics_between(parts, found);
     report(found, output);
@@ -188,7 +190,8 @@ void Cell::deliver(const NodeTopic& topic) {
     std::vector<std::vector<std::pair<Pin*, hal_value>>> rows(size());
     for (std::size_t i = 0; i < topic.fields.size(); ++i)
         for (const NodeReader& reader : topic.fields[i].readers)
-            if (Pin* const pin = machines_[reader.node].pins[nodes_[topic.from].name + "." + names[i]]; pin && values[i]) rows[reader.node].emplace_back(pin, values[i]->value);
+            if (Pin* const pin = machines_[reader.node].pins[nodes_[topic.from].name + "." + names[i]]; pin && values[i])
+                rows[reader.node].emplace_back(pin, values[i]->value);
     for (std::size_t i = 0; i < size(); ++i) {
         if (rows[i].empty()) continue;
         const std::lock_guard lock(machines_[i].session->mutex);

@@ -23,7 +23,8 @@ public:
     Cell(std::string name, std::vector<NodeLine> nodes, const SessionOptions& session, const ShellOptions& shell);
     ~Cell();
 
-    /// Loads the files into every node and finds what passes between them. What several nodes would say is said once. False: something is wrong.
+    /// Loads the files into every node and finds what passes between them. What several nodes would say is said once. False: something
+    /// is wrong.
     bool load(const std::vector<std::string>& files, const std::string& ini, Output& output);
 
     const std::string& name() const { return name_; }
@@ -61,7 +62,7 @@ private:
     ShellOptions options_;
     std::vector<Machine> machines_;
     std::vector<NodeTopic> topics_;
-    Sources texts_;                     ///< of all nodes' texts that diagnostics between them show
+    Sources texts_;  ///< of all nodes' texts that diagnostics between them show
     std::map<std::pair<std::string, std::uint32_t>, std::uint32_t> known_texts_;
     std::int64_t step_ns_ = 0, now_ns_ = 0;
     std::size_t alone_ = SIZE_MAX;

@@ -27,10 +27,14 @@ std::string hz(std::int64_t ns) { return format_exact(HAL_TYPE_FLOAT, hal_value{
 
 const std::string& from(const Cell& cell, const NodeTopic& topic) { return cell.nodes()[topic.from].name; }
 
-std::string topic_name(const Cell& cell, const NodeTopic& topic) { return "halcyon/" + cell.name() + "/" + from(cell, topic) + "/" + topic.thread; }
+std::string topic_name(const Cell& cell, const NodeTopic& topic) {
+    return "halcyon/" + cell.name() + "/" + from(cell, topic) + "/" + topic.thread;
+}
 
 /// The name on the wire changes with the signals: nodes with other versions of the netlist never take each other's bytes.
-std::string type_name(const Cell& cell, const NodeTopic& topic) { return "halcyon::nodes::" + from(cell, topic) + "_" + hex(hash(topic.layout())); }
+std::string type_name(const Cell& cell, const NodeTopic& topic) {
+    return "halcyon::nodes::" + from(cell, topic) + "_" + hex(hash(topic.layout()));
+}
 
 /// The layout without blanks: an argument.
 std::string compact(const NodeTopic& topic) {
@@ -66,8 +70,8 @@ const NodeReader* reader_of(const NodeField& field, std::size_t node) {
 
 std::string send(const Cell& cell, const NodeTopic& topic, const std::string& participant) {
     const std::string instance = out_name(cell, topic);
-    std::string text = "loadrt dds_publish names=" + instance + " topic=" + topic_name(cell, topic) + " type=" + type_name(cell, topic) + " fields=\"" +
-                       compact(topic) + "\" rate=" + hz(topic.rate_ns) + " reliable=0" + participant + "\n";
+    std::string text = "loadrt dds_publish names=" + instance + " topic=" + topic_name(cell, topic) + " type=" + type_name(cell, topic) +
+                       " fields=\"" + compact(topic) + "\" rate=" + hz(topic.rate_ns) + " reliable=0" + participant + "\n";
     for (const NodeField& field : topic.fields) text += "net " + field.signal + " => " + instance + "." + field.signal + "\n";
     return text + "addf " + instance + " " + topic.thread + "\n";
 }
@@ -85,8 +89,9 @@ std::string take(const Cell& cell, const NodeTopic& topic, std::size_t node, con
         pins.insert(pins.end(), reader->pins.begin(), reader->pins.end());
     }
     const Thread* const thread = thread_for(const_cast<Cell&>(cell).session(node).model(), pins);
-    return "loadrt dds_subscribe names=" + instance + " topic=" + topic_name(cell, topic) + " type=" + type_name(cell, topic) + " fields=\"" + fields +
-           "\" timeout_ms=" + ms(topic.deadline_ns) + " reliable=0" + participant + "\n" + nets + "addf " + instance + " " + thread->name + " 1\n";
+    return "loadrt dds_subscribe names=" + instance + " topic=" + topic_name(cell, topic) + " type=" + type_name(cell, topic) +
+           " fields=\"" + fields + "\" timeout_ms=" + ms(topic.deadline_ns) + " reliable=0" + participant + "\n" + nets + "addf " +
+           instance + " " + thread->name + " 1\n";
 }
 
 }  // namespace
@@ -104,10 +109,12 @@ std::vector<std::string> node_latencies(const Cell& cell, std::size_t node, bool
     std::vector<std::string> lines;
     for (const NodeTopic& topic : cell.topics())
         for (const NodeField& field : topic.fields) {
-            const std::string how = simulated ? "passed every " + every(topic) + " (hal sim)" : "over DDS every " + every(topic) + ", deadline " + deadline(topic);
+            const std::string how = simulated ? "passed every " + every(topic) + " (hal sim)"
+                                              : "over DDS every " + every(topic) + ", deadline " + deadline(topic);
             if (topic.from == node) {
                 for (const NodeReader& reader : field.readers)
-                    lines.push_back(field.signal + ": " + field.writer->name + " => node " + cell.nodes()[reader.node].name + "  " + how + " (sent by " + topic.thread + ")");
+                    lines.push_back(field.signal + ": " + field.writer->name + " => node " + cell.nodes()[reader.node].name + "  " + how +
+                                    " (sent by " + topic.thread + ")");
             } else if (const NodeReader* const reader = reader_of(field, node)) {
                 for (const Pin* const pin : reader->pins)
                     lines.push_back(field.signal + ": node " + from(cell, topic) + " => " + pin->name + "  " + how + ", then " +
@@ -182,7 +189,8 @@ NodeLinks node_links(const Cell& cell, std::size_t node, const std::string& part
         }
     }
     links.before = "loadrt node cell=" + cell.name() + " node=" + cell.nodes()[node].name + (peers.empty() ? "" : " others=" + peers) +
-                   (offers.empty() ? "" : " offers=\"" + offers + "\"") + (wants.empty() ? "" : " wants=\"" + wants + "\"") + participant + "\n";
+                   (offers.empty() ? "" : " offers=\"" + offers + "\"") + (wants.empty() ? "" : " wants=\"" + wants + "\"") + participant +
+                   "\n";
     // what comes from others is taken before anything reads it; the watch sees it just taken
     links.behind = (thread ? "addf node.watch " + thread->name + " 1\n" : "") + takes + after + links.behind;
     return links;

@@ -8,18 +8,22 @@ namespace {
 
 TEST(TopTest, reads_what_an_instance_says) {
     SeenInstance seen;
-    ASSERT_TRUE(read_status("instance arm\nhost lab\npid 77\nrunning 1\nthread servo 1000000 12345 2 0\nthread slow 10000000 1234 0 1\nfaults 3\nfault it broke\ncell line\nnode left\n", seen));
+    ASSERT_TRUE(
+        read_status("instance arm\nhost lab\npid 77\nrunning 1\nthread servo 1000000 12345 2 0\nthread slow 10000000 1234 0 1\nfaults "
+                    "3\nfault it broke\ncell line\nnode left\n",
+                    seen));
     EXPECT_EQ(seen.instance + seen.host + seen.cell + seen.node, "armlablineleft");
     EXPECT_EQ(seen.pid, 77);
     ASSERT_EQ(seen.threads.size(), 2u);
     EXPECT_EQ(seen.threads[0].missed, 2u);
     EXPECT_TRUE(seen.threads[1].faulted);
     EXPECT_EQ(seen.faults, 3u);
-    EXPECT_EQ(top_table({seen}),
-              "INSTANCE         HOST         NODE                 THREAD            PERIOD       CYCLES   MISSED FAULTS\n"
-              "arm              lab          line/left            servo               1 ms        12345        2      3\n"
-              "                                                   slow               10 ms         1234        0         stopped by a fault\n"
-              "                 newest fault: it broke\n");
+    EXPECT_EQ(
+        top_table({seen}),
+        "INSTANCE         HOST         NODE                 THREAD            PERIOD       CYCLES   MISSED FAULTS\n"
+        "arm              lab          line/left            servo               1 ms        12345        2      3\n"
+        "                                                   slow               10 ms         1234        0         stopped by a fault\n"
+        "                 newest fault: it broke\n");
 }
 
 TEST(TopTest, a_text_from_the_network_does_not_steer_the_terminal) {

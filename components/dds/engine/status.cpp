@@ -44,7 +44,8 @@ namespace {
 
 class StatusBeacon final : public Beacon, private Served {
 public:
-    StatusBeacon(std::shared_ptr<Participant> participant, const hal_status* host) : participant_(std::move(participant)), host_(host), buffer_(largest_status) {
+    StatusBeacon(std::shared_ptr<Participant> participant, const hal_status* host)
+        : participant_(std::move(participant)), host_(host), buffer_(largest_status) {
         Quality quality = status_quality();
         quality.depth = 1;
         writer_ = participant_->writer(status_topic(), quality, nullptr);
@@ -75,9 +76,7 @@ private:
             for (const auto& [owner, lines] : added_) text += lines;
             writer_->write(status_bytes(text));
             return now + 50'000'000;
-        } catch (const std::exception&) {
-            return now + status_period_ns;
-        }
+        } catch (const std::exception&) { return now + status_period_ns; }
     }
 
     const std::shared_ptr<Participant> participant_;
@@ -92,7 +91,7 @@ private:
 };
 
 struct Beacons {
-    std::mutex                                            mutex;
+    std::mutex                                          mutex;
     std::map<const Participant*, std::weak_ptr<Beacon>> all;
 };
 Beacons& beacons() {
@@ -103,7 +102,8 @@ Beacons& beacons() {
 /// hal top's ear.
 class Ear final : public Listener {
 public:
-    Ear(const Settings& settings, void (*heard)(void*, const char*, std::size_t), void* user) : heard_(heard), user_(user), participant_(open(settings)) {
+    Ear(const Settings& settings, void (*heard)(void*, const char*, std::size_t), void* user)
+        : heard_(heard), user_(user), participant_(open(settings)) {
         Quality quality = status_quality();
         quality.depth = 64;
         reader_ = participant_->reader(status_topic(), quality, this);
@@ -145,8 +145,8 @@ Settings settings_of(const char* words) {
 }  // namespace
 
 std::shared_ptr<Beacon> beacon(const std::shared_ptr<Participant>& participant, const hal_status* host) {
-    const std::lock_guard lock(beacons().mutex);
-    std::weak_ptr<Beacon>& known = beacons().all[participant.get()];
+    const std::lock_guard   lock(beacons().mutex);
+    std::weak_ptr<Beacon>&  known = beacons().all[participant.get()];
     std::shared_ptr<Beacon> one = known.lock();
     if (!one) known = one = std::make_shared<StatusBeacon>(participant, host);
     return one;

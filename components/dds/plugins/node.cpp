@@ -51,7 +51,8 @@ std::string difference(const std::string& sends, const std::string& sender, cons
     for (const auto& [signal, type] : here) {
         const auto other = there.find(signal);
         if (other == there.end()) return "signal '" + signal + "' is known to node '" + taker + "' only";
-        if (other->second != type) return "signal '" + signal + "' is " + other->second + " on node '" + sender + "' and " + type + " on node '" + taker + "'";
+        if (other->second != type)
+            return "signal '" + signal + "' is " + other->second + " on node '" + sender + "' and " + type + " on node '" + taker + "'";
     }
     for (const auto& [signal, type] : there)
         if (!here.contains(signal)) return "signal '" + signal + "' is known to node '" + sender + "' only";
@@ -70,10 +71,15 @@ std::string shown(std::string words) {
 struct Other {
     Other(hal::Component& c, const hal::Function& f, std::string node)
         : name(std::move(node)),
-          heard_name(name + ".heard"), age_name(name + ".heard-age-ms"), online_name(name + ".online"), age_ms_name(name + ".age-ms"), refused_name(name + ".refused"),
+          heard_name(name + ".heard"),
+          age_name(name + ".heard-age-ms"),
+          online_name(name + ".online"),
+          age_ms_name(name + ".age-ms"),
+          refused_name(name + ".refused"),
           heard(c, f, heard_name.c_str(), "its signals come; linked when it sends some to this node"),
           heard_age(c, f, age_name.c_str(), "how old they are", {.unit = "ms"}),
-          online(c, f, online_name.c_str(), "it is there: its signals come, or, when it sends none to this node, its status", {.safe = false}),
+          online(c, f, online_name.c_str(), "it is there: its signals come, or, when it sends none to this node, its status",
+                 {.safe = false}),
           age(c, f, age_ms_name.c_str(), "since its signals, or its status, were sent", {.unit = "ms"}),
           refused(c, f, refused_name.c_str(), "it runs a netlist whose signals are others than here") {}
 
@@ -99,7 +105,8 @@ public:
     explicit Node(const hal_host* host) : Component(host) {
         const auto wanted = topics_of(wants_.get());
         for (Other& other : others_)
-            other.sends = std::any_of(wanted.begin(), wanted.end(), [&](const auto& topic) { return topic.first.starts_with(other.name + "/"); });
+            other.sends =
+                std::any_of(wanted.begin(), wanted.end(), [&](const auto& topic) { return topic.first.starts_with(other.name + "/"); });
     }
 
     void start() {
@@ -130,7 +137,8 @@ public:
                 throw std::runtime_error(why);
             }
         }
-        beacon_->add(this, "cell " + cell_.get() + "\nnode " + self_.get() + "\noffers " + offers_.get() + "\nwants " + wants_.get() + "\n");
+        beacon_->add(this,
+                     "cell " + cell_.get() + "\nnode " + self_.get() + "\noffers " + offers_.get() + "\nwants " + wants_.get() + "\n");
     }
     void stop() noexcept {
         reader_.reset();
@@ -181,7 +189,8 @@ private:
 
     static std::string whom(std::string_view text) {
         const auto instance = values_of(text, "instance"), host = values_of(text, "host"), pid = values_of(text, "pid");
-        return shown("instance '" + (instance.empty() ? "?" : instance[0]) + "' on " + (host.empty() ? "?" : host[0]) + ", process " + (pid.empty() ? "?" : pid[0]));
+        return shown("instance '" + (instance.empty() ? "?" : instance[0]) + "' on " + (host.empty() ? "?" : host[0]) + ", process " +
+                     (pid.empty() ? "?" : pid[0]));
     }
 
     static std::string process(std::string_view text) {
@@ -193,7 +202,9 @@ private:
     void twin(std::string_view text) {
         if (process(text) == own_) return;
         if (!started_) refusal_ = "node '" + self_.get() + "' of '" + cell_.get() + "' runs already: " + whom(text);
-        else if (twin_.empty()) std::fputs(("node: node '" + self_.get() + "' of '" + cell_.get() + "' runs twice: here and as " + whom(text) + "\n").c_str(), stderr);
+        else if (twin_.empty())
+            std::fputs(("node: node '" + self_.get() + "' of '" + cell_.get() + "' runs twice: here and as " + whom(text) + "\n").c_str(),
+                       stderr);
         twin_ = whom(text);
         changed_.notify_all();
     }
@@ -210,11 +221,12 @@ private:
                 why = difference(sent == theirs.end() ? "" : sent->second, other.name, layout, self_.get());
             }
         for (const auto& [topic, layout] : topics_of(offers_.get()))
-            if (const auto taken = wanted.find(topic); why.empty() && taken != wanted.end()) why = difference(layout, self_.get(), taken->second, other.name);
+            if (const auto taken = wanted.find(topic); why.empty() && taken != wanted.end())
+                why = difference(layout, self_.get(), taken->second, other.name);
         other.differs.store(!why.empty(), std::memory_order_relaxed);
         if (!why.empty())
-            why = "node '" + other.name + "' (" + whom(text) + ") runs another version of netlist '" + cell_.get() + "' than node '" + self_.get() + "': " + why +
-                  "; run the same file on both";
+            why = "node '" + other.name + "' (" + whom(text) + ") runs another version of netlist '" + cell_.get() + "' than node '" +
+                  self_.get() + "': " + why + "; run the same file on both";
         why = shown(why);
         if (!started_) {
             if (!why.empty()) refusal_ = why;
@@ -229,13 +241,13 @@ private:
     }
 
     ParticipantArguments arguments_{*this};
-    hal::TextArgument cell_{*this, "cell", "cell", "name of the netlist: nodes of others are not looked at"};
-    hal::TextArgument self_{*this, "node", "node", "which of its nodes this is"};
-    hal::TextArgument names_{*this, "others", "", "the other nodes"};
-    hal::TextArgument offers_{*this, "offers", "", "what this node sends: NODE/THREAD=SIGNAL:TYPE,...;"};
-    hal::TextArgument wants_{*this, "wants", "", "what this node takes, likewise"};
-    hal::Argument     patience_ms_{*this, "patience_ms", 1000, "how long the start waits to hear of other nodes", {.min = 0, .max = 60'000}};
-    hal::Function     watch_{*this, "watch", &Node::watch, "looks which nodes are there"};
+    hal::TextArgument    cell_{*this, "cell", "cell", "name of the netlist: nodes of others are not looked at"};
+    hal::TextArgument    self_{*this, "node", "node", "which of its nodes this is"};
+    hal::TextArgument    names_{*this, "others", "", "the other nodes"};
+    hal::TextArgument    offers_{*this, "offers", "", "what this node sends: NODE/THREAD=SIGNAL:TYPE,...;"};
+    hal::TextArgument    wants_{*this, "wants", "", "what this node takes, likewise"};
+    hal::Argument patience_ms_{*this, "patience_ms", 1000, "how long the start waits to hear of other nodes", {.min = 0, .max = 60'000}};
+    hal::Function watch_{*this, "watch", &Node::watch, "looks which nodes are there"};
 
     std::deque<Other> others_ = [this] {
         std::deque<Other> all;
@@ -246,12 +258,12 @@ private:
     const hal::dds::Settings settings_ = arguments_.settings();
 
     // Between the engine's threads and start()
-    std::mutex              mutex_;
-    std::condition_variable changed_;
-    std::set<std::string>   greeted_;
-    std::string             refusal_, own_, twin_;
+    std::mutex                             mutex_;
+    std::condition_variable                changed_;
+    std::set<std::string>                  greeted_;
+    std::string                            refusal_, own_, twin_;
     std::set<std::array<std::uint8_t, 12>> told_;  ///< participants whose status came
-    bool                    started_ = false;
+    bool                                   started_ = false;
 
     std::shared_ptr<Participant> participant_;
     std::shared_ptr<Beacon>      beacon_;
@@ -265,10 +277,11 @@ HAL_COMPONENT(Node, "node", "Watches over the other nodes of a netlist for sever
 
 * `node.OTHER.online`: its signals come within their deadline. A node that sends none to this one is there while its status comes.
 * `node.OTHER.age-ms`: how old its signals are.
-* `node.OTHER.refused`: it runs a version of the netlist in which a signal between the two is another one. Nothing of it is taken, and a line
-  on standard error says which signal, and who the two are. A node that starts and finds such a one, or its own twin, does not start.
+* `node.OTHER.refused`: it runs a version of the netlist in which a signal between the two is another one. Nothing of it is taken, and a
+  line on standard error says which signal, and who the two are. A node that starts and finds such a one, or its own twin, does not start.
 
-A part of the netlist links them like any other pins. By hand, as the loader does it for the node `motor`, whose netlist has a part `desk`, too:
+A part of the netlist links them like any other pins. By hand, as the loader does it for the node `motor`, whose netlist has a part `desk`,
+too:
 
     loadrt node cell=conveyor node=motor others=desk
     loadrt not names=alarm
