@@ -87,6 +87,7 @@ void Script::take_part(std::uint32_t source, Parsed& parsed) {
     if (!nodes.empty()) {
         std::vector<std::string> names;
         for (const NodeLine& node : nodes) names.push_back(node.name);
+        parsed.problems.clear();  // of a text that is nobody's; $(NODE) has no value here
         parsed.problems.error("several-nodes", line->span, "this netlist is for " + counted(nodes.size(), "machine") + ": " + listed(names, 100), "",
                               "hal run " + session_.sources.get(source).name + " --node " + names.front() + " loads the part of one");
     }
