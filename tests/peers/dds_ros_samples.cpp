@@ -15,7 +15,7 @@ int main() {
             Schema s = Schema::of_ros(ros, {"shoulder", "elbow", "w"}, frame);
             double value = 1.25;
             for (const hal::dds::Place& p : s.places) {
-                const std::uint64_t whole = static_cast<std::uint64_t>(value);
+                const std::int64_t whole = static_cast<std::int64_t>(value);
                 if (p.type == HAL_TYPE_FLOAT) std::memcpy(s.sample.data() + p.offset, &value, 8);
                 else if (p.type == HAL_TYPE_BIT) s.sample[p.offset] = 1;
                 else std::memcpy(s.sample.data() + p.offset, &whole, p.type == HAL_TYPE_S64 || p.type == HAL_TYPE_U64 ? 8 : 4);
