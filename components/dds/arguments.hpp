@@ -36,7 +36,8 @@ public:
           server_(c, "server", "", "discovery servers ADDRESS:PORT instead of multicast"),
           shared_memory_(c, "shared_memory", 0, "1: between processes of this machine too", {.min = 0, .max = 1}),
           profile_(c, "profile", "",
-                   "participant profile of Fast DDS: FILE.xml:NAME; data_writer and data_reader profiles named like the topic count too"),
+                   "participant profile of Fast DDS: FILE.xml:NAME; those of writers and readers named like the topic count where no "
+                   "argument says"),
           security_(c, "security", "", "folder of certificates and permissions, as ROS 2's enclaves have it") {}
 
     /// In the component's constructor: files are looked for beside the netlist. [setup]

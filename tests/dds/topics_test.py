@@ -4,7 +4,31 @@
 import signal
 import unittest
 
+from pathlib import Path
+
 from rig import DdsCase, wait_until
+
+# The participant stays on this machine; the writer of the topic does not fit dds_subscribe's readers.
+PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <transport_descriptors>
+    <transport_descriptor>
+      <transport_id>local</transport_id>
+      <type>UDPv4</type>
+      <interfaceWhiteList><address>127.0.0.1</address></interfaceWhiteList>
+    </transport_descriptor>
+  </transport_descriptors>
+  <participant profile_name="machine">
+    <rtps>
+      <userTransports><transport_id>local</transport_id></userTransports>
+      <useBuiltinTransports>false</useBuiltinTransports>
+    </rtps>
+  </participant>
+  <data_writer profile_name="arm/state">
+    <qos><ownership><kind>EXCLUSIVE</kind></ownership></qos>
+  </data_writer>
+</profiles>
+"""
 
 
 class Topics(DdsCase):
@@ -115,6 +139,18 @@ class Topics(DdsCase):
         while (line := stranger.stdout.readline()) and not line.startswith("sample"):
             pass
         self.assertRegex(line, r"^sample \d+ 2\.250000\n$")
+
+    def test_shared_memory_carries_it_when_asked(self):
+        publisher = self.publisher(1.5, more="shared_memory=1")
+        self.subscriber(more="shared_memory=1")
+        self.becomes("sub.valid", "TRUE")
+        self.assertIn("/dev/shm/fastrtps_", (Path("/proc") / str(publisher.pid) / "maps").read_text())
+
+    def test_a_profile_of_fast_dds_counts(self):
+        self.write("profile.xml", PROFILE)
+        self.publisher(1.5, more="profile=profile.xml:machine")
+        self.subscriber()
+        self.says("sub: a publisher of topic 'arm/state' offers less than is asked for: ownership")
 
     def test_what_cannot_be_loaded_is_refused_with_the_reason(self):
         for arguments, reason in (("fields=a:float", "which topic? write topic=NAME"),
