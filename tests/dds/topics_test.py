@@ -135,10 +135,7 @@ class Topics(DdsCase):
 
     def test_a_stranger_reads_what_is_published(self):
         self.publisher(2.25)
-        stranger = self.stranger("listen")
-        while (line := stranger.stdout.readline()) and not line.startswith("sample"):
-            pass
-        self.assertRegex(line, r"^sample \d+ 2\.250000\n$")
+        self.assertRegex(self.reads_a_sample(self.stranger("listen")), r"^sample \d+ 2\.250000\n$")
 
     def test_shared_memory_carries_it_when_asked(self):
         publisher = self.publisher(1.5, more="shared_memory=1")
