@@ -11,6 +11,8 @@ from harness import HAL, PATIENCE, ROOT, Case, wait_until
 os.environ["ASAN_OPTIONS"] = os.environ.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0:detect_leaks=0"
 HAVE_DDS = any("dds_publish.so" in names for _, _, names in os.walk(HAL.parent.parent / "lib")) or \
     any("dds_publish.so" in names for _, _, names in os.walk(HAL.parent.parent / "components"))
+HAVE_VISION = any("vision_blob.so" in names for _, _, names in os.walk(HAL.parent.parent / "lib")) or \
+    any("vision_blob.so" in names for _, _, names in os.walk(HAL.parent.parent / "components"))
 
 # `sender` counts up, `taker` sends back twice of it. The deadline is long: this machine may be busy.
 CELL = """loadrt threads name1=servo period1=1000000
@@ -185,7 +187,7 @@ class Running(Case):
         self.assertRegex(done.stderr, "node 'taker' of 'cell' runs (already:|twice: here and as) instance 'taker' on ")
 
 
-@unittest.skipUnless(HAVE_DDS, "built without Fast DDS")
+@unittest.skipUnless(HAVE_DDS and HAVE_VISION, "built without Fast DDS or OpenCV")
 class Namespaces(Case):
     """halfiles/cell: a network namespace and a process for each node."""
 
@@ -221,12 +223,30 @@ class Namespaces(Case):
 class Cell(Case):
     """halfiles/cell on the virtual clock."""
 
-    def test_both_robots_follow_their_bottles(self):
-        said = self.good("sim", ROOT / "halfiles/cell/cell.hal", "--for", "15s", "-e", "robot1: getp pilot.distance",
-                         "-e", "robot2: getp pilot.distance", "-e", "cell: getp apart.out")
-        first, second, apart = map(float, said.split())
-        self.assertLess(max(first, second), 0.03, said)
-        self.assertGreater(apart, 0.3, said)
+    def sim(self, netlist, *asked):
+        return self.good("sim", netlist, "--for", "15s", *(word for one in asked for word in ("-e", one))).split()
+
+    @unittest.skipUnless(HAVE_VISION, "built without OpenCV")
+    def test_both_robots_follow_the_bottles_that_the_camera_sees(self):
+        first, second, apart, *places = map(float, self.sim(
+            ROOT / "halfiles/cell/cell.hal", "robot1: getp pilot.distance", "robot2: getp pilot.distance", "cell: getp apart.out",
+            *(f"camera: getp {pin}" for pin in ("eye.track-0-x", "push1.sine", "eye.track-0-y", "push1.cosine",
+                                                "eye.track-1-x", "push2.sine", "eye.track-1-y", "push2.cosine"))))
+        self.assertLess(max(first, second), 0.03)
+        self.assertGreater(apart, 0.3)
+        for seen, true in zip(places[::2], places[1::2]):
+            self.assertAlmostEqual(true, seen, delta=0.02)
+
+    @unittest.skipUnless(HAVE_VISION, "built without OpenCV")
+    def test_without_a_bottle_nobody_drives(self):
+        for file in ("cell.hal", "field.ground"):
+            self.write(file, (ROOT / "halfiles/cell" / file).read_text().replace("setp hall.object-1-kind 1\n", ""))
+        self.assertEqual(["1", "FALSE", "FALSE", "0.2"], self.sim("cell.hal", "camera: getp eye.count", "cell: getp go.out",
+                                                                  "robot1: getp pilot.enable", "robot1: getp base.x"))
+
+    @unittest.skipIf(HAVE_VISION, "OpenCV is there")
+    def test_without_opencv_check_says_which_package(self):
+        self.assertIn("libopencv-contrib-dev", self.bad("check", ROOT / "halfiles/cell/cell.hal"))
 
 
 class Top(Case):
