@@ -2,13 +2,16 @@
 """Netlists for several machines: hal check, hal sim, and hal run --node with a process for each node on loopback; hal top."""
 import json
 import os
+import re
 import subprocess
 import unittest
 
 from harness import HAL, PATIENCE, ROOT, Case, wait_until
+from own_network import dds_domain
 
 # Fast DDS frees some of its memory by another size than it took; who is killed here leaks on purpose.
 os.environ["ASAN_OPTIONS"] = os.environ.get("ASAN_OPTIONS", "") + ":new_delete_type_mismatch=0:detect_leaks=0"
+DOMAIN = dds_domain()  # in a network of its own
 HAVE_DDS = any("dds_publish.so" in names for _, _, names in os.walk(HAL.parent.parent / "lib")) or \
     any("dds_publish.so" in names for _, _, names in os.walk(HAL.parent.parent / "components"))
 HAVE_VISION = any("vision_blob.so" in names for _, _, names in os.walk(HAL.parent.parent / "lib")) or \
@@ -108,13 +111,28 @@ class Language(Case):
 class Running(Case):
     def setUp(self):
         super().setUp()
-        # a domain that other tests at the same time hardly have
-        self.environment["HALCYON_DDS"] = f"domain={1 + os.getpid() % 230}"
+        self.environment["HALCYON_DDS"] = f"domain={DOMAIN}"
         self.environment["SKIP_DEFAULT_XML_FILE"] = "1"
         self.path = self.write("cell.hal", CELL)
 
     def node(self, name, path=None):
         return self.start("run", path or self.path, "--node", name, instance=name)
+
+    def until_said(self, pattern, *words):
+        """Runs hal until it has said on standard error what matches: how long two nodes take to meet is up to the machine."""
+        log = open(self.folder / "said", "w+")
+        self.addCleanup(log.close)
+        process = subprocess.Popen(["hal", "run", *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=log)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+
+        def said():
+            ended = process.poll() is not None
+            text = (self.folder / "said").read_text()
+            return text if ended or re.search(pattern, text) else None
+        text = wait_until(said, f"it says '{pattern}'")
+        self.assertRegex(text, pattern)
 
     def until(self, node, pin, good, what):
         return wait_until(lambda: good(self.value(pin, instance=node)), f"{what} ({pin} of {node} is {self.value(pin, instance=node)})")
@@ -152,7 +170,7 @@ class Running(Case):
         self.assertEqual(("cell", "sender", again.pid), tuple(seen["sender"][key] for key in ("cell", "instance", "pid")))
         self.assertEqual(["servo"], [thread["name"] for thread in seen["sender"]["threads"]])
         self.assertGreaterEqual(seen["taker"]["faults"], 1)
-        self.assertIn("cell/taker", self.good("top"))
+        wait_until(lambda: "cell/taker" in self.good("top"), "it is in the table")
         self.end(again)
         out, err = self.end(taker)
         self.assertNotIn("ERROR", err)
@@ -171,10 +189,8 @@ class Running(Case):
         path = self.folder / "new" / "cell.hal"
         os.rename(other, path)
         # on a machine that is very busy the two meet later than in the second that the start waits; then it is said, and nothing passes
-        done = self.run_program("run", path, "--node", "sender", "--for", "5s")
-        self.assertIn("runs another version of netlist 'cell' than node 'sender': signal 'count' is s32 on node 'sender' and float on node "
-                      "'taker'; run the same file on both", done.stderr)
-        self.assertIn("node 'taker' (instance 'taker' on ", done.stderr)
+        self.until_said(r"node 'taker' \(instance 'taker' on .*\) runs another version of netlist 'cell' than node 'sender': "
+                        "signal 'count' is s32 on node 'sender' and float on node 'taker'; run the same file on both", path, "--node", "sender")
         self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
 
     def test_settings_that_are_none_are_named(self):
@@ -183,8 +199,8 @@ class Running(Case):
 
     def test_a_node_runs_once(self):
         self.node("taker")
-        done = self.run_program("run", self.path, "--node", "taker", "--name", "twin", "--for", "5s")
-        self.assertRegex(done.stderr, "node 'taker' of 'cell' runs (already:|twice: here and as) instance 'taker' on ")
+        self.until_said("node 'taker' of 'cell' runs (already:|twice: here and as) instance 'taker' on ", self.path, "--node", "taker",
+                        "--name", "twin")
 
 
 @unittest.skipUnless(HAVE_DDS and HAVE_VISION, "built without Fast DDS or OpenCV")
@@ -259,7 +275,7 @@ class Top(Case):
         self.assertIn("alone", self.good("top", "--once"))
 
     def test_nobody(self):
-        self.environment["HALCYON_DDS"] = f"domain={1 + os.getpid() % 230}"
+        self.environment["HALCYON_DDS"] = f"domain={DOMAIN}"
         self.assertEqual("[]\n", self.good("top", "--json"))
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "cli"))
 from harness import HAL, Case, wait_until  # noqa: E402, F401
+from own_network import dds_domain, own_network  # noqa: E402, F401
 
 STRANGER = Path(os.environ.get("DDS_STRANGER") or HAL.parent / "dds_stranger")
-DOMAIN = 20 + os.getpid() % 200  # tests run side by side
+DOMAIN = dds_domain()  # in a network of its own
 
 PUBLISH = """loadrt threads name1=servo period1=1000000
 loadrt dds_publish names=pub topic=arm/state fields=angle:float,ready:bit,count:s32*2 rate=200 {more}
@@ -67,6 +68,11 @@ class DdsCase(Case):
     def becomes(self, pin, value, instance="subscriber"):
         wait_until(lambda: self.value(pin, instance) == value, f"{instance}: {pin} is {value}")
 
+    def shows(self, *values):
+        """The subscriber's pins become valid with these values: on a busy machine samples may be late, and what was valid is not for a while."""
+        for pin, value in zip(("angle", "ready", "count-0", "count-1"), values):
+            self.becomes("sub." + pin, value)
+
     def says(self, text, instance="subscriber"):
         wait_until(lambda: text in self.words(instance), f"{instance} says '{text}'")
 
@@ -88,6 +94,6 @@ class DdsCase(Case):
         """Its whole output."""
         if process.stdin.closed:
             return "", ""
-        out = process.communicate(timeout=60)
+        out = process.communicate(timeout=120)
         self.assertEqual(0, process.returncode, out)
         return out

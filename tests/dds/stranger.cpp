@@ -4,6 +4,7 @@
 //   rate=HZ        samples per second; 0: a flood    clock=SECONDS  how much its clock is ahead
 //   bytes=HEX      sends these bytes instead         value=X        in the first field, a float
 //   reliable=0     best effort                       listen         prints what comes instead
+//   depth=N        samples kept until they were read
 //   domain=N, security=FOLDER, server=ADDRESS:PORT, interfaces=…
 // Ends with standard input; says "matched" when somebody is there.
 #include <poll.h>
@@ -44,6 +45,7 @@ bool option(Options& o, const std::string& word) {
     else if (key == "count") o.count = std::atol(value.c_str());
     else if (key == "listen") o.listen = true;
     else if (key == "reliable") o.quality.reliable = value == "1";
+    else if (key == "depth") o.quality.depth = std::atoi(value.c_str());
     else if (key == "domain") o.settings.domain = std::atoi(value.c_str());
     else if (key == "security") o.settings.security = value;
     else if (key == "server") o.settings.servers = {value};
@@ -99,7 +101,7 @@ void write_all(Writer& writer, const Options& o, const Schema& schema) {
         if (o.rate > 0) std::this_thread::sleep_for(std::chrono::duration<double>(1 / o.rate));
     }
     say("sent " + std::to_string(sent));
-    writer.wait_for_acknowledgments(2'000'000'000);
+    writer.wait_for_acknowledgments(60'000'000'000);
 }
 
 }  // namespace

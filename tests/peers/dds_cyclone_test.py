@@ -70,6 +70,7 @@ class JointState(IdlStruct, typename="sensor_msgs::msg::dds_::JointState_"):
 
 
 RELIABLE = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(16))
+ALL = Qos(Policy.Reliability.Reliable(duration(seconds=60)), Policy.History.KeepAll)
 THREAD = "loadrt threads name1=servo period1=1000000\n"
 FIELDS = "fields=ready:bit,angle:float,count:s32,number:u64"
 
@@ -83,7 +84,7 @@ class Cyclone(DdsCase):
         return DataReader(self.participant, Topic(self.participant, name, kind), qos=RELIABLE)
 
     def writer(self, name, kind):
-        return DataWriter(self.participant, Topic(self.participant, name, kind), qos=RELIABLE)
+        return DataWriter(self.participant, Topic(self.participant, name, kind), qos=ALL)
 
     def first(self, reader):
         return wait_until(lambda: reader.take(1), "a sample comes")[0]
