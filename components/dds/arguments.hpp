@@ -11,19 +11,9 @@
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
 #include "schema.hpp"
+#include "words.hpp"
 
 namespace hal::dds {
-
-/// "a,b,c" or, as netlists without quotes have it, "a;b;c".
-inline std::vector<std::string> list_of(const std::string& text) {
-    std::vector<std::string> all;
-    for (std::size_t at = 0; at < text.size();) {
-        const std::size_t end = std::min(text.find_first_of(",;", at), text.size());
-        if (end > at) all.push_back(text.substr(at, end - at));
-        at = end + 1;
-    }
-    return all;
-}
 
 /// Of the participant: who may meet. A member before the pins.
 class ParticipantArguments {

@@ -14,21 +14,16 @@
 
 #include "engine.hpp"
 #include "hal/status.h"
+#include "words.hpp"
 
 namespace hal::dds {
 
 constexpr std::int64_t status_period_ns = 500'000'000;
-constexpr std::size_t  largest_status = 60'000;
 
 /// "halcyon/status", a string.
 HAL_EXPORT TopicType status_topic();
 /// A reader may be slow: newest of each.
 HAL_EXPORT Quality status_quality();
-HAL_EXPORT std::vector<std::uint8_t> status_bytes(std::string_view text);
-/// Empty when the bytes are no such string.
-HAL_EXPORT std::string_view status_text(std::span<const std::uint8_t> bytes) noexcept;
-/// The values of a key, in order.
-HAL_EXPORT std::vector<std::string> values_of(std::string_view text, std::string_view key);
 
 /// Publishes the status of this instance, once per participant, as long as somebody holds it.
 class Beacon {
@@ -43,7 +38,7 @@ HAL_EXPORT std::shared_ptr<Beacon> beacon(const std::shared_ptr<Participant>&, c
 }  // namespace hal::dds
 
 /// For `hal top`, which finds this library when it is there: calls `heard` with each status that comes, in a thread of the engine, until
-/// halcyon_status_close. `settings` are words KEY=VALUE: domain, interfaces, peers, server. nullptr: `problem` (256 bytes) says why.
+/// halcyon_status_close. `settings` are words KEY=VALUE, as of `hal run --dds`. nullptr: `problem` (256 bytes) says why.
 extern "C" {
 HAL_EXPORT void* halcyon_status_open(const char* settings, void (*heard)(void* user, const char* text, size_t length), void* user,
                                      char* problem);

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import unittest
 
-from rig import DOMAIN, DdsCase
+from rig import DOMAIN, DdsCase, wait_until
 
 if not shutil.which("openssl"):
     print("openssl is not installed")
@@ -80,6 +80,14 @@ class Security(DdsCase):
         self.reads_a_sample(tool)
         self.assertEqual("ready\n", self.end_stranger(without)[0])
         self.assertEqual("ready\n", self.end_stranger(thief)[0])
+
+    def test_hal_top_with_a_certificate_sees_who_has_one(self):
+        self.authority("authority")
+        self.publisher(more=self.enclave("arm", topic="*"))
+        domain, tool = f"domain={DOMAIN}", self.enclave("tool", topic="*")
+        elsewhere = {"XDG_RUNTIME_DIR": str(self.folder / "tool")}  # so that it has the network only
+        wait_until(lambda: '"publisher"' in self.good("top", "--json", "--dds", f"{domain} {tool}", environment=elsewhere), "hal top sees it")
+        self.assertEqual("[]\n", self.good("top", "--json", "--dds", domain, environment=elsewhere))
 
     def test_who_is_not_permitted_the_topic_is_refused_by_name(self):
         self.authority("authority")

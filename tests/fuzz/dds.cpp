@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // DDS: whatever comes as a sample is decoded within its bytes or refused with nothing changed; what was decoded of plain fields is encoded the
-// same again. Whatever is given as fields is refused with a sentence or makes a type whose own sample can be decoded.
+// same again. Whatever is given as fields is refused with a sentence or makes a type whose own sample can be decoded. Whatever comes as the
+// status of an instance is read within its bytes, and what is shown of it does not steer a terminal.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -8,6 +10,8 @@
 #include <vector>
 
 #include "components/dds/schema.hpp"
+#include "components/dds/words.hpp"
+#include "tools/top.hpp"
 
 namespace {
 
@@ -48,6 +52,29 @@ void fields(std::string_view text) {
     } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a refusal says why"); }
 }
 
+bool plain(std::string_view text) {
+    return std::none_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
+}
+
+void status(std::span<const std::uint8_t> given) {
+    const std::vector<std::uint8_t> bytes(given.begin(), given.end());
+    const std::string text(status_text(bytes));
+    require(status_text(status_bytes(text)) == text, "what was read can be written");
+    std::vector<std::string> layouts{""};
+    for (const char* key : {"offers", "wants", "instance"})
+        for (const std::string& value : values_of(text, key)) {
+            require(value.find('\n') == value.npos, "a value is on one line");
+            require(plain(shown(value)) && shown(value).size() <= 600, "what is shown is one short line");
+            for (const auto& [topic, layout] : topics_of(value)) layouts.push_back(layout);
+        }
+    for (std::size_t i = 1; i < layouts.size() && i < 20; ++i)
+        require(difference(layouts[i - 1], "a", layouts[i], "b").empty() == (layouts[i - 1] == layouts[i]),
+                "two layouts differ when they do");
+    hal::tools::SeenInstance seen;
+    if (hal::tools::read_status(text, seen))
+        require(plain(seen.instance + seen.host + seen.cell + seen.node + seen.fault), "hal top shows it");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -57,6 +84,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                      Schema::of_ros("sensor_msgs/Image", {}, "camera")};
     if (size == 0) return 0;
     if (data[0] < std::size(schemas)) sample(schemas[data[0]], {data + 1, size - 1});
+    else if (data[0] == std::size(schemas)) status({data + 1, size - 1});
     else fields({reinterpret_cast<const char*>(data), size});
     return 0;
 }

@@ -30,6 +30,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "dds/words.hpp"
 #include "settings.hpp"
 
 namespace hal::dds {
@@ -350,7 +351,7 @@ private:
     static void compare(const Watched& ours, const Remote& theirs) {
         if (ours.topic != theirs.topic || ours.writes == theirs.writes || ours.type == theirs.type) return;
         ours.gate->event(Event::wrong_type, 0,
-                         "topic '" + ours.topic + "' has the type " + ours.type + " here and " + theirs.type + " at a " +
+                         "topic '" + ours.topic + "' has the type " + ours.type + " here and " + shown(theirs.type) + " at a " +
                              (theirs.writes ? "publisher" : "subscriber") + " elsewhere; nothing is exchanged with it");
     }
     template <class Data>

@@ -32,7 +32,7 @@ public:
         {
             std::unique_lock lock(mutex_);
             std::erase_if(entries_, [&s](const Entry& e) { return e.served == &s; });
-            if (!entries_.empty()) return;
+            if (!entries_.empty() || !running_) return;
             running_ = false;
             wake_.notify_one();
         }

@@ -2,6 +2,7 @@
 #include "dds/status.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
 #include <sstream>
 #include <stdexcept>
@@ -10,35 +11,6 @@ namespace hal::dds {
 
 TopicType status_topic() { return {"halcyon/status", "halcyon::Status", largest_status + 16}; }
 Quality   status_quality() { return {.reliable = true, .last_value = true, .depth = 1}; }
-
-std::vector<std::uint8_t> status_bytes(std::string_view text) {
-    text = text.substr(0, largest_status);
-    std::vector<std::uint8_t> bytes{0, 1, 0, 0};
-    const auto                length = static_cast<std::uint32_t>(text.size() + 1);
-    for (unsigned shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::uint8_t>(length >> shift));
-    bytes.insert(bytes.end(), text.begin(), text.end());
-    bytes.push_back(0);
-    return bytes;
-}
-
-std::string_view status_text(std::span<const std::uint8_t> bytes) noexcept {
-    if (bytes.size() < 9 || bytes[0] != 0 || bytes[1] != 1) return {};
-    std::uint32_t length = 0;
-    for (unsigned i = 0; i < 4; ++i) length |= static_cast<std::uint32_t>(bytes[4 + i]) << (8 * i);
-    if (length < 1 || length > bytes.size() - 8) return {};
-    return {reinterpret_cast<const char*>(bytes.data() + 8), length - 1};
-}
-
-std::vector<std::string> values_of(std::string_view text, std::string_view key) {
-    std::vector<std::string> values;
-    while (!text.empty()) {
-        const std::size_t      end = std::min(text.find('\n'), text.size());
-        const std::string_view line = text.substr(0, end);
-        if (line.starts_with(key) && line.size() > key.size() && line[key.size()] == ' ') values.emplace_back(line.substr(key.size() + 1));
-        text.remove_prefix(std::min(end + 1, text.size()));
-    }
-    return values;
-}
 
 namespace {
 
@@ -119,25 +91,27 @@ private:
     std::unique_ptr<Reader>      reader_;
 };
 
-std::vector<std::string> list(const std::string& text) {
-    std::vector<std::string> all;
-    std::stringstream        from(text);
-    for (std::string one; std::getline(from, one, ',');) all.push_back(one);
-    return all;
-}
-
 Settings settings_of(const char* words) {
     Settings          settings;
     std::stringstream from(words);
     settings.name = "hal top";
     for (std::string word; from >> word;) {
-        const auto        equals = word.find('=');
-        const std::string key = word.substr(0, equals), value = equals == word.npos ? "" : word.substr(equals + 1);
-        if (key == "domain") settings.domain = std::stoi(value);
-        else if (key == "interfaces") settings.interfaces = list(value);
-        else if (key == "peers") settings.peers = list(value);
-        else if (key == "server") settings.servers = list(value);
-        else throw std::invalid_argument("there is no setting '" + key + "'; the settings are domain= interfaces= peers= server=");
+        const auto        equals = std::min(word.find('='), word.size());
+        const std::string key = word.substr(0, equals), value = word.substr(std::min(equals + 1, word.size()));
+        if (key == "domain") {
+            const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), settings.domain);
+            if (error != std::errc{} || end != value.data() + value.size())
+                throw std::invalid_argument("'" + word + "': write domain=NUMBER, 0 to 232");
+        } else if (key == "shared_memory" && (value == "0" || value == "1")) settings.shared_memory = value == "1";
+        else if (key == "interfaces") settings.interfaces = list_of(value);
+        else if (key == "peers") settings.peers = list_of(value);
+        else if (key == "server") settings.servers = list_of(value);
+        else if (key == "profile") settings.profile = value;
+        else if (key == "security") settings.security = value;
+        else
+            throw std::invalid_argument("'" + word +
+                                        "' is no setting; the settings are domain= interfaces= peers= server= shared_memory=0 or 1, "
+                                        "profile= security=");
     }
     return settings;
 }

@@ -8,10 +8,9 @@
 #include <mutex>
 #include <optional>
 
-#include "dds/arguments.hpp"
+#include "dds/attendance.hpp"
 #include "dds/field_pins.hpp"
 #include "dds/outbox.hpp"
-#include "dds/status.hpp"
 
 namespace {
 
@@ -22,21 +21,9 @@ public:
     using hal::Component::Component;
 
     void start() {
-        participant_ = open(settings_);
-        writer_ = participant_->writer(topic_, quality_, this);
-        try {
-            beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
-        } catch (const std::exception& e) {  // permissions need not know of it
-            arguments_.say(std::string("hal top does not show this instance: ") + e.what());
-        }
-        hal::dds::serve(*this);
+        attendance_.begin(arguments_, settings_, *this, [this](Participant& p) { return p.writer(topic_, quality_, this); });
     }
-    void stop() noexcept {
-        if (participant_) withdraw(*this);
-        writer_.reset();
-        beacon_.reset();
-        participant_.reset();
-    }
+    void stop() noexcept { attendance_.end(*this); }
 
     /// Stores the pins into the next place of the outbox, every n-th cycle. [realtime]
     void publish(hal::Cycle cycle) noexcept {
@@ -112,7 +99,7 @@ private:
             std::memcpy(bytes.data() + schema_.stamp, &sec, sizeof sec);
             std::memcpy(bytes.data() + schema_.stamp + 4, &nanosec, sizeof nanosec);
         }
-        (writer_->write(bytes, source) ? sent_ : refused_).fetch_add(1, std::memory_order_relaxed);
+        (attendance_.endpoint().write(bytes, source) ? sent_ : refused_).fetch_add(1, std::memory_order_relaxed);
     }
 
     void on_event(Event e, int count, const std::string& words) noexcept override {
@@ -161,9 +148,7 @@ private:
     std::int64_t lead_ = 0;  // when it looks first, from the beginning of the cycle
     std::int64_t expected_ = 0, since_ = 0;  // the cycle it is looking for, and since when
 
-    std::shared_ptr<Participant> participant_;
-    std::shared_ptr<Beacon>      beacon_;  // tells hal top of this instance
-    std::unique_ptr<Writer>      writer_;
+    Attendance<Writer> attendance_;
 };
 
 }  // namespace

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <memory>
 
-#include "dds/arguments.hpp"
+#include "dds/attendance.hpp"
 #include "dds/field_pins.hpp"
-#include "dds/status.hpp"
 #include "hal/queue.hpp"
 
 namespace {
@@ -33,21 +32,9 @@ public:
 
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
-        participant_ = open(settings_);
-        reader_ = participant_->reader(topic_, quality_, this);
-        try {
-            beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
-        } catch (const std::exception& e) {  // permissions need not know of it
-            arguments_.say(std::string("hal top does not show this instance: ") + e.what());
-        }
-        hal::dds::serve(*this);
+        attendance_.begin(arguments_, settings_, *this, [this](Participant& p) { return p.reader(topic_, quality_, this); });
     }
-    void stop() noexcept {
-        if (participant_) withdraw(*this);
-        reader_.reset();
-        beacon_.reset();
-        participant_.reset();
-    }
+    void stop() noexcept { attendance_.end(*this); }
 
     /// Shows the newest sample; no newer one within the timeout: not valid. [realtime]
     void take(hal::Cycle cycle) noexcept {
@@ -218,9 +205,7 @@ private:
     State        said_ = State::waiting;
     std::int64_t quiet_since_ = 0;
 
-    std::shared_ptr<Participant> participant_;
-    std::shared_ptr<Beacon>      beacon_;  // tells hal top of this instance
-    std::unique_ptr<Reader>      reader_;
+    Attendance<Reader> attendance_;
 };
 
 }  // namespace

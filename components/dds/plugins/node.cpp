@@ -23,50 +23,6 @@ namespace {
 
 using namespace hal::dds;
 
-/// "cell/servo=x:float,y:bit;cell/slow=z:s32;" as topic to layout.
-std::map<std::string, std::string> topics_of(const std::string& text) {
-    std::map<std::string, std::string> all;
-    for (std::size_t at = 0; at < text.size();) {
-        const std::size_t end = std::min(text.find(';', at), text.size()), equals = text.find('=', at);
-        if (equals < end) all[text.substr(at, equals - at)] = text.substr(equals + 1, end - equals - 1);
-        at = end + 1;
-    }
-    return all;
-}
-
-/// "x:float,y:bit" as signal to type.
-std::map<std::string, std::string> signals_of(const std::string& layout) {
-    std::map<std::string, std::string> all;
-    for (const std::string& one : list_of(layout)) {
-        const std::size_t colon = one.rfind(':');
-        if (colon != one.npos) all[one.substr(0, colon)] = one.substr(colon + 1);
-    }
-    return all;
-}
-
-/// The first difference of a topic's layout, of which `sender` says the one and `taker` the other; empty: they agree.
-std::string difference(const std::string& sends, const std::string& sender, const std::string& takes, const std::string& taker) {
-    if (sends == takes) return {};
-    const auto there = signals_of(sends), here = signals_of(takes);
-    for (const auto& [signal, type] : here) {
-        const auto other = there.find(signal);
-        if (other == there.end()) return "signal '" + signal + "' is known to node '" + taker + "' only";
-        if (other->second != type)
-            return "signal '" + signal + "' is " + other->second + " on node '" + sender + "' and " + type + " on node '" + taker + "'";
-    }
-    for (const auto& [signal, type] : there)
-        if (!here.contains(signal)) return "signal '" + signal + "' is known to node '" + sender + "' only";
-    return "their signals stand in another order";
-}
-
-/// Words that came over the network, on their way to a terminal.
-std::string shown(std::string words) {
-    words.resize(std::min<std::size_t>(words.size(), 600));
-    for (char& c : words)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
-    return words;
-}
-
 /// Another node, as its cycle and the engine's threads know it.
 struct Other {
     Other(hal::Component& c, const hal::Function& f, std::string node)

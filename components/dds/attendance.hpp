@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// What a component with a topic has while it runs.
+#pragma once
+
+#include "dds/arguments.hpp"
+#include "dds/status.hpp"
+
+namespace hal::dds {
+
+/// Its participant, its writer or reader, the beacon that tells hal top of the instance, and its place in the DDS thread.
+template <class Endpoint>
+class Attendance {
+public:
+    /// `make(participant)` makes the endpoint. What it throws has left nothing behind. [setup]
+    template <class Make>
+    void begin(const Arguments& arguments, const Settings& settings, Served& served, Make make) {
+        auto participant = open(settings);
+        endpoint_ = make(*participant);
+        participant_ = std::move(participant);
+        try {
+            beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
+        } catch (const std::exception& e) {  // permissions need not know of it
+            arguments.say(std::string("hal top does not show this instance: ") + e.what());
+        }
+        serve(served);
+    }
+    /// Also when begin() was not called, or threw. [setup]
+    void end(Served& served) noexcept {
+        if (participant_) withdraw(served);
+        endpoint_.reset();
+        beacon_.reset();
+        participant_.reset();
+    }
+    /// After begin(). [any]
+    Endpoint& endpoint() const noexcept { return *endpoint_; }
+
+private:
+    std::shared_ptr<Participant> participant_;
+    std::shared_ptr<Beacon>      beacon_;
+    std::unique_ptr<Endpoint>    endpoint_;
+};
+
+}  // namespace hal::dds
