@@ -65,14 +65,14 @@ std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
     return fmt::format("{}\n{}\n", line, key);
 }
 
-std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t) {
+std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t, const std::string& by_way_of) {
     const auto& e = s.stations[t.station];
     return fmt::format(
         "{}: an input of it becomes an output of it after {:.2f} us at worst, {} cycle{} after it was read\n"
-        "  read {:.2f}, sent {:.2f} (slot {}), there {:.2f}; master's thread {:.2f}, sent {:.2f}, there {:.2f}; written {:.2f}\n"
+        "  read {:.2f}, sent {:.2f} (slot {}), there {:.2f}; {}'s thread {:.2f}, sent {:.2f}, there {:.2f}; written {:.2f}\n"
         "  {:.2f} - {:.2f} + {:.2f} for an input that changed just after it was read = {:.2f} us\n",
         e.name, us(t.worst), t.cycles, t.cycles == 1 ? "" : "s", us(t.read), us(t.up), e.slots.front().setup.id, us(t.up_arrives),
-        us(t.master), us(t.down), us(t.down_arrives), us(t.output), us(t.output), us(t.read), us(s.cycle), us(t.worst));
+        by_way_of, us(t.master), us(t.down), us(t.down_arrives), us(t.output), us(t.output), us(t.read), us(s.cycle), us(t.worst));
 }
 
 std::string text_of(const config::Schedule& s, const plan::Plan& p) {
@@ -91,7 +91,7 @@ std::string text_of(const config::Schedule& s, const plan::Plan& p) {
                 fmt::format("{} looks {:g} us after the beginning of the cycle and takes over {:g} us after the sync that did not come\n",
                             e.name, us(e.phase), us(e.backup_offset));
     text += fmt::format("outputs are safe {} cycle{} after the last sync: {:g} us\n", s.lost, s.lost == 1 ? "" : "s", us(s.cycle * s.lost));
-    for (const plan::RoundTrip& t : p.trips) text += trip_text(s, t);
+    for (const plan::RoundTrip& t : p.trips) text += trip_text(s, t, s.stations[*p.by_way_of].name);
     return text;
 }
 

@@ -50,6 +50,14 @@ Time leaves(const Schedule& s, const StationEntry& e, Time begun, std::size_t pl
     return t + static_cast<Time>(slot.period - 1) * s.cycle;
 }
 
+/// Who closes the loops: the master; when it has no slot and keeps the time alone, the first backup that has one.
+std::optional<std::size_t> loops_of(const Schedule& s) {
+    for (const Role role : {Role::master, Role::backup})
+        for (std::size_t i = 0; i < s.stations.size(); ++i)
+            if (s.stations[i].role == role && !s.stations[i].slots.empty()) return i;
+    return {};
+}
+
 std::size_t longest(const StationEntry& e, std::size_t place = 0) {
     return ethernet::header_bytes + std::max<std::size_t>(e.slots[place].setup.size, 46);
 }
@@ -62,19 +70,20 @@ Plan plan_of(const Schedule& s) {
     for (const Entry& e : plan.entries)
         if (e.what != Entry::What::backup_sync)
             plan.load += static_cast<double>(e.until - e.at) / static_cast<double>(s.cycle) / static_cast<double>(e.period);
-    const StationEntry* m = s.master();
-    if (m == nullptr || m->slots.empty()) return plan;
+    plan.by_way_of = loops_of(s);
+    if (!plan.by_way_of) return plan;
+    const StationEntry& m = s.stations[*plan.by_way_of];
     for (std::size_t i = 0; i < s.stations.size(); ++i) {
         const StationEntry& e = s.stations[i];
-        if (e.role == Role::master || e.slots.empty()) continue;
+        if (i == *plan.by_way_of || e.slots.empty()) continue;
         RoundTrip t;
         t.station = i;
         t.read = e.phase;
         t.up = leaves(s, e, t.read);
         t.up_arrives = t.up + s.path(longest(e));
-        t.master = next(m->phase, s.cycle, t.up_arrives);
-        t.down = leaves(s, *m, t.master);
-        t.down_arrives = t.down + s.path(longest(*m));
+        t.master = next(m.phase, s.cycle, t.up_arrives);
+        t.down = leaves(s, m, t.master);
+        t.down_arrives = t.down + s.path(longest(m));
         t.output = next(e.phase, s.cycle, t.down_arrives);
         t.worst = t.output - t.read + s.cycle;
         t.cycles = static_cast<std::uint32_t>((t.output - t.read) / s.cycle);

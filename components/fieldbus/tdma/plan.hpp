@@ -23,15 +23,15 @@ std::vector<Entry> entries_of(const config::Schedule&);
 /// There is a cycle in which both are used.
 bool meet(const Entry&, const Entry&);
 
-/// From an input of a station by way of the master to an output of the same station. Times from the sync of the cycle in which the
-/// station's thread read the input.
+/// From an input of a station by way of the one that closes the loops to an output of the same station. Times from the sync of the cycle
+/// in which the station's thread read the input.
 struct RoundTrip {
     std::size_t station = 0;
     Time read = 0;         ///< the station's thread reads its inputs
     Time up = 0;           ///< its frame leaves, in its first slot, at worst
     Time up_arrives = 0;
-    Time master = 0;       ///< the master's thread takes it and computes
-    Time down = 0;         ///< the master's frame leaves, in its first slot, at worst
+    Time master = 0;       ///< that station's thread takes it and computes
+    Time down = 0;         ///< its frame leaves, in its first slot, at worst
     Time down_arrives = 0;
     Time output = 0;       ///< the station's thread takes it
     Time worst = 0;        ///< of an input that changed just after it was read: a cycle more
@@ -41,7 +41,9 @@ struct RoundTrip {
 struct Plan {
     std::vector<Entry>     entries;
     double                 load = 0.0;  ///< share of the time that frames take, all of their full length, slots by their period
-    std::vector<RoundTrip> trips;       ///< of the stations that have a slot, when the master has one
+    /// Who closes the loops: the master; when it has no slot and keeps the time alone, the first backup that has one; or nobody.
+    std::optional<std::size_t> by_way_of;
+    std::vector<RoundTrip> trips;       ///< of the other stations that have a slot
 };
 Plan plan_of(const config::Schedule&);
 

@@ -110,6 +110,21 @@ TEST(Plan, adds_up_load_and_latency) {
     EXPECT_EQ(2'150'000, p.trips[1].output);
 }
 
+TEST(Plan, goes_by_way_of_the_backup_when_the_master_keeps_the_time_alone) {
+    const auto r = config::read(
+        "cycle 1000\nmaster:\nbackup-master:\nphase 80\nbackup-offset 140\nslot 0 220 1/1 46\n"
+        "slave:\nname x\nphase 300\nslot 0 420 1/1 46\n");
+    ASSERT_TRUE(r.good()) << said(r);
+    const auto p = plan::plan_of(r.schedule);
+    EXPECT_EQ(1U, p.by_way_of);
+    ASSERT_EQ(1U, p.trips.size());
+    EXPECT_EQ(2U, p.trips[0].station) << "x";
+    EXPECT_EQ(1'080'000, p.trips[0].master);
+    EXPECT_EQ(1'220'000, p.trips[0].down);
+    EXPECT_EQ(2'000'000, p.trips[0].worst);
+    EXPECT_EQ(std::nullopt, plan::plan_of(config::read("cycle 1000\nmaster:\nslave:\nslot 0 400\n").schedule).by_way_of);
+}
+
 TEST(Ways, are_what_the_schedule_leaves) {
     const auto r = config::read(
         "cycle 1000\nmaster:\nphase 80\nslot 0 220 1/1 400\nslot 2 900 1/1 46\nslave:\nname x\nphase 300\nslot 0 420 1/1 250\n"
