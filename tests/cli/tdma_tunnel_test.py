@@ -119,6 +119,18 @@ class Tunnel(Segment):
         self.wait_for_words("m", "tdma.0: the interface hal0 was deleted; ordinary packets pass again after unloadrt and loadrt\n")
         self.assertEqual("TRUE", self.pin("m", "running"))
 
+    def test_a_station_without_a_file_gets_its_ip_with_its_schedule(self):
+        cell = CELL.replace("name x\n", f"name x\nmac {self.mac('x')}\n").replace("slot 0 500 1/1 46", "slot 0 500 1/1 300")
+        self.write("cell.tdma", cell.format(size=200))
+        self.station("x", self.netlist("x").replace("config=cell.tdma station=x", "station=auto"))
+        self.assertNotIn("ordinary packets", self.said("x"))
+        self.station("m", self.netlist("m"))
+        self.wait_for_words("x", "tdma.0: ordinary packets pass by hal0, MTU 196, IP 10.9.0.2\n")
+        for name in self.names:
+            self.wait_for_carrier(name)
+        self.ping("m", "10.9.0.2")
+        self.assertIn("mtu 196", self.at("x", "ip", "link", "show", "hal0").stdout)
+
     def refused(self, tunnel, *before, station="m", cell=CELL):
         """What the program says that ends because of the tunnel."""
         self.write("cell.tdma", cell.format(size=1500))

@@ -58,7 +58,7 @@ void Client::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
     switch (m.id) {
     case Id::stage_1:
         if (!is_for_us(m)) return;
-        if (step_ != Step::waiting && m.from != server_) {  // two servers: the first has it
+        if (step_ != Step::waiting && m.from != server_ && m.from != station_.status().master) {  // two servers: the first has it
             ++foreign_;
             events_.on_other_server(m.from);
             return;

@@ -17,7 +17,22 @@ void Server::begin() noexcept {
         c = {};
         c.setup = setup;
     }
-    ready_ = 0, foreign_ = 0, began_ = INT64_MIN;
+    ready_ = 0, foreign_ = 0, serves_ = false;
+}
+
+void Server::serve(Time now) noexcept {
+    serves_ = true, began_ = now;
+    if (station_.setup().role == Role::master) return;
+    const Time known = now + 10 * station_.setup().cycle;  // by then all have heard who sends the syncs
+    for (Client& c : clients_) c.invited = known - invitation;
+}
+
+/// Another one serves: who is there it learns anew when its turn comes again.
+void Server::rest() noexcept {
+    if (!serves_) return;
+    serves_ = false;
+    for (Client& c : clients_) c.state = ClientState::searching, c.restart = c.began = false, c.invited = INT64_MIN / 2;
+    ready_ = 0;
 }
 
 void Server::become(Client& c, ClientState state) noexcept {
@@ -49,6 +64,7 @@ void Server::heard(const Address& from, Time now) noexcept {
 }
 
 void Server::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
+    if (!serves_) return;
     Message m;
     Client* c = decode(frame, m) ? find(m) : nullptr;
     if (c == nullptr || !take(*c, m, now)) ++foreign_;
@@ -133,7 +149,8 @@ bool Server::invite(Client& c, Time now) noexcept {
 }
 
 void Server::before_slots(Time now) noexcept {
-    if (began_ == INT64_MIN) began_ = now;
+    if (!station_.status().leading) return rest();
+    if (!serves_) serve(now);
     const Time silence = 2 * static_cast<Time>(heartbeat_ms_) * 1'000'000;
     for (Client& c : clients_) {
         if (c.state != ClientState::ready || heartbeat_ms_ == 0 || now - c.heard <= silence + 1'000'000) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Gives stations their configuration, and notices when one is gone. Its frames wait in slot 0 of the station, behind all others. A station
-// that is heard to send is at work already, by a file of its own, and is not asked.
+// Gives stations their configuration, and notices when one is gone, while its own station sends the syncs: the master, or a backup in its
+// place. Its frames wait in slot 0 of the station, behind all others. A station that is heard to send is at work already, by a file of its
+// own, and is not asked.
 #pragma once
 
 #include <string>
@@ -61,6 +62,8 @@ private:
     bool    invite(Client&, Time now) noexcept;
     bool    take(Client&, const Message&, Time now) noexcept;
     void    become(Client&, ClientState) noexcept;
+    void    serve(Time now) noexcept;
+    void    rest() noexcept;
 
     Station&                                          station_;
     Logical                                           own_;
@@ -70,7 +73,8 @@ private:
     std::size_t                                       next_ = 0;
     std::uint32_t                                     ready_ = 0;
     std::uint64_t                                     foreign_ = 0;
-    Time                                              began_ = INT64_MIN;
+    bool                                              serves_ = false;
+    Time                                              began_ = 0;  // to serve
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};
 };
 

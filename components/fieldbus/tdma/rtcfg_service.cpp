@@ -32,16 +32,20 @@ std::vector<Server::ClientSetup> Service::clients_of(const config::Schedule& sch
         if (i == own || e.role == Role::master || (!e.ip && !e.mac)) continue;
         Server::ClientSetup client{e.mac.value_or(Address{}), logical_of(e), config::block_of(schedule, i), {}};
         if (!e.stage_2.empty()) {
+            const bool must = schedule.stations[own].role == Role::master;  // a backup serves as well as it can
             Message first;
             first.client = client.logical;
             first.data = std::span(reinterpret_cast<const std::uint8_t*>(client.stage_1.data()), client.stage_1.size());
-            if (const std::size_t needs = stage_1_bytes(first), has = room_of(schedule.stations[own]); needs > has)
+            if (const std::size_t needs = stage_1_bytes(first), has = room_of(schedule.stations[own]); must && needs > has)
                 throw std::invalid_argument("station " + e.name + " has a stage2, so the master sends it its block, too: " +
                                             std::to_string(needs) + " bytes in one frame, and the master's slot 0 has " +
                                             (has == 0 ? "none: write slot 0 OFFSET" : std::to_string(has) + ": make it longer") +
                                             ", as in slot 0 100 1/1 " + std::to_string(needs));
             const std::string which = "stage2 of station " + e.name + ": the file '" + e.stage_2 + "'";
-            if (!read(e.stage_2, client.stage_2)) throw std::invalid_argument(which + " cannot be read: " + client.stage_2);
+            if (!read(e.stage_2, client.stage_2)) {
+                if (must) throw std::invalid_argument(which + " cannot be read: " + client.stage_2);
+                client.stage_2.clear();
+            }
             if (client.stage_2.size() > largest_stage_2)
                 throw std::invalid_argument(which + " has " + std::to_string(client.stage_2.size()) + " bytes; stations take " +
                                             std::to_string(largest_stage_2) + " at most");

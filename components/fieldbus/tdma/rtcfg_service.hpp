@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the master of a segment does for stations without a schedule: gives each of its file its block and its file, by RTcfg.
+// What the master of a segment, or a backup in its place, does for stations without a schedule: gives each of its file its block and its
+// file, by RTcfg.
 #pragma once
 
 #include <functional>
@@ -17,7 +18,7 @@ public:
     /// The bytes of a file that stage 2 sends, or false and the reason in `bytes`.
     using Read = std::function<bool(const std::string& name, std::string& bytes)>;
 
-    /// All outlive it. Throws std::invalid_argument when a stage 2 file cannot be sent. [setup]
+    /// All outlive it. Throws std::invalid_argument when a stage 2 file cannot be sent; a backup has none for that station then. [setup]
     Service(Station& station, const config::Schedule& schedule, std::size_t own, const Read& read, Events& events);
 
     Server&       server() noexcept { return server_; }

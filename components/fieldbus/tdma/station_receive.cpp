@@ -307,8 +307,9 @@ void Station::start_leading(Time now) noexcept {
 
 bool Station::may_lead() const noexcept {
     if (setup_.role != Role::backup || status_.state != State::running || !heard_ever_) return false;
-    // With a phase the thread looks after the sync of its cycle was due; without one the newest that can be here is the last cycle's.
-    const std::uint32_t newest = setup_.phase > 0 ? number_ : number_ - 1;
+    // With a phase the thread looks after the sync of its cycle was due; without one the newest that can be here is the last cycle's. So it
+    // is for a thread that cannot come into phase, as another station's in one process, and looks too early by more than the guard.
+    const std::uint32_t newest = setup_.phase > 0 && status_.error <= setup_.guard ? number_ : number_ - 1;
     return static_cast<std::int32_t>(newest - heard_cycle_) > 0;
 }
 

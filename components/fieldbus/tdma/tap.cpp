@@ -39,6 +39,9 @@ public:
         if (thread_.joinable()) thread_.join();
     }
     const std::string& name() const noexcept override { return name_; }
+    void scheduled(const std::optional<config::Ip>& ip, std::size_t mtu) noexcept override {
+        news_.store(came | (ip ? has_ip | std::bit_cast<std::uint32_t>(*ip) : 0) | std::uint64_t{mtu} << 34, std::memory_order_release);
+    }
 
     /// What is wrong, or nothing. [setup]
     std::string open() {
@@ -53,6 +56,8 @@ public:
     }
 
 private:
+    static constexpr std::uint64_t came = std::uint64_t{1} << 32, has_ip = std::uint64_t{1} << 33;  // above these the MTU, below the IP
+
     std::string open_device() {
         constexpr const char* device = "/dev/net/tun";
         device_ = can::Descriptor(::open(device, O_RDWR | O_NONBLOCK | O_CLOEXEC));
@@ -86,8 +91,9 @@ private:
 
     /// What a user without the right to it lets somebody else type once.
     std::string by_hand() const {
+        const std::string mtu = tunnel_.mtu() != 0 ? std::to_string(tunnel_.mtu()) : "BYTES";  // of slot 1 less 4, once there is a schedule
         std::string text = "make it once: sudo ip tuntap add dev " + setup_.name + " mode tap user $USER; sudo ip link set " + setup_.name +
-                           " address " + ethernet::to_string(setup_.address) + " mtu " + std::to_string(tunnel_.mtu()) + " up";
+                           " address " + ethernet::to_string(setup_.address) + " mtu " + mtu + " up";
         if (setup_.ip) text += "; sudo ip addr add " + prefixed(setup_) + " dev " + setup_.name;
         return text;
     }
@@ -111,6 +117,16 @@ private:
             if (!ask(SIOCSIFHWADDR, now)) return refused("the address " + ethernet::to_string(setup_.address));
         }
         if (!set_mtu(shown_mtu_)) return refused("an MTU of " + std::to_string(shown_mtu_));
+        if (auto problem = set_ip(); !problem.empty()) return problem;
+        ifreq flags{};
+        if (!ask(SIOCGIFFLAGS, flags)) return name_ + " cannot be asked: " + can::reason();
+        if ((flags.ifr_flags & IFF_UP) == 0) {
+            flags.ifr_flags = static_cast<short>(flags.ifr_flags | IFF_UP);
+            if (!ask(SIOCSIFFLAGS, flags)) return refused("up");
+        }
+        return {};
+    }
+    std::string set_ip() {
         if (setup_.ip) {
             const std::uint32_t mask = htonl(setup_.prefix == 0 ? 0 : ~std::uint32_t{0} << (32 - setup_.prefix));
             const auto          wanted = std::bit_cast<std::uint32_t>(*setup_.ip);
@@ -120,13 +136,21 @@ private:
             ip_of(ip).s_addr = wanted, ip_of(net).s_addr = mask;
             if (!same && (!ask(SIOCSIFADDR, ip) || !ask(SIOCSIFNETMASK, net))) return refused("the IP " + prefixed(setup_));
         }
-        ifreq flags{};
-        if (!ask(SIOCGIFFLAGS, flags)) return name_ + " cannot be asked: " + can::reason();
-        if ((flags.ifr_flags & IFF_UP) == 0) {
-            flags.ifr_flags = static_cast<short>(flags.ifr_flags | IFF_UP);
-            if (!ask(SIOCSIFFLAGS, flags)) return refused("up");
-        }
         return {};
+    }
+    /// What RTcfg brought.
+    void take(std::uint64_t news) {
+        const std::size_t mtu = news >> 34;
+        if ((news & has_ip) != 0) {
+            setup_.ip = std::bit_cast<config::Ip>(static_cast<std::uint32_t>(news));
+            if (const auto problem = set_ip(); !problem.empty()) say(problem);
+        }
+        if (mtu == 0)
+            say("tunnel: ordinary packets leave in slot 1, and this station's block has none; write slot 1 OFFSET into it, in the file "
+                "of the master");
+        else
+            say("ordinary packets pass by " + name_ + ", MTU " + std::to_string(mtu) +
+                (setup_.ip ? ", IP " + config::to_string(*setup_.ip) : ""));
     }
     std::string refused(const std::string& what) const {
         const int error = errno;
@@ -149,6 +173,7 @@ private:
         pthread_setname_np(pthread_self(), "tap");
         Time busy_until = 0;
         while (!ended_.load()) {
+            if (const auto news = news_.exchange(0, std::memory_order_acquire); news != 0) take(news);
             if (const std::size_t mtu = tunnel_.mtu(); mtu != shown_mtu_) {  // another schedule came
                 if (!set_mtu(mtu)) say(refused("an MTU of " + std::to_string(mtu)));
                 shown_mtu_ = mtu;
@@ -185,7 +210,7 @@ private:
     }
 
     Tunnel&                                               tunnel_;
-    const TapSetup                                        setup_;
+    TapSetup                                              setup_;  // its IP is the thread's, once that runs
     const std::string                                     instance_;
     std::string                                           name_;
     can::Descriptor                                       device_, socket_;
@@ -193,6 +218,7 @@ private:
     bool                                                  carrier_ = false;
     unsigned                                              gone_ = 0;
     std::array<std::uint8_t, ethernet::largest_frame + 4> buffer_{};  // one with a VLAN tag is read whole, to be counted
+    std::atomic<std::uint64_t>                            news_{0};  // written by the cycle, taken by the thread; 0: none
     std::atomic<bool>                                     ended_{false};
     std::thread                                           thread_;
 };

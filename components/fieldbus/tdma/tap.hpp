@@ -30,6 +30,8 @@ class Tap {
 public:
     virtual ~Tap() = default;  ///< [setup] the interface goes with it, unless it was there before
     virtual const std::string& name() const noexcept = 0;  ///< as the kernel called it. [any]
+    /// The station has another schedule now: the IP of its block, if it has one, and what slot 1 carries. The thread does it. [realtime]
+    virtual void scheduled(const std::optional<config::Ip>& ip, std::size_t mtu) noexcept = 0;
 };
 
 /// Makes the interface, or takes one that is there and nobody else's, and starts the thread. The tunnel outlives it. [setup]

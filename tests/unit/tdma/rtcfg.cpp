@@ -199,6 +199,17 @@ TEST(Rtcfg_server, says_that_its_slot_is_too_short_when_nothing_is_heard_of_a_st
     EXPECT_EQ(0, cell.x.events[Event::running]);
 }
 
+TEST(Rtcfg_service, of_a_backup_does_without_what_only_the_master_has) {
+    const auto reading = config::read(
+        "cycle 1000\nmaster:\nslot 0 100\nbackup-master:\nname b\nbackup-offset 60\nslot 0 300\n"
+        "slave:\nname x\nmac 02:00:00:00:00:03\nstage2 x.cfg\nslot 0 600");
+    ASSERT_TRUE(reading.good()) << config::to_string(reading, "");
+    Cell cell;
+    const auto none = [](const std::string&, std::string& bytes) { return bytes = "No such file or directory", false; };
+    EXPECT_THROW(rtcfg::Service(cell.m.station, reading.schedule, 0, none, cell.m), std::invalid_argument);
+    EXPECT_EQ(1U, rtcfg::Service(cell.m.station, reading.schedule, 1, none, cell.m).server().clients()) << "x";
+}
+
 TEST(Rtcfg_client, takes_nothing_from_a_second_server_and_no_other_configuration_while_it_runs) {
     Cell cell;
     Said said;

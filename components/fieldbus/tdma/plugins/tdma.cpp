@@ -100,7 +100,7 @@ public:
     }
 
     void receive(hal::Cycle cycle) noexcept {
-        if (applicant_ && applicant_->cycle()) words_ = &applicant_->accepted()->words, told_period_ = false;
+        if (applicant_ && applicant_->cycle()) take_over(*applicant_->accepted());
         const bool fits = turns_in(cycle);
         if (!fits && !told_period_) {
             told_period_ = true;
@@ -141,6 +141,16 @@ private:
         }
     }
 
+    /// A schedule that RTcfg brought. [realtime]
+    void take_over(const rtcfg::Accepted& accepted) noexcept {
+        words_ = &accepted.words, told_period_ = false;
+        if (!tap_) return;
+        std::size_t mtu = 0;
+        for (const SlotSetup& s : accepted.setup.slots)
+            if (s.id == tunnel_slot) mtu = tunnel_mtu(s.size);
+        tap_->scheduled(accepted.schedule.stations.front().ip, mtu);
+    }
+
     bool turns_in(hal::Cycle cycle) const noexcept { return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle; }
     Companion* companion() const noexcept {
         return service_ ? static_cast<Companion*>(&service_->server()) : applicant_ ? &applicant_->client() : nullptr;
@@ -158,9 +168,7 @@ private:
         std::string      file = "schedule=", text = inline_argument_.get();
         if (is_by_rtcfg()) {
             if (link_.get().empty()) throw std::invalid_argument("on which segment? write link=eth:enp3s0");
-            if (!tunnel_argument_.get().empty())
-                throw std::invalid_argument("tunnel= needs the schedule at once: give config= and the station's name");
-            return;
+            return look_at_tunnel();
         }
         if (!stage_2_argument_.get().empty())
             throw std::invalid_argument("stage2= is of a station that gets its schedule from the master: station=auto");
@@ -196,7 +204,8 @@ private:
             throw std::invalid_argument("on which segment? write link=eth:enp3s0 or link=sim:NAME/" + station_argument_.get());
         entry_ = schedule_.stations[*which];
         setup_ = config::setup_of(schedule_, *which);
-        look_at_tunnel(file);
+        look_at_tunnel();
+        look_for_tunnel_slot(file);
     }
 
     /// The station has no schedule, but only its address: by its MAC address, or by `station=10.0.0.3`.
@@ -223,7 +232,7 @@ private:
                 applicant_->work();
                 if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(20));
             });
-        } else if (entry_ && entry_->role == Role::master) {
+        } else if (entry_ && entry_->role != Role::slave) {
             const hal::Texts texts(*this);
             const auto read = [&](const std::string& file, std::string& bytes) { return config::read_from_disk(texts.find(file), bytes); };
             service_ = std::make_unique<rtcfg::Service>(*station_, schedule_, config::find(schedule_, entry_->name).value(), read,
@@ -231,12 +240,16 @@ private:
         }
     }
 
-    /// What `tunnel=` asks of the schedule.
-    void look_at_tunnel(const std::string& file) const {
+    void look_at_tunnel() const {
         if (tunnel_argument_.get().empty()) return;
         if (auto problem = wrong_name(tunnel_argument_.get()); !problem.empty()) throw std::invalid_argument("tunnel=" + problem);
         if (!parse_prefix(netmask_argument_.get()))
             throw std::invalid_argument("netmask=" + netmask_argument_.get() + " is none; write 24 or 255.255.255.0");
+    }
+
+    /// What `tunnel=` asks of the schedule.
+    void look_for_tunnel_slot(const std::string& file) const {
+        if (tunnel_argument_.get().empty()) return;
         const auto is_tunnels = [](const SlotSetup& s) { return s.id == tunnel_slot; };
         if (std::none_of(setup_.slots.begin(), setup_.slots.end(), is_tunnels))
             throw std::invalid_argument("tunnel=" + tunnel_argument_.get() + ": ordinary packets leave in slot 1, and " + entry_->name +
@@ -248,9 +261,11 @@ private:
     OpenedTap open_tunnel(const ethernet::Port& port) {
         if (tunnel_argument_.get().empty()) return {};
         tunnel_ = std::make_unique<Tunnel>(*station_);
-        OpenedTap opened = open_tap(
-            *tunnel_, {tunnel_argument_.get(), port.address(), entry_->ip, parse_prefix(netmask_argument_.get()).value_or(24)}, name_);
+        const auto ip = entry_ ? entry_->ip : own_ip_;
+        OpenedTap opened =
+            open_tap(*tunnel_, {tunnel_argument_.get(), port.address(), ip, parse_prefix(netmask_argument_.get()).value_or(24)}, name_);
         if (!opened.tap) throw std::runtime_error("tunnel: " + opened.problem);
+        if (!entry_) return opened;  // it is said when there is a schedule
         std::fputs((name_ + ": ordinary packets pass by " + opened.tap->name() + ", MTU " + std::to_string(tunnel_->mtu()) +
                     (entry_->ip ? ", IP " + config::to_string(*entry_->ip) : "") + "\n")
                        .c_str(),
@@ -408,8 +423,9 @@ private:
     hal::Out<bool>          leading{*this, receive_, "leading", "this station sends the syncs"};
     hal::Out<bool>          master_active{*this, receive_, "master-active", "somebody sends them"};
     hal::Out<bool>          configured{*this, receive_, "configured", "it has a schedule: its own, or the master's by RTcfg"};
-    hal::Out<std::uint32_t> stations{*this, receive_, "stations", "master: stations that got their schedule from it and are alive"};
-    hal::Out<std::uint32_t> stations_dead{*this, receive_, "stations-dead", "master: such that are silent now"};
+    hal::Out<std::uint32_t> stations{*this, receive_, "stations",
+                                    "of the station that sends the syncs: those that got their schedule from it and are alive"};
+    hal::Out<std::uint32_t> stations_dead{*this, receive_, "stations-dead", "such that are silent now"};
     hal::Out<std::uint32_t> stage_2_bytes{*this, receive_, "stage2-bytes", "of the file that came from the master and is written"};
     hal::Out<bool>          link_up{*this, receive_, "link-up", "the line has a carrier"};
     hal::Out<bool>          fault{*this, receive_, "fault", "see show fault; ends when it recovered by itself, or by reset"};
