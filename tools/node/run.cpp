@@ -5,6 +5,8 @@
 #include <charconv>
 #include <fmt/chrono.h>
 #include <fmt/core.h>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 #include <unistd.h>
 
@@ -12,6 +14,7 @@
 #include "can/bus.hpp"
 #include "canopen/devices/eds_export.hpp"
 #include "canopen/devices/node.hpp"
+#include "node/aside.hpp"
 #include "node/station.hpp"
 #include "say.hpp"
 #include "signals.hpp"
@@ -78,10 +81,11 @@ std::string eds_text(const NodeKind& kind, const canopen::Program& program) {
     return canopen::eds::write_eds(eds);
 }
 
-/// Says on standard output what changes about a node.
+/// Says what changes about a node, by `say`, which is false when nobody reads any more.
 class Reporter {
 public:
-    Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began) : node_(node), program_(program), began_(began) {}
+    Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began, std::function<bool(const std::string&)> say)
+        : node_(node), program_(program), began_(began), say_(std::move(say)) {}
 
     /// False: nobody reads any more.
     bool look(std::int64_t now) {
@@ -109,7 +113,7 @@ public:
             bus_ = bus;
             say(fmt::format("bus {}", can::word(bus)));
         }
-        return text.empty() || print(text);
+        return say_(text);
     }
 
     std::string end(std::int64_t now) {
@@ -131,6 +135,7 @@ private:
     canopen::Node& node_;
     const canopen::Program& program_;
     const std::int64_t began_;
+    const std::function<bool(const std::string&)> say_;
     canopen::NmtState state_ = canopen::NmtState::initialising;
     std::uint8_t id_ = 0, errors_ = 0;
     std::int64_t news_at_ = INT64_MIN / 2;
@@ -162,7 +167,9 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
     const std::string who = id == canopen::unconfigured ? "without node-id" : fmt::format("node {}", id);
     if (!print(fmt::format("{}, {} on {} ({}): {}; Ctrl-C ends it\n", kind.name, who, about.address, about.transport, kind.what))) return 1;
     const std::int64_t began = now_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
-    Reporter reporter(node, program, began);
+    std::optional<Aside> aside;
+    if (station) aside.emplace();
+    Reporter reporter(node, program, began, [&](const std::string& text) { return aside ? aside->say(text) : print(text); });
     std::size_t next = 0;
     std::string problem;
     const auto change_world = [&](std::int64_t now) {
@@ -179,6 +186,7 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
             now = now_ns();
             return !stop.requested() && now < end && (is_read = look(now));
         });
+        aside.reset();
         if (is_read) is_read = print(station->summary());
     } else {
         while (!stop.requested() && now < end) {
