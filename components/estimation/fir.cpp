@@ -58,11 +58,11 @@ private:
                 char*             rest = nullptr;
                 const double      w = std::strtod(word.c_str(), &rest);
                 if (word.empty() || *rest != '\0' || !(std::fabs(w) < 1e100))
-                    throw std::invalid_argument("taps: '" + word + "' is not a number; write them as 0.25,0.5,0.25");
+                    throw std::invalid_argument("taps=" + text + ": '" + word + "' is not a number; write them as 0.25,0.5,0.25");
                 weights_.push_back(w);
                 at = end + 1;
             }
-            if (weights_.size() > 1024) throw std::invalid_argument("taps: more than 1024");
+            if (weights_.size() > 1024) throw std::invalid_argument("taps=" + text + ": more than 1024");
             return;
         }
         if (!(corner > 0.0 && corner < 0.5))

@@ -37,7 +37,8 @@ struct ForceControl : hal::Component {
     hal::Out<double>        velocity_out{*this, "velocity-out", "its derivative", {.unit = "m/s", .finite = true}};
     hal::Out<double>        error{*this, "error", "force-command - force", {.unit = "N"}};
     hal::Out<bool>          saturated{*this, "saturated", "effort or offset is at its limit"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles with an input that was no number: nothing moves on"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs",
+                                       "cycles with an input that was no number: no effort, position-out stands still"};
 
     hal::Function run{*this, "update", &ForceControl::update, "one step of the loop"};
 
@@ -45,7 +46,7 @@ struct ForceControl : hal::Component {
         const double dt = cycle.seconds(), path = position_command, e = command - force;
         if (!std::isfinite(e + path + velocity + position)) {
             bad_inputs = bad_inputs + 1;
-            effort = 0.0;
+            effort = velocity_out = 0.0;
             return;
         }
         error = e;
@@ -123,7 +124,7 @@ path lies inside the wall, and is as good as that is known. Needs no force senso
 
 (N. Hogan, *Impedance Control*, ASME J. Dynamic Systems 107, 1985; B. Siciliano, L. Villani, *Robot Force Control*, 1999.) While effort or offset are at
 their limits the integrators stand still. A change of `mode` starts with empty memories. An input that is no number takes the effort
-away.
+away and lets `position-out` stand still, for as long as it is none.
 
     loadrt force_control names=finger
     addf finger.update servo

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <condition_variable>
 #include <deque>
@@ -145,11 +146,14 @@ public:
                 show();
             }
         }
+        bool numbers = true;
         for (std::size_t i = 0; i < x.size(); ++i) {
             const double off = x[i] - target[i];
             if (std::isfinite(off)) state_(static_cast<Eigen::Index>(i)) = off;
-            else bad_inputs = bad_inputs + 1;
+            else bad_inputs = bad_inputs + 1, numbers = false;
         }
+        blind_ = numbers ? 0 : std::min(blind_, UINT32_MAX - 1) + 1;
+        valid = blind_ <= hold_cycles;
         Vector out;
         multiply(out, gain_, state_);
         bool full = false;
@@ -157,7 +161,7 @@ public:
             const double wanted = -out(static_cast<Eigen::Index>(i)), limit = std::fabs(max_output);
             const double given = limit > 0.0 ? std::clamp(wanted, -limit, limit) : wanted;
             full = full || given != wanted;
-            u[i] = enable && std::isfinite(given) ? given : 0.0;
+            u[i] = enable && valid && std::isfinite(given) ? given : 0.0;
         }
         saturated = full;
     }
@@ -237,8 +241,11 @@ public:
     hal::Out<bool>    designing{*this, "designing", "a new gain is being computed; the old one is at work"};
     hal::Out<bool>    refused{*this, "refused", "the weights of now make no gain: negative, or no number; the last good one is at work"};
     hal::Out<std::uint32_t> designs{*this, "designs", "gains swapped in since the start"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "states that were no number: the one of the cycle before was taken"};
-    hal::Function           run{*this, "update", &Lqr::update, "takes a new gain, if there is one, and applies it"};
+    hal::Out<bool> valid{*this, "valid", "FALSE: a state was no number for longer than hold-cycles, and all u are 0", {.safe = false}};
+    hal::Out<std::uint32_t>   bad_inputs{*this, "bad-inputs", "states that were no number"};
+    hal::Param<std::uint32_t> hold_cycles{
+        *this, "hold-cycles", "for so many cycles in a row the last number of a state that is none stays", {.initial = 10}};
+    hal::Function run{*this, "update", &Lqr::update, "takes a new gain, if there is one, and applies it"};
 
 private:
     std::deque<hal::In<double>>  q_, r_;
@@ -246,6 +253,7 @@ private:
     Matrix                       gain_;
     Vector                       state_;
     Order                        order_;
+    std::uint32_t                blind_ = 0;  // cycles in a row with a state that is no number
     Designer                     designer_;
 };
 
@@ -264,7 +272,8 @@ the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the cycle s
 take no time, so how many of them a new design takes is not fixed there.
 
 A plant with an unstable mode that no input reaches, or that Q does not see, is refused with its name. A state that is no number is left
-out: the one of the cycle before stays. `gain-I-J` can be linked to a component with a control law of its own, such as furuta_control.
+out: for `hold-cycles` its last number stays, then `valid` falls and all u are 0 until it is a number again. `gain-I-J` can be linked to a
+component with a control law of its own, such as furuta_control.
 
     loadrt lqr names=sled plant=sampled a=0,1;0,0 b=0;0.5 q=100,0;0,1 r=0.01
     addf sled.update servo

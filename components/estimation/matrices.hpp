@@ -23,6 +23,7 @@ struct Given {
     Eigen::MatrixXd value;
     bool            in_file = false;
     std::uint32_t   begin = 0, end = 0;  ///< its name in the file
+    std::string     argument;            ///< NAME=TEXT, when a load argument gave it: a refusal that begins so is shown at its place
 };
 
 struct TextProblem {
@@ -128,7 +129,7 @@ private:
         numbers_.clear();
     }
     void open(std::string name, std::size_t begin, std::size_t end) {
-        current_ = {std::move(name), {}, false, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)};
+        current_ = {std::move(name), {}, false, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), {}};
         open_ = true;
         diagonal_ = lost_ = false;
     }
@@ -197,10 +198,11 @@ public:
             if (text.empty() && (any || *w->example == '\0')) continue;
             MatrixText reader;
             reader.read_rows(w->name, text.empty() ? w->example : text);
+            const std::string argument = lower(w->name) + "=" + (text.size() > 40 ? text.substr(0, 37) + "..." : text);
             if (!reader.problems.empty())
-                throw std::invalid_argument(lower(w->name) + "=" + text + ": " + reader.problems[0].sentence + "; " +
-                                            reader.problems[0].help);
-            given_[lower(w->name)] = reader.found[0];
+                throw std::invalid_argument(argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
+            reader.found[0].argument = argument;
+            given_[lower(w->name)] = std::move(reader.found[0]);
         }
     }
     bool has(const char* name) const { return given_.contains(lower(name)); }
@@ -241,7 +243,7 @@ public:
             texts_.say(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
             hal::Texts::refuse();
         }
-        throw std::invalid_argument(sentence + "; " + help);
+        throw std::invalid_argument((given.argument.empty() ? "" : given.argument + ": ") + sentence + "; " + help);
     }
     [[noreturn]] void refuse(const char* name, const std::string& sentence, const std::string& help) const {
         refuse(at(name), sentence, help);
