@@ -50,10 +50,9 @@ struct FurutaControl : hal::Component {
         *this,
         "max-arm-velocity",
         "swing-up: an arm that turns faster is braked before anything else; one and a half times as fast ends a balance",
-        {.initial = 5.0, .unit = "rad/s"}};
-    hal::Param<double> catch_angle{*this, "catch-angle", "nearer to upright than this it may balance", {.initial = 0.4, .unit = "rad"}};
-    hal::Param<double> catch_torque{
-        *this, "catch-torque", "and when pendulum and its speed ask for less than this many times the torque there is", {.initial = 2.5}};
+        {.initial = 5.5, .unit = "rad/s"}};
+    hal::Param<double> catch_angle{
+        *this, "catch-angle", "nearer to upright than this it balances, if that is going to succeed", {.initial = 0.4, .unit = "rad"}};
     hal::Param<double> lose_angle{
         *this, "lose-angle", "farther from upright than this it swings up again", {.initial = 0.6, .unit = "rad"}};
     hal::Param<double> arm_reach{
@@ -86,6 +85,8 @@ struct FurutaControl : hal::Component {
         const bool   sane = std::isfinite(s.arm + s.pendulum + s.arm_speed + s.pendulum_speed) && std::fabs(s.pendulum) < 1e6;
         if (!sane) {
             bad_inputs = bad_inputs + 1;
+            balanced = false;
+            upright_s_ = 0.0;
             return give(0.0, 0.0);
         }
         lead(s);
@@ -116,10 +117,7 @@ private:
     void choose(double tilt, const State& s) noexcept {
         if (!enable) now_ = Phase::off;
         else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle || std::fabs(s.arm_speed) >= 1.5 * max_velocity || !gains_valid) {
-            const double asks =
-                std::fabs(gain_pendulum * tilt + gain_pendulum_velocity * s.pendulum_speed + gain_arm_velocity * s.arm_speed);
-            const bool can = gains_valid && std::fabs(tilt) < catch_angle && asks < catch_torque * max_torque &&
-                             std::fabs(s.arm_speed) < 1.5 * max_velocity;
+            const bool can = gains_valid && std::fabs(tilt) < catch_angle && succeeds(tilt, s);
             now_ = can ? Phase::balance : Phase::swing_up;
             if (can) catches = catches + 1;
         }
@@ -130,6 +128,22 @@ private:
         const double reach = std::fabs(arm_reach);
         return -(gain_arm * std::clamp(s.arm, -reach, reach) + gain_pendulum * tilt + gain_arm_velocity * s.arm_speed +
                  gain_pendulum_velocity * s.pendulum_speed);
+    }
+
+    /// True when a prediction says that the balance brings the pendulum upright: with less torque than there is, as the amplifier may give less,
+    /// and with the arm below the speed that ends a balance.
+    bool succeeds(double tilt, State s) const noexcept {
+        constexpr double dt = 0.005, ahead = 0.6, part_of_torque = 0.8, part_of_speed = 0.95;
+        const double     limit = part_of_torque * std::fabs(max_torque), fastest = std::fabs(max_velocity);
+        for (double t = 0.0; t < ahead; t += dt) {
+            const Rates rates = under(std::clamp(held(tilt, s), -limit, limit), s);
+            s.arm += dt * (s.arm_speed + 0.5 * dt * rates.arm), tilt += dt * (s.pendulum_speed + 0.5 * dt * rates.pendulum);
+            s.arm_speed += dt * rates.arm, s.pendulum_speed += dt * rates.pendulum;
+            s.pendulum = tilt + std::numbers::pi;
+            if (!(std::fabs(tilt) < lose_angle && std::fabs(s.arm_speed) < part_of_speed * 1.5 * fastest)) return false;
+            if (std::fabs(tilt) < upright_angle && std::fabs(s.pendulum_speed) < 1.0 && std::fabs(s.arm_speed) < fastest) return true;
+        }
+        return false;
     }
 
     /// Energy flows into the pendulum as -(c cos a a' + K sin²a q') q" (K. Åström, K. Furuta, *Swinging up a pendulum by energy control*,
@@ -151,16 +165,25 @@ private:
                friction * std::tanh(s.arm_speed / 0.05);
     }
 
-    /// Leads the pendulum on by its age: on the second equation, with the arm's acceleration of the last torque.
-    void lead(State& s) const noexcept {
-        const double age = std::clamp(pendulum_age.get(), 0.0, 0.05), K = swing_inertia;
-        const double sin = std::sin(s.pendulum), cos = std::cos(s.pendulum), c = coupling * cos;
-        const double determinant = (arm_inertia + K * sin * sin) * K - c * c;
-        if (!(age > 0.0) || !(determinant > 0.0)) return;
+    struct Rates {
+        double arm, pendulum;
+    };
+    /// Accelerations under a torque, without friction: the rig's two equations, solved. Zeros when the parameters make no physical sense.
+    Rates under(double drive, const State& s) const noexcept {
+        const double K = swing_inertia, sin = std::sin(s.pendulum), cos = std::cos(s.pendulum), c = coupling * cos;
+        const double J = arm_inertia + K * sin * sin, determinant = J * K - c * c;
+        if (!(determinant > 0.0)) return {0.0, 0.0};
         const double on_arm =
-            torque - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed + coupling * sin * s.pendulum_speed * s.pendulum_speed;
+            drive - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed + coupling * sin * s.pendulum_speed * s.pendulum_speed;
         const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - weight_moment * sin;
-        const double acceleration = ((arm_inertia + K * sin * sin) * on_pendulum - c * on_arm) / determinant;
+        return {(K * on_arm - c * on_pendulum) / determinant, (J * on_pendulum - c * on_arm) / determinant};
+    }
+
+    /// Leads the pendulum on by its age, with the arm's acceleration of the last torque.
+    void lead(State& s) const noexcept {
+        const double age = std::clamp(pendulum_age.get(), 0.0, 0.05);
+        if (!(age > 0.0)) return;
+        const double acceleration = under(torque, s).pendulum;
         s.pendulum += age * (s.pendulum_speed + 0.5 * age * acceleration);
         s.pendulum_speed += age * acceleration;
     }
@@ -184,7 +207,8 @@ HAL_COMPONENT(FurutaControl, "furuta_control", "Swings a Furuta pendulum up, cat
 up a pendulum by energy control*, Automatica 36, 2000), while weak springs hold the arm about `arm-command`. The torque for the
 acceleration comes from the rig's equations (see the manual of furuta), so the parameters are those of the rig.
 
-**Catching.** Within `catch-angle` of upright, and when the state feedback asks for no more than `catch-torque` times what the motor can give.
+**Catching.** Within `catch-angle` of upright, and when the rig's equations, solved 0.6 s ahead with the torque that there is, say that the balance
+succeeds: what comes too fast, or with the arm too fast, swings on and comes again.
 
 **Balancing.** torque = -(gain-arm arm + gain-pendulum tilt + gain-arm-velocity arm' + gain-pendulum-velocity tilt'); link the gains to an lqr with these
 states and the torque as input. Beyond `lose-angle` it swings up again. A step of `arm-command` farther than `arm-reach` is taken at the speed of
