@@ -18,7 +18,10 @@ struct Settings {
 };
 
 struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
-    using CameraComponent::CameraComponent;
+    explicit VisionPendulum(const hal_host* host) : CameraComponent(host) {
+        if (!(focal > 0.0 && distance > arm_length + rod_length && arm_length > 0.0 && rod_length > 0.0))
+            throw std::invalid_argument("focal, arm_length and rod_length have to be above 0, and distance above arm_length + rod_length");
+    }
 
     hal::RealArgument focal{*this, "focal", 280.0, "focal length of the camera, px"};
     hal::RealArgument distance{*this, "distance", 1.2, "from the motor's axis to the camera, m"};
@@ -55,8 +58,6 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
                                   {.initial = 0.005, .unit = "rad"}};
 
     void start() {
-        if (!(focal > 0.0 && distance > arm_length + rod_length && arm_length > 0.0 && rod_length > 0.0))
-            throw std::invalid_argument("focal, arm_length and rod_length have to be above 0, and distance above arm_length + rod_length");
         record_ = hal::extension<hal_faults>("hal.faults/1");
         shown_ns_ = no_time;
         lost_ = false;

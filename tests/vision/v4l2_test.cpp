@@ -18,7 +18,7 @@ class Kernel : public VideoSystem {
 public:
     std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
     std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
-    std::uint32_t gives_width = width, gives_height = height, line = 0;
+    std::uint32_t gives_width = width, gives_height = height, gives_format = 0, line = 0;
     int open_error = 0, format_error = 0, fail_call = -1, calls = 0;
     bool gone = false, no_camera = false, monotonic = true;
     std::uint32_t bytes = width * height * 2;
@@ -64,6 +64,7 @@ public:
             if (format_error != 0) return errno = format_error, -1;
             auto& pix = static_cast<v4l2_format*>(argument)->fmt.pix;
             pix.width = gives_width, pix.height = gives_height, pix.bytesperline = line;
+            if (gives_format != 0) pix.pixelformat = gives_format;
             return 0;
         }
         case VIDIOC_REQBUFS: static_cast<v4l2_requestbuffers*>(argument)->count = 3; return 0;
@@ -212,8 +213,12 @@ TEST_F(V4l2, refusals_say_what_to_do) {
     EXPECT_EQ(refusal(), "/dev/video0 gives no frames; a camera has several devices, and often the even ones do");
     kernel.capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
     kernel.formats = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_H264};
-    EXPECT_EQ(refusal(), "/dev/video0 offers MJPG, H264; only YUYV and GREY are read, which cameras for machine vision have");
+    EXPECT_EQ(refusal(), "/dev/video0 offers MJPG, H264; only YUYV and GREY are read; ffmpeg -i /dev/video0 -pix_fmt yuyv422 -f v4l2 "
+                         "/dev/videoN makes YUYV of it for a v4l2loopback device");
     kernel.formats = {V4L2_PIX_FMT_YUYV};
+    kernel.gives_format = V4L2_PIX_FMT_MJPEG;
+    EXPECT_EQ(refusal(), "/dev/video0 gives MJPG and not YUYV at this size; take a smaller one: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    kernel.gives_format = 0;
     kernel.gives_width = 640, kernel.gives_height = 480;
     EXPECT_EQ(refusal(), "/dev/video0 has no frames of 16 x 4; write v4l2:/dev/video0?width=640&height=480");
     kernel.format_error = EBUSY;

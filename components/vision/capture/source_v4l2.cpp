@@ -181,7 +181,8 @@ private:
         }
         if (!yuyv && !grey)
             return fail(Trouble::refused, device_ + " offers " + (offered.empty() ? "no format" : offered) +
-                                              "; only YUYV and GREY are read, which cameras for machine vision have");
+                                              "; only YUYV and GREY are read; ffmpeg -i " + device_ +
+                                              " -pix_fmt yuyv422 -f v4l2 /dev/videoN makes YUYV of it for a v4l2loopback device");
         v4l2_format format{};
         format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         format.fmt.pix.width = static_cast<std::uint32_t>(width_);
@@ -193,7 +194,7 @@ private:
         const v4l2_pix_format& is = format.fmt.pix;
         if (is.pixelformat != wanted)
             return fail(Trouble::refused, device_ + " gives " + four_letters(is.pixelformat) + " and not " + four_letters(wanted) +
-                                              " at this size; try a smaller width and height");
+                                              " at this size; take a smaller one: v4l2-ctl -d " + device_ + " --list-formats-ext");
         if (is.width != static_cast<std::uint32_t>(width_) || is.height != static_cast<std::uint32_t>(height_))
             return fail(Trouble::refused, device_ + " has no frames of " + std::to_string(width_) + " x " + std::to_string(height_) +
                                               "; write v4l2:" + device_ + "?width=" + std::to_string(is.width) +
