@@ -74,15 +74,20 @@ public:
           encoding_(c, "encoding", "bgr8", "of an Image"),
           reliable_(c, "reliable", 1, "1: what is lost is sent again; 0: best effort", {.min = 0, .max = 1}),
           depth_(c, "depth", 16, "samples kept for those who have not got them yet", {.min = 1, .max = 100'000}),
-          deadline_(c, "deadline_ms", 0, "a sample at least so often: promised by publishers, asked for by subscribers; 0: none"),
-          budget_(c, "latency_ms", 0, "latency budget: a hint for the engine"),
-          lease_(c, "lease_ms", 0, "liveliness: a publisher not heard of for so long counts as dead; 0: as its participant, 5000"),
+          deadline_(c, "deadline_ms", 0, "a sample at least so often: promised by publishers, asked for by subscribers; 0: none",
+                    {.min = 0, .max = longest_ms}),
+          budget_(c, "latency_ms", 0, "latency budget: a hint for the engine", {.min = 0, .max = longest_ms}),
+          lease_(c, "lease_ms", 0, "liveliness: a publisher not heard of for so long counts as dead; 0: as its participant, 5000",
+                 {.min = 0, .max = longest_ms}),
           participant(c) {}
 
     /// Throws std::invalid_argument. [setup]
     Schema schema() const {
         if (!participant.loading() && fields_.get().empty() && ros_.get().empty()) return Schema::of_fields("value:float");
         if (topic_.get().empty()) throw std::invalid_argument("which topic? write topic=NAME");
+        if (topic_.get().size() > longest_name || type_.get().size() > longest_name)
+            throw std::invalid_argument("names of topics and types have at most " + std::to_string(longest_name) + " letters; make " +
+                                        (topic_.get().size() > longest_name ? "topic=" : "type=") + " shorter");
         if (!ros_.get().empty()) {
             if (!fields_.get().empty() || !type_.get().empty())
                 throw std::invalid_argument("ros= gives the fields and the type; leave fields= and type= out");
@@ -115,6 +120,9 @@ public:
     const std::string name;  ///< of the instance
 
 private:
+    static constexpr std::size_t  longest_name = 250;  // 255 in DDS, of which ROS 2 takes some
+    static constexpr std::int64_t longest_ms = 86'400'000;
+
     static std::string name_of(hal::Component&) {
         const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
         return naming != nullptr ? naming->name(hal::detail::creating) : "dds";

@@ -71,14 +71,19 @@ std::map<std::string, std::string> signals_of(const std::string& layout) {
 std::string difference(const std::string& sends, const std::string& sender, const std::string& takes, const std::string& taker) {
     if (sends == takes) return {};
     const auto there = signals_of(sends), here = signals_of(takes);
+    const auto only = [](const std::string& signal, const std::string& node) {
+        return "signal '" + signal + "' is known to node '" + node + "' only";
+    };
+    const auto types = [&](const std::string& signal, const std::string& sent, const std::string& taken) {
+        return "signal '" + signal + "' is " + sent + " on node '" + sender + "' and " + taken + " on node '" + taker + "'";
+    };
     for (const auto& [signal, type] : here) {
         const auto other = there.find(signal);
-        if (other == there.end()) return "signal '" + signal + "' is known to node '" + taker + "' only";
-        if (other->second != type)
-            return "signal '" + signal + "' is " + other->second + " on node '" + sender + "' and " + type + " on node '" + taker + "'";
+        if (other == there.end()) return only(signal, taker);
+        if (other->second != type) return types(signal, other->second, type);
     }
     for (const auto& [signal, type] : there)
-        if (!here.contains(signal)) return "signal '" + signal + "' is known to node '" + sender + "' only";
+        if (!here.contains(signal)) return only(signal, sender);
     return "their signals stand in another order";
 }
 

@@ -154,9 +154,14 @@ class Topics(DdsCase):
                                   ("topic=t ros=std_msgs/Float64 fields=a:bit", "ros= gives the fields and the type; leave fields= and type= out"),
                                   ("topic=t ros=sensor_msgs/JointState", "a JointState needs the names of its joints: joints=shoulder,elbow"),
                                   ("topic=t fields=a:bit domain=300", "domain=300 is outside 0 to 232"),
+                                  ("topic=t fields=a:bit lease_ms=-1", "lease_ms=-1 is outside 0 to 86400000"),
+                                  (f"topic={'t' * 251} fields=a:bit", "names of topics and types have at most 250 letters; make topic= shorter"),
+                                  (f"topic=t type={'t' * 251} fields=a:bit", "names of topics and types have at most 250 letters; make type= shorter"),
                                   ("topic=t fields=valid:bit", "'sub.valid'")):
             self.write("bad.hal", f"loadrt dds_subscribe names=sub {arguments}\n")
             self.assertIn(reason, self.bad("check", "bad.hal"), arguments)
+        self.write("bad.hal", "loadrt dds_publish names=pub topic=t fields=a:bit rate=-1\n")
+        self.assertIn("rate= is below 0; write samples per second, or 0 for every cycle", self.bad("check", "bad.hal"))
         for arguments, reason in (("interfaces=nosuch0", "interfaces: this machine has no interface or address 'nosuch0'; it has "),
                                   ("peers=here", "peers: 'here' is not an address, as in 192.168.1.7"),
                                   ("server=10.0.0.1", "server=10.0.0.1 is not an address and a port, as in 192.168.1.7:11811"),

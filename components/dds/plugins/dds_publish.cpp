@@ -18,7 +18,9 @@ using namespace hal::dds;
 
 class DdsPublish : public hal::Component, private Listener, private Served {
 public:
-    using hal::Component::Component;
+    explicit DdsPublish(const hal_host* host) : Component(host) {
+        if (!(rate_ >= 0)) throw std::invalid_argument("rate= is below 0; write samples per second, or 0 for every cycle");
+    }
 
     void start() {
         attendance_.begin(arguments_, settings_, *this, [this](Participant& p) { return p.writer(topic_, quality_, this); });
