@@ -291,8 +291,12 @@ Opened open(const std::string& place, const Options& options) {
     ethernet::Options how;
     how.types = {ether_type};
     how.receive_capacity = std::clamp<std::size_t>(options.receive_capacity / 8, 64, 1024);
-    auto opened = ethernet::open(settings.segment + settings.segment_options, how);
-    if (!opened) return {nullptr, std::move(opened.problem)};
+    const std::string segment = settings.segment + settings.segment_options;
+    auto opened = ethernet::open(segment, how);
+    if (!opened) {  // the caller says the address that was written
+        if (opened.problem.starts_with(segment + ": ")) opened.problem.erase(0, segment.size() + 2);
+        return {nullptr, std::move(opened.problem)};
+    }
     // Another one for each link of this machine, and on a segment in memory the same ones in every run.
     static std::atomic<std::uint16_t> opened_before{0};
     auto session = ++opened_before;

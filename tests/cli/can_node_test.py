@@ -56,6 +56,9 @@ class Sdo(Node):
         self.assertEqual("6411:1 = 0xFED4 (65236, or -300)\n", self.read("6411:1"))
         self.assertEqual("6411:1 = -300 (0xFED4)\n", self.read("6411:1", "--type", "i16"))
         self.assertEqual("6411:1 Write analogue output 16-bit, Analogue output 1 = -300 (0xFED4)\n", self.read("6411:1", "--eds", "io.eds"))
+        self.assertEqual("6411:1 = D4 FE (2 bytes; u32 has 4)\n", self.read("6411:1", "--type", "u32"))
+        self.can("sdo", "write", self.bus, "5", "6411:1", "-301")
+        self.assertEqual("6411:1 = -301 (0xFED3)\n", self.read("6411:1", "--type", "i16"))
         self.can("sdo", "write", self.bus, "5", "0x6200:2", "0x5A")  # as wide as the node says it is
         self.assertEqual("6200:2 = 0x5A (90)\n", self.read("6200sub2"))
         self.assertRegex(self.read("1008"), r'^1008:0 = "[^"]+" \(\d+ bytes\)\n$')
@@ -98,6 +101,9 @@ class Sdo(Node):
         sdo = ("sdo", "write", self.bus, "5", "1017")
         self.assertEqual("hal can sdo write: '70000' does not fit into UNSIGNED16 (0..65535)\n", self.bad_can(*sdo, "70000", "--eds", "io.eds"))
         self.assertEqual("hal can sdo write: '010' would be octal; write it without the 0 in front, or 0x…\n", self.bad_can(*sdo, "010", "--type", "u16"))
+        self.assertEqual("hal can sdo write: '-1' does not fit into UNSIGNED16 (0..65535)\n", self.bad_can(*sdo, "-1", "--type", "u16"))
+        self.assertEqual("hal can sdo write: '40000' does not fit into INTEGER16 (-32768..32767)\n",
+                         self.bad_can("sdo", "write", self.bus, "5", "6411:1", "40000", "--type", "i16"))
         self.assertIn("'u17' is no data type; there are bool, i8", self.bad_can(*sdo, "1", "--type", "u17"))
         self.assertEqual("hal can sdo write: '200' is no node; write 1 to 127\n", self.bad_can("sdo", "write", self.bus, "200", "1017", "1"))
         self.assertEqual("hal can sdo write: cannot read 'none.bin': No such file or directory\n", self.bad_can(*sdo, "--from", "none.bin"))

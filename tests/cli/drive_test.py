@@ -71,7 +71,8 @@ class OneShot(Drive):
         self.drive("A", "set", "home-offset", 500)
         self.assertRegex(self.drive("A", "home", 23), r"^A: homed, at ")
         self.assertRegex(self.drive("A", "go", 500), r"^A: at (49\d|50\d|510)\n$")
-        self.assertEqual("node 2, 6098:0: invalid value for the parameter (0x06090030); the device's EDS has the limits: LowLimit, HighLimit\n",
+        self.assertEqual("A: the drive knows no homing method 99; it has 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 17, 18, 19, 20, 21, 22, 23, "
+                         "24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37\n",
                          self.refused("A", "home", 99))
 
     def test_reasons_when_not(self):

@@ -118,7 +118,11 @@ class Devices(Node):
         self.expect(again, "program 2.1 runs")
 
     def test_a_flash_that_cannot_be_kept_is_said(self):
+        self.assertEqual("hal node bootloader: there is no folder for 'nowhere/flash.bin'; type: mkdir -p nowhere\n",
+                         self.bad("node", "bootloader", "--link", self.bus, "--id", 4, "--flash", "nowhere/flash.bin"))
+        (self.folder / "nowhere").mkdir()
         device = self.node("bootloader", "--id", 4, "--flash", "nowhere/flash.bin")
+        (self.folder / "nowhere").rmdir()
         self.write_object(4, "1f51:1", "u8", "0")
         self.expect(device, "bootloader; flash: no error")
         self.write_object(4, "1f51:1", "u8", "3")

@@ -284,9 +284,31 @@ bool HandAxis::quick_stop() {
     return true;
 }
 
+/// A drive knows some of the methods; 60E3h says which, where it is there.
+bool HandAxis::choose_homing(int method) {
+    const auto data = static_cast<std::uint8_t>(method);
+    const std::uint16_t at = of_axis(object::homing_method, axis_);
+    SdoRequest request{.index = at, .data = std::span(&data, 1)};
+    if (station_.transfer(node_, request)) return true;
+    using canopen::Abort;
+    if (!request.aborted_there || (request.abort != Abort::value && request.abort != Abort::too_high && request.abort != Abort::too_low))
+        return station_.fail_transfer(node_, request, fmt::format("{:04X}:0", at)), false;
+    std::string known;
+    std::int64_t count = 0, one = 0;
+    bool missing = false;
+    if (read(object::supported_homing_methods, 0, count, false, &missing))
+        for (unsigned sub = 1; sub <= count && sub < 255; ++sub) {
+            if (!read(object::supported_homing_methods, static_cast<std::uint8_t>(sub), one, true, &missing)) break;
+            known += fmt::format("{}{}", known.empty() ? "" : ", ", one);
+        }
+    if (known.empty() && !missing) return false;  // the bus failed
+    return refuse(fmt::format("the drive knows no homing method {}; {}", method,
+                              known.empty() ? "its manual lists those it has" : "it has " + known));
+}
+
 bool HandAxis::home(std::optional<int> method) {
     if (!adopt()) return false;
-    if (method && !write(object::homing_method, 0, *method, 1)) return false;
+    if (method && !choose_homing(*method)) return false;
     const Mode before = command_.mode == Mode::profile_position ? command_.mode : Mode::profile_position;
     command_.velocity = command_.torque = 0.0;
     if (!begin_motion(before)) return false;

@@ -40,6 +40,7 @@ public:
     /// An object of the axis, as of the first one. False after saying why; or, with `missing`, when the drive has no such object.
     bool read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing = nullptr);
     bool write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes);
+    bool choose_homing(int method);
     /// "A: " and the sentence, on stderr; false.
     bool refuse(const std::string& sentence) const;
 

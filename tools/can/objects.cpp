@@ -194,7 +194,9 @@ std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
                            looks_like_text(bytes) ? fmt::format(", or \"{}\"", text_in(bytes)) : "");
     }
     constexpr std::size_t most = 32;
-    return fmt::format("{}{} ({})", hex_bytes(bytes.first(std::min(bytes.size(), most)), " "), bytes.size() > most ? " …" : "", count());
+    const std::string no_such = canopen::bits_of(type) != 0 ? fmt::format("; {} has {}", type_word(type), canopen::bytes_of(type)) : "";
+    return fmt::format("{}{} ({}{})", hex_bytes(bytes.first(std::min(bytes.size(), most)), " "), bytes.size() > most ? " …" : "", count(),
+                       no_such);
 }
 
 std::string value_json(std::span<const std::uint8_t> bytes, Type type) {
@@ -211,11 +213,9 @@ std::string value_json(std::span<const std::uint8_t> bytes, Type type) {
 
 bool parse_value(const std::string& text, Type type, std::vector<std::uint8_t>& bytes, std::string& problem) {
     if (is_text(type)) return bytes.assign(text.begin(), text.end()), true;
-    const eds::Encoded value = eds::encode(text, static_cast<std::uint16_t>(type), 0);
+    const eds::Encoded value = eds::encode_strictly(text, static_cast<std::uint16_t>(type), 0);
     if (!value) return problem = value.error, false;
     if (value.node_id) return problem = fmt::format("'{}' has a $NODEID in it; write the number", text), false;
-    if (value.spelling == eds::Spelling::octal)
-        return problem = fmt::format("'{}' would be octal; write it without the 0 in front, or 0x…", text), false;
     if (value.bytes.empty() && canopen::bits_of(type) != 0) return problem = "the value is empty", false;
     return bytes = value.bytes, true;
 }

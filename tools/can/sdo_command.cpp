@@ -81,16 +81,16 @@ int run_can_sdo_read(const Options& options) {
 
 namespace {
 
-/// The width of an object nobody has described: what it holds now.
-bool width_of(Station& station, std::uint8_t node, const ObjectName& object, Type& type, std::string& problem) {
+/// The type of an object nobody has described: as wide as what it holds now, signed for a negative value.
+bool width_of(Station& station, std::uint8_t node, const ObjectName& object, const std::string& value, Type& type, std::string& problem) {
     std::uint8_t room[64];
     SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .room = room};
-    const bool read = station.transfer(node, request);
+    const bool read = station.transfer(node, request), negative = value.starts_with('-');
     switch (read ? request.size : 0) {
-    case 1: type = Type::unsigned8; return true;
-    case 2: type = Type::unsigned16; return true;
-    case 4: type = Type::unsigned32; return true;
-    case 8: type = Type::unsigned64; return true;
+    case 1: type = negative ? Type::integer8 : Type::unsigned8; return true;
+    case 2: type = negative ? Type::integer16 : Type::unsigned16; return true;
+    case 4: type = negative ? Type::integer32 : Type::unsigned32; return true;
+    case 8: type = negative ? Type::integer64 : Type::unsigned64; return true;
     default: break;
     }
     problem = read ? fmt::format("it holds {} bytes now", request.size)
@@ -124,7 +124,7 @@ int run_can_sdo_write(const Options& options) {
     Station station(options);
     if (!station.open(options.words[0])) return 1;
     if (!from_file && type == Type::none) {
-        if (!width_of(station, words.node, object, type, problem)) return fail(options, problem);
+        if (!width_of(station, words.node, object, options.words[3], type, problem)) return fail(options, problem);
         if (!parse_value(options.words[3], type, bytes, problem)) return fail(options, problem);
     }
     SdoRequest request{.index = object.index, .sub = object.sub, .mode = words.mode, .data = bytes};

@@ -66,7 +66,10 @@ bool Station::transfer(std::uint8_t node, canopen::SdoRequest& request) {
     return request.ok();
 }
 
-const char* advice(Abort why) {
+namespace {
+
+/// What to do about an abort: half a sentence for `bus` and `node`; empty when nothing general can be said.
+std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16_t index) {
     switch (why) {
     case Abort::toggle:
     case Abort::sequence:
@@ -89,15 +92,22 @@ const char* advice(Abort why) {
     case Abort::incompatible:
     case Abort::internal_incompatible:
     case Abort::range_reversed: return "another object of the device contradicts it";
-    case Abort::access: return "while it is in use it may be locked: a PDO is changed when it is off: hal can pdo disable";
+    case Abort::access:
+        return fmt::format("while it is in use it may be locked; a PDO is changed when it is off: hal can pdo show {} {}, then pdo disable", bus,
+                           node);
     case Abort::cannot_store: return "1010 takes only 0x65766173 (save), 1011 only 0x64616F6C (load); else the memory is locked or worn";
     case Abort::local_control: return "a switch at the device, or its own program, has the command";
-    case Abort::device_state: return "most settings are taken in pre-operational: hal can nmt ADDRESS preop NODE";
-    case Abort::hardware: return "see its error register: hal can sdo read ADDRESS NODE 1001";
+    case Abort::device_state:
+        if (index == 0x1f50)
+            return fmt::format("its program is stopped and cleared before: hal can sdo write {0} {1} 1F51:1 0 --type u8, then 3", bus, node);
+        return fmt::format("most settings are taken in pre-operational: hal can nmt {} preop {}", bus, node);
+    case Abort::hardware: return fmt::format("see its error register: hal can sdo read {} {} 1001", bus, node);
     case Abort::no_resource: return "all SDO channels of the device are in use";
     default: return "";
     }
 }
+
+}  // namespace
 
 int Station::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request, const std::string& object) const {
     if (bus.stop.requested() && !request.aborted_there)
@@ -109,7 +119,7 @@ int Station::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request
                                 node, static_cast<double>(settings_of(options_).timeout) * (settings_of(options_).resends + 1) / 1e9,
                                 object, can::word(s.state), options_.words.front()));
     }
-    const std::string what = advice(request.abort);
+    const std::string what = advice(request.abort, options_.words.front(), node, request.index);
     return fail(options_, fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object,
                                       request.aborted_there ? "" : "gave up: ", canopen::word(request.abort),
                                       static_cast<std::uint32_t>(request.abort), what.empty() ? "" : "; " + what));

@@ -36,8 +36,6 @@ private:
     std::vector<can::Frame> room_;
 };
 
-/// What to do about an abort: half a sentence; empty when nothing general can be said.
-const char* advice(canopen::Abort);
 /// `5` or `0x05`; false when it is no node id.
 bool parse_node(const std::string& text, std::uint8_t& node);
 /// Says so on stderr when it is none.

@@ -152,6 +152,7 @@ void Master::poll(Time now) noexcept {
     schedule();
     if (dirty_) update();
     send_commands();
+    polled_ = now;
 }
 
 void Master::on_node(std::uint8_t id, NodeEvent event, NmtState state, Time now) noexcept {

@@ -105,7 +105,7 @@ private:
     NmtState own_state_ = NmtState::initialising;
     unsigned booting_ = 0, ready_ = 0;
     bool keeps_some_ = false, halted_ = false, started_together_ = false, was_operational_ = false, commanded_ = false, dirty_ = false;
-    Time now_ = 0, last_command_ = 0;
+    Time now_ = 0, polled_ = 0, last_command_ = 0;
 };
 
 }  // namespace hal::canopen

@@ -40,7 +40,9 @@ void Master::Node::on_beat(bool boot_up) noexcept {
     else if (was_operational_ && ++doubts_ == 2) return lose(Cause::left_operational);  // one alone may be late
     const auto window = 10 * producer_ms_ * millisecond;
     if (guarding() || window == 0 || (status.notes & note_doubled) != 0) return;
-    if (beats_ == 0 || now() - beats_since_ >= window) beats_ = 0, beats_since_ = now();
+    // After a pause the heartbeats of it come all at once.
+    const bool paused = now() - master_.polled_ > producer_ms_ * millisecond;
+    if (beats_ == 0 || paused || now() - beats_since_ >= window) beats_ = 0, beats_since_ = now();
     if (++beats_ <= 16) return;
     status.notes |= note_doubled;
     master_.events_.on_step(status);

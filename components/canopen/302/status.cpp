@@ -215,7 +215,8 @@ std::string sentence(const MasterSetup& setup, const NetworkStatus& s, const Nod
     if (s.state == NetworkState::stopped) return result + "by command; 'start' boots it";
     if (node == setup.nodes.end()) return result + "no node is known to be the cause";
     const auto of = sentence(*node, of_node);
-    result += of.empty() ? node_name(*node) + " is " + word(of_node.step) : of;
+    const bool idle = of_node.step == Step::running && !of_node.operational;
+    result += of.empty() ? node_name(*node) + " is " + (idle ? word(of_node.state) : word(of_node.step)) : of;
     if (s.state == NetworkState::failed) result += "; all nodes were stopped";
     else if (of_node.step == Step::waiting) result += "; it is tried again";
     return result;

@@ -72,6 +72,10 @@ std::string range_of(const DataType& type) {
     return "-" + std::to_string((top >> 1) + 1) + ".." + std::to_string(top >> 1);
 }
 
+std::string unfitting(std::string_view text, const DataType& type) {
+    return quoted(text) + " does not fit into " + std::string(type.name) + " (" + range_of(type) + ")";
+}
+
 std::vector<std::uint8_t> little(std::uint64_t value, unsigned bytes) {
     std::vector<std::uint8_t> out;
     for (unsigned i = 0; i < bytes; ++i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
@@ -120,7 +124,7 @@ Encoded integer(std::string_view text, const DataType& type, unsigned node_id) {
         fits = fits && magnitude <= half;
     }
     if (!fits) {
-        out.error = quoted(text) + " does not fit into " + std::string(type.name) + " (" + range_of(type) + ")";
+        out.error = unfitting(text, type);
         return out;
     }
     out.bytes = little(negative ? ~magnitude + 1 : magnitude, type.bytes());
@@ -293,6 +297,17 @@ Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id) {
     case Kind::unicode: out.bytes = utf16(text); return out;
     default: return octets(text);
     }
+}
+
+Encoded encode_strictly(std::string_view text, std::uint16_t code, unsigned node_id) {
+    Encoded out = encode(text, code, node_id);
+    if (out.spelling == Spelling::octal) {
+        out.error = quoted(text) + " would be octal; write it without the 0 in front, or 0x…";
+    } else if (out.spelling == Spelling::unsigned_for_negative) {
+        const std::optional<Number> number = parse_number(text);
+        if (!number || !number->hex || number->negative) out.error = unfitting(text, *data_type(code));
+    }
+    return out;
 }
 
 std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {

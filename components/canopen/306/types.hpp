@@ -53,6 +53,10 @@ struct Encoded {
 /// The value `text` of an object of type `code` on node `node_id`. An empty text is a value of no bytes and no error.
 Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id);
 
+/// The same of what a person writes by hand: no octal, and a decimal number that does not fit is an error, not the same bits with the
+/// other sign, as files have it.
+Encoded encode_strictly(std::string_view text, std::uint16_t code, unsigned node_id);
+
 /// The opposite, as the writer spells it: hexadecimal for naturals, decimal for integers; text as it is.
 std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code);
 

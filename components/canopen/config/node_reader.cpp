@@ -220,10 +220,11 @@ void NodeReader::write_one(const Line& line) {
     if (known != nullptr && !known->writable)
         return refuse("object " + object_label(index, sub, known->single) + " (" + known->about + ") cannot be written",
                       "the description has it as read only");
-    const eds::Encoded value = eds::encode(line.value.text, static_cast<std::uint16_t>(*type), node_.setup.id);
+    const eds::Encoded value = eds::encode_strictly(line.value.text, static_cast<std::uint16_t>(*type), node_.setup.id);
     if (!value || value.bytes.empty()) {
-        report_.error(Topic::value, line.value.at, value ? "there is no value to write" : value.error,
-                      "the object is of type " + std::string(word(*type)));
+        const std::string wanted = word(*type), problem = value ? "there is no value to write" : value.error;
+        report_.error(Topic::value, line.value.at, problem,
+                      problem.find(wanted) == std::string::npos ? "the object is of type " + wanted : "");
         return;
     }
     node_.setup.writes.push_back({{index, sub, value.bytes}, known != nullptr ? known->about : std::string()});

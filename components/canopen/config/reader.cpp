@@ -428,6 +428,13 @@ Reading read(const ByIndex& wish, const ReadFile& read_file) {
     text += "\n[node " + std::to_string(wish.slave) + "]\n";
     if (!wish.eds.empty()) text += "eds = " + wish.eds + "\n";
     Reading                                                       out;
+    if (wish.slave == wish.master)
+        out.messages.push_back({Severity::error,
+                                Topic::node,
+                                {},
+                                "slavenodeid= and masternodeid= are both " + std::to_string(wish.slave),
+                                "",
+                                "every node on a bus has an id of its own"});
     std::map<std::pair<std::uint16_t, std::uint8_t>, std::string> names;
     const Catalog                                                 drive("cia402", 1), lines("cia401", 1);
     const auto                                                    take = [&](const std::string& list, bool to_node) {

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <unistd.h>
 
 namespace hal::canopen {
 
@@ -21,7 +22,13 @@ std::string read_flash(const std::string& path, std::size_t most, std::optional<
     image.reset();
     errno = 0;
     const File file(std::fopen(path.c_str(), "rbe"));
-    if (!file) return errno == ENOENT ? std::string() : problem("cannot read", path);
+    if (!file && errno == ENOENT) {  // it is made when there is an image: that needs its folder
+        const auto slash = path.rfind('/');
+        const auto folder = path.substr(0, slash == std::string::npos ? 0 : slash);
+        if (folder.empty() || ::access(folder.c_str(), F_OK) == 0) return {};
+        return "there is no folder for '" + path + "'; type: mkdir -p " + folder;
+    }
+    if (!file) return problem("cannot read", path);
     std::vector<std::uint8_t> room(most + 1);
     const auto size = std::fread(room.data(), 1, room.size(), file.get());
     if (std::ferror(file.get()) != 0) return problem("cannot read", path);

@@ -21,6 +21,7 @@ public:
         : config_(config),
           setup_(config.setup()),
           file_(file),
+          instance_(instance),
           told_(std::move(instance), [this](const Event& e) { return words(e); }, 512) {}
 
     void start() { told_.start(); }           // [setup]
@@ -28,18 +29,25 @@ public:
 
     // By the cycle. What finds no room is not said. [realtime]
     void node(const NodeStatus& s) noexcept { told_.tell({Event::node, s, {}, {}, {}, 0}); }
+    /// What should be known of it: one bit of its notes.
+    void note(NodeStatus s, Note one) noexcept {
+        s.notes = one;
+        told_.tell({Event::note, s, {}, {}, {}, 0});
+    }
     void network(const NetworkStatus& n, const NodeStatus& s) noexcept { told_.tell({Event::network, s, n, {}, {}, 0}); }
     void emergency(const NodeStatus& s, const Emergency& e) noexcept { told_.tell({Event::emergency, s, {}, e, {}, 0}); }
     /// `had`: it was in order, now or earlier.
     void bus(can::State state, bool had) noexcept { told_.tell({had ? Event::bus : Event::waiting, {}, {}, {}, state, 0}); }
     void cycle(Time period) noexcept { told_.tell({Event::cycle, {}, {}, {}, {}, period}); }
+    /// One of its two functions does not run.
+    void missing(bool sends) noexcept { told_.tell({sends ? Event::no_transmit : Event::no_receive, {}, {}, {}, {}, 0}); }
     void flying(const FlyingMaster& f) noexcept {
         if (f.master() != 0) told_.tell({Event::flying, {}, {}, {}, {}, 0, f.master()});
     }
 
 private:
     struct Event {
-        enum Kind : std::uint8_t { node, network, emergency, bus, waiting, cycle, flying } kind = node;
+        enum Kind : std::uint8_t { node, note, network, emergency, bus, waiting, cycle, flying, no_transmit, no_receive } kind = node;
         NodeStatus    of_node{};
         NetworkStatus of_network{};
         Emergency     of_emergency{};
@@ -58,6 +66,10 @@ private:
         case Event::node:
             for (const NodeSetup& n : setup_.nodes)
                 if (n.id == e.of_node.id) return sentence(n, e.of_node);
+            break;
+        case Event::note:
+            for (const NodeSetup& n : setup_.nodes)
+                if (n.id == e.of_node.id) return note_sentences(n, e.of_node).front();
             break;
         case Event::network: {
             const NetworkStatus& n = e.of_network;
@@ -79,13 +91,13 @@ private:
                           emergency_word(config_, e.of_node.id, code), e.of_emergency.error_register);
             return text;
         }
-        case Event::bus:
-            return std::string("the bus is ") + can::word(e.of_bus) +
-                   (e.of_bus == can::State::bus_off ? "; it is tried again by itself" : "");
+        case Event::bus: return bus_words(e.of_bus);
         case Event::waiting: return "waits for the bus: its interface is off, or its slots may not be used yet";
         case Event::flying:
             return e.master == config_.node_id ? "is the NMT master now"
                                                : "node " + std::to_string(e.master) + " is the NMT master; this one is ready to take over";
+        case Event::no_transmit: return missing_words("transmit", "nothing is sent");
+        case Event::no_receive: return missing_words("receive", "no node is booted");
         case Event::cycle:
             for (const config::Message& m : config::load_messages(config_, e.period, file_)) return m.sentence + "; " + m.help;
             break;
@@ -93,9 +105,25 @@ private:
         return {};
     }
 
+    std::string missing_words(const std::string& function, const char* so) const {
+        return "its function " + function + " runs in no thread, so " + so + "; type: addf " + instance_ + "." + function + " THREAD";
+    }
+    static const char* bus_words(can::State state) {
+        switch (state) {
+        case can::State::active: return "the bus is active again";
+        case can::State::warning:
+            return "the bus is warning: many frames fail; check the cable, its termination, the bit rate, and that a node is there";
+        case can::State::passive:
+            return "the bus is passive: most frames fail; check the cable, its termination, the bit rate, and that a node is there";
+        case can::State::bus_off: return "the bus is bus off: too many errors; it is tried again by itself";
+        case can::State::down: return "the bus is down: its interface is off or was taken away; it is tried again by itself";
+        }
+        return "";
+    }
+
     const config::MasterConfig& config_;
     const MasterSetup           setup_;
-    const std::string           file_;
+    const std::string           file_, instance_;
     Time                        operational_told_ = -1;  // of which start it was said that the network is operational
     hal::Reporter<Event>        told_;                   // the last: its thread uses the others
 };

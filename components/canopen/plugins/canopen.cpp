@@ -30,7 +30,7 @@ std::string seconds_text(Time t) {
 
 /// A node's faults in words, made before the first cycle.
 struct FaultWords {
-    std::string                 silent, guarding, toggle, rebooted, left, not_started, doubled;
+    std::string                 silent, guarding, toggle, rebooted, left, not_started, doubled, suspected;
     std::array<std::string, 16> boot;  // by the letter of CiA 302
 
     FaultWords(const config::Node& n) {
@@ -44,6 +44,7 @@ struct FaultWords {
         left = who + " left the operational state by itself" + safe;
         not_started = who + " was started and did not become operational" + safe;
         doubled = who + " is there twice: two devices have this node-id" + safe;
+        suspected = who + " sends more heartbeats than it should: two devices may have this node-id";
         for (char letter = 'A'; letter <= 'O'; ++letter)
             boot[static_cast<std::size_t>(letter - 'A')] =
                 who + " cannot be booted: " + word(static_cast<BootResult>(letter)) + " (result " + letter + ")";
@@ -93,6 +94,8 @@ public:
         if (follower_) follower_->start();
         link_ = std::move(opened);
         period_ = 0;
+        unsent_ = unheard_ = 0;
+        notes_told_.assign(nodes_.size(), 0);
         reporter_->start();
         runner_->open(*link_);
         tell_ways(description.address);
@@ -113,6 +116,9 @@ public:
                 raise("the SYNC period is no multiple of the thread's period; SYNCs come up to half a period early or late", not_a_number);
         }
         now_ = now;
+        unheard_ = 0;
+        unsent_ += period_;
+        if (is_long_now(unsent_, period_)) reporter_->missing(true);
         runner_->receive(now);
         if (follower_) follow(now);
         if (flying_) flying_->show(*runner_);
@@ -123,6 +129,9 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
+        unsent_ = 0;
+        unheard_ += cycle.period_ns();
+        if (is_long_now(unheard_, cycle.period_ns())) reporter_->missing(false);
         objects_->take(*runner_);
         runner_->transmit(cycle.start_ns(), cycle.period_ns(), link_ && link_->leads(config_.node_id, cycle.start_ns(), cycle.period_ns()));
     }
@@ -142,6 +151,11 @@ private:
         return naming != nullptr ? naming->name(host) : "canopen.0";
     }
     bool by_index() const { return slave_ != 0; }
+    /// `sum` comes to a second, or three cycles, with what was `added`.
+    static bool is_long_now(Time sum, Time added) noexcept {
+        const Time limit = std::max<Time>(second, 3 * added);
+        return sum >= limit && sum - added < limit;
+    }
 
     /// How long the values of the pins are on the wire, where its schedule is known: to the station called as the node, or at most. [setup]
     void tell_ways(const std::string& link) {
@@ -266,6 +280,15 @@ private:
         } else if (s.step == Step::running && pins.is_faulty) {
             reporter_->node(s);
         }
+        if (s.step == Step::running) tell_notes(place, s);
+    }
+    /// What should be known of a node, once; that it is there twice, after each boot.
+    void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
+        const unsigned fresh = s.notes & ~unsigned{notes_told_[place]};
+        notes_told_[place] = static_cast<std::uint8_t>((notes_told_[place] & ~note_doubled) | s.notes);
+        for (unsigned bit = 1; bit <= note_updated; bit <<= 1)
+            if ((fresh & bit) != 0) reporter_->note(s, static_cast<Note>(bit));
+        if ((fresh & note_doubled) != 0) raise(words_[place].suspected.c_str(), not_a_number);
     }
     void on_network(const NetworkStatus& n) noexcept override {
         static constexpr NodeStatus nobody{};
@@ -322,7 +345,9 @@ private:
     std::unique_ptr<Reporter>    reporter_;
     std::unique_ptr<SharedLink>  link_;
     const hal_faults*            faults_ = nullptr;
+    std::vector<std::uint8_t>    notes_told_;  // bits of NodeStatus::notes, by node
     Time                         period_ = 0, now_ = 0;
+    Time                         unsent_ = 0, unheard_ = 0;  // how long one function ran without the other
     bool                         overran_ = false;
 };
 

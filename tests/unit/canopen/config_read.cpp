@@ -248,6 +248,13 @@ TEST(CanopenConfig, what_is_wrong_is_said_with_its_place_and_what_to_type) {
               "arm:2:7: a node section is named by the node's id, 1 to 127, and a name of your own; write [node 5 NAME]");
     EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statusword, position-actual-value, velocity-actual-value\n"),
               "arm:4:9: these objects are 80 bits together; a PDO carries 64; move some to another PDO");
+    EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\nwrite torque-slope = -1\n"),
+              "arm:4:22: '-1' does not fit into UNSIGNED32 (0..4294967295)");
+    EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\nwrite homing-method = 200\n"),
+              "arm:4:23: '200' does not fit into INTEGER8 (-128..127)");
+    EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\nwrite torque-slope = 0100\n"),
+              "arm:4:22: '0100' would be octal; write it without the 0 in front, or 0x…; the object is of type UNSIGNED32");
+    EXPECT_TRUE(read("[bus]\n[node 5]\ndevice = cia402\nwrite homing-method = 0xFF\n", "arm", files).good());  // the bits of -1
     EXPECT_EQ(said("link = can:can0\n"),
               "arm:1:1: this line stands before the first section; begin the file with [bus]\n"
               "arm:1:1: there is no section [bus]; write [bus] and below it link = can:can0 and bitrate = 1M");
@@ -267,6 +274,8 @@ TEST(CanopenConfig, by_index_inputs_go_to_the_node_and_outputs_come_from_it) {
     EXPECT_EQ(find(n, false, 1)->objects[0].index, 0x6063);
     EXPECT_EQ(find(n, false, 2)->objects[0].bits, 16);
     EXPECT_FALSE(read(ByIndex{"speed", "", "", 2, 1}, files).good());
+    EXPECT_EQ(to_string(read(ByIndex{"24831", "", "", 1, 1}, files), "arm"),
+              "arm:0:0: slavenodeid= and masternodeid= are both 1; every node on a bus has an id of its own");
 }
 
 /// Axes with a statusword and a position each way.
