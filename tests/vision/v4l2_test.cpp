@@ -201,13 +201,13 @@ TEST_F(V4l2, stamp_is_the_arrival_where_the_driver_has_another_clock) {
 
 TEST_F(V4l2, refusals_say_what_to_do) {
     kernel.open_error = ENOENT;
-    EXPECT_EQ(refusal(), "there is no camera /dev/video0");
+    EXPECT_EQ(refusal(), "there is no camera /dev/video0; those that there are: ls -l /dev/v4l/by-id");
     EXPECT_EQ(camera->problem().kind, Trouble::absent);
     kernel.open_error = EACCES;
     EXPECT_EQ(refusal(), "/dev/video0 may not be opened by this user; type: sudo usermod -aG video $USER, and log in anew");
     kernel.open_error = 0;
     kernel.no_camera = true;
-    EXPECT_EQ(refusal(), "/dev/video0 is no camera; those that there are: ls /dev/v4l/by-id");
+    EXPECT_EQ(refusal(), "/dev/video0 is no camera; those that there are: ls -l /dev/v4l/by-id");
     kernel.no_camera = false;
     kernel.capabilities = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING;
     EXPECT_EQ(refusal(), "/dev/video0 gives no frames; a camera has several devices, and often the even ones do");
@@ -306,7 +306,7 @@ TEST_F(SharedCamera, that_cannot_be_opened_says_why_to_each) {
     kernel.open_error = ENOENT;
     EXPECT_FALSE(a->open(0));
     EXPECT_FALSE(b->open(0));
-    EXPECT_EQ(b->problem().text, "there is no camera /dev/video0");
+    EXPECT_EQ(b->problem().text, "there is no camera /dev/video0; those that there are: ls -l /dev/v4l/by-id");
     EXPECT_EQ(kernel.open_now, 0);
 }
 

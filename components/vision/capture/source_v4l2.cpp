@@ -144,7 +144,8 @@ private:
         return Got::lost;
     }
     bool not_opened(int error) {
-        if (error == ENOENT || error == ENODEV || error == ENXIO) return fail(Trouble::absent, "there is no camera " + device_);
+        if (error == ENOENT || error == ENODEV || error == ENXIO)
+            return fail(Trouble::absent, "there is no camera " + device_ + "; those that there are: ls -l /dev/v4l/by-id");
         if (error == EACCES || error == EPERM)
             return fail(Trouble::refused, device_ + " may not be opened by this user; type: sudo usermod -aG video $USER, and log in anew");
         if (error == EBUSY) return busy();
@@ -161,7 +162,7 @@ private:
     bool start() {
         v4l2_capability able{};
         if (system_.control(fd_, VIDIOC_QUERYCAP, &able) == -1)
-            return fail(Trouble::refused, device_ + " is no camera; those that there are: ls /dev/v4l/by-id");
+            return fail(Trouble::refused, device_ + " is no camera; those that there are: ls -l /dev/v4l/by-id");
         const std::uint32_t can = (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
         if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
             return fail(Trouble::refused, device_ + " gives no frames; a camera has several devices, and often the even ones do");
