@@ -59,7 +59,7 @@ bool plain(std::string_view text) {
 void status(std::span<const std::uint8_t> given) {
     const std::vector<std::uint8_t> bytes(given.begin(), given.end());
     const std::string text(status_text(bytes));
-    require(status_text(status_bytes(text)) == text, "what was read can be written");
+    require(status_text(status_bytes(text)) == std::string_view(text).substr(0, largest_status), "what was read can be written");
     std::vector<std::string> layouts{""};
     for (const char* key : {"offers", "wants", "instance"})
         for (const std::string& value : values_of(text, key)) {
