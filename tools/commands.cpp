@@ -280,7 +280,7 @@ void declare_can_pdo_watch(CLI::App& app, Options& o) {
 void declare_can_lss(CLI::App& app, Options& o) {
     words(app, o, "ADDRESS COMMAND", "the bus; scan, switch configuration|waiting, select VENDOR PRODUCT REVISION SERIAL, inquire, node-id N|none, "
                                      "bit-rate RATE, activate DELAY, store, identify [VENDOR PRODUCT REVISION SERIAL]");
-    duration(app, "--timeout", o.timeout_ns, "an answer comes within 1s, 200ms … (default 100ms; of each step of a scan 20ms)");
+    duration(app, "--timeout", o.timeout_ns, "an answer comes within 1s, 200ms … (default 1s; of each step of a scan 20ms, twice that with each repetition)");
 }
 
 void declare_can_gateway(CLI::App& app, Options& o) {

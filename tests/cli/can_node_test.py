@@ -175,7 +175,7 @@ class Lss(Node):
     IDENTIFIER = "none"
 
     def ready(self):
-        return self.run_program("can", "lss", self.bus, "identify", "--timeout", "100ms").returncode == 0
+        return self.run_program("can", "lss", self.bus, "identify").returncode == 0
 
     def test_a_node_without_id_is_found_and_gets_one(self):
         identity = r"vendor (0x\w+), product (0x\w+), revision (0x\w+), serial (0x00000001)"

@@ -77,8 +77,9 @@ class OneShot(Drive):
 
     def test_reasons_when_not(self):
         self.node("--set", "dc-link-0=10")
-        self.assertEqual('A: enable: drive stays in "switch on disabled" after "shutdown" for 2.00 s (statusword 0x0260); '
-                         "voltage-enabled is 0: has its power stage supply?\n", self.refused("A", "on"))
+        self.assertRegex(self.refused("A", "on"),
+                         r'^A: enable: drive stays in "switch on disabled" after "shutdown" for \d+\.\d\d s \(statusword 0x0260\); '
+                         r"voltage-enabled is 0: has its power stage supply\?\n$")
         self.assertEqual("B: node 2 has no such axis: object 6841 is missing\n", self.refused("B", "on"))
         self.assertRegex(self.bad("can", "drive", self.bus, "--node", 9, "--timeout", "50ms", "A", "on"),
                          r"^hal can drive: node 9 did not answer within 0.15 s \(asked for 6041:0\); the bus is active; hal can scan udp:\S+ shows who is there\n$")
@@ -88,8 +89,8 @@ class OneShot(Drive):
         self.assertEqual("A: enable: drive is in fault (statusword 0x0218, error 0x7305: incremental sensor 1); remove the cause, then type: A reset\n",
                          self.refused("A", "on"))
         self.assertRegex(self.drive("A", "status"), r"(?s)^A: fault, mode .*\n   error 0x7305: incremental sensor 1\n$")
-        self.assertIn('A: reset: drive stays in "fault" after "fault reset" for 2.00 s (statusword 0x0218, error 0x7305: incremental sensor 1)',
-                      self.refused("A", "reset"))
+        self.assertRegex(self.refused("A", "reset"), r'A: reset: drive stays in "fault" after "fault reset" for \d+\.\d\d s '
+                                                     r"\(statusword 0x0218, error 0x7305: incremental sensor 1\)")
 
     def test_fault_on_the_way(self):
         self.node()

@@ -23,7 +23,7 @@ canopen::SdoClientSettings settings_of(const Options& options) {
 Station::Station(const Options& options)
     : network(out, *this, settings_of(options)),
       lss(out, options.timeout_ns > 0 ? canopen::LssMasterSettings{.timeout = options.timeout_ns, .scan_timeout = options.timeout_ns}
-                                      : canopen::LssMasterSettings{}),
+                                      : canopen::LssMasterSettings{.timeout = canopen::second, .repeats = 5}),
       options_(options),
       room_(256) {}
 

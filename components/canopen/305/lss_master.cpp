@@ -87,6 +87,9 @@ void LssMaster::scan_part() noexcept {
     send_scan(bit_, part_);
 }
 
+/// Twice as long with each repetition: the answers may have come late.
+Time LssMaster::scan_wait() const noexcept { return settings_.scan_timeout << std::min(settings_.repeats - repeats_left_, 5U); }
+
 void LssMaster::scan_answer(bool yes) noexcept {
     switch (job_) {
     case Job::scan_reset:
@@ -122,7 +125,7 @@ void LssMaster::handle(const Frame& f, Time now) noexcept {
     if (!busy() || f.length != 8) return;
     if (job_ != Job::expect) {
         // All slaves that the question fits answer, each in its turn: the next question waits for the last of them.
-        if (f.data[0] == 0x4f && !unsent_ && !heard_) heard_ = true, asked_ = now - settings_.scan_timeout + settings_.scan_timeout / 4;
+        if (f.data[0] == 0x4f && !unsent_ && !heard_) heard_ = true, asked_ = now - scan_wait() + settings_.scan_timeout / 4;
         return;
     }
     if (f.data[0] != expected_) return;
@@ -145,7 +148,7 @@ void LssMaster::poll(Time now) noexcept {
         asked_ = now;
         return;
     }
-    if (now - asked_ >= settings_.scan_timeout) scan_answer(heard_);
+    if (now - asked_ >= scan_wait()) scan_answer(heard_);
 }
 
 }  // namespace hal::canopen

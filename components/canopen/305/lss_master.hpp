@@ -9,7 +9,7 @@ namespace hal::canopen {
 struct LssMasterSettings {
     Time timeout = 100 * millisecond;      ///< an answer that comes, comes by then
     Time scan_timeout = 20 * millisecond;  ///< the same while scanning, where silence is an answer
-    unsigned repeats = 1;                  ///< a step of the scan that ends in a contradiction is done again
+    unsigned repeats = 1;                  ///< a step of the scan that ends in a contradiction is done again, and waits twice as long
 };
 
 /// The master's side, one job at a time: start it, poll and handle until it is no longer busy, look at the result.
@@ -55,6 +55,7 @@ private:
     void send_scan(std::uint8_t bit, std::uint8_t next) noexcept;
     void scan_part() noexcept;
     void scan_answer(bool yes) noexcept;
+    Time scan_wait() const noexcept;
 
     FrameQueue& out_;
     LssMasterSettings settings_;
