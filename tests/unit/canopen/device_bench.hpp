@@ -84,7 +84,7 @@ private:
     const std::string address_;
 
 public:
-    Node node;
+    canopen::Node node;
     Events events;
     FrameQueue out{256};
     Network network{out, events, {.timeout = 100 * millisecond}};
