@@ -64,6 +64,7 @@ class Segment(Case):
         node = lambda *words: subprocess.run(["hal", "node", "axis-io", "--id", "1", *words], executable=str(HAL), env=self.environment, text=True,
                                              stdout=subprocess.PIPE, stderr=subprocess.PIPE).stderr
         self.assertIn("write --link cane:eth0 with --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
+        self.assertIn("--skew is of a station in a TDMA; add --tdma FILE, its schedule\n", node("--link", "cane:lo", "--skew", "200ppm"))
         self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
         self.assertIn("there are axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
         self.assertIn("cannot read 'none.tdma'", node("--link", "cane:lo", "--tdma", "none.tdma"))

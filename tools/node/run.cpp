@@ -192,7 +192,8 @@ int turn_until_ended(const Options& options, const NodeKind& kind, canopen::Prog
         while (!stop.requested() && now < end) {
             change_world(now);
             node.turn(now, about.simulated ? now : can::unclocked);
-            if (!(is_read = look(now))) break;
+            is_read = look(now);
+            if (!is_read) break;
             node.link().wait(1'000'000);
             now = now_ns();
         }
@@ -211,6 +212,11 @@ int run_node(const Options& options, const NodeKind& kind, canopen::Program& pro
     if (options.node.link.empty())
         return fail(options, "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node " + kind.name);
     if (!parse_id(options, kind, id, problem)) return fail(options, problem);
+    const NodeOptions& given = options.node;
+    if (given.tdma.empty())
+        for (const auto& [name, value] : {std::pair{"--station", &given.station}, {"--tunnel", &given.tunnel}, {"--skew", &given.skew},
+                                          {"--drift", &given.drift}})
+            if (!value->empty()) return fail(options, fmt::format("{} is of a station in a TDMA; add --tdma FILE, its schedule", name));
     std::vector<std::pair<canopen::Fault, canopen::FaultSetting>> faults(options.node.faults.size());
     for (std::size_t n = 0; n < faults.size(); ++n)
         if (!canopen::parse_fault(options.node.faults[n], faults[n].first, faults[n].second, problem)) return fail(options, problem);
