@@ -13,6 +13,9 @@ namespace hal::link {
 
 inline std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
 
+/// How `apply` below begins what it says of a key that it does not know.
+inline constexpr std::string_view no_option = "there is no option ";
+
 /// `key`, `key=0` or `key=1`; what is wrong with it, or nothing.
 inline std::string to_flag(std::string_view key, std::string_view value, bool has_value, bool& flag) {
     if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
@@ -26,6 +29,7 @@ struct Driver {
     std::string_view name;
     Opened (*open)(const std::string& place, const Options&);
     bool (*is_own_option)(std::string_view key) = nullptr;
+    std::string (*own_options)() = nullptr;  ///< their names, for people
 };
 
 /// Opens by the driver that the address names. `apply(key, value, has_value, options)` says what is wrong with an option, or nothing;
@@ -53,7 +57,9 @@ Opened open_address(std::string_view address, Options options, std::span<const D
             where.append(std::exchange(separator, "&")).append(item);
             continue;
         }
-        const std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
+        std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
+        if (problem.starts_with(no_option) && driver->own_options != nullptr)
+            problem += ", and of " + std::string(driver->name) + ": " + driver->own_options();
         if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
     }
     try {

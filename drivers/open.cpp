@@ -19,7 +19,7 @@ namespace {
 
 constexpr link::Driver<Opened, Options> drivers[] = {
     {"can", socketcan::open}, {"sim", simbus::open},    {"udp", canudp::open},
-    {"slcan", slcan::open},   {"replay", replay::open}, {"cane", cane::open, cane::is_own_option},
+    {"slcan", slcan::open},   {"replay", replay::open}, {"cane", cane::open, cane::is_own_option, cane::own_options},
 };
 
 using link::quoted;
@@ -67,7 +67,8 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     if (key == "restart") return to_number(o.restart_ms, 3'600'000);
     if (key == "sendqueue") return to_number(o.send_capacity, 65536);
     if (key == "receivequeue") return to_number(o.receive_capacity, 65536);
-    return "there is no option " + quoted(key) + "; there are bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue";
+    return std::string(link::no_option) + quoted(key) +
+           "; there are bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue";
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
         o.address = *address;
         return {};
     }
-    return "there is no option " + quoted(key) +
+    return std::string(link::no_option) + quoted(key) +
            "; there are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, sendqueue, receivequeue";
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "link/can.hpp"
@@ -9,6 +10,8 @@ namespace hal::can::cane {
 
 /// Whether `key` belongs to this driver rather than to every CAN link. [setup]
 bool is_own_option(std::string_view key);
+/// "format, order, …". [setup]
+std::string own_options();
 
 /// `cane:IF?key=value`: CAN messages in Ethernet frames. `place` has the driver's own options behind it. [setup]
 Opened open(const std::string& place, const Options&);

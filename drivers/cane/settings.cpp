@@ -55,6 +55,13 @@ std::string apply(std::string_view key, std::string_view value, Settings& s) {
 
 }  // namespace
 
+std::string own_options() {
+    std::string text;
+    for (const auto key : own_keys) text += std::string(key) + ", ";
+    for (const auto key : segment_keys) text += std::string(key) + ", ";
+    return text + "node5";
+}
+
 bool is_own_option(std::string_view key) { return is_in(own_keys, key) || is_in(segment_keys, key) || key.starts_with("node"); }
 
 std::string parse(std::string_view place, Settings& s) {

@@ -65,6 +65,9 @@ class Segment(Case):
                                              stdout=subprocess.PIPE, stderr=subprocess.PIPE).stderr
         self.assertIn("write --link cane:eth0 with --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
         self.assertIn("--skew is of a station in a TDMA; add --tdma FILE, its schedule\n", node("--link", "cane:lo", "--skew", "200ppm"))
+        self.assertIn("there is no option 'slots'; there are bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue, "
+                      "and of cane: format, order, slot, priority, learn, to, mac, speed, policy, spin, promiscuous, node5\n",
+                      node("--link", "cane:lo?slots=3"))
         self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
         self.assertIn("there are axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
         self.assertIn("cannot read 'none.tdma'", node("--link", "cane:lo", "--tdma", "none.tdma"))
