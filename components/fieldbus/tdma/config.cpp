@@ -123,7 +123,10 @@ std::optional<Ip> parse_ip(std::string_view text) {
     const char* at = text.data();
     const char* end = at + text.size();
     for (std::size_t i = 0; i < 4; ++i) {
-        if (i != 0 && (at == end || *at++ != '.')) return {};
+        if (i != 0) {
+            if (at == end || *at != '.') return {};
+            ++at;
+        }
         const auto [next, error] = std::from_chars(at, end, ip[i]);
         if (error != std::errc() || next == at) return {};
         at = next;

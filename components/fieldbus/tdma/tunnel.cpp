@@ -20,7 +20,7 @@ bool is_whole(std::uint16_t type, std::span<const std::uint8_t> p) noexcept {
     switch (type) {
     case ipv4: {
         if (p.size() < 20 || p[0] >> 4 != 4) return false;
-        const std::size_t header = (p[0] & 15U) * 4U, total = get<std::uint16_t>(p, 2);
+        const std::size_t header = std::size_t{p[0] & 15U} * 4U, total = get<std::uint16_t>(p, 2);
         return header >= 20 && total >= header && total <= p.size();
     }
     case arp: return p.size() >= 28;
