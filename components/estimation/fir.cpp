@@ -52,17 +52,18 @@ private:
         if (!taps.get().empty()) {
             std::size_t        at = 0;
             const std::string& text = taps.get();
+            const auto         wrong = [&text](const std::string& why) { return std::invalid_argument("taps=" + text + ": " + why); };
             while (at <= text.size()) {
                 const std::size_t end = std::min(text.find_first_of(",; ", at), text.size());
                 const std::string word = text.substr(at, end - at);
                 char*             rest = nullptr;
                 const double      w = std::strtod(word.c_str(), &rest);
                 if (word.empty() || *rest != '\0' || !(std::fabs(w) < 1e100))
-                    throw std::invalid_argument("taps=" + text + ": '" + word + "' is not a number; write them as 0.25,0.5,0.25");
+                    throw wrong("'" + word + "' is not a number; write them as 0.25,0.5,0.25");
                 weights_.push_back(w);
                 at = end + 1;
             }
-            if (weights_.size() > 1024) throw std::invalid_argument("taps=" + text + ": more than 1024");
+            if (weights_.size() > 1024) throw wrong("more than 1024");
             return;
         }
         if (!(corner > 0.0 && corner < 0.5))
