@@ -505,6 +505,9 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
         return fail(options, fmt::format("something is missing; type: hal {} {}", row.name, row.usage));
     } catch (const CLI::ParseError& error) {
         std::string what = error.what();
+        constexpr std::string_view unread = "Could not convert: ";  // --speed = fast
+        if (const auto equals = what.find(" = "); what.starts_with(unread) && equals != std::string::npos)
+            what = fmt::format("{}: '{}' is no number", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3));
         std::replace(what.begin(), what.end(), '\n', ' ');
         return fail(options, fmt::format("{}; see: hal help {}", what, row.name));
     }

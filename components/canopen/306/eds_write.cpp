@@ -180,6 +180,14 @@ private:
     void flags(std::uint32_t bits) {
         if (bits != 0) key("ObjFlags", hex(bits, 1));
     }
+    void described(const Entry& entry) {
+        key("ParameterName", entry.name);
+        key("ObjectType", hex(static_cast<unsigned>(entry.type), 1));
+        if (entry.data_type != 0) key("DataType", hex(entry.data_type));
+        values(entry);
+        configured(entry);
+        flags(entry.flags);
+    }
 
     void spread(const Object& o, const std::string& name, std::string Entry::* field, const std::vector<std::string>& usual) {
         std::vector<std::pair<unsigned, const std::string*>> different;
@@ -225,12 +233,7 @@ private:
             extras(o.extras);
             for (const Entry& entry : o.entries) {
                 section(prefix + label(o.index, entry.sub));
-                key("ParameterName", entry.name);
-                key("ObjectType", hex(static_cast<unsigned>(entry.type), 1));
-                if (entry.data_type != 0) key("DataType", hex(entry.data_type));
-                values(entry);
-                configured(entry);
-                flags(entry.flags);
+                described(entry);
                 extras(entry.extras);
             }
         }
@@ -265,12 +268,7 @@ private:
             for (const SubExtension& extension : one.extensions) {
                 const Entry& entry = extension.object.entries.at(0);
                 section(prefix + "SubExt" + label(extension.object.index));
-                key("ParameterName", entry.name);
-                key("ObjectType", hex(static_cast<unsigned>(entry.type), 1));
-                if (entry.data_type != 0) key("DataType", hex(entry.data_type));
-                values(entry);
-                configured(entry);
-                flags(entry.flags);
+                described(entry);
                 key("Count", extension.count);
                 key("ObjExtend", extension.object_extend);
                 extras(entry.extras);

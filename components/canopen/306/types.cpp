@@ -77,8 +77,8 @@ std::string unfitting(std::string_view text, const DataType& type) {
 }
 
 std::vector<std::uint8_t> little(std::uint64_t value, unsigned bytes) {
-    std::vector<std::uint8_t> out;
-    for (unsigned i = 0; i < bytes; ++i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    std::vector<std::uint8_t> out(bytes);
+    for (unsigned i = 0; i < bytes; ++i) out[i] = static_cast<std::uint8_t>(value >> (8 * i));
     return out;
 }
 
