@@ -214,8 +214,8 @@ int run_node(const Options& options, const NodeKind& kind, canopen::Program& pro
     if (!parse_id(options, kind, id, problem)) return fail(options, problem);
     const NodeOptions& given = options.node;
     if (given.tdma.empty())
-        for (const auto& [name, value] : {std::pair{"--station", &given.station}, {"--tunnel", &given.tunnel}, {"--skew", &given.skew},
-                                          {"--drift", &given.drift}})
+        for (const auto& [name, value] :
+             {std::pair{"--station", &given.station}, {"--tunnel", &given.tunnel}, {"--skew", &given.skew}, {"--drift", &given.drift}})
             if (!value->empty()) return fail(options, fmt::format("{} is of a station in a TDMA; add --tdma FILE, its schedule", name));
     std::vector<std::pair<canopen::Fault, canopen::FaultSetting>> faults(options.node.faults.size());
     for (std::size_t n = 0; n < faults.size(); ++n)
