@@ -51,6 +51,14 @@ class Segment(Case):
         left = subprocess.run(["ip", "netns", "list"], stdout=subprocess.PIPE, text=True).stdout
         self.assertNotIn("hal-cnc-", left)
 
+    def test_a_folder_that_cannot_be_is_named(self):
+        done = subprocess.run([ROOT / "halfiles/ethernet-furuta/bring-up"], env={**self.environment, "HAL": str(HAL), "TMPDIR": "/nowhere"},
+                              text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        if done.returncode == 77:
+            self.skipTest("no network namespaces here")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("nothing can be written in '/nowhere', where what the processes say would be; set TMPDIR=FOLDER\n", done.stdout)
+
     def test_wrong_words_are_named(self):
         done = subprocess.run([ROOT / "halfiles/ethernet-cnc/bring-up", "fast"], env={**self.environment, "HAL": str(HAL)}, text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
