@@ -238,6 +238,17 @@ const void* extension_of(const hal_host*, const char* id) {
     return std::strcmp(id, HAL_TEXTS) == 0 ? &texts : nullptr;
 }
 
+// A given argument that nothing asked for, and that is nearly one of those that were: more of the truth than what the constructor missed.
+bool is_misspelled(const Component& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+    const std::vector<std::string> all(asked.begin(), asked.end());
+    for (const auto& [name, given] : request.arguments)
+        if (const std::string hint = asked.contains(name) ? "" : did_you_mean(name, all); !hint.empty()) {
+            diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", hint);
+            return true;
+        }
+    return false;
+}
+
 // One instance: memory, constructor, declarations into the model.
 bool construct_one(Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics, std::unique_ptr<Instance> instance, Construction& c) {
     c.sources = &sources;
@@ -253,6 +264,7 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
                 diagnostics.error("bad-argument", given.at, "component '" + component.name + "': " + why, "", "hal doc " + component.name + " lists its arguments");
                 return false;
             }
+        if (is_misspelled(component, request, c.asked, diagnostics)) return false;
         diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + why);
         return false;
     }
