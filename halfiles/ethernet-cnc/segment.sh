@@ -20,6 +20,7 @@ hal=${HAL:-hal}
 command -v "$hal" >/dev/null || { say "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
 folder=$(mktemp -d "${TMPDIR:-/tmp}/hal-$machine.XXXXXX" 2>/dev/null) ||
     { say "nothing can be written in '${TMPDIR:-/tmp}', where what the processes say would be; set TMPDIR=FOLDER" >&2; exit 1; }
+if [ -n "${HAL_BRING_UP:-}" ]; then export XDG_RUNTIME_DIR=$folder; fi  # the folder of the control sockets may be the real root's
 switch=hal-$machine-switch
 pids=()
 carriers=()
