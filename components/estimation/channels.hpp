@@ -88,7 +88,7 @@ private:
     };
     static std::int64_t cycles(const Row& row, hal::Cycle cycle) noexcept {
         const double count = row.age / cycle.seconds();
-        return count > 0.5 ? (count < 1e9 ? static_cast<std::int64_t>(count + 0.5) : 1'000'000'000) : 0;
+        return count > 0.5 ? (count < 1e9 ? std::llround(count) : 1'000'000'000) : 0;
     }
 
     std::vector<std::unique_ptr<Row>> rows_;

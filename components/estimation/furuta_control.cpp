@@ -133,9 +133,10 @@ private:
     /// True when a prediction says that the balance brings the pendulum upright: with less torque than there is, as the amplifier may give less,
     /// and with the arm below the speed that ends a balance.
     bool succeeds(double tilt, State s) const noexcept {
-        constexpr double dt = 0.005, ahead = 0.6, part_of_torque = 0.8, part_of_speed = 0.95;
+        constexpr double dt = 0.005, part_of_torque = 0.8, part_of_speed = 0.95;
+        constexpr int    steps = 120;  // 0.6 s
         const double     limit = part_of_torque * std::fabs(max_torque), fastest = std::fabs(max_velocity);
-        for (double t = 0.0; t < ahead; t += dt) {
+        for (int i = 0; i < steps; ++i) {
             const Rates rates = under(std::clamp(held(tilt, s), -limit, limit), s);
             s.arm += dt * (s.arm_speed + 0.5 * dt * rates.arm), tilt += dt * (s.pendulum_speed + 0.5 * dt * rates.pendulum);
             s.arm_speed += dt * rates.arm, s.pendulum_speed += dt * rates.pendulum;

@@ -198,7 +198,9 @@ public:
             if (text.empty() && (any || *w->example == '\0')) continue;
             MatrixText reader;
             reader.read_rows(w->name, text.empty() ? w->example : text);
-            const std::string argument = lower(w->name) + "=" + (text.size() > 40 ? text.substr(0, 37) + "..." : text);
+            const bool  whole = text.size() <= 40;
+            std::string argument = lower(w->name);
+            argument.append("=").append(text, 0, whole ? text.size() : 37).append(whole ? "" : "...");
             if (!reader.problems.empty())
                 throw std::invalid_argument(argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
             reader.found[0].argument = argument;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "estimation/matrix.hpp"
@@ -76,7 +77,7 @@ class Past {
 public:
     /// Takes its memory here. [setup]
     Past(Model& model, std::size_t history, Vector x0, Matrix p0, Eigen::Index inputs, Eigen::Index channels)
-        : model_(model), start_{x0, p0, Vector::Zero(inputs), Vector::Zero(channels)}, moments_(history, start_) {}
+        : model_(model), start_{std::move(x0), std::move(p0), Vector::Zero(inputs), Vector::Zero(channels)}, moments_(history, start_) {}
 
     const Moment& now() const noexcept { return at(number_); }
 
