@@ -88,7 +88,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t stack = 512 * 1024;
+    static constexpr std::size_t stack = std::size_t{512} * 1024;
 };
 
 /// A sample on its way in or out.
@@ -294,6 +294,7 @@ public:
     std::vector<Known> known() const override {
         const std::lock_guard lock(mutex_);
         std::vector<Known>    all;
+        all.reserve(known_.size());
         for (const auto& [prefix, k] : known_) all.push_back(k);
         return all;
     }

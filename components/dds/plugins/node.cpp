@@ -138,8 +138,7 @@ private:
             if (node[0] == self_.get()) return twin(text);
             for (Other& other : others_)
                 if (other.name == node[0]) judge(other, text, sample.monotonic_ns);
-        } catch (const std::exception&) {
-            // a text that cannot be kept is one that did not come
+        } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): a text that cannot be kept is one that did not come
         }
     }
 
