@@ -28,7 +28,7 @@ std::string refusal(std::string_view fields) {
     } catch (const std::invalid_argument& e) { return e.what(); }
     return "accepted";
 }
-std::vector<hal_value> values_of(const Schema& s, const Bytes& bytes) {
+std::vector<hal_value> decoded(const Schema& s, const Bytes& bytes) {
     std::vector<hal_value> values(s.fields.size());
     EXPECT_TRUE(decode(s, bytes, values));
     return values;
@@ -54,7 +54,7 @@ TEST(Schema, values_come_out_as_they_went_in) {
     put(s, 3, 0xfffffff0u);
     put(s, 4, std::int64_t{-1'000'000'000'000});
     put(s, 5, ~std::uint64_t{1});
-    const auto v = values_of(s, s.sample);
+    const auto v = decoded(s, s.sample);
     EXPECT_TRUE(v[0].bit);
     EXPECT_EQ(-2.5, v[1].real);
     EXPECT_EQ(-7, v[2].s32);
@@ -66,11 +66,11 @@ TEST(Schema, values_come_out_as_they_went_in) {
 TEST(Schema, other_byte_orders_and_the_second_representation_are_read) {
     const Schema s = Schema::of_fields("n:s32,f:float");
     const Bytes big{0, 0, 0, 0, 0, 0, 0, 5, 0, 0, 0, 0, 0x40, 0x04, 0, 0, 0, 0, 0, 0};  // 5, 2.5
-    auto v = values_of(s, big);
+    auto v = decoded(s, big);
     EXPECT_EQ(5, v[0].s32);
     EXPECT_EQ(2.5, v[1].real);
     const Bytes second{0, 7, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 0x40};  // no gap before the double
-    v = values_of(s, second);
+    v = decoded(s, second);
     EXPECT_EQ(5, v[0].s32);
     EXPECT_EQ(2.5, v[1].real);
 }
@@ -168,7 +168,7 @@ TEST(Outbox, hands_over_in_order_and_is_full_at_last) {
         const auto bytes = box.front(time);
         ASSERT_EQ(s.sample.size(), bytes.size());
         EXPECT_EQ(100 + i, time);
-        EXPECT_EQ(i, values_of(s, Bytes(bytes.begin(), bytes.end()))[0].s32);
+        EXPECT_EQ(i, decoded(s, Bytes(bytes.begin(), bytes.end()))[0].s32);
         box.take();
     }
     EXPECT_TRUE(box.front(time).empty());
