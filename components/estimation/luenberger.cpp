@@ -61,7 +61,7 @@ private:
              {"poles", "0.95,0.9",
               "n: where the poles of the error are to lie; real, inside of the unit circle; none twice when one measurement is there"},
              {"x0", "", "n: the states at the start; 0 without it"}});
-        const Dense        a = given.square("A");
+        const Dense&       a = given.square("A");
         const Eigen::Index n = a.rows();
         const Dense        b =
             given.has("B") ? given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has") : Dense(Dense::Zero(n, 0));

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::size_t most_files = 100'000;
-constexpr std::size_t most_bytes = 3 * 2 * most_pixels + 4096;  // of a file: what the largest frame has in 16 bits
+constexpr std::size_t most_bytes = std::size_t{3} * 2 * most_pixels + 4096;  // of a file: what the largest frame has in 16 bits
 
 class Frames final : public Source {
 public:

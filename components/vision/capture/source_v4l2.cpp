@@ -203,7 +203,7 @@ private:
         is_yuyv_ = wanted == V4L2_PIX_FMT_YUYV;
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         line_ = std::max<std::size_t>(is.bytesperline, row);
-        if (!Frame::fits(width_, height_) || line_ > 16u * most_wide || (is_yuyv_ && width_ % 2 != 0))
+        if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * most_wide || (is_yuyv_ && width_ % 2 != 0))
             return fail(Trouble::huge,
                         "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
         return true;
@@ -255,7 +255,7 @@ private:
             std::uint8_t* const       to = frame.row(y);
             if (!is_yuyv_) std::memcpy(to, from, row);
             else if (grey_)
-                for (int x = 0; x < width_; ++x) to[x] = from[2 * x];
+                for (std::size_t x = 0; x < row / 2; ++x) to[x] = from[2 * x];
             else yuyv_to_bgr(from, to, static_cast<std::size_t>(width_));
         }
         frame.number = buffer.sequence;
