@@ -10,7 +10,9 @@ namespace {
 
 constexpr double alpha_end = 0.05, beta_end = alpha_end * alpha_end / (2.0 - alpha_end);  // critically damped
 constexpr double outlier_sigmas = 5.0, smallest_outlier_ns = 2'000.0;
-constexpr std::uint32_t most_outliers = 8;     // in a row; then the clock itself has jumped
+// In a row; then the clock itself has jumped. Syncs come late when they are held up, on a busy computer for many cycles, and meanwhile the
+// drift is known; none comes early.
+constexpr std::uint32_t most_early = 8, most_late = 100;
 constexpr double        largest_drift = 1e-3;  // 1000 ppm: no crystal
 
 }  // namespace
@@ -35,7 +37,9 @@ bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
     if (taken_ >= 8) {
         const double limit = std::max(outlier_sigmas * std::sqrt(square_), smallest_outlier_ns);
         if (std::abs(e) > limit) {
-            if (++outliers_ <= most_outliers) return false;
+            const bool early = e > 0.0;
+            outliers_ = early == early_ ? outliers_ + 1 : 1, early_ = early;
+            if (outliers_ <= (early ? most_early : most_late)) return false;
             clear();
             return take(sent, arrived, delay);
         }

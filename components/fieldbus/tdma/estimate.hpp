@@ -35,8 +35,8 @@ private:
     Time          at_ = 0;            // local time of `offset_`
     double        offset_ = 0.0, drift_ = 0.0;
     double        square_ = 0.0;      // mean square of e
-    std::uint32_t taken_ = 0, outliers_ = 0;
-    bool          leading_ = false;
+    std::uint32_t taken_ = 0, outliers_ = 0;  // outliers: in a row, all early or all late
+    bool          early_ = false, leading_ = false;
 };
 
 }  // namespace hal::tdma

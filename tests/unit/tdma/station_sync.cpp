@@ -19,6 +19,24 @@ std::vector<std::uint8_t> some_frame(int from, std::size_t length = 60, std::uin
     return frame;
 }
 
+TEST(Clock_estimate, coasts_while_syncs_are_held_up_and_follows_a_clock_that_jumped) {
+    constexpr Time way = 5'000;
+    ClockEstimate clock;
+    Time sent = 0, jump = 0;
+    const auto local = [&] { return sent + sent / 5000 + jump + way; };  // this clock is 200 ppm fast
+    const auto sync = [&](Time late) { return sent += ms, clock.take(sent, local() + late, way); };
+    for (int i = 0; i < 300; ++i) sync(i % 3 * 300);
+    for (int i = 0; i < 90; ++i) EXPECT_FALSE(sync(400'000 + i)) << i;
+    EXPECT_NEAR(sent + way, clock.global(local()), 1'000) << "90 cycles later";
+    EXPECT_TRUE(sync(300)) << "and the first that is in time counts";
+    jump = 50'000;
+    for (int i = 0; i < 140; ++i) sync(i % 3 * 300);
+    EXPECT_NEAR(sent + way, clock.global(local()), 1'000) << "later for good: it is this clock that jumped";
+    jump = -50'000;
+    for (int i = 0; i < 40; ++i) sync(i % 3 * 300);
+    EXPECT_NEAR(sent + way, clock.global(local()), 1'000) << "nothing comes early; that is believed sooner";
+}
+
 TEST(Station_begins_as_master, when_nobody_else_sends_a_sync) {
     Bed bed;
     Machine& m = bed.add(1, master());
