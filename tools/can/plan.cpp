@@ -96,7 +96,8 @@ std::string why_late(const Table& table, const std::vector<plan::Message>& messa
 std::string help_text(const Table& table, const std::vector<plan::Message>& messages) {
     std::string text;
     if (const auto rate = plan::sufficient_bit_rate(messages, table.bus))
-        text += fmt::format("  = help: with bitrate = {}k everything is in time\n", *rate / 1000);
+        text += fmt::format("  = help: with bitrate = {} everything is in time\n",
+                            *rate == 1'000'000 ? "1M" : fmt::format("{}k", *rate / 1000));
     if (const auto order = plan::sufficient_order(messages, table.bus); !order.empty()) {
         text += "  = help: in this order of identifiers, lowest first, everything is in time:";
         for (const std::size_t i : order) text += fmt::format(" {}", id_of(messages[i]));

@@ -113,7 +113,7 @@ std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const
     }
     std::string help = "hal canopen plan " + path + " shows the arithmetic and what to change";
     if (const auto rate = plan::sufficient_bit_rate(schedule.messages, schedule.bus))
-        help = "bitrate = " + std::to_string(*rate / 1000) + "k would do; " + help;
+        help = "bitrate = " + (*rate == 1'000'000 ? "1M" : std::to_string(*rate / 1000) + "k") + " would do; " + help;
     return {{Severity::warning, Topic::load, config.at, std::move(sentence), "the first that may be late is " + schedule.names[late],
              std::move(help)}};
 }

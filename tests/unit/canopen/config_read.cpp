@@ -294,6 +294,9 @@ TEST(CanopenSchedule, says_how_many_axes_fit_into_a_millisecond) {
     EXPECT_TRUE(load_messages(good(axes(3, "sync = 1ms\n")), millisecond, "arm").empty());
     EXPECT_FALSE(load_messages(good(axes(8, "sync = 1ms\n")), millisecond, "arm").empty());
     EXPECT_TRUE(load_messages(good(axes(8, "sync = 2500us\n")), millisecond, "arm").empty());
+    const auto slow = load_messages(good(axes(3, "bitrate = 250k\nsync = 1ms\n")), millisecond, "arm");
+    ASSERT_EQ(slow.size(), 1U);
+    EXPECT_EQ(slow[0].help, "bitrate = 1M would do; hal canopen plan arm shows the arithmetic and what to change");
 }
 
 }  // namespace
