@@ -74,7 +74,16 @@ void configuration(std::span<const std::uint8_t> given) {
     require(!client.configured(), "a frame alone configures nothing");
     client.accept(m.from, 100);
     for (int i = 0; i < 3; ++i) client.arrived(frame, 2), client.before_slots(3);
-    rtcfg::Server server(station, {}, {{m.from, {}, "slave:\nslot 0 100\n", "a file"}, {{}, {true, {10, 0, 0, 3}}, "", ""}}, 100);
+    static Station leading(StationSetup{.role = Role::master, .slots = {{.size = 200}}});  // only who sends the syncs serves
+    static const auto segment = hal::ethernet::open("sim:fuzz");
+    static const bool leads = [] {
+        leading.attach(*segment.port);
+        for (Time now = 1'000'000; now < 20'000'000; now += 1'000'000) leading.receive(now);
+        return leading.ready() && leading.status().leading;
+    }();
+    require(leads, "a master that is alone leads");
+    rtcfg::Server server(leading, {}, {{m.from, {}, "slave:\nslot 0 100\n", "a file"}, {{}, {true, {10, 0, 0, 3}}, "", ""}}, 100);
+    server.before_slots(0);
     for (Time now = 1; now < 3'000'000'000; now += 700'000'000)
         server.arrived(frame, now), server.heard(m.from, now), server.before_slots(now);
     require(server.ready() <= server.clients(), "as many as there are");
