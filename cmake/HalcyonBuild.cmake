@@ -46,7 +46,7 @@ endif()
 # those ALONE do, and are compiled one by one. With optimisation and sanitizers g++ 12 takes longer for eight than for each of them.
 function(halcyon_unity target)
     cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
-    if(HALCYON_UNITY AND NOT CMAKE_CXX_CLANG_TIDY)
+    if(HALCYON_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
         set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
         if(with_ALONE)
             set_source_files_properties(${with_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
@@ -54,9 +54,9 @@ function(halcyon_unity target)
     endif()
 endfunction()
 
-# The same for what has HALCYON_TOOL_OPTIONS, under g++'s sanitizers only: what users run is compiled source by source.
+# The same for what has HALCYON_TOOL_OPTIONS, under a sanitizer only: what users run is compiled source by source.
 function(halcyon_unity_tool)
-    if(HALCYON_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    if(HALCYON_SANITIZE)
         halcyon_unity(${ARGV})
     endif()
 endfunction()
