@@ -252,7 +252,7 @@ private:
     void on_step(std::size_t place, const NodeStatus& s) noexcept override {
         NodePins&         pins = nodes_[place];
         const FaultWords& w = words_[place];
-        const double      silence = s.last_heard == 0 ? not_a_number : static_cast<double>(now_ - s.last_heard) * 1e-9;
+        const double      silence = s.last_heard == 0 ? not_a_number : static_cast<double>((now_ - s.last_heard + millisecond / 2) / millisecond) * 1e-3;
         if (s.losses != pins.losses) {
             pins.losses = s.losses;
             pins.is_faulty = true;
