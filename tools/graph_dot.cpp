@@ -51,7 +51,7 @@ public:
 
 private:
     /// 1 for the first function of the thread; 0: in none.
-    static std::size_t place(const Function& function) {
+    static std::size_t place(const LoadedFunction& function) {
         if (!function.thread || function.init) return 0;
         const auto& all = function.thread->functions;
         const auto at = std::find(all.begin(), all.end(), &function);
@@ -79,7 +79,7 @@ private:
             "    {} [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" color=\"#808080\">"
             "<tr><td colspan=\"2\"><b>{}</b>{}</td></tr>",
             node, escaped(item.name), item.component->name == item.name ? "" : " (" + escaped(item.component->name) + ")");
-        for (const Function* function : item.functions) {
+        for (const LoadedFunction* function : item.functions) {
             const std::size_t order = place(*function);
             const std::string where = order != 0       ? fmt::format("{}. in {}", order, escaped(function->thread->name))
                                       : function->init ? fmt::format("once in {}", escaped(function->thread->name))
@@ -122,7 +122,7 @@ private:
     /// First and last place of the functions that may use the pin, in its thread.
     static std::pair<std::size_t, std::size_t> places(const Pin& pin) {
         std::size_t first = 0, last = 0;
-        const auto count = [&](const Function& function) {
+        const auto count = [&](const LoadedFunction& function) {
             const std::size_t at = place(function);
             if (at == 0) return;
             first = first == 0 ? at : std::min(first, at);
@@ -130,7 +130,7 @@ private:
         };
         if (pin.function) count(*pin.function);
         else if (pin.instance)
-            for (const Function* function : pin.instance->functions) count(*function);
+            for (const LoadedFunction* function : pin.instance->functions) count(*function);
         return {first, last};
     }
 

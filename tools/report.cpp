@@ -32,14 +32,14 @@ std::string wrapped(const std::string& head, const std::vector<std::string>& wor
 }
 
 struct Slowest {
-    const Function* function;
+    const LoadedFunction* function;
     double mean_ns, max_ns;
 };
 
 std::vector<Slowest> slowest_functions(const Model& model, std::size_t most) {
     std::vector<Slowest> all;
     for (const auto& thread : model.threads)
-        for (const Function* function : thread->functions) {
+        for (const LoadedFunction* function : thread->functions) {
             const plan::FunctionTimes& times = *function->times;
             const std::uint64_t samples = times.samples.load(std::memory_order_relaxed);
             if (samples == 0) continue;
@@ -57,7 +57,7 @@ std::string loaded_summary(Session& session) {
     const std::lock_guard lock(session.mutex);
     const Model& model = session.model();
     std::size_t instances = 0, width = 0;
-    std::vector<const Component*> shown;
+    std::vector<const LoadedComponent*> shown;
     for (const auto& component : model.components)
         if (!component->instances.empty()) {
             instances += component->instances.size();
@@ -68,14 +68,14 @@ std::string loaded_summary(Session& session) {
     std::string text =
         fmt::format("{} of {}, {}, {}\n", counted(instances, "instance", "instances"), counted(shown.size(), "component", "components"),
                     counted(model.signals.size(), "signal", "signals"), counted(model.threads.size(), "thread", "threads"));
-    for (const Component* component : shown) {
+    for (const LoadedComponent* component : shown) {
         std::vector<std::string> names;
         for (const auto& instance : component->instances) names.push_back(instance->name);
         text += wrapped(fmt::format("  {:{}}  ", component->name, width), names, 24);
     }
     for (const auto& thread : model.threads) {
         std::vector<std::string> names;
-        for (const Function* function : thread->functions) names.push_back(function->name);
+        for (const LoadedFunction* function : thread->functions) names.push_back(function->name);
         if (names.empty()) names.emplace_back("(no functions)");
         text += wrapped(
             fmt::format("  {:{}}  every {}: ", thread->name, width, format_duration(static_cast<double>(thread->options.period_ns))), names,

@@ -46,7 +46,9 @@ public:
     }
 
 private:
-    bool excluded(const Function* function) const { return function->halted || (input_.without && input_.without->contains(function)); }
+    bool excluded(const LoadedFunction* function) const {
+        return function->halted || (input_.without && input_.without->contains(function));
+    }
 
     // Where a pin's value is before the plan is taken: in the instance the threads know.
     const hal_pin& present(const Pin& pin) const {
@@ -57,7 +59,7 @@ private:
     Thread* thread_for(const Pin& pin) const {
         if (pin.of_thread) return pin.of_thread;
         if (pin.function) return excluded(pin.function) ? nullptr : pin.function->thread;
-        for (const Function* function : pin.instance->functions)
+        for (const LoadedFunction* function : pin.instance->functions)
             if (function->thread && !excluded(function)) return function->thread;
         return nullptr;
     }
@@ -66,7 +68,7 @@ private:
     bool spread(const Pin& pin) const {
         if (!is_loose(pin)) return false;
         const Thread* first = nullptr;
-        for (const Function* function : pin.instance->functions) {
+        for (const LoadedFunction* function : pin.instance->functions) {
             if (!function->thread || excluded(function)) continue;
             if (first && function->thread != first) return true;
             first = function->thread;
@@ -126,7 +128,7 @@ private:
             wanted.push_back(&place);
         };
         for (const auto* row : {&thread.init, &thread.functions})
-            for (const Function* function : *row) {
+            for (const LoadedFunction* function : *row) {
                 if (excluded(function)) continue;
                 for (const Instance* instance : function->instances)
                     for (const auto& pin : instance->pins) want(*pin);
@@ -150,13 +152,14 @@ private:
     void steps(Thread& thread, plan::Plan& plan) {
         std::size_t checks = 0;
         for (const auto* row : {&thread.init, &thread.functions})
-            for (const Function* function : *row)
+            for (const LoadedFunction* function : *row)
                 for (const Instance* instance : function->instances) checks += instance->finite.size();
         plan.finite_checks = std::make_unique<plan::FiniteCheck[]>(checks);
         std::size_t check = 0;
         std::unordered_set<const Instance*> met;
-        const auto fill = [&](const std::vector<Function*>& row, std::vector<plan::Step>& to, std::vector<plan::Function>& functions) {
-            for (Function* function : row) {
+        const auto fill = [&](const std::vector<LoadedFunction*>& row, std::vector<plan::Step>& to,
+                              std::vector<plan::Function>& functions) {
+            for (LoadedFunction* function : row) {
                 if (excluded(function)) continue;
                 const auto begin = static_cast<std::uint32_t>(to.size());
                 to.insert(to.end(), function->steps.begin(), function->steps.end());
@@ -168,7 +171,8 @@ private:
                     }
                 functions.push_back({begin, static_cast<std::uint32_t>(to.size()), function->id, function->times.get()});
                 for (const Instance* instance : function->instances)
-                    if (met.insert(instance).second) plan.emergency.insert(plan.emergency.end(), instance->emergency.begin(), instance->emergency.end());
+                    if (met.insert(instance).second)
+                        plan.emergency.insert(plan.emergency.end(), instance->emergency.begin(), instance->emergency.end());
             }
         };
         fill(thread.init, plan.init_steps, plan.init);
@@ -179,7 +183,7 @@ private:
 
     void rows(const Thread& thread, plan::Plan& plan) const {
         std::unordered_map<hal_step, hal_row> known;
-        for (const Function* function : thread.functions)
+        for (const LoadedFunction* function : thread.functions)
             if (function->row.run) known[function->row.step] = function->row.run;
         const auto add = [&](hal_row row, std::size_t end) {
             if (!plan.rows.empty() && !row && !plan.rows.back().run) plan.rows.back().end = static_cast<std::uint32_t>(end);
@@ -206,7 +210,7 @@ private:
         for (const plan::Row& row : plan.rows)
             if (row.run) set.push_back({reinterpret_cast<const void*>(row.run), code});
         const std::size_t before = set.size();
-        for (const Function* function : thread.functions) {
+        for (const LoadedFunction* function : thread.functions) {
             if (excluded(function)) continue;
             for (const Instance* instance : function->instances) {
                 const auto begin = reinterpret_cast<std::uintptr_t>(instance->memory);
@@ -335,8 +339,8 @@ private:
 
 Compiled compile(const Model& model, const CompileInput& input) { return Compiler(model, input).run(); }
 
-std::unordered_set<const Function*> moving(const Model& model) {
-    std::unordered_set<const Function*> functions;
+std::unordered_set<const LoadedFunction*> moving(const Model& model) {
+    std::unordered_set<const LoadedFunction*> functions;
     for_all_pins(model, [&](const Pin& pin) {
         Thread* const to = thread_of(pin);
         if (!pin.home || !to || pin.home == to) return;

@@ -18,7 +18,7 @@ namespace hal {
 struct CompileInput {
     std::uint64_t epoch = 0;
     /// Functions left out: those that move between threads, in the first of two swaps.
-    const std::unordered_set<const Function*>* without = nullptr;
+    const std::unordered_set<const LoadedFunction*>* without = nullptr;
     /// New values of what threads own, and signals that take a pin's value (see Edit).
     const std::unordered_map<Pin*, hal_value>* pin_values = nullptr;
     const std::unordered_map<Signal*, hal_value>* signal_values = nullptr;
@@ -60,6 +60,6 @@ struct Compiled {
 Compiled compile(const Model& model, const CompileInput& input);
 
 /// Functions whose instances move from one thread to another: they need two swaps. Empty: one is enough.
-std::unordered_set<const Function*> moving(const Model& model);
+std::unordered_set<const LoadedFunction*> moving(const Model& model);
 
 }  // namespace hal

@@ -127,7 +127,7 @@ bool Edit::remove_thread(Word name) {
 }
 
 bool Edit::add_function(Word function_name, Word thread_name, int position, Span position_at, bool init) {
-    Function* const target = function(function_name);
+    LoadedFunction* const target = function(function_name);
     Thread* const to = thread(thread_name);
     if (!target || !to) return false;
     if (target->thread) {
@@ -165,7 +165,7 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
 }
 
 bool Edit::remove_function(Word function_name, Word thread_name) {
-    Function* const target = function(function_name);
+    LoadedFunction* const target = function(function_name);
     Thread* const from = thread(thread_name);
     if (!target || !from) return false;
     if (target->thread != from)
@@ -175,7 +175,7 @@ bool Edit::remove_function(Word function_name, Word thread_name) {
     return true;
 }
 
-void Edit::take_from_thread(Function& function) {
+void Edit::take_from_thread(LoadedFunction& function) {
     Thread* const from = function.thread;
     if (!from) return;
     const bool init = function.init;
@@ -192,9 +192,9 @@ void Edit::take_from_thread(Function& function) {
     structural_ = true;
 }
 
-Component& Edit::add_component(std::string name, Span at) {
-    auto owned = std::make_unique<Component>();
-    Component* const made = owned.get();
+LoadedComponent& Edit::add_component(std::string name, Span at) {
+    auto owned = std::make_unique<LoadedComponent>();
+    LoadedComponent* const made = owned.get();
     made->name = std::move(name);
     made->loaded = at;
     made->id = model_.next_component_id;
@@ -211,7 +211,7 @@ Component& Edit::add_component(std::string name, Span at) {
     return *made;
 }
 
-void Edit::add_time_pins(Function& function) {
+void Edit::add_time_pins(LoadedFunction& function) {
     plan::FunctionTimes& times = *function.times;
     function.pins.push_back(own_pin(model_, function.name + ".time", HAL_TYPE_S32, HAL_DIR_OUT, times.time, "duration of the last sampled call", "ns"));
     function.pins.push_back(own_pin(model_, function.name + ".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, times.tmax, "longest sampled call; set it to 0 to start again", "ns"));
@@ -219,12 +219,12 @@ void Edit::add_time_pins(Function& function) {
     for (const auto& pin : function.pins) pin->function = &function;
 }
 
-std::uint32_t Edit::take_number(Component& component) {
+std::uint32_t Edit::take_number(LoadedComponent& component) {
     on_undo([&component] { --component.next_number; });
     return component.next_number++;
 }
 
-void Edit::note_arguments(Component& component, std::string text, Load load) {
+void Edit::note_arguments(LoadedComponent& component, std::string text, Load load) {
     make_room(component.arguments);
     make_room(component.loads);
     on_undo([&component] {
@@ -235,12 +235,13 @@ void Edit::note_arguments(Component& component, std::string text, Load load) {
     component.loads.push_back(std::move(load));
 }
 
-void Edit::reorder(Thread& thread, std::vector<Function*> functions) {
+void Edit::reorder(Thread& thread, std::vector<LoadedFunction*> functions) {
     on_undo([&thread, before = thread.functions] { thread.functions = before; });
     thread.functions = std::move(functions);
 }
 
-bool Edit::add_instance(Component& component, std::unique_ptr<Instance>& owned, std::vector<std::unique_ptr<Function>> functions) {
+bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& owned,
+                        std::vector<std::unique_ptr<LoadedFunction>> functions) {
     Instance* const made = owned.get();
     if (const Instance* const there = model_.find_instance(made->name)) {
         Diagnostic d{Severity::error, "name-taken", "there is an instance " + quoted(made->name) + " already (" + there->component->name + ")", {{made->loaded, "second time"}}, {}};
@@ -263,7 +264,7 @@ bool Edit::add_instance(Component& component, std::unique_ptr<Instance>& owned, 
     make_room(added_instances_);
     const auto functions_before = component.functions.size();
     on_undo([this, made, functions_before] {
-        Component& of = *made->component;
+        LoadedComponent& of = *made->component;
         while (of.functions.size() > functions_before) {
             for (const auto& pin : of.functions.back()->pins) model_.pin.erase(pin->name);
             model_.function.erase(of.functions.back()->name);
@@ -308,7 +309,7 @@ void Edit::remove_pins(Instance& instance, const std::vector<Pin*>& pins) {
     });
 }
 
-void Edit::extend_function(Function& function, const plan::Step& step, Instance& instance) {
+void Edit::extend_function(LoadedFunction& function, const plan::Step& step, Instance& instance) {
     make_room(function.steps);
     make_room(function.instances);
     on_undo([&function] {
@@ -320,7 +321,7 @@ void Edit::extend_function(Function& function, const plan::Step& step, Instance&
 }
 
 void Edit::remove_instance(Instance& leaving) {
-    Component& component = *leaving.component;
+    LoadedComponent& component = *leaving.component;
     for (const auto& pin : leaving.pins) {
         Signal* const written = pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_SAFE) ? pin->signal : nullptr;
         unlink(*pin);
@@ -328,17 +329,17 @@ void Edit::remove_instance(Instance& leaving) {
     }
     // functions of its own go; shared ones lose its steps, and go with the last instance
     struct Gone {
-        Function* function;
+        LoadedFunction* function;
         std::ptrdiff_t position;
     };
     struct Shrunk {
-        Function* function;
+        LoadedFunction* function;
         std::vector<plan::Step> steps;
         std::vector<Instance*> instances;
     };
     std::vector<Gone> gone;
     auto shrunk = std::make_shared<std::vector<Shrunk>>();
-    for (Function* const function : leaving.functions) {
+    for (LoadedFunction* const function : leaving.functions) {
         if (function->shared && function->instances.size() > 1) {
             shrunk->push_back({function, function->steps, function->instances});
             continue;
@@ -388,7 +389,7 @@ void Edit::remove_instance(Instance& leaving) {
     structural_ = true;
 }
 
-void Edit::remove_component(Component& leaving) {
+void Edit::remove_component(LoadedComponent& leaving) {
     while (!leaving.instances.empty()) remove_instance(*leaving.instances.back());
     const auto at = owner(model_.components, &leaving);
     make_room(removed_.components);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Edits of the model as one transaction: every rule a single edit can break is checked here, with the place of every
-// word; everything done can be undone. LinuxCNC's rules (DESIGN section 4, "Kept from LinuxCNC exactly").
+// word; everything done can be undone. LinuxCNC's rules (docs/linuxcnc-compatibility.md).
 #pragma once
 
 #include <algorithm>
@@ -52,41 +52,42 @@ public:
     /// `position` as addf has it: appended (-1 or none), n from the front, -n from the end, never 0.
     bool add_function(Word function, Word thread, int position, Span position_at, bool init);
     bool remove_function(Word function, Word thread);
-    void take_from_thread(Function& function);
+    void take_from_thread(LoadedFunction& function);
 
     // --- names ------------------------------------------------------------------------------------------------------
     bool alias(Word kind, Word name, Word second);
     bool unalias(Word kind, Word second);
 
     // --- components and instances -----------------------------------------------------------------------------------
-    Component& add_component(std::string name, Span at);
+    LoadedComponent& add_component(std::string name, Span at);
     /// Takes an instance with its pins and functions into the indices; reports names that are taken.
     /// Leaves `instance` alone when it refuses.
-    bool add_instance(Component& component, std::unique_ptr<Instance>& instance, std::vector<std::unique_ptr<Function>> functions);
+    bool add_instance(LoadedComponent& component, std::unique_ptr<Instance>& instance,
+                      std::vector<std::unique_ptr<LoadedFunction>> functions);
     /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names that are taken.
     bool add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at);
     /// Takes pins out that are in no signal.
     void remove_pins(Instance& instance, const std::vector<Pin*>& pins);
     /// The number of the next unnamed instance.
-    std::uint32_t take_number(Component& component);
+    std::uint32_t take_number(LoadedComponent& component);
     /// Puts a thread's functions into another order.
-    void reorder(Thread& thread, std::vector<Function*> functions);
+    void reorder(Thread& thread, std::vector<LoadedFunction*> functions);
     /// `loadrt` arguments as they were written, for `save`, and taken apart, for `reload`.
-    void note_arguments(Component& component, std::string text, Load load);
+    void note_arguments(LoadedComponent& component, std::string text, Load load);
     /// A shared function gets one more instance.
-    void extend_function(Function& function, const plan::Step& step, Instance& instance);
+    void extend_function(LoadedFunction& function, const plan::Step& step, Instance& instance);
     void remove_instance(Instance& instance);
-    void remove_component(Component& component);
-    void add_time_pins(Function& function);
+    void remove_component(LoadedComponent& component);
+    void add_time_pins(LoadedFunction& function);
     /// Exchanges a component's code and instances with those of `fresh`, which was made beside the model and has an instance for
     /// each. Pins and functions that both declare stay the same objects: links, values, places in threads and times are kept.
     /// False after reporting what stands against it; then `fresh` is as it was.
-    bool replace(Component& component, std::unique_ptr<Component>& fresh, Span at);
+    bool replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>& fresh, Span at);
 
     // --- look-ups that report ---------------------------------------------------------------------------------------
     Pin* pin(Word name);
     Signal* signal(Word name);
-    Function* function(Word name);
+    LoadedFunction* function(Word name);
     Thread* thread(Word name);
     /// What was to be made and was not, as was said: that its pins, functions or the like are not there either is not said again.
     void note_absent(std::string name) { absent_.insert(std::move(name)); }
@@ -99,8 +100,8 @@ public:
     /// Forgets how to undo; what was removed is handed over to be destroyed after the threads have let go of it.
     struct Removed {
         std::vector<std::unique_ptr<Instance>> instances;
-        std::vector<std::unique_ptr<Function>> functions;
-        std::vector<std::unique_ptr<Component>> components;
+        std::vector<std::unique_ptr<LoadedFunction>> functions;
+        std::vector<std::unique_ptr<LoadedComponent>> components;
         std::vector<std::unique_ptr<Signal>> signals;
         std::vector<std::unique_ptr<Thread>> threads;
         std::vector<decltype(Signal::port)> ports;  ///< of a buffer that was undone
@@ -109,8 +110,8 @@ public:
     const std::vector<Instance*>& added_instances() const { return added_instances_; }
     /// A component that was replaced, and the one that is not in the model: the old one; after undo() the new one.
     struct Replaced {
-        Component* component;
-        std::unique_ptr<Component> other;
+        LoadedComponent* component;
+        std::unique_ptr<LoadedComponent> other;
         bool stopped = false;  ///< the old instances have been stopped for the new ones
     };
     std::deque<Replaced>& replaced() { return replaced_; }

@@ -73,13 +73,13 @@ Signal* Edit::signal(Word name) {
     return nullptr;
 }
 
-Function* Edit::function(Word name) {
-    if (Function* const found = model_.find_function(name.text)) return found;
+LoadedFunction* Edit::function(Word name) {
+    if (LoadedFunction* const found = model_.find_function(name.text)) return found;
     if (is_absent(name.text)) return nullptr;
     std::string help;
     if (const Instance* const instance = model_.find_instance(name.text)) {
         std::vector<std::string> own;
-        for (const Function* function : instance->functions) own.push_back(function->name);
+        for (const LoadedFunction* function : instance->functions) own.push_back(function->name);
         if (!own.empty()) help = "functions of " + instance->name + ": " + listed(own);
     }
     fail("no-such-function", name.span, "there is no function " + quoted(name.text), did_you_mean(name.text, names(model_.function)), help);

@@ -31,7 +31,7 @@ std::vector<Pair> pairs_of(const std::vector<std::unique_ptr<T>>& old_row, const
 }
 
 bool same_pin(const Pin& a, const Pin& b) { return a.type == b.type; }
-bool same_function(const Function&, const Function&) { return true; }
+bool same_function(const LoadedFunction&, const LoadedFunction&) { return true; }
 
 /// The rows change places, but objects that are kept stay in the model's row, in the new order.
 template <class T>
@@ -57,7 +57,7 @@ void swap_declarations(Pin& a, Pin& b) {
     std::swap(a.pointer, b.pointer);
     std::swap(a.function, b.function);
 }
-void swap_declarations(Function& a, Function& b) {
+void swap_declarations(LoadedFunction& a, LoadedFunction& b) {
     std::swap(a.doc, b.doc);
     std::swap(a.steps, b.steps);
     std::swap(a.row, b.row);
@@ -77,7 +77,7 @@ void swap_contents(Instance& a, Instance& b) {
     std::swap(a.constructed, b.constructed);
     std::swap(a.started, b.started);
 }
-void swap_contents(Component& a, Component& b) {
+void swap_contents(LoadedComponent& a, LoadedComponent& b) {
     std::swap(a.plugin, b.plugin);
     std::swap(a.library, b.library);
     std::swap(a.path, b.path);
@@ -91,11 +91,11 @@ struct InstancePair {
 /// All of one replacement, so that it can be done and undone.
 struct Replacement {
     Model& model;
-    Component &component, &other;
+    LoadedComponent &component, &other;
     std::vector<InstancePair> instances;
     std::vector<Pair> functions;
     std::vector<Pin*> gone_pins, new_pins;
-    std::vector<Function*> gone_functions, new_functions;
+    std::vector<LoadedFunction*> gone_functions, new_functions;
 
     void enter(Pin& pin) const {
         model.pin.emplace(pin.name, &pin);
@@ -112,7 +112,7 @@ struct Replacement {
     }
     void run() const {
         for (const Pin* const pin : gone_pins) leave(*pin);
-        for (const Function* const function : gone_functions) model.function.erase(function->name);
+        for (const LoadedFunction* const function : gone_functions) model.function.erase(function->name);
         swap_contents(component, other);
         exchange(component.functions, other.functions, functions);
         for (const InstancePair& pair : instances) {
@@ -120,12 +120,12 @@ struct Replacement {
             exchange(pair.kept->pins, pair.fresh->pins, pair.pins);
         }
         exchange_kept_declarations();
-        for (Function* const function : new_functions) model.function.emplace(function->name, function);
+        for (LoadedFunction* const function : new_functions) model.function.emplace(function->name, function);
         for (Pin* const pin : new_pins) enter(*pin);
     }
     void back() const {
         for (const Pin* const pin : new_pins) leave(*pin);
-        for (const Function* const function : new_functions) model.function.erase(function->name);
+        for (const LoadedFunction* const function : new_functions) model.function.erase(function->name);
         exchange_kept_declarations();
         for (const InstancePair& pair : instances) {
             exchange_back(pair.kept->pins, pair.fresh->pins, pair.pins);
@@ -133,14 +133,14 @@ struct Replacement {
         }
         exchange_back(component.functions, other.functions, functions);
         swap_contents(component, other);
-        for (Function* const function : gone_functions) model.function.emplace(function->name, function);
+        for (LoadedFunction* const function : gone_functions) model.function.emplace(function->name, function);
         for (Pin* const pin : gone_pins) enter(*pin);
     }
 };
 
 /// The new version's rows speak of its own objects; from now on they speak of those the model will have.
 void translate(const Replacement& r) {
-    std::unordered_map<const Function*, Function*> function_of;
+    std::unordered_map<const LoadedFunction*, LoadedFunction*> function_of;
     std::unordered_map<const Instance*, Instance*> instance_of;
     for (const Pair& pair : r.functions) function_of[r.other.functions[pair.fresh].get()] = r.component.functions[pair.kept].get();
     for (const InstancePair& pair : r.instances) instance_of[pair.fresh] = pair.kept;
@@ -157,15 +157,15 @@ void translate(const Replacement& r) {
         }
         for (Pin*& pin : pair.fresh->finite)
             if (const auto kept = pin_of.find(pin); kept != pin_of.end()) pin = kept->second;
-        for (Function*& function : pair.fresh->functions)
+        for (LoadedFunction*& function : pair.fresh->functions)
             if (const auto kept = function_of.find(function); kept != function_of.end()) function = kept->second;
     }
 }
 
 }  // namespace
 
-bool Edit::replace(Component& component, std::unique_ptr<Component>& owned, Span at) {
-    Component& fresh = *owned;
+bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>& owned, Span at) {
+    LoadedComponent& fresh = *owned;
     const std::size_t errors_before = diagnostics->errors();
     const auto conflict = [&](std::string message, Span other, const char* label, std::string help) {
         Diagnostic d{Severity::error, "reload-conflict", std::move(message), {{at, "the new version"}}, {std::move(help)}};
@@ -173,7 +173,7 @@ bool Edit::replace(Component& component, std::unique_ptr<Component>& owned, Span
         diagnostics->add(std::move(d));
     };
     auto r = std::make_shared<Replacement>(Replacement{model_, component, fresh, {}, {}, {}, {}, {}, {}});
-    r->functions = pairs_of<Function>(component.functions, fresh.functions, same_function);
+    r->functions = pairs_of<LoadedFunction>(component.functions, fresh.functions, same_function);
     for (std::size_t i = 0; i < component.instances.size(); ++i) {
         Instance& kept = *component.instances[i];
         r->instances.push_back({&kept, fresh.instances[i].get(), pairs_of<Pin>(kept.pins, fresh.instances[i]->pins, same_pin)});
@@ -220,7 +220,7 @@ bool Edit::replace(Component& component, std::unique_ptr<Component>& owned, Span
         function_is_new[pair.fresh] = false;
     }
     for (std::size_t i = 0; i < function_stays.size(); ++i) {
-        Function& function = *component.functions[i];
+        LoadedFunction& function = *component.functions[i];
         if (function_stays[i]) continue;
         r->gone_functions.push_back(&function);
         if (function.thread)
@@ -230,7 +230,7 @@ bool Edit::replace(Component& component, std::unique_ptr<Component>& owned, Span
         for (const auto& pin : function.pins) vanished(*pin, "is no more");
     }
     for (std::size_t i = 0; i < function_is_new.size(); ++i) {
-        Function& function = *fresh.functions[i];
+        LoadedFunction& function = *fresh.functions[i];
         if (!function_is_new[i]) continue;
         r->new_functions.push_back(&function);
         for (const auto& pin : function.pins) r->new_pins.push_back(pin.get());

@@ -27,12 +27,12 @@ struct Model::Texts {
 
 Pin* Model::find_pin(std::string_view name) const { return find(pin, name); }
 Signal* Model::find_signal(std::string_view name) const { return find(signal, name); }
-Function* Model::find_function(std::string_view name) const { return find(function, name); }
+LoadedFunction* Model::find_function(std::string_view name) const { return find(function, name); }
 Thread* Model::find_thread(std::string_view name) const { return find(thread, name); }
 Instance* Model::find_instance(std::string_view name) const { return find(instance, name); }
 
-Component* Model::find_component(std::string_view name) const {
-    if (Component* const exact = find(component, name)) return exact;
+LoadedComponent* Model::find_component(std::string_view name) const {
+    if (LoadedComponent* const exact = find(component, name)) return exact;
     const auto same = [](char a, char b) { return a == b || (a == '-' && b == '_') || (a == '_' && b == '-'); };
     for (const auto& candidate : components)
         if (std::equal(name.begin(), name.end(), candidate->name.begin(), candidate->name.end(), same)) return candidate.get();
@@ -54,8 +54,8 @@ std::vector<const Signal*> Model::sorted_signals() const {
     return sorted(std::move(all));
 }
 
-std::vector<const Function*> Model::sorted_functions() const {
-    std::vector<const Function*> all;
+std::vector<const LoadedFunction*> Model::sorted_functions() const {
+    std::vector<const LoadedFunction*> all;
     all.reserve(function.size());
     for (const auto& [name, f] : function) all.push_back(f);
     return sorted(std::move(all));
@@ -78,7 +78,7 @@ Thread* thread_of(const Pin& pin) {
     if (pin.of_thread) return pin.of_thread;
     if (pin.function) return pin.function->thread;
     if (pin.instance)
-        for (const Function* function : pin.instance->functions)
+        for (const LoadedFunction* function : pin.instance->functions)
             if (function->thread) return function->thread;
     return nullptr;
 }

@@ -18,9 +18,9 @@
 
 namespace hal {
 
-struct Component;
+struct LoadedComponent;
 struct Instance;
-struct Function;
+struct LoadedFunction;
 struct Signal;
 struct Thread;
 
@@ -36,7 +36,7 @@ struct Pin {
     hal_pin* memory = nullptr;       ///< in the instance
     hal_value** pointer = nullptr;   ///< a second pointer to the slot, in the plugin's own memory
     Instance* instance = nullptr;    ///< nullptr: a pin of a thread or of a function's times
-    Function* function = nullptr;    ///< the one function that uses it, or nullptr: all of the instance
+    LoadedFunction* function = nullptr;  ///< the one function that uses it, or nullptr: all of the instance
     Thread* of_thread = nullptr;     ///< pins of a thread itself
     Signal* signal = nullptr;
     Span linked_at;
@@ -66,13 +66,14 @@ struct Signal {
     std::shared_ptr<hal_value> cell; ///< when I/O pins of several threads share it
 };
 
-struct Function {
+/// A function of a loaded component, which `addf` can put into a thread. (hal::Function is what a component's author declares it by.)
+struct LoadedFunction {
     std::string name;
     const char* doc = "";
     std::vector<plan::Step> steps;   ///< one, or one per instance of a shared function
     struct { hal_row run = nullptr; hal_step step = nullptr; } row;  ///< runs many calls of that step
     std::vector<Instance*> instances;///< whose steps these are, in the same order
-    Component* component = nullptr;
+    LoadedComponent* component = nullptr;
     bool shared = false;
     Thread* thread = nullptr;
     bool init = false;               ///< placed by initf rather than addf
@@ -93,12 +94,12 @@ struct Way {
 
 struct Instance {
     std::string name;
-    Component* component = nullptr;
+    LoadedComponent* component = nullptr;
     void* memory = nullptr;
     std::shared_ptr<void> storage;   ///< the block several instances of one loadrt share
     std::vector<std::unique_ptr<char[]>> allocations;
     std::vector<std::unique_ptr<Pin>> pins;
-    std::vector<Function*> functions;
+    std::vector<LoadedFunction*> functions;
     std::vector<plan::Step> emergency;
     std::vector<std::pair<std::string, hal_stream*>> streams;
     std::vector<Pin*> finite;        ///< its declared-finite outputs
@@ -115,8 +116,8 @@ struct Load {
     std::vector<std::string> personalities;
 };
 
-/// A component that is loaded: a plugin, or one the runtime provides itself (`threads`).
-struct Component {
+/// A component that is loaded: a plugin, one the runtime provides itself (`threads`), or a program's.
+struct LoadedComponent {
     std::string name;                ///< as loadrt was given it
     const hal_component* plugin = nullptr;  ///< nullptr: built in
     std::shared_ptr<void> library;
@@ -124,7 +125,7 @@ struct Component {
     std::vector<std::string> arguments;     ///< one text per loadrt, for `save`
     std::vector<Load> loads;                ///< the same, taken apart, for `reload`
     std::vector<std::unique_ptr<Instance>> instances;
-    std::vector<std::unique_ptr<Function>> functions;
+    std::vector<std::unique_ptr<LoadedFunction>> functions;
     std::uint32_t next_number = 0;   ///< of the next unnamed instance
     std::uint32_t id = 0;
     std::int64_t process = 0;        ///< of a program's component: its process. Its instance, if any, has pins only
@@ -146,9 +147,9 @@ struct ThreadOptions {
 struct Thread {
     std::string name;
     ThreadOptions options;
-    std::vector<Function*> functions, init;
+    std::vector<LoadedFunction*> functions, init;
     bool init_done = false;
-    Component* component = nullptr;  ///< `threads`, when loadrt made it; nullptr: newthread did
+    LoadedComponent* component = nullptr;  ///< `threads`, when loadrt made it; nullptr: newthread did
     std::vector<std::unique_ptr<Pin>> pins;
     hal_pin time{}, tmax{}, tmax_increased{}, beat{}, missed{}, wakeup{};  ///< memory of `pins`
     std::uint32_t id = 0;            ///< the executor's number; 0 until it runs
@@ -160,26 +161,26 @@ template <class T>
 using Index = std::unordered_map<std::string_view, T*>;
 
 struct Model {
-    std::vector<std::unique_ptr<Component>> components;
+    std::vector<std::unique_ptr<LoadedComponent>> components;
     std::vector<std::unique_ptr<Signal>> signals;   ///< unordered: erased by swapping with the last
     std::vector<std::unique_ptr<Thread>> threads;   ///< fastest first
-    Index<Component> component;
+    Index<LoadedComponent> component;
     Index<Instance> instance;
     Index<Pin> pin;                                  ///< by name and by alias
     Index<Signal> signal;
-    Index<Function> function;
+    Index<LoadedFunction> function;
     Index<Thread> thread;
 
     Pin* find_pin(std::string_view name) const;
     Signal* find_signal(std::string_view name) const;
-    Function* find_function(std::string_view name) const;
+    LoadedFunction* find_function(std::string_view name) const;
     Thread* find_thread(std::string_view name) const;
     Instance* find_instance(std::string_view name) const;
-    Component* find_component(std::string_view name) const;  ///< `-` and `_` are the same here
+    LoadedComponent* find_component(std::string_view name) const;  ///< `-` and `_` are the same here
 
     std::vector<const Pin*> sorted_pins() const;             ///< by name; aliases not repeated
     std::vector<const Signal*> sorted_signals() const;
-    std::vector<const Function*> sorted_functions() const;
+    std::vector<const LoadedFunction*> sorted_functions() const;
 
     /// Keeps a text for as long as the model lives; equal texts share.
     const char* keep(std::string_view text);

@@ -11,7 +11,7 @@ namespace {
 
 // Pins a function uses: those that name it, and those of its instances that name none.
 template <class Action>
-void for_pins(const Function& function, Action action) {
+void for_pins(const LoadedFunction& function, Action action) {
     for (const Instance* instance : function.instances)
         for (const auto& pin : instance->pins)
             if (!pin->function || pin->function == &function) action(*pin);
@@ -19,7 +19,7 @@ void for_pins(const Function& function, Action action) {
 
 }  // namespace
 
-std::vector<Function*> dataflow_order(const std::vector<Function*>& functions, Span at, Diagnostics& diagnostics) {
+std::vector<LoadedFunction*> dataflow_order(const std::vector<LoadedFunction*>& functions, Span at, Diagnostics& diagnostics) {
     const std::size_t n = functions.size();
     std::unordered_map<const Signal*, std::vector<std::size_t>> writers;
     for (std::size_t i = 0; i < n; ++i)
@@ -50,7 +50,7 @@ std::vector<Function*> dataflow_order(const std::vector<Function*>& functions, S
     std::set<std::pair<std::size_t, std::size_t>> waiting;
     std::vector<std::size_t> costs(n);
     for (std::size_t i = 0; i < n; ++i) waiting.emplace(costs[i] = cost(i), i);
-    std::vector<Function*> order;
+    std::vector<LoadedFunction*> order;
     order.reserve(n);
     while (!waiting.empty()) {
         const std::size_t next = waiting.begin()->second;

@@ -239,7 +239,8 @@ const void* extension_of(const hal_host*, const char* id) {
 }
 
 // A given argument that nothing asked for, and that is nearly one of those that were: more of the truth than what the constructor missed.
-bool is_misspelled(const Component& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+bool is_misspelled(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked,
+                   Diagnostics& diagnostics) {
     const std::vector<std::string> all(asked.begin(), asked.end());
     for (const auto& [name, given] : request.arguments)
         if (const std::string hint = asked.contains(name) ? "" : did_you_mean(name, all); !hint.empty()) {
@@ -250,7 +251,8 @@ bool is_misspelled(const Component& component, const LoadRequest& request, const
 }
 
 // One instance: memory, constructor, declarations into the model.
-bool construct_one(Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics, std::unique_ptr<Instance> instance, Construction& c) {
+bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics,
+                   std::unique_ptr<Instance> instance, Construction& c) {
     c.sources = &sources;
     c.diagnostics = &diagnostics;
     const hal_host host{sizeof host, &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of};
@@ -279,15 +281,15 @@ bool construct_one(Edit& edit, Component& component, const LoadRequest& request,
         diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
         return false;
     }
-    std::vector<std::unique_ptr<Function>> own;
-    std::vector<std::pair<Function*, plan::Step>> extended;
-    std::map<const void*, Function*> by_identity;
+    std::vector<std::unique_ptr<LoadedFunction>> own;
+    std::vector<std::pair<LoadedFunction*, plan::Step>> extended;
+    std::map<const void*, LoadedFunction*> by_identity;
     for (const DeclaredFunction& decl : c.functions) {
-        Function* function = decl.shared ? c.model.find_function(decl.full) : nullptr;
+        LoadedFunction* function = decl.shared ? c.model.find_function(decl.full) : nullptr;
         if (function && function->shared && function->component == &component) {
             extended.emplace_back(function, plan::Step{decl.step, decl.self});
         } else {
-            auto made = std::make_unique<Function>();
+            auto made = std::make_unique<LoadedFunction>();
             function = made.get();
             function->name = decl.full;
             function->doc = c.model.keep(decl.doc);
@@ -334,7 +336,7 @@ std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
     return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
 }
 
-bool all_known(const Component& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
     for (const auto& [name, given] : request.arguments) {
         if (asked.contains(name)) continue;
         std::vector<std::string> all(asked.begin(), asked.end());
@@ -348,7 +350,8 @@ bool all_known(const Component& component, const LoadRequest& request, const std
 
 }  // namespace
 
-bool construct_again(Model& beside, Edit& edit, const Component& old, Component& fresh, Span at, Sources& sources, Diagnostics& diagnostics) {
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
+                     Diagnostics& diagnostics) {
     edit.diagnostics = &diagnostics;
     const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
     for (std::size_t i = 0; i < old.instances.size(); ++i) {
@@ -373,7 +376,8 @@ bool construct_again(Model& beside, Edit& edit, const Component& old, Component&
     return true;
 }
 
-bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics) {
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
+               Diagnostics& diagnostics) {
     const hal_component& plugin = *component.plugin;
     const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
     const std::size_t stride = stride_of(plugin);

@@ -31,14 +31,16 @@ struct LoadRequest {
 };
 
 /// The instances of a component once more, from another plugin and in a model beside: same names, arguments and personalities.
-bool construct_again(Model& beside, Edit& edit, const Component& old, Component& fresh, Span at, Sources& sources, Diagnostics& diagnostics);
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
+                     Diagnostics& diagnostics);
 
 /// Instances of `my_comp` and their pins are named my-comp…
 std::string dashed(std::string component);
 
 /// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes with the commit. `sources` takes the
 /// texts that components find something wrong in.
-bool construct(Model& model, Edit& edit, Component& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics);
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
+               Diagnostics& diagnostics);
 
 /// Starts one instance: it may acquire hardware. The reason of a refusal, or empty.
 std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);

@@ -39,7 +39,7 @@ void load_threads(Elaboration& on, const Token& name, Args args, const std::stri
             if (token.text.starts_with("name")) on.edit.note_absent(token.text.substr(token.text.find('=') + 1));
         return;
     }
-    Component* component = on.model.find_component("threads");
+    LoadedComponent* component = on.model.find_component("threads");
     if (!component) component = &on.edit.add_component("threads", name.span);
     on.edit.note_arguments(*component, written, {});
     for (NewThread& thread : threads) {
@@ -50,7 +50,8 @@ void load_threads(Elaboration& on, const Token& name, Args args, const std::stri
 
 // count=, names= … are the component's own arguments: it names its pins itself.
 bool names_itself(Elaboration& on, const Token& name) {
-    if (const Component* const loaded = on.model.find_component(name.text)) return loaded->plugin && (loaded->plugin->flags & HAL_COMPONENT_WHOLE_NAMES);
+    if (const LoadedComponent* const loaded = on.model.find_component(name.text))
+        return loaded->plugin && (loaded->plugin->flags & HAL_COMPONENT_WHOLE_NAMES);
     Diagnostics ignored;
     const auto plugin = on.plugins.open(name.text, name.span, ignored);
     return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
@@ -101,7 +102,7 @@ bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& re
 }
 
 bool make_instances(Elaboration& on, const Token& name, const LoadRequest& request, const std::string& written) {
-    Component* component = on.model.find_component(name.text);
+    LoadedComponent* component = on.model.find_component(name.text);
     if (component && !component->plugin) {
         on.diagnostics.error("name-taken", name.span, quoted(name.text) + " is a program started by loadusr");
         return false;
@@ -133,8 +134,8 @@ void loadrt(Elaboration& on, const Command&, Args args) {
     on.edit.note_absent(dashed(args[0].text));
 }
 
-Component* loaded_component(Elaboration& on, const Token& name) {
-    Component* const component = on.model.find_component(name.text);
+LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
+    LoadedComponent* const component = on.model.find_component(name.text);
     if (component) return component;
     std::vector<std::string> loaded;
     for (const auto& one : on.model.components) loaded.push_back(one->name);
@@ -146,20 +147,20 @@ Component* loaded_component(Elaboration& on, const Token& name) {
 void unload(Elaboration& on, const Command&, Args args) {
     if (args[0].text == "all") {
         for (std::size_t i = on.model.components.size(); i-- > 0;) {
-            Component& component = *on.model.components[i];
+            LoadedComponent& component = *on.model.components[i];
             if (component.process == 0 && component.name != "threads") on.edit.remove_component(component);
         }
         while (!on.model.threads.empty()) on.edit.remove_thread({on.model.threads.back()->name, args[0].span});
-        if (Component* const threads = on.model.find_component("threads")) on.edit.remove_component(*threads);
+        if (LoadedComponent* const threads = on.model.find_component("threads")) on.edit.remove_component(*threads);
         return;
     }
     if (Instance* const instance = on.model.find_instance(args[0].text); instance && !on.model.find_component(args[0].text)) {
-        Component& component = *instance->component;
+        LoadedComponent& component = *instance->component;
         on.edit.remove_instance(*instance);
         if (component.instances.empty()) on.edit.remove_component(component);
         return;
     }
-    Component* const component = loaded_component(on, args[0]);
+    LoadedComponent* const component = loaded_component(on, args[0]);
     if (!component) return;
     if (component->process != 0) {
         on.diagnostics.error("is-a-program", args[0].span, quoted(args[0].text) + " is a program's component", "", "unloadusr " + component->name + " ends it");
@@ -177,7 +178,7 @@ void reload(Elaboration& on, const Command&, Args args) {
         on.diagnostics.error("no-such-component", name.span, quoted(name.text) + " is an instance; a component is reloaded with all its instances", "", "reload " + instance->component->name);
         return;
     }
-    Component* const component = loaded_component(on, name);
+    LoadedComponent* const component = loaded_component(on, name);
     if (!component) return;
     if (!component->plugin) {
         on.diagnostics.error("no-such-component", name.span, component->process != 0 ? quoted(name.text) + " is a program, not a plugin" : quoted(name.text) + " belongs to the runtime", "",
@@ -194,12 +195,12 @@ void reload(Elaboration& on, const Command&, Args args) {
     // constructed beside the model; what was made and is not taken over is destroyed here
     Model beside = on.model.beside();
     Edit making(beside);
-    Component& fresh = making.add_component(component->name, name.span);
+    LoadedComponent& fresh = making.add_component(component->name, name.span);
     fresh.plugin = plugin->component;
     fresh.library = plugin->library;
     fresh.path = plugin->path;
     struct Undo {
-        Component& component;
+        LoadedComponent& component;
         bool taken = false;
         ~Undo() {
             if (taken) return;
@@ -422,13 +423,13 @@ void elaborate(Elaboration& on, const Command& command) {
 
 void apply_auto_order(Model&, Edit& edit, const std::vector<AutoOrder>& orders, Diagnostics& diagnostics) {
     for (const AutoOrder& order : orders) {
-        std::vector<Function*> there;
-        for (Function* function : order.functions)
+        std::vector<LoadedFunction*> there;
+        for (LoadedFunction* function : order.functions)
             if (function->thread == order.thread) there.push_back(function);
-        const std::vector<Function*> sorted = dataflow_order(there, order.at, diagnostics);
-        std::vector<Function*> row = order.thread->functions;
+        const std::vector<LoadedFunction*> sorted = dataflow_order(there, order.at, diagnostics);
+        std::vector<LoadedFunction*> row = order.thread->functions;
         auto next = sorted.begin();
-        for (Function*& place : row)
+        for (LoadedFunction*& place : row)
             if (std::find(there.begin(), there.end(), place) != there.end()) place = *next++;
         edit.reorder(*order.thread, std::move(row));
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The commands that change the model: one row each. DESIGN section 4, step 2.
+// The commands that change the model: one row each. Step 2 of docs/design.md.
 #pragma once
 
 #include <string_view>
@@ -15,7 +15,7 @@ namespace hal {
 /// Functions that `addf --auto` placed in a thread; put in order when the transaction is complete.
 struct AutoOrder {
     Thread* thread;
-    std::vector<Function*> functions;
+    std::vector<LoadedFunction*> functions;
     Span at;
 };
 

@@ -12,13 +12,15 @@ namespace {
 
 using Memory = std::deque<hal_pin>;  // pins come one by one and never move
 
-Instance* instance_of(const Component& component) { return component.instances.empty() ? nullptr : component.instances.front().get(); }
+Instance* instance_of(const LoadedComponent& component) {
+    return component.instances.empty() ? nullptr : component.instances.front().get();
+}
 
 }  // namespace
 
 void Session::add_process(const std::string& name, std::int64_t pid, const Command& command) {
     Edit once(state_->model);
-    Component& component = once.add_component(name, command.span);
+    LoadedComponent& component = once.add_component(name, command.span);
     component.process = pid;
     std::string text;
     for (const Token& token : command.args) text += (text.empty() ? "" : " ") + token.text;
@@ -26,12 +28,13 @@ void Session::add_process(const std::string& name, std::int64_t pid, const Comma
 }
 
 void Session::set_process(std::string_view name, std::int64_t pid) {
-    if (Component* const component = state_->model.find_component(name); component && component->process != 0) component->process = pid;
+    if (LoadedComponent* const component = state_->model.find_component(name); component && component->process != 0)
+        component->process = pid;
 }
 
 void Session::remove_process(std::string_view name) {
     State& s = *state_;
-    Component* const component = s.model.find_component(name);
+    LoadedComponent* const component = s.model.find_component(name);
     if (!component || component->process == 0) return;
     if (Instance* const instance = instance_of(*component)) {
         bool linked = false;
@@ -52,7 +55,7 @@ void Session::remove_process(std::string_view name) {
 
 Pin* Session::add_outside_pin(std::string_view component_name, const OutsidePin& wanted, std::string& problem) {
     State& s = *state_;
-    Component* const component = s.model.find_component(component_name);
+    LoadedComponent* const component = s.model.find_component(component_name);
     if (!component || component->process == 0) {
         problem = "there is no program '" + std::string(component_name) + "'";
         return nullptr;
@@ -100,7 +103,7 @@ Pin* Session::add_outside_pin(std::string_view component_name, const OutsidePin&
 
 void Session::remove_outside_pins(std::string_view component_name, const std::vector<Pin*>& pins) {
     State& s = *state_;
-    Component* const component = s.model.find_component(component_name);
+    LoadedComponent* const component = s.model.find_component(component_name);
     Instance* const instance = component ? instance_of(*component) : nullptr;
     if (!instance || pins.empty()) return;
     std::vector<Pin*> leaving;

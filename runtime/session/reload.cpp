@@ -14,12 +14,14 @@ namespace hal {
 namespace {
 
 // Plugins of an interface before 1.1 do not say.
-bool acquires(const Component& component) { return component.plugin->abi_minor < 1 || (component.plugin->flags & HAL_COMPONENT_STARTS); }
+bool acquires(const LoadedComponent& component) {
+    return component.plugin->abi_minor < 1 || (component.plugin->flags & HAL_COMPONENT_STARTS);
+}
 
 }  // namespace
 
 bool Session::State::start_replaced(Diagnostics& diagnostics) {
-    const auto start = [&](const Component& component) {
+    const auto start = [&](const LoadedComponent& component) {
         for (const auto& instance : component.instances) {
             if (instance->started) continue;
             if (const std::string why = start_instance(*instance, model, *executor, status); !why.empty())
@@ -29,7 +31,7 @@ bool Session::State::start_replaced(Diagnostics& diagnostics) {
         }
         return !diagnostics.failed();
     };
-    std::unordered_set<const Function*> out;
+    std::unordered_set<const LoadedFunction*> out;
     for (const Edit::Replaced& one : edit->replaced()) {
         if (!acquires(*one.component) && !acquires(*one.other)) {
             if (!start(*one.component)) return false;
@@ -57,7 +59,7 @@ bool Session::State::start_replaced(Diagnostics& diagnostics) {
 
 // After undo(): the old instances are in the model again, the new ones beside it, and perhaps in the threads.
 void Session::State::restart_replaced(Diagnostics& diagnostics) {
-    std::unordered_set<const Function*> out;
+    std::unordered_set<const LoadedFunction*> out;
     for (const Edit::Replaced& one : edit->replaced())
         if (one.stopped)
             for (const auto& function : one.component->functions) out.insert(function.get());
@@ -70,7 +72,7 @@ void Session::State::restart_replaced(Diagnostics& diagnostics) {
             if (instance->started || !one.stopped) continue;
             const std::string why = start_instance(*instance, model, *executor, status);
             if (why.empty()) continue;
-            for (Function* const function : instance->functions) function->halted = true;
+            for (LoadedFunction* const function : instance->functions) function->halted = true;
             diagnostics.error("start-failed", instance->loaded,
                               "'" + instance->name + "' (" + one.component->name + ") cannot start again in its old version: " + why,
                               "loaded here",

@@ -2,6 +2,7 @@
 // What the session tells of the machine: threads, faults, delays, privileges.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "model/check/check.hpp"
 #include "session/construct.hpp"
@@ -12,6 +13,14 @@ namespace {
 
 constexpr std::size_t kept_faults = 1000;
 
+/// A code as its standard writes it: 0x7305.
+std::string hexadecimal(double value) {
+    char text[32];
+    const bool fits = value >= 0 && value < 4294967296.0;
+    std::snprintf(text, sizeof text, "0x%04X", fits ? static_cast<unsigned>(value) : 0U);
+    return text;
+}
+
 std::string policy_text(const Granted& granted, bool virtual_clock) {
     if (virtual_clock) return "virtual clock";
     if (granted.policy == Granted::Policy::fifo) return "SCHED_FIFO " + std::to_string(granted.priority);
@@ -19,7 +28,7 @@ std::string policy_text(const Granted& granted, bool virtual_clock) {
     return granted.refused ? "SCHED_OTHER (no privilege)" : "SCHED_OTHER";
 }
 
-const Function* function_with_id(const Model& model, std::uint32_t id) {
+const LoadedFunction* function_with_id(const Model& model, std::uint32_t id) {
     for (const auto& component : model.components)
         for (const auto& function : component->functions)
             if (function->id == id) return function.get();
@@ -57,7 +66,7 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
     const std::string at = " at cycle " + grouped(event.cycle);
     switch (event.code) {
     case HAL_FAULT_EXCEPTION: {
-        const Function* const function = function_with_id(model, event.subject);
+        const LoadedFunction* const function = function_with_id(model, event.subject);
         const std::string who = function ? "function '" + function->name + "' (" + function->component->name + ")" : "a function";
         return {"exception", thread.name + ": " + who + " threw an exception" + at + "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start"};
     }
@@ -71,11 +80,12 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
         return {"budget", thread.name + ": the cycle took " + format_duration(event.value) + " (budget " + format_duration(static_cast<double>(thread.options.budget_ns)) + ")" + at + "; see: show thread " + thread.name};
     case HAL_FAULT_COMPONENT: {
         const Instance* const instance = instance_at(model, event.self);
-        // "what happened {}; what was done": the number where the braces are, the cycle before the semicolon
+        // "what happened {}; what was done": the number where the braces are, in {x} hexadecimal, the cycle before the semicolon
         std::string what = event.reason ? event.reason : "a fault", done;
         const std::string number = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
         if (const auto semicolon = what.find(';'); semicolon != std::string::npos) done = what.substr(semicolon), what.resize(semicolon);
         if (const auto braces = what.find("{}"); braces != std::string::npos) what.replace(braces, 2, number);
+        else if (const auto code = what.find("{x}"); code != std::string::npos) what.replace(code, 3, hexadecimal(event.value));
         else if (!std::isnan(event.value)) what += " (" + number + ")";
         return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at + done + (instance ? "; see: show pin " + instance->name : "")};
     }

@@ -344,7 +344,7 @@ std::vector<std::string> Session::available_components() const { return state_->
 
 std::optional<Declared> Session::declared(std::string_view component) const {
     Diagnostics ignored;
-    const Component* const loaded = model().find_component(component);
+    const LoadedComponent* const loaded = model().find_component(component);
     const std::optional<Plugin> plugin = loaded && loaded->plugin ? Plugin{loaded->plugin, loaded->library, loaded->path} : state_->plugins.open(component, {}, ignored);
     Declared found;
     std::string problem;

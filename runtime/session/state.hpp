@@ -76,7 +76,7 @@ struct Session::State {
 
 private:
     bool all_answer(Diagnostics& diagnostics);
-    bool swap(const std::unordered_set<const Function*>& without, Diagnostics& diagnostics);
+    bool swap(const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics);
     void keep_values();
     void observe_unknowns(Compiled& compiled);
     void settle(Compiled& compiled, const std::vector<Core*>& silent);

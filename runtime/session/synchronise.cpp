@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From an edited model to threads that run it: DESIGN section 4, steps 5 and 6.
+// From an edited model to threads that run it: steps 5 and 6 of docs/design.md.
 #include <algorithm>
 #include <stdexcept>
 
@@ -125,7 +125,7 @@ bool Session::State::synchronise(Diagnostics& diagnostics) {
     return swap({}, diagnostics);
 }
 
-bool Session::State::swap(const std::unordered_set<const Function*>& without, Diagnostics& diagnostics) {
+bool Session::State::swap(const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics) {
     CompileInput input;
     input.epoch = ++epoch;
     input.without = &without;

@@ -104,9 +104,9 @@ void show_timing(Context& context) {
     text += clock_text(context.session);
     text += "\nFunctions:                                    Mean       Max   Samples  Thread\n";
     std::vector<const Pin*> maxima;
-    std::vector<const Function*> functions;
+    std::vector<const LoadedFunction*> functions;
     for (const Thread* const thread : threads)
-        for (const Function* const function : thread->functions) {
+        for (const LoadedFunction* const function : thread->functions) {
             const Pin* const tmax = context.session.model().find_pin(function->name + ".tmax");
             if (!tmax) continue;
             functions.push_back(function);
@@ -114,7 +114,7 @@ void show_timing(Context& context) {
         }
     const auto values = context.session.read_pins(maxima);
     for (std::size_t i = 0; i < functions.size(); ++i) {
-        const Function& function = *functions[i];
+        const LoadedFunction& function = *functions[i];
         const auto samples = function.times->samples.load(std::memory_order_relaxed);
         const auto total = function.times->total_ns.load(std::memory_order_relaxed);
         const double mean = samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);

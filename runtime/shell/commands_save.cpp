@@ -19,7 +19,7 @@ using Text = TextWriter;
 /// Threads of `loadrt threads` that a delthread removed again.
 std::vector<std::string> deleted_threads(const Model& model) {
     std::vector<std::string> gone;
-    const Component* const threads = model.find_component("threads");
+    const LoadedComponent* const threads = model.find_component("threads");
     if (!threads) return gone;
     for (const std::string& arguments : threads->arguments) {
         for (std::size_t at = 0; at < arguments.size();) {
@@ -49,9 +49,9 @@ void new_thread(Text& text, const Thread& thread) {
 void save_comp(Context& context, Text& text) {
     const Model& model = context.session.model();
     text.add("# components\n");
-    std::vector<const Component*> oldest_first = components_newest_first(model, {});
+    std::vector<const LoadedComponent*> oldest_first = components_newest_first(model, {});
     std::reverse(oldest_first.begin(), oldest_first.end());
-    for (const Component* const component : oldest_first) {
+    for (const LoadedComponent* const component : oldest_first) {
         if (component->process != 0) continue;
         for (const std::string& arguments : component->arguments) text.add("loadrt {}{}{}\n", component->name, arguments.empty() ? "" : " ", arguments);
     }
@@ -174,8 +174,8 @@ void save_signal_values(Context& context, Text& text) {
 void save_thread(Context& context, Text& text) {
     text.add("# realtime thread/function links\n");
     for (const Thread* const thread : threads_slowest_first(context.session.model(), {})) {
-        for (const Function* const function : thread->init) text.add("initf {} {}\n", function->name, thread->name);
-        for (const Function* const function : thread->functions) text.add("addf {} {}\n", function->name, thread->name);
+        for (const LoadedFunction* const function : thread->init) text.add("initf {} {}\n", function->name, thread->name);
+        for (const LoadedFunction* const function : thread->functions) text.add("addf {} {}\n", function->name, thread->name);
     }
 }
 

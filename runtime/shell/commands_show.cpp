@@ -39,7 +39,7 @@ std::string value_text(const Request& request, hal_type type, const hal_value& v
 
 void show_comp(Request& request) {
     request.title("Loaded HAL Components:\nID      Type  Name                                            PID   State\n");
-    for (const Component* const component : components_newest_first(request.model(), request.patterns)) {
+    for (const LoadedComponent* const component : components_newest_first(request.model(), request.patterns)) {
         const auto* const program = component->process ? request.context.processes.find(component->name) : nullptr;
         const std::string pid = component->process ? std::to_string(component->process) : "";
         request.add("{:>6}  {:<4}  {:<47} {:>5} {}\n", component->id, component->process ? "User" : "RT", component->name, pid,
@@ -56,7 +56,7 @@ void show_pins(Request& request, bool parameters) {
     const auto values = request.context.session.read_pins(pins);
     for (std::size_t i = 0; i < pins.size(); ++i) {
         const Pin& pin = *pins[i];
-        const Component* const whose = owner(pin);
+        const LoadedComponent* const whose = owner(pin);
         const std::string value = value_text(request, pin.type, values[i]);
         if (request.script()) request.add("{} {:<5} {} {} {}", whose ? std::string_view(whose->name) : "-", name(pin.type), direction_text(pin), value, shown_name(pin));
         else request.add("{:>6}  {:<5} {:<3}  {:>20}  {}", whose ? whose->id : 0, name(pin.type), direction_text(pin), value, shown_name(pin));
@@ -93,7 +93,7 @@ void show_sig(Request& request) {
 
 void show_funct(Request& request) {
     request.title("Exported Functions:\nOwner   CodeAddr  Arg       FP   Users  Name\n");
-    for (const Function* const function : functions_by_name(request.model(), request.patterns)) {
+    for (const LoadedFunction* const function : functions_by_name(request.model(), request.patterns)) {
         const auto address = [](const void* at) { return reinterpret_cast<std::uintptr_t>(at); };
         const plan::Step step = function->steps.empty() ? plan::Step{nullptr, nullptr} : function->steps[0];
         const auto code = address(reinterpret_cast<const void*>(step.step)), self = address(step.self);
@@ -117,7 +117,7 @@ void show_thread(Request& request) {
         if (request.script()) request.add("{} YES {} {:>8} {}", thread->options.period_ns, thread->name, last, longest);
         else request.add("{:>11}  YES  {:>20} ( {:>8}, {:>8} )\n", thread->options.period_ns, thread->name, last, longest);
         int number = 1;
-        for (const Function* const function : thread->functions) {
+        for (const LoadedFunction* const function : thread->functions) {
             if (request.script()) request.add(" {}", function->name);
             else request.add("                 {:>2} {}\n", number++, function->name);
         }

@@ -111,7 +111,7 @@ void add_listed(Search& search) {
     if (kind.starts_with("pin")) add_pins(search, [](const Pin& pin) { return !is_parameter(pin); });
     else if (kind.starts_with("param")) add_pins(search, [](const Pin& pin) { return is_parameter(pin); });
     else if (kind.starts_with("sig")) add_signals(search, [](const Signal&) { return true; });
-    else if (kind.starts_with("funct")) add_functions(search, [](const Function&) { return true; });
+    else if (kind.starts_with("funct")) add_functions(search, [](const LoadedFunction&) { return true; });
     else if (kind == "thread" || kind == "timing")
         for (const auto& thread : search.model().threads) search.add(thread->name);
     else if (kind == "comp")
@@ -150,10 +150,12 @@ constexpr Kind kinds[] = {
     {"FILE", add_files},
     {"FUNCTION", [](Search& s) {
         const bool placed = s.words[0] == "delf";
-        add_functions(s, [&](const Function& f) { return (f.thread != nullptr) == placed && std::find(s.words.begin(), s.words.end(), f.name) == s.words.end(); });
+        add_functions(s, [&](const LoadedFunction& f) {
+            return (f.thread != nullptr) == placed && std::find(s.words.begin(), s.words.end(), f.name) == s.words.end();
+        });
     }},
     {"THREAD", [](Search& s) {
-        const Function* const function = s.words[0] == "delf" && s.words.size() > 1 ? s.model().find_function(s.words[1]) : nullptr;
+        const LoadedFunction* const function = s.words[0] == "delf" && s.words.size() > 1 ? s.model().find_function(s.words[1]) : nullptr;
         for (const auto& thread : s.model().threads)
             if (!function || function->thread == thread.get()) s.add(thread->name, format_duration(static_cast<double>(thread->options.period_ns)));
     }},

@@ -71,7 +71,7 @@ void describe_pins(std::string& to, Session& session, bool parameters, const Pat
         object.text("dir", direction_text(*pin));
         json_value(object.member("value"), pin->type, values[i]);
         if (pin->signal) object.text("signal", pin->signal->name);
-        if (const Component* const component = owner(*pin)) object.text("component", component->name);
+        if (const LoadedComponent* const component = owner(*pin)) object.text("component", component->name);
         if (pin->instance) object.text("instance", pin->instance->name);
         if (const Thread* const thread = thread_of(*pin)) object.text("thread", thread->name);
         if (*pin->doc) object.text("doc", pin->doc);
@@ -94,7 +94,7 @@ void describe_signals(std::string& to, Session& session, const Patterns& pattern
 }
 
 void describe_components(std::string& to, Session& session, Processes& processes, const Patterns& patterns) {
-    array(to, components_newest_first(session.model(), patterns), [&](const Component* component, std::size_t) {
+    array(to, components_newest_first(session.model(), patterns), [&](const LoadedComponent* component, std::size_t) {
         Object object(to);
         object.text("name", component->name);
         if (component->process) {
@@ -109,13 +109,13 @@ void describe_components(std::string& to, Session& session, Processes& processes
             object.text("file", component->path);
         }
         object.names("instances", component->instances, [](const Instance& instance) { return instance.name; });
-        object.names("functions", component->functions, [](const Function& function) { return function.name; });
+        object.names("functions", component->functions, [](const LoadedFunction& function) { return function.name; });
         array(object.member("loaded"), component->arguments, [&](const std::string& arguments, std::size_t) { json_quote(to, arguments); });
     });
 }
 
 void describe_functions(std::string& to, Session& session, const Patterns& patterns) {
-    array(to, functions_by_name(session.model(), patterns), [&](const Function* function, std::size_t) {
+    array(to, functions_by_name(session.model(), patterns), [&](const LoadedFunction* function, std::size_t) {
         Object object(to);
         object.text("name", function->name);
         object.text("component", function->component->name);
@@ -152,8 +152,8 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
             object.number("clock_shift_ns", clock->shift_ns);
             object.real("clock_rate_ppm", clock->rate * 1e6);
         }
-        object.names("functions", thread->functions, [](const Function& function) { return function.name; });
-        object.names("init", thread->init, [](const Function& function) { return function.name; });
+        object.names("functions", thread->functions, [](const LoadedFunction& function) { return function.name; });
+        object.names("init", thread->init, [](const LoadedFunction& function) { return function.name; });
     });
 }
 

@@ -42,17 +42,17 @@ std::vector<const Signal*> signals_by_name(const Model& model, const Patterns& p
     return chosen;
 }
 
-std::vector<const Function*> functions_by_name(const Model& model, const Patterns& patterns) {
+std::vector<const LoadedFunction*> functions_by_name(const Model& model, const Patterns& patterns) {
     auto all = model.sorted_functions();
-    std::erase_if(all, [&](const Function* function) { return !patterns.match(function->name); });
+    std::erase_if(all, [&](const LoadedFunction* function) { return !patterns.match(function->name); });
     return all;
 }
 
-std::vector<const Component*> components_newest_first(const Model& model, const Patterns& patterns) {
-    std::vector<const Component*> chosen;
+std::vector<const LoadedComponent*> components_newest_first(const Model& model, const Patterns& patterns) {
+    std::vector<const LoadedComponent*> chosen;
     for (const auto& component : model.components)
         if (patterns.match(component->name)) chosen.push_back(component.get());
-    std::sort(chosen.begin(), chosen.end(), [](const Component* a, const Component* b) { return a->id > b->id; });
+    std::sort(chosen.begin(), chosen.end(), [](const LoadedComponent* a, const LoadedComponent* b) { return a->id > b->id; });
     return chosen;
 }
 
@@ -71,7 +71,7 @@ std::string clock_text(const Session& session) {
                        format_duration(std::abs(shift)), shift < 0 ? "earlier" : "later", clock->rate * 1e6);
 }
 
-const Component* owner(const Pin& pin) {
+const LoadedComponent* owner(const Pin& pin) {
     if (pin.instance) return pin.instance->component;
     if (pin.function) return pin.function->component;
     return pin.of_thread ? pin.of_thread->component : nullptr;

@@ -35,9 +35,9 @@ const char* direction_text(const Pin& pin);
 /// By the name that is shown.
 std::vector<const Pin*> pins_by_name(const Model& model, bool parameters, const Patterns& patterns);
 std::vector<const Signal*> signals_by_name(const Model& model, const Patterns& patterns);
-std::vector<const Function*> functions_by_name(const Model& model, const Patterns& patterns);
+std::vector<const LoadedFunction*> functions_by_name(const Model& model, const Patterns& patterns);
 /// Newest first, as LinuxCNC lists them.
-std::vector<const Component*> components_newest_first(const Model& model, const Patterns& patterns);
+std::vector<const LoadedComponent*> components_newest_first(const Model& model, const Patterns& patterns);
 /// Slowest first, as LinuxCNC lists them.
 std::vector<const Thread*> threads_slowest_first(const Model& model, const Patterns& patterns);
 
@@ -46,7 +46,7 @@ std::string clock_text(const Session& session);
 
 /// Whose pin it is: the component of its instance or function, of a thread's own pins the one that
 /// made it; nullptr when nobody's.
-const Component* owner(const Pin& pin);
+const LoadedComponent* owner(const Pin& pin);
 
 /// "<==" reads, "==>" writes, "<=>" both; seen from the pin. The signal's view is the mirror image.
 const char* arrow_of_pin(const Pin& pin);

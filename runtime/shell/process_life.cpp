@@ -46,7 +46,7 @@ std::string Processes::Entry::state() const {
 }
 
 bool Processes::has_pins(const Entry& entry) const {
-    const Component* const component = entry.name.empty() ? nullptr : session_.model().find_component(entry.name);
+    const LoadedComponent* const component = entry.name.empty() ? nullptr : session_.model().find_component(entry.name);
     return component && component->process != 0 && !component->instances.empty();
 }
 
@@ -97,7 +97,8 @@ Processes::Entry* Processes::owned(std::string_view name, std::uint64_t owner) {
 
 void Processes::set_ready(Entry& entry, bool ready) {
     entry.ready = ready;
-    if (const Component* const component = ready ? session_.model().find_component(entry.name) : nullptr; component && !component->instances.empty()) {
+    if (const LoadedComponent* const component = ready ? session_.model().find_component(entry.name) : nullptr;
+        component && !component->instances.empty()) {
         // of a dead program's pins those that its successor does not have go
         std::vector<Pin*> orphans;
         for (const auto& pin : component->instances.front()->pins)

@@ -60,7 +60,7 @@ public:
     explicit Bed(const Case& c) : runtime_(true), loop_(loop_over(c.component)) {
         runtime_.apply("newthread t 1000000\n" + netlist(c, c.count));
         const Model& model = runtime_.session.model();
-        for (const Function* function : model.threads.front()->functions) instances_.push_back(function->instances.front()->memory);
+        for (const LoadedFunction* function : model.threads.front()->functions) instances_.push_back(function->instances.front()->memory);
     }
 
     /// A core on this machine that measures itself, or not.
@@ -84,7 +84,7 @@ private:
     void compile_for(Core& core) {
         CompileInput input;
         input.epoch = 1'000'000;
-        const std::unordered_set<const Function*> none;
+        const std::unordered_set<const LoadedFunction*> none;
         const std::unordered_map<Pin*, hal_value> pins;
         const std::unordered_map<Signal*, hal_value> signals;
         const std::unordered_map<Signal*, Pin*> inherited;

@@ -82,7 +82,7 @@ struct Component : testing::TestWithParam<std::string> {
         Machine machine;
         machine.must("newthread t 1000000\n" + load(GetParam()));
         std::string text;
-        for (const Function* function : machine.session.model().sorted_functions()) text += "addf " + function->name + " t\n";
+        for (const LoadedFunction* function : machine.session.model().sorted_functions()) text += "addf " + function->name + " t\n";
         int number = 0;
         for (const Pin* pin : machine.session.model().sorted_pins()) {
             if (!linked || !pin->instance || pin->dir == HAL_DIR_PARAM) continue;

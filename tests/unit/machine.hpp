@@ -82,7 +82,7 @@ public:
             out << "\n";
             for (const auto& instance : component->instances) {
                 out << " instance " << instance->name << (instance->started ? " started" : "") << "\n";
-                for (const Function* function : instance->functions) out << "  function " << function->name << "\n";
+                for (const LoadedFunction* function : instance->functions) out << "  function " << function->name << "\n";
             }
         }
         for (const Pin* pin : model.sorted_pins()) {
@@ -103,12 +103,12 @@ public:
         }
         for (const auto& thread : model.threads) {
             out << "thread " << thread->name << " " << thread->options.period_ns << " init";
-            for (const Function* function : thread->init) out << " " << function->name;
+            for (const LoadedFunction* function : thread->init) out << " " << function->name;
             out << " cyclic";
-            for (const Function* function : thread->functions) out << " " << function->name;
+            for (const LoadedFunction* function : thread->functions) out << " " << function->name;
             out << "\n";
         }
-        for (const Function* function : model.sorted_functions()) {
+        for (const LoadedFunction* function : model.sorted_functions()) {
             out << "function " << function->name << " in " << (function->thread ? function->thread->name : "-") << (function->init ? " init" : "") << " of";
             for (const Instance* instance : function->instances) out << " " << instance->name;
             out << " steps " << function->steps.size() << "\n";

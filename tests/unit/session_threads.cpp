@@ -8,7 +8,8 @@ namespace {
 
 std::string row(const Machine& machine, const char* thread) {
     std::string names;
-    for (const Function* function : machine.session.model().find_thread(thread)->functions) names += (names.empty() ? "" : " ") + function->name;
+    for (const LoadedFunction* function : machine.session.model().find_thread(thread)->functions)
+        names += (names.empty() ? "" : " ") + function->name;
     return names;
 }
 

@@ -10,8 +10,8 @@ void check_spread_pins(const Model& model, Diagnostics& diagnostics) {
             for (const auto& pin : instance->pins)
                 if (!pin->function) shared = shared ? shared : pin.get();
             if (!shared || is_loose(*shared)) continue;
-            const Function* first = nullptr;
-            for (const Function* function : instance->functions) {
+            const LoadedFunction* first = nullptr;
+            for (const LoadedFunction* function : instance->functions) {
                 if (!function->thread) continue;
                 if (!first) first = function;
                 if (function->thread == first->thread) continue;

@@ -10,7 +10,7 @@ namespace {
 template <class Better>
 int position(const Pin& pin, Better better) {
     int best = -1;
-    const auto look = [&](const Function* function) {
+    const auto look = [&](const LoadedFunction* function) {
         if (!function->thread || function->init) return;
         const auto& row = function->thread->functions;
         const int at = static_cast<int>(std::find(row.begin(), row.end(), function) - row.begin());
@@ -18,7 +18,7 @@ int position(const Pin& pin, Better better) {
     };
     if (pin.function) look(pin.function);
     else if (pin.instance)
-        for (const Function* function : pin.instance->functions) look(function);
+        for (const LoadedFunction* function : pin.instance->functions) look(function);
     return best;
 }
 
@@ -32,18 +32,18 @@ public:
     template <class Better>
     int of(const Pin& pin, Better better) const {
         int best = -1;
-        const auto look = [&](const Function* function) {
+        const auto look = [&](const LoadedFunction* function) {
             const auto at = at_.find(function);
             if (at != at_.end() && (best < 0 || better(at->second, best))) best = at->second;
         };
         if (pin.function) look(pin.function);
         else if (pin.instance)
-            for (const Function* function : pin.instance->functions) look(function);
+            for (const LoadedFunction* function : pin.instance->functions) look(function);
         return best;
     }
 
 private:
-    std::unordered_map<const Function*, int> at_;
+    std::unordered_map<const LoadedFunction*, int> at_;
 };
 
 constexpr auto earlier = [](int a, int b) { return a < b; };
