@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What went wrong, where, and what to type: DESIGN section 7. Made anywhere, worded here, rendered in one place.
+// What went wrong, where, and what to type (docs/design.md, Errors). Made anywhere, worded here, rendered in one place.
 #pragma once
 
 #include <string>
@@ -48,7 +48,7 @@ private:
     std::size_t errors_ = 0, warnings_ = 0;
 };
 
-/// One diagnostic as text, ending with a newline: the form of DESIGN section 7.
+/// One diagnostic as text, ending with a newline: the form that docs/design.md describes.
 std::string render(const Diagnostic& diagnostic, const Sources& sources, bool color = false);
 
 /// All of them in order of place (files in order of first mention), a blank line between two; past

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Text to commands and back: LinuxCNC's .hal syntax (facts: linuxcnc-hal.md 2.3) plus name ranges and sets.
-// Knows no component and no pin; DESIGN section 4, step 1.
+// Text to commands and back: LinuxCNC's .hal syntax (halcmd(1)) plus name ranges and sets.
+// Knows no component and no pin: step 1 of docs/design.md.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One running machine: the model, the plugins, the threads, and edits as transactions. DESIGN section 4.
+// One running machine: the model, the plugins, the threads, and edits as transactions (docs/design.md).
 // Only the shell, the tools and tests use it. Every member is [setup] and may be called from any one thread at a time
 // (callers hold Session::mutex).
 #pragma once
@@ -70,7 +70,7 @@ struct FaultRecord {
     std::uint64_t number = 0;
     std::int64_t age_ns = 0;
     std::uint64_t cycle = 0;
-    std::string thread, code, sentence;  ///< sentence: DESIGN section 7's run-time form
+    std::string thread, code, sentence;  ///< sentence: what happened, since when, what was done
 };
 
 enum class Lock : unsigned { none = 0, load = 1, config = 2, params = 4, run = 8, tune = 3, all = 255 };

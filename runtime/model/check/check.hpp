@@ -17,7 +17,7 @@ void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics);  
 void check_cross_thread_io(const Model& model, Diagnostics& diagnostics);       ///< note cross-thread-io
 void check_stale_reads(const Model& model, Diagnostics& diagnostics);           ///< note stale-read
 
-/// How old a value is when a function reads it: the latency contract of DESIGN section 4.
+/// How old a value is when a function reads it: the table in docs/design.md.
 struct Delay {
     const Signal* signal;
     const Pin *writer, *reader;
