@@ -24,6 +24,9 @@ namespace fs = std::filesystem;
 
 // @NAME@ is the component's name, @TYPE@ the same as a type, @PACKAGE@ where find_package looks.
 constexpr std::string_view source = R"CPP(// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+
 #include "hal/component.hpp"
 
 namespace {
