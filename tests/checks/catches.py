@@ -80,6 +80,9 @@ def check_files(root):
     write(root, {"runtime/base/README.md": "read `a.cpp`, `runtime/base/a.cpp`, [up](../README.md), `gone.cpp`\n[lost](lost.md)\n"})
     expect("pages that name what is not there", run(files, root), 1, "runtime/base/README.md:1: mentions gone.cpp",
            "runtime/base/README.md:2: mentions lost.md")
+    write(root, readmes | {"runtime/page.md": "write `lag.cpp`, read [it](base/README.md) and [that](gone.md#there)\n"})
+    expect("a page with a dead link", run(files, root), 1, "runtime/page.md:1: mentions gone.md")
+    (root / "runtime/page.md").unlink()
     write(root, readmes | {"runtime/base/long.cpp": SPDX * 601, "runtime/base/z.py": "import sys\n", "tools/x.cpp": SPDX})
     expect("long, unlicensed, undocumented", run(files, root), 1, "runtime/base/long.cpp: 601 lines", "runtime/base/z.py:1:",
            "tools: has no README.md")
