@@ -9,6 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from vcan import on_vcan0
+
 SCRIPT = """set -e
 candump -L vcan0 >heard-by-candump & candump=$!
 "$1" can dump can:vcan0 --count 9 >heard-by-hal 2>listening & dump=$!
@@ -33,10 +35,7 @@ def main(hal):
         return 77
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "script").write_text(SCRIPT)
-        command = ["sh", "script", str(hal)]
-        if not Path("/sys/class/net/vcan0").exists():
-            print("this machine has no vcan0: running in user-mode-linux", flush=True)
-            command = [str(Path(__file__).resolve().parent / "uml" / "run"), "-t", "100", *command]
+        command = on_vcan0(["sh", "script", str(hal)], 100)
         status = subprocess.run(command, cwd=folder, check=False).returncode
         if status != 0:
             return status

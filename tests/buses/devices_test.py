@@ -7,6 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from vcan import on_vcan0
+
 SCRIPT = """set -e
 for device in "io 5" "jr3 80" "bootloader 4" "drive 2"; do
     set -- "$1" $device
@@ -37,10 +39,7 @@ def main(hal):
         return 77
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "script").write_text(SCRIPT)
-        command = ["sh", "script", str(hal)]
-        if not Path("/sys/class/net/vcan0").exists():
-            print("this machine has no vcan0: running in user-mode-linux", flush=True)
-            command = [str(Path(__file__).resolve().parent / "uml" / "run"), "-t", "100", *command]
+        command = on_vcan0(["sh", "script", str(hal)], 100)
         done = subprocess.run(command, cwd=folder, check=False, stdout=subprocess.PIPE, text=True)
         print(done.stdout)
         if done.returncode != 0:

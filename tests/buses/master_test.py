@@ -8,6 +8,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from vcan import on_vcan0
+
 # In a guest every system call is a hundred times dearer, and the host may be busy: a set-point every 10 ms, slower strokes, patience.
 SLOW = """setp x.max-following-error 50
 setp x-trajectory.maxv 40
@@ -73,10 +75,7 @@ def main(hal):
             return 1
         for name, text in (("axis.hal", axis), ("axis.canopen", config), ("slow.hal", SLOW), ("script", SCRIPT)):
             Path(folder, name).write_text(text)
-        command = ["env", f"HOME={folder}", f"XDG_RUNTIME_DIR={folder}", "TERM=dumb", "sh", "script", str(hal)]
-        if not Path("/sys/class/net/vcan0").exists():
-            print("this machine has no vcan0: running in user-mode-linux", flush=True)
-            command = [str(Path(__file__).resolve().parent / "uml" / "run"), "-t", "200", *command]
+        command = on_vcan0(["env", f"HOME={folder}", f"XDG_RUNTIME_DIR={folder}", "TERM=dumb", "sh", "script", str(hal)], 200)
         began = time.monotonic()
         done = subprocess.run(command, cwd=folder, check=False, stdout=subprocess.PIPE, text=True)
         print(done.stdout)

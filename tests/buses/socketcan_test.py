@@ -3,10 +3,7 @@
 """socketcan_test.py BUS_TESTS: the SocketCAN tests, on this machine where it has vcan0, else in user-mode-linux."""
 import subprocess
 import sys
-from pathlib import Path
 
-command = [sys.argv[1], "--gtest_filter=Socketcan.*", "--gtest_brief=1"]
-if not Path("/sys/class/net/vcan0").exists():
-    print("this machine has no vcan0: running in user-mode-linux", flush=True)
-    command = [str(Path(__file__).parent / "uml" / "run"), "-t", "120", *command]
-sys.exit(subprocess.run(command).returncode)
+from vcan import on_vcan0
+
+sys.exit(subprocess.run(on_vcan0([sys.argv[1], "--gtest_filter=Socketcan.*", "--gtest_brief=1"], 120)).returncode)

@@ -16,16 +16,10 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+from program import program  # noqa: E402
+
 PATIENCE = float(os.environ.get("HALCYON_TEST_TIMEOUT", "30"))  # for what should happen at once
-
-
-def program():
-    if os.environ.get("HAL_BIN"):
-        return Path(os.environ["HAL_BIN"]).resolve()
-    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
-    if not built:
-        sys.exit("harness.py: no program to test; build it (./hal --version) or set HAL_BIN")
-    return built[-1]
 
 
 HAL = program()

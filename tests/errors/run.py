@@ -17,34 +17,21 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+from program import environment, program  # noqa: E402
+
 # No command line provokes these alike on every machine; tests/unit/session_memory.cpp and tests/cli/cell_test.py do.
 ELSEWHERE = {"out-of-memory", "thread-refused", "no-dds"}
 TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
 
 
-def program(arguments):
-    """The program to test; takes it off the arguments when it is the first of them."""
-    if arguments and Path(arguments[0]).name == "hal" and os.access(arguments[0], os.X_OK):
-        return Path(arguments.pop(0)).resolve()
-    if os.environ.get("HAL_BIN"):
-        return Path(os.environ["HAL_BIN"]).resolve()
-    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
-    if not built:
-        sys.exit("run.py: no program to test; build it (./hal --version) or set HAL_BIN")
-    return built[-1]
-
-
 def run(hal, command):
     """Standard error and exit status of a command line."""
     with tempfile.TemporaryDirectory() as folder:
-        keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH") or key.endswith("SAN_OPTIONS")}
-        environment = {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder,
-                       "PATH": f"{hal.parent}:{os.environ['PATH']}"}
         # a file that is no plugin, and the components made for tests
-        environment["HALCYON_PLUGIN_PATH"] = f"plugins:{hal.parent.parent / 'tests' / 'plugins'}"
+        plugins = {"HALCYON_PLUGIN_PATH": f"plugins:{hal.parent.parent / 'tests' / 'plugins'}"}
         try:
-            done = subprocess.run(["/usr/bin/env", *command], cwd=HERE, env=environment, stdin=subprocess.DEVNULL,
+            done = subprocess.run(["/usr/bin/env", *command], cwd=HERE, env=environment(hal, folder) | plugins, stdin=subprocess.DEVNULL,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
         except subprocess.TimeoutExpired as late:
             return late.stderr or b"", f"still running after {TIMEOUT:g} s"

@@ -16,27 +16,10 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+from program import environment, program  # noqa: E402
+
 TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
-
-
-def program(arguments):
-    """The program to test; takes it off the arguments when it is the first of them."""
-    if arguments and Path(arguments[0]).name == "hal" and os.access(arguments[0], os.X_OK):
-        return Path(arguments.pop(0)).resolve()
-    if os.environ.get("HAL_BIN"):
-        return Path(os.environ["HAL_BIN"]).resolve()
-    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
-    if not built:
-        sys.exit("run.py: no program to test; build it (./hal --version) or set HAL_BIN")
-    return built[-1]
-
-
-def environment(hal, folder):
-    """Nothing of the user's own: no colours, no running instances, no home."""
-    keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH") or key.endswith("SAN_OPTIONS")}
-    return {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder,
-            "PATH": f"{hal.parent}:{os.environ['PATH']}"}
 
 
 def run(hal, test):

@@ -15,18 +15,11 @@ import sys
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from program import program  # noqa: E402
+
 ENDINGS = {".eds", ".dcf", ".xdd", ".xdc"}
 SUMMARY = re.compile(r"(\d+) objects?, (\d+) entr(?:y|ies), .*; (\d+) warnings?, (\d+) notes?$")
-
-
-def program():
-    if os.environ.get("HAL_BIN"):
-        return os.environ["HAL_BIN"]
-    built = sorted((ROOT / "build").glob("*/bin/hal"), key=lambda path: path.stat().st_mtime)
-    if not built:
-        sys.exit("eds_corpus.py: no program; build it (./hal --version) or set HAL_BIN")
-    return built[-1]
 
 
 def ours(hal, path):
