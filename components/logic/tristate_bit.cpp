@@ -1,21 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "hal/component.hpp"
+#include "tristate.hpp"
 
-namespace {
-
-struct TristateBit : hal::Component {
-    using Component::Component;
-    hal::In<bool> in{*this, "in", "the value to place"};
-    hal::Io<bool> out{*this, "out", "takes in while enable is TRUE; left alone otherwise"};
-    hal::In<bool> enable{*this, "enable", "TRUE: in goes to out"};
-    hal::Function run{*this, "", hal::step<&TristateBit::update>, "places the value"};
-
-    void update(hal::Cycle) noexcept {
-        if (enable) out = in.get();
-    }
-};
-
-}  // namespace
+using TristateBit = Tristate<bool>;
 
 HAL_COMPONENT(TristateBit, "tristate_bit", "Places a bit on a shared signal while enabled", R"(
 Several of them may write to one signal; the one that runs last in a cycle wins. While no one is enabled the signal keeps

@@ -1,21 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "hal/component.hpp"
+#include "tristate.hpp"
 
-namespace {
-
-struct TristateFloat : hal::Component {
-    using Component::Component;
-    hal::In<double> in{*this, "in", "the value to place"};
-    hal::Io<double> out{*this, "out", "takes in while enable is TRUE; left alone otherwise"};
-    hal::In<bool>   enable{*this, "enable", "TRUE: in goes to out"};
-    hal::Function   run{*this, "", hal::step<&TristateFloat::update>, "places the value"};
-
-    void update(hal::Cycle) noexcept {
-        if (enable) out = in.get();
-    }
-};
-
-}  // namespace
+using TristateFloat = Tristate<double>;
 
 HAL_COMPONENT(TristateFloat, "tristate_float", "Places a number on a shared signal while enabled", R"(
 Several of them may write to one signal; the one that runs last in a cycle wins. While no one is enabled the signal keeps
