@@ -2,23 +2,18 @@
 // What comes to the CAN drivers from outside: datagrams, lines of a serial adapter, captures. The first byte chooses. What was
 // understood is a valid frame, and is understood again after it was written.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string_view>
 
 #include "drivers/canudp/datagram.hpp"
 #include "drivers/link/capture.hpp"
 #include "drivers/slcan/line.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::can;
 
 namespace {
 
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 void check(const Frame& f) {
     require(f.error || f.valid(), "a frame that was read is valid");

@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Frames of type 0x9023, as anybody on the segment can send them: the decoders as it comes, and again with the header made right.
 #include <algorithm>
-#include <cstdlib>
 
 #include "drivers/cane/format.hpp"
 #include "drivers/cane/stations.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::can;
 using namespace hal::can::cane;
 
 namespace {
 
-void require(bool holds) {
-    if (!holds) std::abort();
-}
+using hal::fuzz::require;
 
 void unpack(std::span<const std::uint8_t> whole, Nodes& nodes, Streams& streams) {
     Unpacker u;
@@ -24,13 +22,13 @@ void unpack(std::span<const std::uint8_t> whole, Nodes& nodes, Streams& streams)
     Frame f;
     unsigned count = 0;
     for (; u.next(f); ++count) {
-        require(f.valid() && !f.fd && !f.error);
+        require(f.valid() && !f.fd && !f.error, "a message is a frame of classic CAN");
         nodes.learn(f.id, from, static_cast<std::int64_t>(count) * 300'000'000);
         nodes.where(f.id, true);
         std::array<std::uint8_t, longest_message> again{};
-        require(put_packed(f, again) != 0);
+        require(put_packed(f, again) != 0, "what was read can be written");
     }
-    require(count == u.messages());
+    require(count == u.messages(), "the header's number of messages is read");
 }
 
 }  // namespace
@@ -40,10 +38,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const auto order : {Order::big, Order::little}) {
         Frame f;
         if (get_single(bytes, order, f) != Wrong::none) continue;
-        require(f.valid());
+        require(f.valid(), "a frame that was read is valid");
         std::array<std::uint8_t, single_bytes + 8> again{};
         const auto length = put_single(f, order, again);
-        require(length != 0 && std::equal(again.begin(), again.begin() + static_cast<std::ptrdiff_t>(length), data));
+        require(length != 0 && std::equal(again.begin(), again.begin() + static_cast<std::ptrdiff_t>(length), data), "it is written as it was read");
     }
     Nodes nodes;
     Streams streams;

@@ -3,15 +3,16 @@
 // took), length, eight data bytes. Nothing outside the objects is touched, and what is over is over: nobody waits for ever.
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 
 #include "canopen/device.hpp"
 #include "canopen/network.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::canopen;
 
 namespace {
+
+using hal::fuzz::require;
 
 Description description() {
     Description d = basic_device({.vendor = 1, .product = 2, .revision = 3, .serial = 4, .name = "fuzzed", .emcy_consumers = 2});
@@ -34,12 +35,6 @@ Description description() {
     add_tpdo(d, 2, {.transmission = 1, .mapping = {map_entry(0x2005, 0, 16), map_entry(0x2003, 0, 24)}});
     add_sdo_server(d, 1, cob_invalid, cob_invalid);
     return d;
-}
-
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
 }
 
 }  // namespace

@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Configurations of CANopen networks: whatever is in the file, it is read or refused with a place, and what was read can be used.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "components/canopen/config/schedule.hpp"
 #include "components/canopen/master/own_node.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 namespace {
 
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 constexpr std::string_view description = R"([DeviceInfo]
 VendorNumber=1

@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: MIT
 // LinuxCNC's component language: parse, check, translate, render.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include "tools/comp/comp.hpp"
 #include "tools/comp/syntax.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
-namespace {
-
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
-
-}  // namespace
+using hal::fuzz::require;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     hal::Sources sources;

@@ -3,8 +3,6 @@
 // same again. Whatever is given as fields is refused with a sentence or makes a type whose own sample can be decoded. Whatever comes as the
 // status of an instance is read within its bytes, and what is shown of it does not steer a terminal.
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 #include <vector>
@@ -12,16 +10,12 @@
 #include "components/dds/schema.hpp"
 #include "components/dds/words.hpp"
 #include "tools/top.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 namespace {
 
 using namespace hal::dds;
-
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 void sample(const Schema& schema, std::span<const std::uint8_t> given) {
     const std::vector<std::uint8_t> bytes(given.begin(), given.end());  // so that a byte too far is seen

@@ -2,22 +2,13 @@
 // Device descriptions, EDS, DCF and XML, and concise DCFs: read, written, read again.
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string_view>
 
 #include "components/canopen/306/concise.hpp"
 #include "components/canopen/311/xdd.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
-namespace {
-
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
-
-}  // namespace
+using hal::fuzz::require;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace hal::canopen::eds;

@@ -2,22 +2,17 @@
 // The CiA 309-3 gateway fed with whatever comes, with a device on its bus: every line that is a command gets one answer, in the end
 // nobody waits, and every frame is one that can be sent.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include "canopen/309/gateway.hpp"
 #include "canopen/device.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::canopen;
 
 namespace {
 
-void require(bool holds, const char* what, const std::string& text = "") {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s %s\n", what, text.c_str());
-    std::abort();
-}
+using hal::fuzz::require;
 
 Description description() {
     Description d = basic_device({.vendor = 1, .product = 2, .revision = 3, .serial = 4, .name = "fuzzed"});

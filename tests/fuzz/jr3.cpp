@@ -5,21 +5,16 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 
 #include "canopen/301/protocol.hpp"
 #include "canopen/404/jr3.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::canopen;
 
 namespace {
 
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 template <class Take>
 void each_bit(std::span<const std::uint8_t> bytes, Take take) {

@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Netlists, values and diagnostics: parse, expand, format, render. Dictionary: netlist.dict.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "base/types.hpp"
 #include "netlist/netlist.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 namespace {
 
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 std::string words(const std::vector<hal::Command>& commands) {
     std::string text;

@@ -3,7 +3,6 @@
 // machine is in order afterwards. What may wait or leave the process (programs, files) is not executed here.
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <string_view>
@@ -13,14 +12,11 @@
 #include "session/session.hpp"
 #include "shell/protocol.hpp"
 #include "shell/shell.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 namespace {
 
-void require(bool holds, const char* what, std::string_view line) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n%.*s\n", what, static_cast<int>(line.size()), line.empty() ? "" : line.data());
-    std::abort();
-}
+using hal::fuzz::require;
 
 bool leaves_the_process(std::string_view line) {
     for (const char* word : {"save", "usr", "source", "unlock", "advance", "\\u"})

@@ -3,8 +3,6 @@
 // schedule, it is read or refused with a place, and what is accepted can be used.
 #include <array>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string_view>
 #include <vector>
@@ -16,16 +14,12 @@
 #include "components/fieldbus/tdma/rtcfg_server.hpp"
 #include "components/fieldbus/tdma/station.hpp"
 #include "components/fieldbus/tdma/tunnel.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 namespace {
 
 using namespace hal::tdma;
-
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 void frames(std::span<const std::uint8_t> given) {
     const std::vector<std::uint8_t> frame(given.begin(), given.end());  // so that a byte too far is seen

@@ -3,8 +3,6 @@
 // byte chooses which.
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
@@ -12,16 +10,13 @@
 #include "vision/capture/pnm.hpp"
 #include "vision/capture/source.hpp"
 #include "vision/detect/homography.hpp"
+#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::vision;
 
 namespace {
 
-void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "broken: %s\n", what);
-    std::abort();
-}
+using hal::fuzz::require;
 
 void picture(const std::uint8_t* bytes, std::size_t count) {
     Frame frame;
