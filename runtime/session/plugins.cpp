@@ -160,7 +160,7 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics&
     }
     Plugin plugin{nullptr, library, found};
     plugin.component = static_cast<const hal_component*>(dlsym(library.get(), "hal_plugin"));
-    if (!plugin.component) return bad("it exports no symbol hal_plugin");
+    if (!plugin.component) return bad("it exports no symbol hal_plugin, which HAL_COMPONENT(Type, \"name\", \"summary\") makes");
     if (const std::string why = problem_of(*plugin.component); !why.empty()) return bad(why);
     return plugin;
 }

@@ -199,6 +199,9 @@ public:
         declare(static_cast<B*>(&component), name, entry(step), doc, options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u,
                 detail::run_row<B, step>);
     }
+    // The compiler shows this line where something else was given.
+    template <std::derived_from<Component> C, class F>
+    Function(C&, const char*, F, const char*, FunctionOptions = {}) = delete;  // must be: void NAME(hal::Cycle) noexcept
     Function(const Function&) = delete;
     Function& operator=(const Function&) = delete;
 
@@ -316,6 +319,7 @@ class In : public detail::Pin<T, HAL_DIR_IN> {
 public:
     using detail::Pin<T, HAL_DIR_IN>::Pin;
     In& operator=(const In&) = delete;
+    In& operator=(T) = delete;  // an input is only read; hal::Out and hal::Io can be written
 };
 
 /// A parameter: read by the component, set by `setp`, never linked.
@@ -324,6 +328,7 @@ class Param : public detail::Pin<T, HAL_DIR_PARAM> {
 public:
     using detail::Pin<T, HAL_DIR_PARAM>::Pin;
     Param& operator=(const Param&) = delete;
+    Param& operator=(T) = delete;  // a parameter is only read; setp sets it
 };
 
 /// An output. Reading it gives what was last written.
@@ -426,6 +431,7 @@ bool guarded(const hal_host* host, Action action) noexcept {
 
 template <std::derived_from<Component> C>
 constexpr hal_component component(const char* name, const char* summary, const char* doc = "") {
+    static_assert(std::is_constructible_v<C, const hal_host*>, "the component lacks the line: using Component::Component;");
     constexpr Traits traits = traits_of<C>();
     return {
         sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name, summary, doc,
