@@ -162,36 +162,30 @@ void translate(const Replacement& r) {
     }
 }
 
-}  // namespace
+/// Finds what stays, goes and comes, and reports what the machine uses and the new version does not have.
+struct Comparison {
+    const Edit& edit;
+    Replacement& r;
+    const Span at;
 
-bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>& owned, Span at) {
-    LoadedComponent& fresh = *owned;
-    const std::size_t errors_before = diagnostics->errors();
-    const auto conflict = [&](std::string message, Span other, const char* label, std::string help) {
+    void conflict(std::string message, Span other, const char* label, std::string help) const {
         Diagnostic d{Severity::error, "reload-conflict", std::move(message), {{at, "the new version"}}, {std::move(help)}};
         if (other.known()) d.labels.push_back({other, label});
-        diagnostics->add(std::move(d));
-    };
-    auto r = std::make_shared<Replacement>(Replacement{model_, component, fresh, {}, {}, {}, {}, {}, {}});
-    r->functions = pairs_of<LoadedFunction>(component.functions, fresh.functions, same_function);
-    for (std::size_t i = 0; i < component.instances.size(); ++i) {
-        Instance& kept = *component.instances[i];
-        r->instances.push_back({&kept, fresh.instances[i].get(), pairs_of<Pin>(kept.pins, fresh.instances[i]->pins, same_pin)});
+        edit.diagnostics->add(std::move(d));
     }
-
-    const auto vanished = [&](Pin& pin, const char* why) {
-        r->gone_pins.push_back(&pin);
+    void vanished(Pin& pin, const char* why) const {
+        r.gone_pins.push_back(&pin);
         if (pin.signal)
             return conflict("pin " + quoted(pin.name) + " " + why + " in the new version, and it is on signal " + quoted(pin.signal->name),
                             pin.linked_at, "linked here", "take it off first: unlinkp " + pin.name);
         const bool settable = pin.dir != HAL_DIR_OUT && !pin.read_only() && pin.type != HAL_TYPE_PORT && pin.instance;
-        if (settable && __atomic_load_n(&present(pin).slot->raw, __ATOMIC_RELAXED) != pin.initial.raw)
-            diagnostics->warning("reload-dropped", at,
-                                 (pin.dir == HAL_DIR_PARAM ? "parameter " : "pin ") + quoted(pin.name) + " " + why +
-                                     " in the new version: the value it was set to is lost",
-                                 "", "a setp of it in the netlist needs a change, too");
-    };
-    for (const InstancePair& pair : r->instances) {
+        if (settable && __atomic_load_n(&edit.present(pin).slot->raw, __ATOMIC_RELAXED) != pin.initial.raw)
+            edit.diagnostics->warning("reload-dropped", at,
+                                      (pin.dir == HAL_DIR_PARAM ? "parameter " : "pin ") + quoted(pin.name) + " " + why +
+                                          " in the new version: the value it was set to is lost",
+                                      "", "a setp of it in the netlist needs a change, too");
+    }
+    void compare_pins(const InstancePair& pair) const {
         std::vector<const Pin*> fresh_of(pair.kept->pins.size(), nullptr);
         std::vector<bool> is_new(pair.fresh->pins.size(), true);
         for (const Pair& pin : pair.pins) {
@@ -212,31 +206,50 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
             vanished(pin, other == pair.fresh->pins.end() ? "is no more" : (std::string("has type ") + name((*other)->type)).c_str());
         }
         for (std::size_t i = 0; i < is_new.size(); ++i)
-            if (is_new[i]) r->new_pins.push_back(pair.fresh->pins[i].get());
+            if (is_new[i]) r.new_pins.push_back(pair.fresh->pins[i].get());
     }
-    std::vector<bool> function_stays(component.functions.size(), false), function_is_new(fresh.functions.size(), true);
-    for (const Pair& pair : r->functions) {
-        function_stays[pair.kept] = true;
-        function_is_new[pair.fresh] = false;
+    void compare_functions() const {
+        std::vector<bool> stays(r.component.functions.size(), false), is_new(r.other.functions.size(), true);
+        for (const Pair& pair : r.functions) {
+            stays[pair.kept] = true;
+            is_new[pair.fresh] = false;
+        }
+        for (std::size_t i = 0; i < stays.size(); ++i) {
+            LoadedFunction& function = *r.component.functions[i];
+            if (stays[i]) continue;
+            r.gone_functions.push_back(&function);
+            if (function.thread)
+                conflict("function " + quoted(function.name) + " is no more in the new version, and it is in thread " +
+                             quoted(function.thread->name),
+                         function.added, "added here", "take it out first: delf " + function.name + " " + function.thread->name);
+            for (const auto& pin : function.pins) vanished(*pin, "is no more");
+        }
+        for (std::size_t i = 0; i < is_new.size(); ++i) {
+            LoadedFunction& function = *r.other.functions[i];
+            if (!is_new[i]) continue;
+            r.new_functions.push_back(&function);
+            for (const auto& pin : function.pins) r.new_pins.push_back(pin.get());
+        }
     }
-    for (std::size_t i = 0; i < function_stays.size(); ++i) {
-        LoadedFunction& function = *component.functions[i];
-        if (function_stays[i]) continue;
-        r->gone_functions.push_back(&function);
-        if (function.thread)
-            conflict("function " + quoted(function.name) + " is no more in the new version, and it is in thread " +
-                         quoted(function.thread->name),
-                     function.added, "added here", "take it out first: delf " + function.name + " " + function.thread->name);
-        for (const auto& pin : function.pins) vanished(*pin, "is no more");
+};
+
+}  // namespace
+
+bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>& owned, Span at) {
+    LoadedComponent& fresh = *owned;
+    const std::size_t errors_before = diagnostics->errors();
+    auto r = std::make_shared<Replacement>(Replacement{model_, component, fresh, {}, {}, {}, {}, {}, {}});
+    r->functions = pairs_of<LoadedFunction>(component.functions, fresh.functions, same_function);
+    for (std::size_t i = 0; i < component.instances.size(); ++i) {
+        Instance& kept = *component.instances[i];
+        r->instances.push_back({&kept, fresh.instances[i].get(), pairs_of<Pin>(kept.pins, fresh.instances[i]->pins, same_pin)});
     }
-    for (std::size_t i = 0; i < function_is_new.size(); ++i) {
-        LoadedFunction& function = *fresh.functions[i];
-        if (!function_is_new[i]) continue;
-        r->new_functions.push_back(&function);
-        for (const auto& pin : function.pins) r->new_pins.push_back(pin.get());
-        if (model_.find_function(function.name))
-            fail("name-taken", at, "there is a function " + quoted(function.name) + " already", "its function");
-    }
+    const Comparison comparison{*this, *r, at};
+    for (const InstancePair& pair : r->instances) comparison.compare_pins(pair);
+    comparison.compare_functions();
+    for (const LoadedFunction* const function : r->new_functions)
+        if (model_.find_function(function->name))
+            fail("name-taken", at, "there is a function " + quoted(function->name) + " already", "its function");
     for (const Pin* const pin : r->new_pins) {
         const Pin* const there = model_.find_pin(pin->name);
         const bool goes =

@@ -112,28 +112,29 @@ std::string pair(const Start& slave, const Start& master) {
     return run(master, 120'000).out;
 }
 
-}  // namespace
+/// The figures of each pair, over all rounds.
+struct Measured {
+    Figures reference, master, slave, memory, foreign;  ///< no stack at either side, our master, our device, no wire, Python's master
+    int rounds = 0;
+    bool python = false;  ///< foreign was measured
+};
 
-void can(const Options& options, Report& report) {
-    report.section("CANopen: one node, no pacing of the bus");
-    const Rig rig(options);
-    if (access(rig.ours().c_str(), X_OK) != 0 || access(rig.neutral().c_str(), X_OK) != 0)
-        return report.note("can_stack and can_neutral are not built here");
-    const int rounds = options.quick ? 2 : 5;
+Measured measure(const Options& options, const Rig& rig) {
     const std::string part = options.quick ? "4" : "1", count = options.quick ? "10000" : "40000", &name = rig.interface();
     const Start neutral_slave = rig.program({rig.neutral(), name, "slave"}), our_slave = rig.program({rig.ours(), "can:" + name, "slave"});
     const Start neutral_master = rig.program({rig.neutral(), name, "master", part}),
                 our_master = rig.program({rig.ours(), "can:" + name, "master", part});
     const TemporaryFolder files;
     const std::string script = files.file("master.py", python_master);
-    const bool python = run({.arguments = {"python3", "-c", "import can, canopen"}}).status == 0;
-    Figures reference, master, slave, memory, foreign;
-    for (int n = 0; n < rounds; ++n) {
-        reference.read(pair(neutral_slave, neutral_master));
-        master.read(pair(neutral_slave, our_master));
-        slave.read(pair(our_slave, neutral_master));
-        for (const auto& [words, figures] : {std::pair{std::vector{rig.ours(), "can:" + name}, &master},
-                                              std::pair{std::vector{rig.neutral(), name}, &reference}}) {
+    Measured all;
+    all.rounds = options.quick ? 2 : 5;
+    all.python = run({.arguments = {"python3", "-c", "import can, canopen"}}).status == 0;
+    for (int n = 0; n < all.rounds; ++n) {
+        all.reference.read(pair(neutral_slave, neutral_master));
+        all.master.read(pair(neutral_slave, our_master));
+        all.slave.read(pair(our_slave, neutral_master));
+        for (const auto& [words, figures] : {std::pair{std::vector{rig.ours(), "can:" + name}, &all.master},
+                                              std::pair{std::vector{rig.neutral(), name}, &all.reference}}) {
             Child receiver(rig.program({words[0], words[1], "receive", count}), true);
             receiver.line(5000);
             run(rig.program({rig.neutral(), name, "generate", count, "100000"}), 60'000);
@@ -144,48 +145,42 @@ void can(const Options& options, Report& report) {
             }
             figures->read(text);
         }
-        memory.read(run({.arguments = {rig.ours(), "memory", part}, .everywhere = true}).out);
-        if (python) foreign.read(pair(neutral_slave, rig.program({"python3", script, name, options.quick ? "500" : "2000"})));
+        all.memory.read(run({.arguments = {rig.ours(), "memory", part}, .everywhere = true}).out);
+        if (all.python) all.foreign.read(pair(neutral_slave, rig.program({"python3", script, name, options.quick ? "500" : "2000"})));
     }
+    return all;
+}
+
+/// Master and device against the program without a stack.
+void tell_beside(const Measured& all, Report& report) {
     constexpr double beside = 1.15;
-    const auto add = [&](const std::string& what, const std::string& figure, const std::string& unit, Goal goal) {
-        for (const auto& [side, figures] : {std::pair<std::string, const Figures*>{"master", &master}, {"device", &slave}}) {
-            if (!figures->best(figure)) continue;
-            report.row({.what = side + ": " + what,
-                        .unit = unit,
-                        .ours = figures->best(figure),
-                        .peer = "no stack",
-                        .theirs = reference.best(figure),
-                        .goal = goal});
-        }
-    };
-    add("SDO expedited upload", "exp_up", "/s", at_least(80'000, beside));
-    add("SDO expedited download", "exp_down", "/s", at_least(80'000, beside));
-    add("SDO segmented download, 1 MiB", "seg1m_down", "kB/s", at_least(650, beside));
-    add("SDO segmented upload, 1 MiB", "seg1m_up", "kB/s", at_least(650, beside));
-    add("SDO block download, 1 MiB", "blk1m_down", "kB/s", at_least(1500, beside));
-    add("SDO block upload, 1 MiB", "blk1m_up", "kB/s", at_least(1500, beside));
-    for (const char* which : {"up", "down"})
-        report.row({.what = fmt::format("master: CPU of an expedited {}load", which),
-                    .unit = "us",
-                    .ours = master.best(fmt::format("exp_{}_cpu", which)),
+    const auto row = [&](const std::string& what, const Figures& ours, const std::string& figure, const std::string& unit, Goal goal) {
+        report.row({.what = what,
+                    .unit = unit,
+                    .ours = ours.best(figure),
                     .peer = "no stack",
-                    .theirs = reference.best(fmt::format("exp_{}_cpu", which)),
-                    .goal = limit(6, beside)});
-    add("SYNC to TPDO in the application, p50", "sync_p50", "us", limit(35, beside));
-    add("SYNC to TPDO in the application, p99", "sync_p99", "us", limit(70, beside));
-    report.row({.what = "master: CPU of a cycle of SYNC and TPDO, 1 kHz",
-                .unit = "us",
-                .ours = master.best("sync_cpu"),
-                .peer = "no stack",
-                .theirs = reference.best("sync_cpu"),
-                .goal = limit(38, beside)});
-    report.row({.what = "master: CPU of a received PDO, 10 kHz",
-                .unit = "us",
-                .ours = master.best("receive_cpu"),
-                .peer = "no stack",
-                .theirs = reference.best("receive_cpu"),
-                .goal = limit(8, beside)});
+                    .theirs = all.reference.best(figure),
+                    .goal = goal});
+    };
+    const auto both = [&](const std::string& what, const std::string& figure, const std::string& unit, Goal goal) {
+        if (all.master.best(figure)) row("master: " + what, all.master, figure, unit, goal);
+        if (all.slave.best(figure)) row("device: " + what, all.slave, figure, unit, goal);
+    };
+    both("SDO expedited upload", "exp_up", "/s", at_least(80'000, beside));
+    both("SDO expedited download", "exp_down", "/s", at_least(80'000, beside));
+    both("SDO segmented download, 1 MiB", "seg1m_down", "kB/s", at_least(650, beside));
+    both("SDO segmented upload, 1 MiB", "seg1m_up", "kB/s", at_least(650, beside));
+    both("SDO block download, 1 MiB", "blk1m_down", "kB/s", at_least(1500, beside));
+    both("SDO block upload, 1 MiB", "blk1m_up", "kB/s", at_least(1500, beside));
+    row("master: CPU of an expedited upload", all.master, "exp_up_cpu", "us", limit(6, beside));
+    row("master: CPU of an expedited download", all.master, "exp_down_cpu", "us", limit(6, beside));
+    both("SYNC to TPDO in the application, p50", "sync_p50", "us", limit(35, beside));
+    both("SYNC to TPDO in the application, p99", "sync_p99", "us", limit(70, beside));
+    row("master: CPU of a cycle of SYNC and TPDO, 1 kHz", all.master, "sync_cpu", "us", limit(38, beside));
+    row("master: CPU of a received PDO, 10 kHz", all.master, "receive_cpu", "us", limit(8, beside));
+}
+
+void tell_without_wire(const Measured& all, Report& report) {
     for (const auto& [figure, what] : {std::pair{"blk_down", "block download"},
                                        {"blk_up", "block upload"},
                                        {"seg_down", "segmented download"},
@@ -193,27 +188,43 @@ void can(const Options& options, Report& report) {
         for (const auto& [bus, where] : {std::pair{"sim_", "bus in memory"}, {"memory_", "queue to queue"}})
             report.row({.what = fmt::format("{}: SDO {}, 1 MiB", where, what),
                         .unit = "kB/s",
-                        .ours = memory.best(std::string(bus) + figure),
+                        .ours = all.memory.best(std::string(bus) + figure),
                         .goal = figure[0] == 'b' ? at_least(5000) : Goal{}});
-    report.row({.what = "queue to queue: SDO expedited, both sides", .unit = "/s", .ours = memory.best("memory_exp_up")});
-    if (python)
-        for (const auto& [figure, what] : {std::pair{"exp_up", "expedited upload, /s"},
-                                           {"exp_up_cpu", "its CPU, us"},
-                                           {"seg64k_down", "segmented download, 64 KiB, kB/s"},
-                                           {"blk64k_down", "block download, 64 KiB, kB/s"},
-                                           {"blk64k_up", "block upload, 64 KiB, kB/s"}})
-            report.row({.what = fmt::format("master: SDO {}", what),
-                        .unit = "",
-                        .ours = master.best(figure),
-                        .peer = "Python canopen",
-                        .theirs = foreign.best(figure)});
-    else report.note("the Python package canopen is not installed: python3 -m pip install canopen python-can");
+    report.row({.what = "queue to queue: SDO expedited, both sides", .unit = "/s", .ours = all.memory.best("memory_exp_up")});
+}
+
+void tell_beside_python(const Measured& all, Report& report) {
+    if (!all.python) return report.note("the Python package canopen is not installed: python3 -m pip install canopen python-can");
+    for (const auto& [figure, what] : {std::pair{"exp_up", "expedited upload, /s"},
+                                       {"exp_up_cpu", "its CPU, us"},
+                                       {"seg64k_down", "segmented download, 64 KiB, kB/s"},
+                                       {"blk64k_down", "block download, 64 KiB, kB/s"},
+                                       {"blk64k_up", "block upload, 64 KiB, kB/s"}})
+        report.row({.what = fmt::format("master: SDO {}", what),
+                    .unit = "",
+                    .ours = all.master.best(figure),
+                    .peer = "Python canopen",
+                    .theirs = all.foreign.best(figure)});
+}
+
+}  // namespace
+
+void can(const Options& options, Report& report) {
+    report.section("CANopen: one node, no pacing of the bus");
+    const Rig rig(options);
+    if (access(rig.ours().c_str(), X_OK) != 0 || access(rig.neutral().c_str(), X_OK) != 0)
+        return report.note("can_stack and can_neutral are not built here");
+    const Measured all = measure(options, rig);
+    tell_beside(all, report);
+    tell_without_wire(all, report);
+    tell_beside_python(all, report);
     report.note("lely-core and CANopenNode are not installed as programs; docs/performance.md has their figures by the same method.");
     report.note(
         fmt::format("Over {}. Both sides on one CPU{}. Best of {} rounds, all pairs in turn; median of the same rounds: SDO upload {:.0f}/s "
                     "(no stack {:.0f}/s), SYNC p50 {:.1f} us ({:.1f} us).",
-                    rig.about(), rig.fifo() ? ", SCHED_FIFO" : "", rounds, master.middle("exp_up").value_or(0), reference.middle("exp_up").value_or(0),
-                    master.middle("sync_p50").value_or(0), reference.middle("sync_p50").value_or(0)));
+                    rig.about(), rig.fifo() ? ", SCHED_FIFO" : "", all.rounds, all.master.middle("exp_up").value_or(0),
+                    all.reference.middle("exp_up").value_or(0), all.master.middle("sync_p50").value_or(0),
+                    all.reference.middle("sync_p50").value_or(0)));
 }
 
 }  // namespace hal::bench
