@@ -56,7 +56,8 @@ bool try_plugin(const std::string& folder, const std::string& name, BuiltPlugin&
             std::string function = page.functions.empty() ? "" : page.full_name(page.functions.front());
             if (const auto n = function.find(".N"); n != std::string::npos) function.replace(n, 2, ".0");
             std::replace(problem.begin(), problem.end(), '\n', ' ');
-            answer = fmt::format("good\n{}\n{}\n{}\n{}\n{}\n{}\n", plugin->component->name, page.summary, page.pins.size(), page.functions.size(), function, problem);
+            answer = fmt::format("good\n{}\n{}\n{}\n{}\n{}\n{}\n", plugin->component->name, page.summary, page.pins.size(),
+                                 page.functions.size(), function, problem);
         } else {
             std::string why = diagnostics.all().empty() ? "it cannot be opened" : diagnostics.all().front().message;
             if (const auto at = why.find("is not a usable component: "); at != std::string::npos) why.erase(0, at + 27);
@@ -73,7 +74,8 @@ bool try_plugin(const std::string& folder, const std::string& name, BuiltPlugin&
     std::string answer;
     const int status = finish_program(child, ends[0], answer);
     if (WIFSIGNALED(status)) {
-        built.problem = fmt::format("it crashes when an instance is made ({}): its constructor, or that of a static object", ::strsignal(WTERMSIG(status)));
+        built.problem = fmt::format("it crashes when an instance is made ({}): its constructor, or that of a static object",
+                                    ::strsignal(WTERMSIG(status)));
         return false;
     }
     std::istringstream lines(answer);
@@ -116,7 +118,13 @@ std::string install(const std::string& from, const std::string& folder, const st
 
 /// Flags of cmake/HalcyonComponent.cmake and cmake/HalcyonBuild.cmake.
 std::vector<std::string> flags(Language language, bool clang, bool program) {
-    std::vector<std::string> all{"-O2", program ? "-fPIE" : "-fPIC", program ? "-pie" : "-shared", "-fvisibility=hidden", "-fno-plt", "-ffp-contract=off", "-Wall",
+    std::vector<std::string> all{"-O2",
+                                 program ? "-fPIE" : "-fPIC",
+                                 program ? "-pie" : "-shared",
+                                 "-fvisibility=hidden",
+                                 "-fno-plt",
+                                 "-ffp-contract=off",
+                                 "-Wall",
                                  colours(STDERR_FILENO) ? "-fdiagnostics-color=always" : "-fdiagnostics-color=never"};
     if (language == Language::cpp) all.insert(all.end(), {"-std=c++20", "-fvisibility-inlines-hidden", "-Wextra"});
     else all.push_back("-std=gnu17");
@@ -136,7 +144,8 @@ std::vector<std::string> sdk_includes() {
     const auto complete = [](const std::vector<std::string>& folders) {
         const auto has = [&](const char* header) {
             std::error_code none;
-            return std::any_of(folders.begin(), folders.end(), [&](const std::string& folder) { return fs::is_regular_file(folder + "/" + header, none); });
+            return std::any_of(folders.begin(), folders.end(),
+                               [&](const std::string& folder) { return fs::is_regular_file(folder + "/" + header, none); });
         };
         return has("hal/abi.h") && has("hal/component.hpp");
     };
@@ -165,7 +174,8 @@ std::string find_compiler(Language language, std::string& problem) {
     if (const char* wanted = std::getenv(variable); wanted && *wanted) {
         const auto words = split_words(wanted);
         if (!words.empty() && !in_path(words.front()).empty()) return wanted;
-        problem = fmt::format("{}={} is no program that can be run; unset it, or set it to a {} compiler", variable, wanted, cpp ? "C++20" : "C");
+        problem =
+            fmt::format("{}={} is no program that can be run; unset it, or set it to a {} compiler", variable, wanted, cpp ? "C++20" : "C");
         return {};
     }
     const std::vector<const char*> cpp_names{"g++", "clang++", "c++"}, c_names{"gcc", "clang", "cc"};
@@ -186,7 +196,9 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
     const std::string compiler = find_compiler(source.language, built.problem);
     if (compiler.empty()) return built;
     const std::vector<std::string> headers = sdk_includes();
-    if (headers.empty()) return fail(fmt::format("Halcyon's headers are neither in {} nor beside the program; install them: cmake --install", paths::install_includes));
+    if (headers.empty())
+        return fail(fmt::format("Halcyon's headers are neither in {} nor beside the program; install them: cmake --install",
+                                paths::install_includes));
     const Workshop workshop;
     if (!workshop.problem().empty()) return fail(workshop.problem());
 
@@ -196,7 +208,8 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
         if (const std::string why = write_file(file, *source.text); !why.empty()) return fail(why);
         if (const std::string why = options.keep.empty() ? "" : write_file(options.keep, *source.text); !why.empty()) return fail(why);
     }
-    const std::string map = workshop.file("plugin.map"), library = workshop.file(source.program ? source.name + ".program" : source.name + ".so");
+    const std::string map = workshop.file("plugin.map"),
+                      library = workshop.file(source.program ? source.name + ".program" : source.name + ".so");
     if (const std::string why = write_file(map, "{ global: hal_plugin; local: *; };\n"); !why.empty()) return fail(why);
 
     std::vector<std::string> words = split_words(compiler);
@@ -213,8 +226,10 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
     std::vector<std::string> behind;
     if (source.linuxcnc) {
         const std::string shim = linuxcnc_folder();
-        if (shim.empty()) return fail("the headers for LinuxCNC components (linuxcnc/hal.h) are not installed with Halcyon's others; install it again");
-        words.insert(words.end(), {"-I", shim, source.program ? "-DULAPI=1" : "-DRTAPI=1", fmt::format("-DHALCYON_COMPONENT=\"{}\"", source.name)});
+        if (shim.empty())
+            return fail("the headers for LinuxCNC components (linuxcnc/hal.h) are not installed with Halcyon's others; install it again");
+        words.insert(words.end(),
+                     {"-I", shim, source.program ? "-DULAPI=1" : "-DRTAPI=1", fmt::format("-DHALCYON_COMPONENT=\"{}\"", source.name)});
         for (const char* part : {"component.c", "rtapi.c", "ports.c"}) behind.push_back(shim + "/" + part);
         if (source.program) words.push_back("-DHALCYON_PROGRAM=1"), behind.push_back(shim + "/program.c");
         if (source.comp_main) behind.push_back(shim + "/comp_program.c");
@@ -230,15 +245,18 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
     const int status = run_program(words, built.messages);
     if (status == -1) return fail(fmt::format("{} cannot be run: {}", words.front(), std::strerror(errno)));
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-        return fail(built.messages.empty() ? fmt::format("{} ended without a word, status {}", words.front(), status) : fmt::format("'{}' does not compile; nothing was installed", source.path));
+        return fail(built.messages.empty() ? fmt::format("{} ended without a word, status {}", words.front(), status)
+                                           : fmt::format("'{}' does not compile; nothing was installed", source.path));
     built.name = source.name;
     if (options.load && !source.program && !try_plugin(workshop.path(), source.name, built))
         return fail(fmt::format("'{}' compiles, but is no component: {}; nothing was installed", source.path, built.problem));
     if (built.name.empty() || built.name.find('/') != std::string::npos)
-        return fail(fmt::format("'{}' names its component '{}', which cannot be a file's name; nothing was installed", source.path, built.name));
+        return fail(
+            fmt::format("'{}' names its component '{}', which cannot be a file's name; nothing was installed", source.path, built.name));
     built.path = library;
     if (options.fit && !source.program && !options.fit(built)) return fail(fmt::format("'{}' was not installed", source.path));
-    if (const std::string problem = install(library, folder, built.name + (source.program ? "" : ".so")); !problem.empty()) return fail(problem);
+    if (const std::string problem = install(library, folder, built.name + (source.program ? "" : ".so")); !problem.empty())
+        return fail(problem);
     built.path = folder + "/" + built.name + (source.program ? "" : ".so");
     built.good = true;
     return built;

@@ -21,8 +21,10 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
     if (compiler.empty()) return fail(options, problem);
     const std::vector<std::string> headers = sdk_includes();
     for (const std::string& folder : headers)
-        if (std::error_code none; std::filesystem::is_regular_file(folder + "/check/realtime.c", none)) source = folder + "/check/realtime.c";
-    if (source.empty()) return fail(options, "what --check-rt runs (check/realtime.c) is not installed with Halcyon's headers; install it again");
+        if (std::error_code none; std::filesystem::is_regular_file(folder + "/check/realtime.c", none))
+            source = folder + "/check/realtime.c";
+    if (source.empty())
+        return fail(options, "what --check-rt runs (check/realtime.c) is not installed with Halcyon's headers; install it again");
     const Workshop workshop;
     if (!workshop.problem().empty()) return fail(options, workshop.problem());
     std::vector<std::string> words = split_words(compiler);
@@ -30,7 +32,8 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
     for (const std::string& folder : headers) words.insert(words.end(), {"-I", folder});
     words.insert(words.end(), {source, "-o", workshop.file("realtime"), "-ldl", "-lm", "-pthread"});
     std::string said;
-    if (run_program(words, said) != 0) return write_all(STDERR_FILENO, said), fail(options, "the program that checks real time does not compile");
+    if (run_program(words, said) != 0)
+        return write_all(STDERR_FILENO, said), fail(options, "the program that checks real time does not compile");
 
     std::vector<std::string> run{workshop.file("realtime"), std::filesystem::absolute(built.path).string()};
     run.insert(run.end(), options.arguments.begin(), options.arguments.end());
@@ -44,8 +47,10 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
         else if (line.starts_with("function '")) found += fail(options, fmt::format("{}: {}", built.name, line));
         else if (line.ends_with("extreme values")) print(fmt::format("real time: {}, no violation\n", line));
     }
-    if (!refused.empty()) return fail(options, fmt::format("{} cannot be checked without load arguments: {}; put them behind --", built.name, refused));
-    if (found == 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0)) return fail(options, fmt::format("{} crashes outside its functions, so nothing is known", built.name));
+    if (!refused.empty())
+        return fail(options, fmt::format("{} cannot be checked without load arguments: {}; put them behind --", built.name, refused));
+    if (found == 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))
+        return fail(options, fmt::format("{} crashes outside its functions, so nothing is known", built.name));
     return found == 0 ? 0 : 1;
 }
 

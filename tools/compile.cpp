@@ -71,7 +71,8 @@ bool searched(const std::string& folder) {
     std::error_code none;
     const auto wanted = fs::weakly_canonical(folder, none);
     const Plugins plugins;
-    return std::any_of(plugins.path().begin(), plugins.path().end(), [&](const std::string& one) { return fs::weakly_canonical(one, none) == wanted; });
+    return std::any_of(plugins.path().begin(), plugins.path().end(),
+                       [&](const std::string& one) { return fs::weakly_canonical(one, none) == wanted; });
 }
 
 std::string tilde(const std::string& path) {
@@ -82,7 +83,8 @@ std::string tilde(const std::string& path) {
 void announce(const BuiltPlugin& built, bool program, bool elsewhere) {
     const std::string folder = fs::path(built.path).parent_path().string();
     if (program) {
-        print(fmt::format("{0}: a program; installed as {1}\nnext: in a netlist: loadusr -Wn {0} {2}\n", built.name, tilde(built.path), elsewhere ? built.path : built.name));
+        print(fmt::format("{0}: a program; installed as {1}\nnext: in a netlist: loadusr -Wn {0} {2}\n", built.name, tilde(built.path),
+                          elsewhere ? built.path : built.name));
         return;
     }
     std::string text = fmt::format("{}: ", built.name);
@@ -98,7 +100,8 @@ void announce(const BuiltPlugin& built, bool program, bool elsewhere) {
 int compile_one(const Options& options, const std::string& path) {
     const std::string extension = fs::path(path).extension().string();
     const Kind* kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& k) { return extension == k.extension; });
-    if (kind == std::end(kinds)) return fail(options, fmt::format("'{}' is none of .cpp, .c and .comp, so what it is written in is not known", path));
+    if (kind == std::end(kinds))
+        return fail(options, fmt::format("'{}' is none of .cpp, .c and .comp, so what it is written in is not known", path));
     if (::access(path.c_str(), R_OK) != 0) return fail(options, fmt::format("{}: {}", path, std::strerror(errno)));
     PluginSource source;
     source.name = fs::path(path).stem().string();
@@ -107,7 +110,8 @@ int compile_one(const Options& options, const std::string& path) {
     BuildOptions build;
     build.folder = options.output;
     if (options.keep) build.keep = source.name + (source.language == Language::cpp ? ".cpp" : ".c");
-    if (options.keep && !source.text) return fail(options, fmt::format("--keep is for .comp files: nothing is made of '{}' but the plugin", path));
+    if (options.keep && !source.text)
+        return fail(options, fmt::format("--keep is for .comp files: nothing is made of '{}' but the plugin", path));
     bool said = false;
     const auto say = [&](const BuiltPlugin& built) {
         if (!std::exchange(said, true)) write_all(STDERR_FILENO, built.messages);

@@ -121,7 +121,9 @@ std::string problem_of(const std::string& name) {
     const bool plain = std::all_of(name.begin(), name.end(), [](char c) { return letter(c) || digit(c) || c == '-' || c == '_'; });
     constexpr std::size_t longest = 40;
     if (!plain || name.empty() || !letter(name.front()) || name.back() == '-' || name.back() == '_')
-        return fmt::format("'{}' cannot be a component's name: it begins with a letter, and letters, digits, - and _ follow; try: hal new component {}", name, repaired(name));
+        return fmt::format(
+            "'{}' cannot be a component's name: it begins with a letter, and letters, digits, - and _ follow; try: hal new component {}",
+            name, repaired(name));
     if (name.size() > longest) return fmt::format("the name has {} characters; {} are enough for a component", name.size(), longest);
     std::string underlined = name;
     std::replace(underlined.begin(), underlined.end(), '-', '_');
@@ -152,9 +154,11 @@ std::string type_of(const std::string& name) {
 
 std::string filled(std::string_view text, const std::string& name, const std::string& package) {
     std::string result(text);
-    const std::array<std::pair<std::string_view, std::string>, 3> words{{{"@NAME@", name}, {"@TYPE@", type_of(name)}, {"@PACKAGE@", package}}};
+    const std::array<std::pair<std::string_view, std::string>, 3> words{
+        {{"@NAME@", name}, {"@TYPE@", type_of(name)}, {"@PACKAGE@", package}}};
     for (const auto& [word, value] : words)
-        for (std::size_t at = 0; (at = result.find(word, at)) != std::string::npos; at += value.size()) result.replace(at, word.size(), value);
+        for (std::size_t at = 0; (at = result.find(word, at)) != std::string::npos; at += value.size())
+            result.replace(at, word.size(), value);
     return result;
 }
 
@@ -200,13 +204,15 @@ std::string shell_word(const std::string& word) {
 int run_new(const Options& options) {
     const auto& words = options.words;
     if (words.empty() || words[0] != "component") {
-        const std::string hint = words.size() == 1 && problem_of(words[0]).empty() ? "hal new component " + words[0] : "hal new component NAME";
+        const std::string hint =
+            words.size() == 1 && problem_of(words[0]).empty() ? "hal new component " + words[0] : "hal new component NAME";
         return fail(options, fmt::format("what is to be new? Components can be; type: {}", hint));
     }
     if (words.size() != 2)
-        return fail(options, words.size() < 2 ? "the component needs a name: hal new component NAME"
-                                              : fmt::format("one name is expected, not {}; blanks cannot be part of it: hal new component {}", words.size() - 1,
-                                                            repaired(words[1] + "-" + words[2])));
+        return fail(options, words.size() < 2
+                                 ? "the component needs a name: hal new component NAME"
+                                 : fmt::format("one name is expected, not {}; blanks cannot be part of it: hal new component {}",
+                                               words.size() - 1, repaired(words[1] + "-" + words[2])));
     const std::string& name = words[1];
     if (const std::string why = problem_of(name); !why.empty()) return fail(options, why);
 
@@ -214,12 +220,14 @@ int run_new(const Options& options) {
     const fs::path folder = options.folder.empty() ? fs::path(name) : fs::path(options.folder);
     const bool there = fs::exists(fs::symlink_status(folder, problem));
     if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem)))
-        return fail(options, fmt::format("'{}' exists already; give the new component another folder: hal new component {} --folder DIR", folder.string(), name));
+        return fail(options, fmt::format("'{}' exists already; give the new component another folder: hal new component {} --folder DIR",
+                                         folder.string(), name));
     fs::create_directories(folder, problem);
     if (problem) return fail(options, fmt::format("'{}' cannot be made: {}", folder.string(), problem.message()));
 
     const std::string package = package_hint();
-    const std::array<std::pair<std::string, std::string_view>, 4> files{{{name + ".cpp", source}, {"CMakeLists.txt", project}, {"test.hal", netlist}, {"expected", expected}}};
+    const std::array<std::pair<std::string, std::string_view>, 4> files{
+        {{name + ".cpp", source}, {"CMakeLists.txt", project}, {"test.hal", netlist}, {"expected", expected}}};
     for (const auto& [file, text] : files) {
         std::ofstream out(folder / file, std::ios::binary);
         const std::string content = filled(text, name, package.empty() ? "" : fmt::format(" HINTS \"{}\"", package));

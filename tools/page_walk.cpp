@@ -34,8 +34,8 @@ struct Row {
 
 /// The two names differ in one number only, and the second's is one more.
 bool follows(const Page::Pin& a, const Page::Pin& b) {
-    if (a.type != b.type || a.dir != b.dir || a.read_only != b.read_only || a.doc != b.doc || a.unit != b.unit || a.function != b.function ||
-        a.initial.raw != b.initial.raw)
+    if (a.type != b.type || a.dir != b.dir || a.read_only != b.read_only || a.doc != b.doc || a.unit != b.unit ||
+        a.function != b.function || a.initial.raw != b.initial.raw)
         return false;
     const auto digit = [](char c) { return c >= '0' && c <= '9'; };
     std::size_t from = 0;

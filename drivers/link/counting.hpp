@@ -9,7 +9,8 @@
 
 namespace hal::can {
 
-/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load.
+/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load. [realtime],
+/// and read() [any].
 class Counting {
 public:
     using Count = std::atomic<std::uint64_t>;

@@ -237,7 +237,8 @@ std::string render(const Diagnostics& diagnostics, const Sources& sources, bool 
     std::stable_sort(entries.begin(), entries.end(),
                      [](const Entry& a, const Entry& b) { return a.file != b.file ? a.file < b.file : a.begin < b.begin; });
     std::string out;
-    for (std::size_t i = 0; i < std::min(entries.size(), most_rendered); ++i) out += (out.empty() ? "" : "\n") + render(*entries[i].diagnostic, sources, color);
+    for (std::size_t i = 0; i < std::min(entries.size(), most_rendered); ++i)
+        out += (out.empty() ? "" : "\n") + render(*entries[i].diagnostic, sources, color);
     if (entries.size() > most_rendered) out += "\nand " + std::to_string(entries.size() - most_rendered) + " more; mend these first\n";
     return out;
 }

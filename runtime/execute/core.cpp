@@ -87,7 +87,8 @@ void Core::warm(std::int64_t until_ns) const noexcept {
         return true;
     };
     if (!fetch(this, sizeof *this)) return;
-    for (const hal_pin* pin : {pins_.time, pins_.tmax, pins_.tmax_increased, pins_.beat, pins_.missed, pins_.wakeup}) fetch(pin, sizeof *pin);
+    for (const hal_pin* pin : {pins_.time, pins_.tmax, pins_.tmax_increased, pins_.beat, pins_.missed, pins_.wakeup})
+        fetch(pin, sizeof *pin);
     if (sampled_ < plan_->functions.size()) fetch(plan_->functions[sampled_].times, sizeof(plan::FunctionTimes));
     for (const plan::Memory& memory : plan_->working_set)
         if (!fetch(memory.begin, memory.bytes)) return;
@@ -285,7 +286,9 @@ void check_finite(void* self, const hal_cycle* cycle) {
     auto& check = *static_cast<plan::FiniteCheck*>(self);
     if (const double value = check.pin->slot->real; !std::isfinite(value)) [[unlikely]] {
         __atomic_store_n(&check.pin->slot->raw, check.instead.raw, __ATOMIC_RELAXED);
-        if (!check.bad) static_cast<Core*>(check.sink)->raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, nullptr});
+        if (!check.bad)
+            static_cast<Core*>(check.sink)
+                ->raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, nullptr});
         check.bad = true;
     } else {
         check.bad = false;

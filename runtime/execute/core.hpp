@@ -77,7 +77,9 @@ public:
     /// All writes have reached their places.
     bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
     void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
-    bool withdraw(Observation* observation) { return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel); }
+    bool withdraw(Observation* observation) {
+        return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel);
+    }
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
     /// True once the thread has made its first pass, so that initf functions have run.
     bool passed() const { return passed_.load(std::memory_order_acquire); }

@@ -234,7 +234,8 @@ Executor::Executor(bool virtual_clock) : virtual_(virtual_clock) {
         return true;
     };
     background_.shared.detach = [](const hal_background* b, void* self) {
-        std::erase_if(reinterpret_cast<Between*>(const_cast<hal_background*>(b))->works, [self](const Between::Work& w) { return w.self == self; });
+        std::erase_if(reinterpret_cast<Between*>(const_cast<hal_background*>(b))->works,
+                      [self](const Between::Work& w) { return w.self == self; });
     };
     if (!virtual_) epoch_ns_ = monotonic_ns();
 }
@@ -341,7 +342,8 @@ std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
         Core& core = runner->core;
         const std::int64_t since = core.busy_since_ns();
         if (since == 0) continue;
-        if (!wait_for([&] { return core.busy_since_ns() != since || hangs(core, timeout_ns); }, for_ever) || hangs(core, timeout_ns)) found.push_back(&core);
+        if (!wait_for([&] { return core.busy_since_ns() != since || hangs(core, timeout_ns); }, for_ever) || hangs(core, timeout_ns))
+            found.push_back(&core);
     }
     return found;
 }
@@ -351,9 +353,11 @@ std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*
     for (const auto& [core, plan] : plans) core->offer(plan);
     for (const auto& [core, plan] : plans) call(runner(*core));
     for (const auto& [core, plan] : plans) {
-        const bool taken = wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, timeout_ns + 2 * core->period_ns());
+        const bool taken =
+            wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, timeout_ns + 2 * core->period_ns());
         if (!taken && core->withdraw(plan)) silent.push_back(core);
-        else if (!taken) wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, for_ever);  // it is just taking it
+        else if (!taken)
+            wait_for([&, core = core, plan = plan] { return core->taken() == plan->epoch; }, for_ever);  // it is just taking it
     }
     return silent;
 }

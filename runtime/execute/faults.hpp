@@ -23,12 +23,14 @@ struct FaultEvent {
 /// What is common to all threads; the component `faults` and the session read it.
 struct FaultBoard {
     hal_faults shared{};                    ///< given out as extension "hal.faults/1"; written with atomic builtins
+    /// Any thread that raises one. [realtime]
     void count(const FaultEvent& event, std::uint32_t thread) noexcept {
         __atomic_store_n(&shared.last_code, static_cast<std::uint32_t>(event.code), __ATOMIC_RELAXED);
         __atomic_store_n(&shared.last_thread, thread, __ATOMIC_RELAXED);
         __atomic_store_n(&shared.last_cycle, event.cycle, __ATOMIC_RELAXED);
         __atomic_fetch_add(&shared.count, 1, __ATOMIC_RELEASE);
     }
+    /// Acknowledges all that were counted. [any]
     void clear() noexcept { __atomic_store_n(&shared.cleared, __atomic_load_n(&shared.count, __ATOMIC_ACQUIRE), __ATOMIC_RELEASE); }
 };
 

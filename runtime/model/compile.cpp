@@ -83,7 +83,8 @@ private:
     void find_home(Signal& signal) {
         Compiled::Place& place = out_.places[signal.index];
         place = {&signal, nullptr, nullptr, {}, nullptr};
-        if (signal.type != HAL_TYPE_PORT && std::any_of(signal.pins.begin(), signal.pins.end(), [this](const Pin* pin) { return spread(*pin); })) {
+        if (signal.type != HAL_TYPE_PORT &&
+            std::any_of(signal.pins.begin(), signal.pins.end(), [this](const Pin* pin) { return spread(*pin); })) {
             place.cell = signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
             place.slot = place.cell.get();
         } else if (signal.writer) {
@@ -108,7 +109,8 @@ private:
     // For a cell made now, before any thread takes part: what the session knows.
     hal_value known_value(const Signal& signal) const {
         if (const auto at = input_.signal_values->find(const_cast<Signal*>(&signal)); at != input_.signal_values->end()) return at->second;
-        if (const auto at = input_.inherited->find(const_cast<Signal*>(&signal)); at != input_.inherited->end()) return *present(*at->second).slot;
+        if (const auto at = input_.inherited->find(const_cast<Signal*>(&signal)); at != input_.inherited->end())
+            return *present(*at->second).slot;
         return *signal.slot;
     }
 
@@ -120,7 +122,8 @@ private:
             Compiled::Place& place = out_.places[pin.signal->index];
             if (in_cell(place, pin)) return;
             const bool there = place.home == &thread ? place.slot != nullptr
-                                                     : std::any_of(place.copies.begin(), place.copies.end(), [&](const auto& c) { return c.first == &thread; });
+                                                     : std::any_of(place.copies.begin(), place.copies.end(),
+                                                                   [&](const auto& c) { return c.first == &thread; });
             if (there) return;
             static hal_value pending;  // a mark until the image exists
             if (place.home == &thread) place.slot = &pending;
@@ -273,7 +276,8 @@ private:
             from = signal.cell.get();
         } else if (signal.home == thread) {
             from = signal.slot;
-        } else if (const auto copy = std::find_if(signal.copies.begin(), signal.copies.end(), [&](const auto& c) { return c.first == thread; });
+        } else if (const auto copy =
+                       std::find_if(signal.copies.begin(), signal.copies.end(), [&](const auto& c) { return c.first == thread; });
                    copy != signal.copies.end() && signal.home) {
             from = copy->second;
         } else if (!signal.home) {

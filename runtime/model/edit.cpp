@@ -15,7 +15,8 @@ auto owner(std::vector<std::unique_ptr<T>>& all, const T* one) {
     return std::find_if(all.begin(), all.end(), [&](const auto& candidate) { return candidate.get() == one; });
 }
 
-std::unique_ptr<Pin> own_pin(Model& model, std::string name, hal_type type, hal_dir dir, hal_pin& memory, const char* doc, const char* unit) {
+std::unique_ptr<Pin> own_pin(Model& model, std::string name, hal_type type, hal_dir dir, hal_pin& memory, const char* doc,
+                             const char* unit) {
     auto pin = std::make_unique<Pin>();
     pin->name = std::move(name);
     pin->type = type;
@@ -54,15 +55,18 @@ void Edit::undo() {
 }
 
 bool Edit::name_free(std::string_view name, Span at, const char* what) {
-    if (model_.find_pin(name)) return fail("name-taken", at, "there is a pin " + quoted(name) + " already", what, "give the new instances other names: names=…");
+    if (model_.find_pin(name))
+        return fail("name-taken", at, "there is a pin " + quoted(name) + " already", what, "give the new instances other names: names=…");
     if (model_.find_signal(name))
-        return fail("name-taken", at, "there is a signal " + quoted(name) + " already", what, "signals and pins share their names; rename the signal or the instance");
+        return fail("name-taken", at, "there is a signal " + quoted(name) + " already", what,
+                    "signals and pins share their names; rename the signal or the instance");
     return true;
 }
 
 Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
     if (const Thread* const there = model_.find_thread(name.text)) {
-        Diagnostic d{Severity::error, "name-taken", "there is a thread " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
+        Diagnostic d{
+            Severity::error, "name-taken", "there is a thread " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
         if (there->made.known()) d.labels.push_back({there->made, "made here"});
         diagnostics->add(std::move(d));
         return nullptr;
@@ -131,23 +135,33 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     Thread* const to = thread(thread_name);
     if (!target || !to) return false;
     if (target->thread) {
-        Diagnostic d{Severity::error, "function-in-thread", "function " + quoted(target->name) + " is in thread " + quoted(target->thread->name) + " already",
-                     {{function_name.span, "second time"}}, {}};
+        Diagnostic d{Severity::error,
+                     "function-in-thread",
+                     "function " + quoted(target->name) + " is in thread " + quoted(target->thread->name) + " already",
+                     {{function_name.span, "second time"}},
+                     {}};
         if (target->added.known()) d.labels.push_back({target->added, "added here"});
         d.help.push_back("a function runs in one thread; take it out first: delf " + target->name + " " + target->thread->name);
         diagnostics->add(std::move(d));
         return false;
     }
     if (init && to->init_done)
-        return fail("init-done", function_name.span, "thread " + quoted(to->name) + " has made its first pass; functions of initf would never run",
-                    "too late", "add it before start, or with addf");
+        return fail("init-done", function_name.span,
+                    "thread " + quoted(to->name) + " has made its first pass; functions of initf would never run", "too late",
+                    "add it before start, or with addf");
     auto& row = init ? to->init : to->functions;
     const auto size = static_cast<int>(row.size());
-    if (position == 0) return fail("bad-position", position_at, "position 0 means nothing: 1 is the first place, -1 the last", "", "leave it out to append");
+    if (position == 0)
+        return fail("bad-position", position_at, "position 0 means nothing: 1 is the first place, -1 the last", "",
+                    "leave it out to append");
     const int index = position > 0 ? position - 1 : size + 1 + position;
     if (index < 0 || index > size)
-        return fail("bad-position", position_at, "thread " + quoted(to->name) + " has " + std::to_string(size) + (size == 1 ? " function" : " functions") + ", so there is no position " + std::to_string(position),
-                    "", "positions 1 to " + std::to_string(size + 1) + " count from the front, -1 to -" + std::to_string(size + 1) + " from the end");
+        return fail(
+            "bad-position", position_at,
+            "thread " + quoted(to->name) + " has " + std::to_string(size) + (size == 1 ? " function" : " functions") +
+                ", so there is no position " + std::to_string(position),
+            "",
+            "positions 1 to " + std::to_string(size + 1) + " count from the front, -1 to -" + std::to_string(size + 1) + " from the end");
     make_room(row);
     on_undo([target, to, init, before = target->added, init_before = target->init] {
         auto& functions = init ? to->init : to->functions;
@@ -213,9 +227,12 @@ LoadedComponent& Edit::add_component(std::string name, Span at) {
 
 void Edit::add_time_pins(LoadedFunction& function) {
     plan::FunctionTimes& times = *function.times;
-    function.pins.push_back(own_pin(model_, function.name + ".time", HAL_TYPE_S32, HAL_DIR_OUT, times.time, "duration of the last sampled call", "ns"));
-    function.pins.push_back(own_pin(model_, function.name + ".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, times.tmax, "longest sampled call; set it to 0 to start again", "ns"));
-    function.pins.push_back(own_pin(model_, function.name + ".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, times.tmax_increased, "the last sample was the longest so far", ""));
+    function.pins.push_back(
+        own_pin(model_, function.name + ".time", HAL_TYPE_S32, HAL_DIR_OUT, times.time, "duration of the last sampled call", "ns"));
+    function.pins.push_back(own_pin(model_, function.name + ".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, times.tmax,
+                                    "longest sampled call; set it to 0 to start again", "ns"));
+    function.pins.push_back(own_pin(model_, function.name + ".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, times.tmax_increased,
+                                    "the last sample was the longest so far", ""));
     for (const auto& pin : function.pins) pin->function = &function;
 }
 
@@ -244,7 +261,11 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
                         std::vector<std::unique_ptr<LoadedFunction>> functions) {
     Instance* const made = owned.get();
     if (const Instance* const there = model_.find_instance(made->name)) {
-        Diagnostic d{Severity::error, "name-taken", "there is an instance " + quoted(made->name) + " already (" + there->component->name + ")", {{made->loaded, "second time"}}, {}};
+        Diagnostic d{Severity::error,
+                     "name-taken",
+                     "there is an instance " + quoted(made->name) + " already (" + there->component->name + ")",
+                     {{made->loaded, "second time"}},
+                     {}};
         if (there->loaded.known()) d.labels.push_back({there->loaded, "loaded here"});
         d.help.push_back("give the new one another name: names=…");
         diagnostics->add(std::move(d));
@@ -254,7 +275,8 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
         if (!name_free(pin->name, made->loaded, "its pin")) return false;
     for (const auto& function : functions)
         if (model_.find_function(function->name))
-            return fail("name-taken", made->loaded, "there is a function " + quoted(function->name) + " already", "its function", "give the new instance another name: names=…");
+            return fail("name-taken", made->loaded, "there is a function " + quoted(function->name) + " already", "its function",
+                        "give the new instance another name: names=…");
     for (const auto& function : functions)
         for (const auto& pin : function->pins)
             if (!name_free(pin->name, made->loaded, "a pin of its function")) return false;
@@ -282,7 +304,8 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
     structural_ = true;
     model_.instance.emplace(made->name, made);
     for (const auto& pin : made->pins) model_.pin.emplace(pin->name, pin.get());
-    for (auto function = component.functions.begin() + static_cast<std::ptrdiff_t>(functions_before); function != component.functions.end(); ++function) {
+    for (auto function = component.functions.begin() + static_cast<std::ptrdiff_t>(functions_before); function != component.functions.end();
+         ++function) {
         model_.function.emplace((*function)->name, function->get());
         for (const auto& pin : (*function)->pins) model_.pin.emplace(pin->name, pin.get());
     }

@@ -120,7 +120,8 @@ public:
     std::unordered_map<Pin*, hal_value> pin_values;
     std::unordered_map<Signal*, hal_value> signal_values;
     std::unordered_map<Signal*, Pin*> inherited;  ///< a signal that takes the value the pin has
-    std::unordered_map<const Pin*, hal_pin*> old_memory;  ///< of pins that were replaced: what the threads know until they take the new plan
+    std::unordered_map<const Pin*, hal_pin*>
+        old_memory;  ///< of pins that were replaced: what the threads know until they take the new plan
     /// Where a pin's value is now.
     const hal_pin& present(const Pin& pin) const {
         const auto old = old_memory.find(&pin);

@@ -57,7 +57,8 @@ Pin* Edit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
     if (is_absent(name.text)) return nullptr;
     std::string help = pins_of_instance(model_, name.text);
-    if (model_.find_signal(name.text)) help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
+    if (model_.find_signal(name.text))
+        help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
     if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt makes instances with pins";
     fail("no-such-pin", name.span, "there is no pin " + quoted(name.text), did_you_mean(name.text, names(model_.pin)), help);
     return nullptr;
@@ -97,7 +98,8 @@ Thread* Edit::thread(Word name) {
 
 Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     if (const Signal* const there = model_.find_signal(name.text)) {
-        Diagnostic d{Severity::error, "name-taken", "there is a signal " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
+        Diagnostic d{
+            Severity::error, "name-taken", "there is a signal " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
         if (there->made.known()) d.labels.push_back({there->made, "made here"});
         diagnostics->add(std::move(d));
         return nullptr;
@@ -169,30 +171,31 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
         return refuse("parameter-link", quoted(word.text) + " is a parameter and cannot be linked", "parameter", {}, "",
                       "set it: setp " + std::string(word.text) + " VALUE");
     if (pin.signal)
-        return refuse("pin-linked", "pin " + quoted(word.text) + " is linked to signal " + quoted(pin.signal->name) + " already", "second signal",
-                      pin.linked_at, "first signal", "take it off first: unlinkp " + std::string(word.text));
+        return refuse("pin-linked", "pin " + quoted(word.text) + " is linked to signal " + quoted(pin.signal->name) + " already",
+                      "second signal", pin.linked_at, "first signal", "take it off first: unlinkp " + std::string(word.text));
     if (pin.type != signal.type) {
         const bool writes = pin.dir == HAL_DIR_OUT;
         const std::string convert = writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
-        return refuse("type-mismatch",
-                      "signal " + quoted(signal.name) + " carries " + name(signal.type) + ", pin " + quoted(word.text) + " is " + name(pin.type),
-                      name(pin.type), signal.typed, "the signal became " + std::string(name(signal.type)) + " here",
-                      convert.empty() ? "" : "convert with " + convert + ": loadrt " + convert + " names=" + signal.name + "-conv");
+        return refuse(
+            "type-mismatch",
+            "signal " + quoted(signal.name) + " carries " + name(signal.type) + ", pin " + quoted(word.text) + " is " + name(pin.type),
+            name(pin.type), signal.typed, "the signal became " + std::string(name(signal.type)) + " here",
+            convert.empty() ? "" : "convert with " + convert + ": loadrt " + convert + " names=" + signal.name + "-conv");
     }
     if (pin.dir == HAL_DIR_OUT && signal.writer)
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer", "second output", signal.writer->linked_at, "first output",
-                      "a signal has one output pin; join two sources with sum2, or2 or mux2");
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer", "second output", signal.writer->linked_at,
+                      "first output", "a signal has one output pin; join two sources with sum2, or2 or mux2");
     const auto io = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IO; });
     if (pin.dir == HAL_DIR_OUT && signal.ios != 0)
-        return refuse("two-writers", "signal " + quoted(signal.name) + " has I/O pins already, so it can have no output", "output", (*io)->linked_at,
-                      "I/O pin", "I/O pins share a signal among themselves and with inputs only");
+        return refuse("two-writers", "signal " + quoted(signal.name) + " has I/O pins already, so it can have no output", "output",
+                      (*io)->linked_at, "I/O pin", "I/O pins share a signal among themselves and with inputs only");
     if (pin.dir == HAL_DIR_IO && signal.writer)
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it can have no I/O pin", "I/O pin", signal.writer->linked_at,
-                      "output", "I/O pins share a signal among themselves and with inputs only");
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it can have no I/O pin", "I/O pin",
+                      signal.writer->linked_at, "output", "I/O pins share a signal among themselves and with inputs only");
     if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
         const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IN; });
-        return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader", "second reader", (*reader)->linked_at, "first reader",
-                      "a byte stream has one writer and one reader");
+        return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader", "second reader", (*reader)->linked_at,
+                      "first reader", "a byte stream has one writer and one reader");
     }
 
     // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the signal.
@@ -235,7 +238,8 @@ void Edit::unlink(Pin& pin) {
         } else if (const auto given = inherited.find(signal); given != inherited.end() && given->second != &pin) {
             Pin& giver = *given->second;
             const auto own = pin_values.find(&giver);
-            const hal_value value = own != pin_values.end() ? own->second : hal_value{.raw = __atomic_load_n(&present(giver).slot->raw, __ATOMIC_RELAXED)};
+            const hal_value value =
+                own != pin_values.end() ? own->second : hal_value{.raw = __atomic_load_n(&present(giver).slot->raw, __ATOMIC_RELAXED)};
             pin_values[&pin] = value;
         } else if (!pin.home && (signal->home || signal->cell)) {  // of no thread: it has no slot where the value is
             pin_values[&pin] = hal_value{.raw = __atomic_load_n(&signal->slot->raw, __ATOMIC_RELAXED)};
@@ -265,18 +269,26 @@ bool Edit::set_pin(Word name, Word value) {
     Pin* const target = pin(name);
     if (!target) return false;
     const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
-    if (target->dir == HAL_DIR_OUT) return fail("output-set", name.span, "pin " + quoted(name.text) + " is an output: only its component writes it", "output");
-    if (target->read_only()) return fail("output-set", name.span, "parameter " + quoted(name.text) + " is read-only: only its component sets it", "read-only");
+    if (target->dir == HAL_DIR_OUT)
+        return fail("output-set", name.span, "pin " + quoted(name.text) + " is an output: only its component writes it", "output");
+    if (target->read_only())
+        return fail("output-set", name.span, "parameter " + quoted(name.text) + " is read-only: only its component sets it", "read-only");
     if (target->signal) {
-        Diagnostic d{Severity::error, "linked-set", "pin " + quoted(name.text) + " takes its value from signal " + quoted(target->signal->name), {{name.span, "linked"}}, {}};
+        Diagnostic d{Severity::error,
+                     "linked-set",
+                     "pin " + quoted(name.text) + " takes its value from signal " + quoted(target->signal->name),
+                     {{name.span, "linked"}},
+                     {}};
         if (target->linked_at.known()) d.labels.push_back({target->linked_at, "linked here"});
-        d.help.push_back(target->signal->writer ? "the value comes from '" + target->signal->writer->name + "'; to set it by hand: unlinkp " + std::string(name.text)
+        d.help.push_back(target->signal->writer ? "the value comes from '" + target->signal->writer->name +
+                                                      "'; to set it by hand: unlinkp " + std::string(name.text)
                                                 : "set the signal: sets " + target->signal->name + " " + std::string(value.text));
         diagnostics->add(std::move(d));
         return false;
     }
     if (target->type == HAL_TYPE_PORT)
-        return fail("bad-value", value.span, "a port pin has no value to set", "", "link it and give the signal a buffer: sets SIGNAL BYTES");
+        return fail("bad-value", value.span, "a port pin has no value to set", "",
+                    "link it and give the signal a buffer: sets SIGNAL BYTES");
     const Parsed parsed = parse_value(target->type, value.text);
     if (!parsed.problem.empty())
         return fail("bad-value", value.span, parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
@@ -297,7 +309,9 @@ bool Edit::set_signal(Word name, Word value) {
         const Parsed bytes = parse_value(HAL_TYPE_U32, value.text);
         if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30))
             return fail("bad-value", value.span, quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)", "port signal");
-        if (target->port) return fail("port-sized", name.span, "port signal " + quoted(name.text) + " has its buffer already", "", "its size is fixed once set");
+        if (target->port)
+            return fail("port-sized", name.span, "port signal " + quoted(name.text) + " has its buffer already", "",
+                        "its size is fixed once set");
         auto room = std::make_unique<std::uint8_t[]>(bytes.value.u32);
         auto made = std::make_unique<hal_port>(hal_port{bytes.value.u32, 0, 0, 0, room.get()});
         signal_values[target] = hal_value{.port = made.get()};
@@ -312,7 +326,11 @@ bool Edit::set_signal(Word name, Word value) {
         return true;
     }
     if (target->writer) {
-        Diagnostic d{Severity::error, "writer-set", "signal " + quoted(name.text) + " is written by " + quoted(target->writer->name), {{name.span, "has a writer"}}, {}};
+        Diagnostic d{Severity::error,
+                     "writer-set",
+                     "signal " + quoted(name.text) + " is written by " + quoted(target->writer->name),
+                     {{name.span, "has a writer"}},
+                     {}};
         if (target->writer->linked_at.known()) d.labels.push_back({target->writer->linked_at, "linked here"});
         d.help.push_back("to set it by hand, take the writer off first: unlinkp " + target->writer->name);
         diagnostics->add(std::move(d));
@@ -328,11 +346,13 @@ bool Edit::set_signal(Word name, Word value) {
 
 bool Edit::alias(Word kind, Word name, Word second) {
     if (kind.text != "pin" && kind.text != "param" && kind.text != "parameter")
-        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param", "alias pin NAME ALIAS");
+        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param",
+                    "alias pin NAME ALIAS");
     Pin* const target = pin(name);
     if (!target) return false;
     if (!target->alias.empty())
-        return fail("alias-taken", name.span, quoted(name.text) + " has the alias " + quoted(target->alias) + " already", "", "take it off first: unalias " + std::string(kind.text) + " " + target->alias);
+        return fail("alias-taken", name.span, quoted(name.text) + " has the alias " + quoted(target->alias) + " already", "",
+                    "take it off first: unalias " + std::string(kind.text) + " " + target->alias);
     if (model_.find_pin(second.text)) return fail("name-taken", second.span, "there is a pin or alias " + quoted(second.text) + " already");
     if (model_.find_signal(second.text)) return fail("name-taken", second.span, "there is a signal " + quoted(second.text) + " already");
     std::string name_too(second.text);
@@ -347,7 +367,8 @@ bool Edit::alias(Word kind, Word name, Word second) {
 
 bool Edit::unalias(Word kind, Word second) {
     if (kind.text != "pin" && kind.text != "param" && kind.text != "parameter")
-        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param", "unalias pin ALIAS");
+        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param",
+                    "unalias pin ALIAS");
     Pin* const target = pin(second);
     if (!target) return false;
     if (target->alias.empty()) return fail("no-alias", second.span, quoted(second.text) + " has no alias");

@@ -83,6 +83,8 @@ Thread* thread_of(const Pin& pin) {
     return nullptr;
 }
 
-bool is_loose(const Pin& pin) { return pin.instance && pin.instance->component->plugin && (pin.instance->component->plugin->flags & HAL_COMPONENT_LOOSE_PINS); }
+bool is_loose(const Pin& pin) {
+    return pin.instance && pin.instance->component->plugin && (pin.instance->component->plugin->flags & HAL_COMPONENT_LOOSE_PINS);
+}
 
 }  // namespace hal

@@ -57,7 +57,9 @@ std::vector<LoadedFunction*> dataflow_order(const std::vector<LoadedFunction*>& 
         waiting.erase(waiting.begin());
         for (const auto& [writer, signals] : waits_for[next])
             for (const Signal* signal : signals)
-                diagnostics.note("cyclic-order", at, "'" + functions[next]->name + "' reads '" + signal->name + "' one cycle late: it is in a loop with '" + functions[writer]->name + "'");
+                diagnostics.note("cyclic-order", at,
+                                 "'" + functions[next]->name + "' reads '" + signal->name + "' one cycle late: it is in a loop with '" +
+                                     functions[writer]->name + "'");
         order.push_back(functions[next]);
         for (const std::size_t reader : readers[next]) {
             const auto edge = waits_for[reader].find(next);

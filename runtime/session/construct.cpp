@@ -84,7 +84,8 @@ Result guarded(Construction& c, Result otherwise, Action action) noexcept {
 
 bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Construction& c = of(host);
-    if (decl->size < HAL_PIN_DECL_SIZE_1_0 || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT || decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
+    if (decl->size < HAL_PIN_DECL_SIZE_1_0 || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT ||
+        decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
         return refuse(c, "it declares a pin that is none");
     auto pin = std::make_unique<Pin>();
     pin->name = whole_names(c.instance) ? decl->name : c.instance.name + "." + decl->name;
@@ -223,8 +224,13 @@ void say_of_text(const hal_host* host, const hal_text_message* message) {
         if (c.text_source == 0) c.text_source = c.sources->add(c.text_name, c.text);
         const auto size = static_cast<std::uint32_t>(c.text.size());
         const std::uint32_t begin = std::min(message->begin, size), end = std::clamp(message->end, begin, size);
-        const Severity severity = message->severity == HAL_SEVERITY_ERROR ? Severity::error : message->severity == HAL_SEVERITY_WARNING ? Severity::warning : Severity::note;
-        Diagnostic d{severity, Code::named(message->code).value_or(Code("construct-failed")), message->sentence, {{{c.text_source, begin, end}, message->label}}};
+        const Severity severity = message->severity == HAL_SEVERITY_ERROR     ? Severity::error
+                                  : message->severity == HAL_SEVERITY_WARNING ? Severity::warning
+                                                                              : Severity::note;
+        Diagnostic d{severity,
+                     Code::named(message->code).value_or(Code("construct-failed")),
+                     message->sentence,
+                     {{{c.text_source, begin, end}, message->label}}};
         if (*message->help) d.help.emplace_back(message->help);
         c.diagnostics->add(std::move(d));
         c.said_why = c.said_why || severity == Severity::error;
@@ -263,11 +269,13 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
         const std::string why = c.failure.empty() ? "it gave no reason" : c.failure;
         for (const auto& [name, given] : request.arguments)
             if (why.starts_with(name + "=")) {
-                diagnostics.error("bad-argument", given.at, "component '" + component.name + "': " + why, "", "hal doc " + component.name + " lists its arguments");
+                diagnostics.error("bad-argument", given.at, "component '" + component.name + "': " + why, "",
+                                  "hal doc " + component.name + " lists its arguments");
                 return false;
             }
         if (is_misspelled(component, request, c.asked, diagnostics)) return false;
-        diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + why);
+        diagnostics.error("construct-failed", request.at,
+                          "component '" + component.name + "' cannot make '" + instance->name + "': " + why);
         return false;
     }
     instance->constructed = true;
@@ -278,7 +286,8 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     } const undo{instance};
     if (c.no_memory) throw std::bad_alloc();
     if (!c.failure.empty()) {
-        diagnostics.error("construct-failed", request.at, "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
+        diagnostics.error("construct-failed", request.at,
+                          "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
         return false;
     }
     std::vector<std::unique_ptr<LoadedFunction>> own;
@@ -326,7 +335,9 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
 
 namespace {
 
-std::size_t stride_of(const hal_component& plugin) { return (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align; }
+std::size_t stride_of(const hal_component& plugin) {
+    return (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align;
+}
 
 // Cleared memory for so many instances in a row.
 std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
@@ -341,8 +352,8 @@ bool all_known(const LoadedComponent& component, const LoadRequest& request, con
         if (asked.contains(name)) continue;
         std::vector<std::string> all(asked.begin(), asked.end());
         all.insert(all.end(), {"names", "count", "personality"});
-        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", did_you_mean(name, all),
-                          "its arguments: " + listed(all));
+        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'",
+                          did_you_mean(name, all), "its arguments: " + listed(all));
         return false;
     }
     return true;
@@ -383,9 +394,12 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
     const std::size_t stride = stride_of(plugin);
     const auto block = [&](std::size_t count) { return block_of(plugin, count); };
     bool known = singleton || !request.names.empty() || request.count >= 0;
-    std::size_t total = singleton ? 1 : !request.names.empty() ? request.names.size() : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
+    std::size_t total = singleton                ? 1
+                        : !request.names.empty() ? request.names.size()
+                                                 : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
     if (singleton && (request.names.size() > 1 || request.count > 1)) {
-        diagnostics.error("bad-argument", request.count_at.known() ? request.count_at : request.at, "component '" + component.name + "' has one instance only");
+        diagnostics.error("bad-argument", request.count_at.known() ? request.count_at : request.at,
+                          "component '" + component.name + "' has one instance only");
         return false;
     }
     std::shared_ptr<void> storage = known ? block(std::max<std::size_t>(total, 1)) : block(1);
@@ -396,12 +410,15 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
         instance->component = &component;
         instance->loaded = request.at;
         const std::string serial = !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
-        instance->name = !request.names.empty() ? request.names[i] : singleton ? dashed(component.name) : dashed(component.name) + "." + serial;
+        instance->name = !request.names.empty() ? request.names[i]
+                         : singleton            ? dashed(component.name)
+                                                : dashed(component.name) + "." + serial;
         instance->memory = static_cast<char*>(storage.get()) + in_block++ * stride;
         instance->storage = storage;
         instance->load = component.loads.empty() ? 0 : component.loads.size() - 1;
         instance->number = i;
-        Construction c{model, request, *instance, i, request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()], {}, {}, {}, {}, 0, {}, {}};
+        const std::string personality = request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()];
+        Construction c{model, request, *instance, i, personality, {}, {}, {}, {}, 0, {}, {}};
         c.serial = serial;
         if (!construct_one(edit, component, request, sources, diagnostics, std::move(instance), c)) return false;
         asked.insert(c.asked.begin(), c.asked.end());
@@ -415,7 +432,8 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
             } else if (const auto list = c.list_length > total ? request.arguments.find(*c.lists.begin()) : request.arguments.end();
                        list != request.arguments.end()) {  // a default may say more instances than are wanted
                 diagnostics.error("bad-argument", list->second.at,
-                                  "argument '" + list->first + "' lists " + std::to_string(c.list_length) + " values for " + std::to_string(total) + (total == 1 ? " instance" : " instances"));
+                                  "argument '" + list->first + "' lists " + std::to_string(c.list_length) + " values for " +
+                                      std::to_string(total) + (total == 1 ? " instance" : " instances"));
                 return false;
             }
         }
@@ -494,10 +512,16 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
     executor.clock().claim = claim_clock;
     const hal_host host{
         sizeof host, &starting,
-        [](const hal_host* h, const hal_pin_decl*, hal_pin*) { return static_cast<Starting*>(h->data)->fail("pins are declared in the constructor, not in start"); },
-        [](const hal_host* h, const hal_function_decl*) { return static_cast<Starting*>(h->data)->fail("functions are declared in the constructor, not in start"); },
+        [](const hal_host* h, const hal_pin_decl*, hal_pin*) {
+            return static_cast<Starting*>(h->data)->fail("pins are declared in the constructor, not in start");
+        },
+        [](const hal_host* h, const hal_function_decl*) {
+            return static_cast<Starting*>(h->data)->fail("functions are declared in the constructor, not in start");
+        },
         [](const hal_host*, const hal_argument_decl* decl) { return decl->fallback; },
-        [](const hal_host* h, std::size_t bytes, std::size_t align) { return allocate_for(static_cast<Starting*>(h->data)->instance, bytes, align); },
+        [](const hal_host* h, std::size_t bytes, std::size_t align) {
+            return allocate_for(static_cast<Starting*>(h->data)->instance, bytes, align);
+        },
         [](const hal_host* h, const char* reason) { static_cast<Starting*>(h->data)->fail(reason ? reason : ""); },
         [](const hal_host* h, const char* id) -> const void* {
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;

@@ -65,18 +65,21 @@ bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& re
     for (const Token& token : args) {
         const auto equals = token.text.find('=');
         if (equals == std::string::npos || equals == 0) {
-            on.diagnostics.error("bad-argument", token.span, quoted(token.text) + " is not an argument", "", "arguments are written NAME=VALUE, without blanks around the =");
+            on.diagnostics.error("bad-argument", token.span, quoted(token.text) + " is not an argument", "",
+                                 "arguments are written NAME=VALUE, without blanks around the =");
             good = false;
             continue;
         }
         const std::string key = token.text.substr(0, equals), value = unquoted(token.text.substr(equals + 1));
-        const bool says_instances = (key == "names" || key == "count" || key == "num_chan" || key == "personality") && !names_itself(on, name);
+        const bool says_instances =
+            (key == "names" || key == "count" || key == "num_chan" || key == "personality") && !names_itself(on, name);
         if (says_instances && key == "names") {
             request.names = split_list(value);
             names_at = token.span;
             for (const std::string& one : request.names)
                 if (one.empty()) {
-                    on.diagnostics.error("bad-argument", token.span, "names= lists an empty name", "", "write names=first,second without blanks");
+                    on.diagnostics.error("bad-argument", token.span, "names= lists an empty name", "",
+                                         "write names=first,second without blanks");
                     good = false;
                 }
         } else if (says_instances && key != "personality") {
@@ -94,7 +97,11 @@ bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& re
         }
     }
     if (!request.names.empty() && request.count >= 0) {
-        Diagnostic d{Severity::error, "names-and-count", "names= and count= are both given", {{request.count_at, "how many"}, {names_at, "and which"}}, {"keep names=, it says how many there are"}};
+        Diagnostic d{Severity::error,
+                     "names-and-count",
+                     "names= and count= are both given",
+                     {{request.count_at, "how many"}, {names_at, "and which"}},
+                     {"keep names=, it says how many there are"}};
         on.diagnostics.add(std::move(d));
         good = false;
     }
@@ -139,8 +146,8 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
     if (component) return component;
     std::vector<std::string> loaded;
     for (const auto& one : on.model.components) loaded.push_back(one->name);
-    on.diagnostics.error("no-such-component", name.span, "there is no component " + quoted(name.text) + " here", did_you_mean(name.text, loaded),
-                         loaded.empty() ? "nothing is loaded" : "loaded: " + listed(loaded));
+    on.diagnostics.error("no-such-component", name.span, "there is no component " + quoted(name.text) + " here",
+                         did_you_mean(name.text, loaded), loaded.empty() ? "nothing is loaded" : "loaded: " + listed(loaded));
     return nullptr;
 }
 
@@ -163,7 +170,8 @@ void unload(Elaboration& on, const Command&, Args args) {
     LoadedComponent* const component = loaded_component(on, args[0]);
     if (!component) return;
     if (component->process != 0) {
-        on.diagnostics.error("is-a-program", args[0].span, quoted(args[0].text) + " is a program's component", "", "unloadusr " + component->name + " ends it");
+        on.diagnostics.error("is-a-program", args[0].span, quoted(args[0].text) + " is a program's component", "",
+                             "unloadusr " + component->name + " ends it");
         return;
     }
     if (component->name == "threads")
@@ -175,21 +183,26 @@ void unload(Elaboration& on, const Command&, Args args) {
 void reload(Elaboration& on, const Command&, Args args) {
     const Token& name = args[0];
     if (const Instance* const instance = on.model.find_instance(name.text); instance && !on.model.find_component(name.text)) {
-        on.diagnostics.error("no-such-component", name.span, quoted(name.text) + " is an instance; a component is reloaded with all its instances", "", "reload " + instance->component->name);
+        on.diagnostics.error("no-such-component", name.span,
+                             quoted(name.text) + " is an instance; a component is reloaded with all its instances", "",
+                             "reload " + instance->component->name);
         return;
     }
     LoadedComponent* const component = loaded_component(on, name);
     if (!component) return;
     if (!component->plugin) {
-        on.diagnostics.error("no-such-component", name.span, component->process != 0 ? quoted(name.text) + " is a program, not a plugin" : quoted(name.text) + " belongs to the runtime", "",
-                             component->process != 0 ? "unload it and start it again by loadusr" : "its threads are removed by delthread");
+        on.diagnostics.error(
+            "no-such-component", name.span,
+            component->process != 0 ? quoted(name.text) + " is a program, not a plugin" : quoted(name.text) + " belongs to the runtime", "",
+            component->process != 0 ? "unload it and start it again by loadusr" : "its threads are removed by delthread");
         return;
     }
     auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
     if (!plugin) return;
     if (std::string_view(plugin->component->name) != component->name) {
-        on.diagnostics.error("reload-conflict", name.span, "'" + plugin->path + "' holds component '" + plugin->component->name + "' now, not '" + component->name + "'", "",
-                             "load it beside the old one: loadrt " + std::string(plugin->component->name));
+        on.diagnostics.error("reload-conflict", name.span,
+                             "'" + plugin->path + "' holds component '" + plugin->component->name + "' now, not '" + component->name + "'",
+                             "", "load it beside the old one: loadrt " + std::string(plugin->component->name));
         return;
     }
     // constructed beside the model; what was made and is not taken over is destroyed here
@@ -227,11 +240,13 @@ void add_automatically(Elaboration& on, Args args) {
     AutoOrder order{thread, {}, args[0].span};
     if (args.size() > 1) {
         for (const Token& token : args.subspan(1))
-            if (on.edit.add_function(word(token), word(args[0]), -1, {}, false)) order.functions.push_back(on.model.find_function(token.text));
+            if (on.edit.add_function(word(token), word(args[0]), -1, {}, false))
+                order.functions.push_back(on.model.find_function(token.text));
     } else {
         for (const auto& component : on.model.components)
             for (const auto& function : component->functions)
-                if (!function->thread && on.edit.add_function({function->name, args[0].span}, word(args[0]), -1, {}, false)) order.functions.push_back(function.get());
+                if (!function->thread && on.edit.add_function({function->name, args[0].span}, word(args[0]), -1, {}, false))
+                    order.functions.push_back(function.get());
         if (order.functions.empty()) on.diagnostics.error("no-such-function", args[0].span, "there is no function that is in no thread");
     }
     if (!order.functions.empty()) on.auto_orders.push_back(std::move(order));
@@ -288,13 +303,14 @@ void net(Elaboration& on, const Command&, Args args) {
     if (!signal && unknown_type) return on.edit.note_absent(args[0].text);
     if (!signal) {
         if (on.model.find_pin(args[0].text)) {
-            on.diagnostics.error("signal-named-like-pin", args[0].span, "signal name " + quoted(args[0].text) + " is the name of a pin", "a pin",
-                                 "write the signal's name first: net SIGNAL " + args[0].text);
+            on.diagnostics.error("signal-named-like-pin", args[0].span, "signal name " + quoted(args[0].text) + " is the name of a pin",
+                                 "a pin", "write the signal's name first: net SIGNAL " + args[0].text);
             return;
         }
         if (wanted.empty()) {
             on.edit.note_absent(args[0].text);
-            if (args.size() < 2) on.diagnostics.error("wrong-arguments", args[0].span, "net needs a pin to make a new signal", "", "net SIGNAL PIN…");
+            if (args.size() < 2)
+                on.diagnostics.error("wrong-arguments", args[0].span, "net needs a pin to make a new signal", "", "net SIGNAL PIN…");
             return;
         }
         signal = on.edit.add_signal(word(args[0]), wanted.front().pin->type, wanted.front().token->span);
@@ -308,7 +324,8 @@ void newsig(Elaboration& on, const Command&, Args args) {
     if (!type) {
         std::vector<std::string> all;
         for (const TypeRow& row : types) all.emplace_back(row.name);
-        on.diagnostics.error("no-such-type", args[1].span, "there is no type " + quoted(args[1].text), did_you_mean(args[1].text, all), "types: " + listed(all));
+        on.diagnostics.error("no-such-type", args[1].span, "there is no type " + quoted(args[1].text), did_you_mean(args[1].text, all),
+                             "types: " + listed(all));
         return;
     }
     on.edit.add_signal(word(args[0]), *type, args[1].span);
@@ -373,7 +390,8 @@ constexpr Row rows[] = {
     {"loadrt", 1, any, "loadrt COMPONENT [ARGUMENT=VALUE…]", loadrt},
     {"net", 1, any, "net SIGNAL PIN…", net},
     {"newsig", 2, 2, "newsig SIGNAL TYPE", newsig},
-    {"newthread", 2, any, "newthread NAME PERIOD_NS [cpu=N] [policy=fifo|deadline|other] [priority=N] [spin=TIME] [budget=TIME] [profile=every]", newthread},
+    {"newthread", 2, any,
+     "newthread NAME PERIOD_NS [cpu=N] [policy=fifo|deadline|other] [priority=N] [spin=TIME] [budget=TIME] [profile=every]", newthread},
     {"reload", 1, 1, "reload COMPONENT", reload},
     {"setp", 2, 2, "setp PIN VALUE", setp},
     {"sets", 2, 2, "sets SIGNAL VALUE", sets},
@@ -407,15 +425,17 @@ void elaborate(Elaboration& on, const Command& command) {
     std::vector<Token> without_arrows;
     Args args = command.args;
     if (row.drops_arrows) {
-        std::copy_if(command.args.begin(), command.args.end(), std::back_inserter(without_arrows), [](const Token& t) { return !is_arrow(t.text); });
+        std::copy_if(command.args.begin(), command.args.end(), std::back_inserter(without_arrows),
+                     [](const Token& t) { return !is_arrow(t.text); });
         args = without_arrows;
     }
     if (args.size() < row.least || args.size() > row.most) {
         const bool few = args.size() < row.least;
-        const std::string bound = std::to_string(few ? row.least : row.most) + ((few ? row.least : row.most) == 1 ? " argument" : " arguments");
+        const std::string bound =
+            std::to_string(few ? row.least : row.most) + ((few ? row.least : row.most) == 1 ? " argument" : " arguments");
         const std::string how = row.least == row.most ? "" : few ? "at least " : "at most ";
-        on.diagnostics.error("wrong-arguments", few ? command.name.span : args[row.most].span, std::string(row.name) + " takes " + how + bound + ", not " + std::to_string(args.size()), "",
-                             row.usage);
+        on.diagnostics.error("wrong-arguments", few ? command.name.span : args[row.most].span,
+                             std::string(row.name) + " takes " + how + bound + ", not " + std::to_string(args.size()), "", row.usage);
         return;
     }
     row.run(on, command, args);

@@ -10,7 +10,8 @@
 
 namespace hal {
 
-Session::State::State(SessionOptions o) : options(std::move(o)), plugins(options.plugin_path), executor(std::make_unique<Executor>(options.virtual_clock)) {
+Session::State::State(SessionOptions o)
+    : options(std::move(o)), plugins(options.plugin_path), executor(std::make_unique<Executor>(options.virtual_clock)) {
     if (!options.virtual_clock && !options.check_only) refused = Executor::prepare_process();
 }
 
@@ -68,7 +69,8 @@ void check_all(const Model& model, bool whole, bool complete, Diagnostics& diagn
     check_arrows(model, diagnostics);
     if (!whole) return;
     // a file that has looked at its values before its first addf is not complete yet
-    const bool scheduled = std::any_of(model.threads.begin(), model.threads.end(), [](const auto& thread) { return !thread->functions.empty(); });
+    const bool scheduled =
+        std::any_of(model.threads.begin(), model.threads.end(), [](const auto& thread) { return !thread->functions.empty(); });
     if (complete || scheduled) check_unthreaded_functions(model, diagnostics);
     check_cross_thread_io(model, diagnostics);
     check_stale_reads(model, diagnostics);
@@ -90,7 +92,8 @@ bool Session::commit(Diagnostics& diagnostics) {
 }
 
 bool Session::State::carry_out(Diagnostics& diagnostics) {
-    if (!edit->structural() && edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) return write_values(diagnostics);
+    if (!edit->structural() && edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2)
+        return write_values(diagnostics);
     apply_auto_order(model, *edit, auto_orders, diagnostics);
     Diagnostics found;
     check_all(model, commands > 1, options.check_only, found);
@@ -106,9 +109,11 @@ bool Session::State::carry_out(Diagnostics& diagnostics) {
     if (!all_answer(diagnostics)) return false;
 
     for (Instance* const instance : edit->added_instances()) {
-        if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance) continue;  // unloaded again in the same edit
+        if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance)
+            continue;  // unloaded again in the same edit
         if (const std::string why = start_instance(*instance, model, *executor, status); !why.empty())
-            diagnostics.error("start-failed", instance->loaded, "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
+            diagnostics.error("start-failed", instance->loaded,
+                              "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
     }
     if (diagnostics.failed()) return false;
     touched = true;
@@ -137,7 +142,8 @@ bool Session::State::write_values(Diagnostics& diagnostics) {
             for (const auto& [thread, copy] : signal->copies) write(thread, copy, value);
     }
     if (!executor->write(rows, answer_timeout_ns)) {
-        diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "", "show thread and show fault say more");
+        diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "",
+                          "show thread and show fault say more");
         return false;
     }
     for (const auto& [signal, value] : edit->signal_values) {
@@ -150,7 +156,8 @@ bool Session::State::write_values(Diagnostics& diagnostics) {
 
 void Session::State::out_of_memory(Diagnostics& diagnostics) {
     reserve.reset();
-    diagnostics.error("out-of-memory", {}, "there is no memory left for this edit", "", "the machine runs on as it was; 'ulimit -v' and 'ulimit -l' limit a process");
+    diagnostics.error("out-of-memory", {}, "there is no memory left for this edit", "",
+                      "the machine runs on as it was; 'ulimit -v' and 'ulimit -l' limit a process");
 }
 
 // The transaction is over, one way or the other: what is no longer in the model goes.
@@ -345,7 +352,8 @@ std::vector<std::string> Session::available_components() const { return state_->
 std::optional<Declared> Session::declared(std::string_view component) const {
     Diagnostics ignored;
     const LoadedComponent* const loaded = model().find_component(component);
-    const std::optional<Plugin> plugin = loaded && loaded->plugin ? Plugin{loaded->plugin, loaded->library, loaded->path} : state_->plugins.open(component, {}, ignored);
+    const std::optional<Plugin> plugin =
+        loaded && loaded->plugin ? Plugin{loaded->plugin, loaded->library, loaded->path} : state_->plugins.open(component, {}, ignored);
     Declared found;
     std::string problem;
     if (!plugin || !gather(*plugin->component, found, problem)) return {};

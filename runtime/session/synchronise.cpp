@@ -86,8 +86,11 @@ bool Session::State::all_answer(Diagnostics& diagnostics) {
 void Session::State::silent_thread(const Core* hangs, Diagnostics& diagnostics) const {
     for (const auto& [thread, one] : cores)
         if (one == hangs)
-            diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' did not answer within " + format_duration(static_cast<double>(answer_timeout_ns)) + ": one of its functions hangs, or it gets no CPU time", "",
-                              "show thread and show fault say more");
+            diagnostics.error("silent-thread", thread->made,
+                              "thread '" + thread->name + "' did not answer within " +
+                                  format_duration(static_cast<double>(answer_timeout_ns)) +
+                                  ": one of its functions hangs, or it gets no CPU time",
+                              "", "show thread and show fault say more");
 }
 
 void Session::State::withdraw(Diagnostics* diagnostics) {
@@ -98,7 +101,8 @@ void Session::State::withdraw(Diagnostics* diagnostics) {
         // Threads that took the new plan take one of the old model again, with the values it had.
         std::vector<const Thread*> orphans;
         for (const auto& [thread, core] : cores)
-            if (std::none_of(model.threads.begin(), model.threads.end(), [&, t = thread](const auto& one) { return one.get() == t; })) orphans.push_back(thread);
+            if (std::none_of(model.threads.begin(), model.threads.end(), [&, t = thread](const auto& one) { return one.get() == t; }))
+                orphans.push_back(thread);
         for (const Thread* const thread : orphans) {
             if (executor->remove(*cores[thread], answer_timeout_ns)) cores.erase(thread);
             else in_step = false;
@@ -223,7 +227,9 @@ void Session::State::retire() {
 // All threads that answered run the new plans; the old images are still there, and nobody writes them any more. A thread
 // that did not answer still runs its old plan, so what is known of its places stays.
 void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent) {
-    const auto hangs = [&](const Thread* thread) { return thread && std::find(silent.begin(), silent.end(), core(thread)) != silent.end(); };
+    const auto hangs = [&](const Thread* thread) {
+        return thread && std::find(silent.begin(), silent.end(), core(thread)) != silent.end();
+    };
     for (Compiled::Place& place : compiled.places) {
         Signal& signal = *place.signal;
         if (hangs(signal.home) || hangs(place.home)) continue;
@@ -235,7 +241,8 @@ void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent
             } else if (signal.cell) signal.value.raw = __atomic_load_n(&signal.cell->raw, __ATOMIC_RELAXED);
             else if (signal.home) signal.value = *signal.slot;
         } else if (place.cell) {
-            if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end()) __atomic_store_n(&place.cell->raw, set->second.raw, __ATOMIC_RELAXED);
+            if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end())
+                __atomic_store_n(&place.cell->raw, set->second.raw, __ATOMIC_RELAXED);
         }
     }
     for (const auto& rebind : compiled.session_rebinds) {
@@ -247,7 +254,9 @@ void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent
         if (!hangs(pin->home) && !hangs(thread)) pin->home = thread;
     for (Compiled::Place& place : compiled.places) {
         Signal& signal = *place.signal;
-        const auto keep = [&](auto& copies, bool of_hanging) { std::erase_if(copies, [&](const auto& copy) { return hangs(copy.first) != of_hanging; }); };
+        const auto keep = [&](auto& copies, bool of_hanging) {
+            std::erase_if(copies, [&](const auto& copy) { return hangs(copy.first) != of_hanging; });
+        };
         if (silent.empty()) {
             signal.copies = std::move(place.copies);
         } else {

@@ -22,7 +22,8 @@ bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& 
         thread.options.period_ns = *ns;
         return true;
     }
-    diagnostics.error("bad-period", at, "'" + std::string(text) + "' is not a period", "", "a period is in nanoseconds, at least 1000: 1000000 is a millisecond");
+    diagnostics.error("bad-period", at, "'" + std::string(text) + "' is not a period", "",
+                      "a period is in nanoseconds, at least 1000: 1000000 is a millisecond");
     return false;
 }
 
@@ -70,9 +71,12 @@ bool parse_new_thread(std::span<const Token> args, NewThread& thread, Diagnostic
         if (token.text == "fp" || token.text == "nofp") continue;
         const auto equals = token.text.find('=');
         bool known = false;
-        if (equals != std::string::npos && !set_option(thread, std::string_view(token.text).substr(0, equals), std::string_view(token.text).substr(equals + 1), token.span, diagnostics, known)) good = false;
+        if (equals != std::string::npos && !set_option(thread, std::string_view(token.text).substr(0, equals),
+                                                       std::string_view(token.text).substr(equals + 1), token.span, diagnostics, known))
+            good = false;
         else if (!known) {
-            diagnostics.error("unknown-argument", token.span, "newthread has no option '" + token.text + "'", "", "options: fp nofp cpu= policy= priority= spin= budget= profile=every");
+            diagnostics.error("unknown-argument", token.span, "newthread has no option '" + token.text + "'", "",
+                              "options: fp nofp cpu= policy= priority= spin= budget= profile=every");
             good = false;
         }
     }
@@ -102,7 +106,8 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
             }
         }
         if (!known) {
-            diagnostics.error("unknown-argument", token.span, "threads has no argument '" + token.text + "'", "", "arguments: name1=NAME period1=NS cpu1=N policy1=… spin1=… budget1=…, then name2= and so on");
+            diagnostics.error("unknown-argument", token.span, "threads has no argument '" + token.text + "'", "",
+                              "arguments: name1=NAME period1=NS cpu1=N policy1=… spin1=… budget1=…, then name2= and so on");
             good = false;
         }
     }
@@ -122,7 +127,9 @@ void fit_period(const Model& model, NewThread& thread, Diagnostics& diagnostics)
     const std::int64_t base = fastest.options.period_ns, wanted = thread.options.period_ns;
     if (wanted < base || wanted % base == 0) return;
     thread.options.period_ns = (wanted + base / 2) / base * base;
-    diagnostics.warning("period-multiple", thread.period_at, "a period of " + std::to_string(wanted) + " ns is not a multiple of the fastest thread's (" + fastest.name + ", " + std::to_string(base) + " ns)",
+    diagnostics.warning("period-multiple", thread.period_at,
+                        "a period of " + std::to_string(wanted) + " ns is not a multiple of the fastest thread's (" + fastest.name + ", " +
+                            std::to_string(base) + " ns)",
                         "taken as " + std::to_string(thread.options.period_ns), "write " + std::to_string(thread.options.period_ns));
 }
 

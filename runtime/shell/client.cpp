@@ -148,7 +148,8 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
         s.in.erase(0, end + 1);
     }
     if (!hello.is_object() || hello.value("halcyon", 0) != 1) {
-        problem = hello.is_object() ? "instance '" + s.instance + "' speaks another version of the protocol" : "instance '" + s.instance + "' does not answer";
+        problem = hello.is_object() ? "instance '" + s.instance + "' speaks another version of the protocol"
+                                    : "instance '" + s.instance + "' does not answer";
         return nullptr;
     }
     s.version = hello.value("version", "");
@@ -237,7 +238,8 @@ Json environment_for(std::string_view text) {
 }  // namespace
 
 bool Client::set_options(const Options& o) {
-    Json options{{"keep_going", o.keep_going}, {"echo", o.echo}, {"script", o.script}, {"json", o.json}, {"color", o.color}, {"notes", o.notes}, {"level", o.level}, {"directory", o.directory}};
+    Json options{{"keep_going", o.keep_going}, {"echo", o.echo},   {"script", o.script}, {"json", o.json},
+                 {"color", o.color},           {"notes", o.notes}, {"level", o.level},   {"directory", o.directory}};
     return request({{"options", std::move(options)}}).value("ok", false);
 }
 
@@ -255,7 +257,8 @@ Completion Client::complete(std::string_view line, std::size_t cursor) {
     const Json reply = request({{"complete", line}, {"cursor", cursor}});
     Completion completion;
     completion.begin = reply.value("begin", std::size_t{0});
-    for (const Json& candidate : reply.value("candidates", Json::array())) completion.candidates.push_back({candidate.value("text", ""), candidate.value("hint", "")});
+    for (const Json& candidate : reply.value("candidates", Json::array()))
+        completion.candidates.push_back({candidate.value("text", ""), candidate.value("hint", "")});
     return completion;
 }
 

@@ -22,8 +22,11 @@ void command_source(Context& context) { context.script.source(context); }
 // Those of the file that is run are gone by now: its nodes' parts are taken before the first command.
 void command_node(Context& context) {
     const bool typed = context.session.sources.get(context.command.span.source).name.starts_with('<');
-    context.diagnostics.error("misplaced-node", context.command.name.span, std::string("`node` lines ") + (typed ? "are not typed" : "do not stand in a file that another one reads"), "",
-                              typed ? "write them in a netlist, and type: hal run FILE --node " + context.argument(0) : "write `node " + context.argument(0) + "` above the `source` line");
+    context.diagnostics.error("misplaced-node", context.command.name.span,
+                              std::string("`node` lines ") + (typed ? "are not typed" : "do not stand in a file that another one reads"),
+                              "",
+                              typed ? "write them in a netlist, and type: hal run FILE --node " + context.argument(0)
+                                    : "write `node " + context.argument(0) + "` above the `source` line");
 }
 
 void command_print(Context& context) {
@@ -47,7 +50,8 @@ void command_debug(Context& context) {
     int level = -1;
     const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), level);
     if (status != std::errc{} || end != text.data() + text.size() || level < 0 || level > 5) {
-        context.diagnostics.error("unknown-word", context.span(0), "'" + text + "' is no level", "", "levels go from 0 (nothing) to 5 (everything)");
+        context.diagnostics.error("unknown-word", context.span(0), "'" + text + "' is no level", "",
+                                  "levels go from 0 (nothing) to 5 (everything)");
         return;
     }
     context.shell.options.level = static_cast<Level>(std::min(level, 3));
@@ -91,7 +95,8 @@ std::string Shell::explain(std::string_view code) {
 std::string Shell::manual() {
     std::string text = "# Commands\n";
     for (const auto& row : command_table()) {
-        text += fmt::format("\n## {}\n\n    {}\n\n{}{}.\n", names_of(row), usage(row), static_cast<char>(std::toupper(row.summary[0])), row.summary + 1);
+        text += fmt::format("\n## {}\n\n    {}\n\n{}{}.\n", names_of(row), usage(row), static_cast<char>(std::toupper(row.summary[0])),
+                            row.summary + 1);
         if (*row.help) text += fmt::format("\n{}\n", row.help);
     }
     return text;

@@ -91,14 +91,18 @@ void command_lock(Context& context) {
     if (level == "none") context.session.lock = static_cast<unsigned>(Lock::none);
     else if (level == "tune") context.session.lock = static_cast<unsigned>(Lock::tune);
     else if (level == "all") context.session.lock = static_cast<unsigned>(Lock::all);
-    else context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "'", "", "the locks are: none, tune, all");
+    else
+        context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "'", "",
+                                  "the locks are: none, tune, all");
 }
 
 void command_unlock(Context& context) {
     const std::string_view level = context.argument_or(0, "all");
     if (level == "all") context.session.lock = static_cast<unsigned>(Lock::none);
     else if (level == "tune") context.session.lock &= ~static_cast<unsigned>(Lock::tune);
-    else context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "' to take off", "", "the choices are: all, tune");
+    else
+        context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "' to take off", "",
+                                  "the choices are: all, tune");
 }
 
 }  // namespace hal

@@ -25,21 +25,24 @@ struct Plan {
     std::size_t program = 0;
 };
 
-constexpr const char* usage = "usage: loadusr [-W] [-Wn NAME] [-w] [-i] [--restart=no|on-failure|always] [--restart-delay=TIME] PROGRAM [ARGUMENT]...";
+constexpr const char* usage =
+    "usage: loadusr [-W] [-Wn NAME] [-w] [-i] [--restart=no|on-failure|always] [--restart-delay=TIME] PROGRAM [ARGUMENT]...";
 
 /// True for an option about restarts, which it has then taken or reported.
 bool restart_option(Context& context, Plan& plan, std::size_t i, const std::string& option) {
     const auto equals = option.find('=');
     const std::string key = option.substr(0, equals), value = equals == option.npos ? "" : option.substr(equals + 1);
     if (key == "--restart") {
-        static constexpr std::pair<const char*, Restart> words[] = {{"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
+        static constexpr std::pair<const char*, Restart> words[] = {
+            {"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
         const auto word = std::find_if(std::begin(words), std::end(words), [&](const auto& w) { return value == w.first; });
         if (word != std::end(words)) plan.restart.when = word->second;
         else context.diagnostics.error("unknown-option", context.span(i), "--restart is no, on-failure or always", "", usage);
         return true;
     }
     if (key != "--restart-delay") return false;
-    if (const auto delay = parse_duration_ns(value, false); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000) plan.restart.delay_ns = *delay;
+    if (const auto delay = parse_duration_ns(value, false); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000)
+        plan.restart.delay_ns = *delay;
     else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay is a time from 10ms to 1h", "", usage);
     return true;
 }
@@ -60,19 +63,20 @@ bool read_options(Context& context, Plan& plan) {
             plan.any_name = false;
             plan.name = context.argument(++i);
         } else {
-            context.diagnostics.error("unknown-option", context.span(i), "loadusr has no option '" + option + "'" + (option == "-Wn" ? " without a name" : ""), "",
-                                      usage);
+            context.diagnostics.error("unknown-option", context.span(i),
+                                      "loadusr has no option '" + option + "'" + (option == "-Wn" ? " without a name" : ""), "", usage);
             return false;
         }
     }
     plan.program = i;
     if (plan.wait_end && plan.restart.when != Restart::no) {
-        context.diagnostics.error("unknown-option", context.span(0), "-w waits for a program's end, --restart does not let it end", "", usage);
+        context.diagnostics.error("unknown-option", context.span(0), "-w waits for a program's end, --restart does not let it end", "",
+                                  usage);
         return false;
     }
     if (i == context.count()) {
-        context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' needs a program to start", "something is missing",
-                                  usage);
+        context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' needs a program to start",
+                                  "something is missing", usage);
         return false;
     }
     if (plan.name.empty()) {
@@ -168,7 +172,8 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
     context.processes.collect(pid);
     if (pipes) pipes->pass_on(context.output, 0);
     if (status == 0 || plan.ignore_status) return;
-    const std::string how = status > 128 ? "was ended by signal " + std::to_string(status - 128) : "failed with exit status " + std::to_string(status);
+    const std::string how =
+        status > 128 ? "was ended by signal " + std::to_string(status - 128) : "failed with exit status " + std::to_string(status);
     context.diagnostics.error("program-failed", context.span(plan.program), "'" + context.argument(plan.program) + "' " + how, "",
                               "-i before the program's name ignores the status");
 }

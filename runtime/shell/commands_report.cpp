@@ -29,7 +29,8 @@ struct Counts {
 };
 
 Counts count(const Model& model) {
-    Counts counts{model.components.size(), model.instance.size(), 0, 0, 0, model.signals.size(), model.function.size(), model.threads.size()};
+    Counts counts{model.components.size(), model.instance.size(), 0, 0, 0, model.signals.size(),
+                  model.function.size(),   model.threads.size()};
     for (const auto& [name, pin] : model.pin) {
         if (name != pin->name) ++counts.aliases;
         else ++(is_parameter(*pin) ? counts.parameters : counts.pins);
@@ -41,7 +42,9 @@ Counts count(const Model& model) {
 void memory_status(std::string& text, const Model& model) {
     const Counts counts = count(model);
     text += "HAL memory status\n";
-    const auto add = [&](const char* what, std::size_t number) { text += fmt::format("  active {:<12} {}\n", std::string(what) + ":", number); };
+    const auto add = [&](const char* what, std::size_t number) {
+        text += fmt::format("  active {:<12} {}\n", std::string(what) + ":", number);
+    };
     add("components", counts.components);
     add("instances", counts.instances);
     add("pins", counts.pins);
@@ -56,10 +59,12 @@ std::string status_json(const Session& session) {
     const Counts c = count(session.model());
     std::string text = "{\"instance\":";
     json_quote(text, session.options().name);
-    return text + fmt::format(",\"running\":{},\"lock\":{},\"faults\":{},\"components\":{},\"instances\":{},\"pins\":{},\"parameters\":{},\"aliases\":{},"
-                              "\"signals\":{},\"functions\":{},\"threads\":{}}}\n",
-                              session.running(), session.lock, session.fault_count(), c.components, c.instances, c.pins, c.parameters, c.aliases, c.signals,
-                              c.functions, c.threads);
+    return text +
+           fmt::format(
+               ",\"running\":{},\"lock\":{},\"faults\":{},\"components\":{},\"instances\":{},\"pins\":{},\"parameters\":{},\"aliases\":{},"
+               "\"signals\":{},\"functions\":{},\"threads\":{}}}\n",
+               session.running(), session.lock, session.fault_count(), c.components, c.instances, c.pins, c.parameters, c.aliases,
+               c.signals, c.functions, c.threads);
 }
 
 /// Three figures of a distribution in one column each.
@@ -73,7 +78,8 @@ void command_status(Context& context) {
     const std::string_view what = context.argument_or(0, "all");
     if (what == "instance") return context.output.out(context.session.status_text());
     if (what != "all" && what != "lock" && what != "mem") {
-        context.diagnostics.error("unknown-word", context.span(0), "there is no status of '" + std::string(what) + "'", "", "the choices are: lock, mem, instance, all");
+        context.diagnostics.error("unknown-word", context.span(0), "there is no status of '" + std::string(what) + "'", "",
+                                  "the choices are: lock, mem, instance, all");
         return;
     }
     if (context.options().json) return context.output.out(status_json(context.session));
@@ -97,8 +103,9 @@ void show_timing(Context& context) {
             "Name                     Period     Cycles   Missed       p50       p99       max       p50       p99       max  Scheduling\n";
     for (const Thread* const thread : threads) {
         const ThreadReport r = context.session.thread_report(*thread);
-        text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name, format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed,
-                            figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns), figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
+        text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name, format_duration(static_cast<double>(r.period_ns)),
+                            r.cycles, r.missed, figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
+                            figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
                             r.cpu >= 0 ? fmt::format(", CPU {}", r.cpu) : "", r.faulted ? ", stopped by a fault" : "");
     }
     text += clock_text(context.session);
@@ -118,7 +125,8 @@ void show_timing(Context& context) {
         const auto samples = function.times->samples.load(std::memory_order_relaxed);
         const auto total = function.times->total_ns.load(std::memory_order_relaxed);
         const double mean = samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);
-        text += fmt::format("{:<40} {:>9} {:>9} {:>9}  {}\n", function.name, format_duration(mean), format_duration(values[i].s32), samples, function.thread->name);
+        text += fmt::format("{:<40} {:>9} {:>9} {:>9}  {}\n", function.name, format_duration(mean), format_duration(values[i].s32), samples,
+                            function.thread->name);
     }
     context.output.out(text + "\n");
 }
@@ -138,7 +146,8 @@ void show_faults(Context& context) {
     std::string text;
     if (context.options().json) {
         for (const auto& record : records) {
-            text += fmt::format("{}{{\"number\":{},\"age_ns\":{},\"cycle\":{},\"thread\":", text.empty() ? "" : ",", record.number, record.age_ns, record.cycle);
+            text += fmt::format("{}{{\"number\":{},\"age_ns\":{},\"cycle\":{},\"thread\":", text.empty() ? "" : ",", record.number,
+                                record.age_ns, record.cycle);
             json_quote(text, record.thread);
             json_quote(text += ",\"code\":", record.code);
             json_quote(text += ",\"sentence\":", record.sentence);
@@ -146,7 +155,8 @@ void show_faults(Context& context) {
         }
         return context.output.out("[" + text + "]\n");
     }
-    for (const auto& record : records) text += fmt::format("{:>4}  {} ago  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)), record.sentence);
+    for (const auto& record : records)
+        text += fmt::format("{:>4}  {} ago  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)), record.sentence);
     if (records.empty()) text = "no faults\n";
     else text += fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", context.session.fault_count());
     context.output.out(text);
@@ -154,7 +164,8 @@ void show_faults(Context& context) {
 
 void command_fault(Context& context) {
     if (context.argument(0) == "clear") return context.session.clear_faults();
-    context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' cannot be done to faults", "", "type `fault clear`, or `show fault` to see them");
+    context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' cannot be done to faults", "",
+                              "type `fault clear`, or `show fault` to see them");
 }
 
 }  // namespace hal

@@ -26,7 +26,8 @@ std::vector<std::string> deleted_threads(const Model& model) {
             const auto end = std::min(arguments.find(' ', at), arguments.size());
             const std::string word = arguments.substr(at, end - at);
             const auto equals = word.find('=');
-            if (word.starts_with("name") && equals != word.npos && !model.find_thread(word.substr(equals + 1))) gone.push_back(word.substr(equals + 1));
+            if (word.starts_with("name") && equals != word.npos && !model.find_thread(word.substr(equals + 1)))
+                gone.push_back(word.substr(equals + 1));
             at = end + 1;
         }
     }
@@ -53,7 +54,8 @@ void save_comp(Context& context, Text& text) {
     std::reverse(oldest_first.begin(), oldest_first.end());
     for (const LoadedComponent* const component : oldest_first) {
         if (component->process != 0) continue;
-        for (const std::string& arguments : component->arguments) text.add("loadrt {}{}{}\n", component->name, arguments.empty() ? "" : " ", arguments);
+        for (const std::string& arguments : component->arguments)
+            text.add("loadrt {}{}{}\n", component->name, arguments.empty() ? "" : " ", arguments);
     }
     for (const std::string& name : deleted_threads(model)) text.add("delthread {}\n", name);
     for (const auto& thread : model.threads)  // fastest first, so that periods fit
@@ -100,7 +102,8 @@ void save_nets(Context& context, Text& text, bool arrows) {
     text.add("# nets\n");
     for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
         new_signal(text, *signal);
-        for (const Pin* const pin : by_name(*signal)) text.add("linksp {} {} {}\n", signal->name, arrows ? arrow_of_signal(*pin) : "", shown_name(*pin));
+        for (const Pin* const pin : by_name(*signal))
+            text.add("linksp {} {} {}\n", signal->name, arrows ? arrow_of_signal(*pin) : "", shown_name(*pin));
     }
 }
 
@@ -163,11 +166,13 @@ void save_unconnected(Context& context, Text& text) {
 void save_signal_values(Context& context, Text& text) {
     text.add("# signal values\n");
     auto signals = signals_by_name(context.session.model(), {});
-    std::erase_if(signals, [](const Signal* signal) { return signal->type == HAL_TYPE_PORT ? !signal->port : signal->writer || signal->ios > 0; });
+    std::erase_if(signals,
+                  [](const Signal* signal) { return signal->type == HAL_TYPE_PORT ? !signal->port : signal->writer || signal->ios > 0; });
     const auto values = context.session.read_signals(signals);
     for (std::size_t i = 0; i < signals.size(); ++i) {
         const Signal& signal = *signals[i];
-        text.add("sets {} {:>20}\n", signal.name, signal.type == HAL_TYPE_PORT ? std::to_string(signal.port->capacity) : saved_value(signal.type, values[i]));
+        text.add("sets {} {:>20}\n", signal.name,
+                 signal.type == HAL_TYPE_PORT ? std::to_string(signal.port->capacity) : saved_value(signal.type, values[i]));
     }
 }
 
@@ -223,7 +228,9 @@ void command_save(Context& context) {
     Text text;
     bool known = false;
     for (const Section& section : sections) {
-        const bool chosen = wanted == "all" ? section.in_all : wanted == "allu" ? section.in_allu : wanted == section.name || (!section.also.empty() && wanted == section.also);
+        const bool chosen = wanted == "all"    ? section.in_all
+                            : wanted == "allu" ? section.in_allu
+                                               : wanted == section.name || (!section.also.empty() && wanted == section.also);
         if (!chosen) continue;
         section.save(context, text);
         known = true;
@@ -231,7 +238,8 @@ void command_save(Context& context) {
     if (!known) {
         std::vector<std::string> names{"all", "allu"};
         for (const Section& section : sections) names.emplace_back(section.name);
-        context.diagnostics.error("unknown-word", context.span(0), "there is no '" + std::string(wanted) + "' to save", did_you_mean(wanted, names), "the choices are: " + listed(names, names.size()));
+        context.diagnostics.error("unknown-word", context.span(0), "there is no '" + std::string(wanted) + "' to save",
+                                  did_you_mean(wanted, names), "the choices are: " + listed(names, names.size()));
         return;
     }
     if (context.count() < 2) return context.output.out(text.text);

@@ -58,8 +58,12 @@ void show_pins(Request& request, bool parameters) {
         const Pin& pin = *pins[i];
         const LoadedComponent* const whose = owner(pin);
         const std::string value = value_text(request, pin.type, values[i]);
-        if (request.script()) request.add("{} {:<5} {} {} {}", whose ? std::string_view(whose->name) : "-", name(pin.type), direction_text(pin), value, shown_name(pin));
-        else request.add("{:>6}  {:<5} {:<3}  {:>20}  {}", whose ? whose->id : 0, name(pin.type), direction_text(pin), value, shown_name(pin));
+        if (request.script())
+            request.add("{} {:<5} {} {} {}", whose ? std::string_view(whose->name) : "-", name(pin.type), direction_text(pin), value,
+                        shown_name(pin));
+        else
+            request.add("{:>6}  {:<5} {:<3}  {:>20}  {}", whose ? whose->id : 0, name(pin.type), direction_text(pin), value,
+                        shown_name(pin));
         if (pin.signal) request.add(" {} {}", arrow_of_pin(pin), pin.signal->name);
         request.text += '\n';
     }
@@ -187,8 +191,8 @@ const Kind* find_kind(Context& context, bool to_list) {
         if (kind.name == wanted) return &kind;
         names.emplace_back(kind.name);
     }
-    context.diagnostics.error("unknown-word", context.span(0), "there is no '" + std::string(wanted) + "' to " + context.command.name.text, did_you_mean(wanted, names),
-                              "the kinds are: " + listed(names, names.size()));
+    context.diagnostics.error("unknown-word", context.span(0), "there is no '" + std::string(wanted) + "' to " + context.command.name.text,
+                              did_you_mean(wanted, names), "the kinds are: " + listed(names, names.size()));
     return nullptr;
 }
 
@@ -205,7 +209,8 @@ bool read_patterns(Context& context, std::vector<std::string>& patterns, std::op
         const std::string wanted = apart ? std::string(context.argument_or(at, "")) : word.substr(2);
         type = type_named(wanted);
         if (!type) {
-            context.diagnostics.error("no-such-type", context.span(at), "there is no type '" + wanted + "'", "", "types: bit, float, s32, u32, s64, u64, port");
+            context.diagnostics.error("no-such-type", context.span(at), "there is no type '" + wanted + "'", "",
+                                      "types: bit, float, s32, u32, s64, u64, port");
             return false;
         }
         i = at;

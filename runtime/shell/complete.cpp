@@ -135,49 +135,75 @@ struct Kind {
 
 /// The words in capitals of the command table, each with where its names come from.
 constexpr Kind kinds[] = {
-    {"COMPONENT", [](Search& s) { for (const auto& name : s.session.available_components()) s.add(name); }},
+    {"COMPONENT",
+     [](Search& s) {
+    for (const auto& name : s.session.available_components()) s.add(name);
+}},
     {"ARGUMENT=VALUE", add_load_arguments},
-    {"LOADED", [](Search& s) {
-        for (const auto& c : s.model().components) s.add(c->name, c->process ? "program" : fmt::format("{} instances", c->instances.size()));
-        for (const auto& [name, instance] : s.model().instance) s.add(std::string(name), instance->component->name);
-    }},
-    {"RELOADABLE", [](Search& s) {
-        for (const auto& c : s.model().components)
-            if (c->plugin) s.add(c->name, fmt::format("{} instances", c->instances.size()));
-    }},
-    {"PROCESS", [](Search& s) { for (const auto& name : s.processes.names()) s.add(name); }},
+    {"LOADED",
+     [](Search& s) {
+    for (const auto& c : s.model().components) s.add(c->name, c->process ? "program" : fmt::format("{} instances", c->instances.size()));
+    for (const auto& [name, instance] : s.model().instance) s.add(std::string(name), instance->component->name);
+}},
+    {"RELOADABLE",
+     [](Search& s) {
+    for (const auto& c : s.model().components)
+        if (c->plugin) s.add(c->name, fmt::format("{} instances", c->instances.size()));
+}},
+    {"PROCESS",
+     [](Search& s) {
+    for (const auto& name : s.processes.names()) s.add(name);
+}},
     {"PROGRAM", add_files},
     {"FILE", add_files},
-    {"FUNCTION", [](Search& s) {
-        const bool placed = s.words[0] == "delf";
-        add_functions(s, [&](const LoadedFunction& f) {
-            return (f.thread != nullptr) == placed && std::find(s.words.begin(), s.words.end(), f.name) == s.words.end();
-        });
-    }},
-    {"THREAD", [](Search& s) {
-        const LoadedFunction* const function = s.words[0] == "delf" && s.words.size() > 1 ? s.model().find_function(s.words[1]) : nullptr;
-        for (const auto& thread : s.model().threads)
-            if (!function || function->thread == thread.get()) s.add(thread->name, format_duration(static_cast<double>(thread->options.period_ns)));
-    }},
+    {"FUNCTION",
+     [](Search& s) {
+    const bool placed = s.words[0] == "delf";
+    add_functions(s, [&](const LoadedFunction& f) {
+        return (f.thread != nullptr) == placed && std::find(s.words.begin(), s.words.end(), f.name) == s.words.end();
+    });
+}},
+    {"THREAD",
+     [](Search& s) {
+    const LoadedFunction* const function = s.words[0] == "delf" && s.words.size() > 1 ? s.model().find_function(s.words[1]) : nullptr;
+    for (const auto& thread : s.model().threads)
+        if (!function || function->thread == thread.get())
+            s.add(thread->name, format_duration(static_cast<double>(thread->options.period_ns)));
+}},
     {"SIGNAL", [](Search& s) { add_signals(s, [](const Signal&) { return true; }); }},
     {"FREE-SIGNAL", [](Search& s) { add_signals(s, [](const Signal& signal) { return !signal.writer && signal.ios == 0; }); }},
-    {"PIN", [](Search& s) {
+    {"PIN",
+     [](Search& s) {
         // net and linksp have named the signal already; linkps PIN SIGNAL and linkpp take any free pin
-        if (s.words[0] == "net" || s.words[0] == "linksp") add_free_pins(s);
-        else add_pins(s, [](const Pin& pin) { return !pin.signal && pin.dir != HAL_DIR_PARAM; });
-    }},
+    if (s.words[0] == "net" || s.words[0] == "linksp") add_free_pins(s);
+    else add_pins(s, [](const Pin& pin) { return !pin.signal && pin.dir != HAL_DIR_PARAM; });
+}},
     {"LINKED-PIN", [](Search& s) { add_pins(s, [](const Pin& pin) { return pin.signal != nullptr; }); }},
     {"SETTABLE", [](Search& s) { add_pins(s, [](const Pin& pin) { return pin.dir != HAL_DIR_OUT && !pin.read_only() && !pin.signal; }); }},
-    {"PIN-OR-PARAMETER", [](Search& s) {
-        const bool aliasing = s.words[0] == "alias" && s.words.size() > 1;
-        add_pins(s, [&](const Pin& pin) { return !aliasing || (is_parameter(pin) == (s.words[1] == "param") && pin.alias.empty()); });
-    }},
-    {"ALIAS", [](Search& s) { for (const auto& [key, pin] : s.model().pin) if (key == pin->alias) s.add(std::string(key), pin->name); }},
+    {"PIN-OR-PARAMETER",
+     [](Search& s) {
+    const bool aliasing = s.words[0] == "alias" && s.words.size() > 1;
+    add_pins(s, [&](const Pin& pin) { return !aliasing || (is_parameter(pin) == (s.words[1] == "param") && pin.alias.empty()); });
+}},
+    {"ALIAS",
+     [](Search& s) {
+    for (const auto& [key, pin] : s.model().pin)
+        if (key == pin->alias) s.add(std::string(key), pin->name);
+}},
     {"VALUE", add_values},
-    {"TYPE", [](Search& s) { for (const auto& row : types) s.add(row.name); }},
+    {"TYPE",
+     [](Search& s) {
+    for (const auto& row : types) s.add(row.name);
+}},
     {"PATTERN", add_listed},
-    {"COMMAND", [](Search& s) { for (const auto& row : command_table()) s.add(row.name, row.summary); }},
-    {"CODE", [](Search& s) { for (const auto& row : code_pages) s.add(row.name); }},
+    {"COMMAND",
+     [](Search& s) {
+    for (const auto& row : command_table()) s.add(row.name, row.summary);
+}},
+    {"CODE",
+     [](Search& s) {
+    for (const auto& row : code_pages) s.add(row.name);
+}},
 };
 
 void add_word(Search& search, std::string_view word) {
@@ -251,7 +277,8 @@ Completion Shell::complete(std::string_view line, std::size_t cursor) const {
     }
     auto& found = completion.candidates;
     std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.text < b.text; });
-    found.erase(std::unique(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.text == b.text; }), found.end());
+    found.erase(std::unique(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.text == b.text; }),
+                found.end());
     return completion;
 }
 

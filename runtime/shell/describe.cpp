@@ -200,7 +200,8 @@ std::vector<std::string> names_of(const Model& model, Listed kind, const Pattern
                 if (!pin->alias.empty()) names.push_back(pin->alias);
         break;
     case Listed::all:
-        for (const Listed each : {Listed::components, Listed::pins, Listed::signals, Listed::parameters, Listed::functions, Listed::threads}) {
+        for (const Listed each :
+             {Listed::components, Listed::pins, Listed::signals, Listed::parameters, Listed::functions, Listed::threads}) {
             auto more = names_of(model, each, patterns);
             std::move(more.begin(), more.end(), std::back_inserter(names));
         }
@@ -209,7 +210,8 @@ std::vector<std::string> names_of(const Model& model, Listed kind, const Pattern
     return names;
 }
 
-void describe(std::string& to, Session& session, Processes& processes, Listed kind, const Patterns& patterns, std::optional<hal_type> type) {
+void describe(std::string& to, Session& session, Processes& processes, Listed kind, const Patterns& patterns,
+              std::optional<hal_type> type) {
     switch (kind) {
     case Listed::components: return describe_components(to, session, processes, patterns);
     case Listed::pins: return describe_pins(to, session, false, patterns, type);

@@ -23,13 +23,15 @@ std::string system_reason() { return std::strerror(errno); }
 bool private_folder(const std::string& folder, Diagnostics& diagnostics) {
     struct stat about{};
     if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-        diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' cannot be made: " + system_reason(), "", "set XDG_RUNTIME_DIR to a folder of your own");
+        diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' cannot be made: " + system_reason(), "",
+                          "set XDG_RUNTIME_DIR to a folder of your own");
         return false;
     }
     if (lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) && about.st_uid == geteuid()) {
         if ((about.st_mode & 0077) == 0 || chmod(folder.c_str(), 0700) == 0) return true;
     }
-    diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' is not yours alone", "", "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
+    diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' is not yours alone", "",
+                      "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
     return false;
 }
 
@@ -44,12 +46,14 @@ std::string content_of(int file) {
 
 bool Endpoint::open(std::string_view name, Diagnostics& diagnostics) {
     if (!good_instance_name(name)) {
-        diagnostics.error("no-socket", {}, "'" + std::string(name) + "' is no name for an instance", "", "up to 64 letters, digits, -, _ and ., not beginning with a dot");
+        diagnostics.error("no-socket", {}, "'" + std::string(name) + "' is no name for an instance", "",
+                          "up to 64 letters, digits, -, _ and ., not beginning with a dot");
         return false;
     }
     path_ = socket_path(name);
     if (path_.size() >= sizeof(sockaddr_un::sun_path)) {
-        diagnostics.error("no-socket", {}, "the path of the control socket is too long: " + path_, "", "set XDG_RUNTIME_DIR to a shorter path");
+        diagnostics.error("no-socket", {}, "the path of the control socket is too long: " + path_, "",
+                          "set XDG_RUNTIME_DIR to a shorter path");
         return false;
     }
     if (private_folder(socket_folder(), diagnostics) && take_lock(name, diagnostics) && listen_at(diagnostics)) return true;
@@ -67,8 +71,9 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         }
         if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
             const std::string pid = content_of(lock_);
-            diagnostics.error("instance-running", {}, "an instance named '" + std::string(name) + "' runs already" + (pid.empty() ? "" : " (process " + pid + ")"), "",
-                              "give this one another name with --name" + (pid.empty() ? "" : ", or end that one: kill " + pid));
+            diagnostics.error("instance-running", {},
+                              "an instance named '" + std::string(name) + "' runs already" + (pid.empty() ? "" : " (process " + pid + ")"),
+                              "", "give this one another name with --name" + (pid.empty() ? "" : ", or end that one: kill " + pid));
             close(lock_);
             lock_ = -1;
             return false;
@@ -94,7 +99,9 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
     path_.copy(address.sun_path, sizeof address.sun_path - 1);
     unlink(path_.c_str());  // we hold the lock: what is there was left over by a dead process
     // The mode a socket has when it is bound becomes the file's: there is no moment at which it is open to others.
-    if (socket_ >= 0 && fchmod(socket_, 0600) == 0 && bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 && listen(socket_, 64) == 0) return true;
+    if (socket_ >= 0 && fchmod(socket_, 0600) == 0 && bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+        listen(socket_, 64) == 0)
+        return true;
     diagnostics.error("no-socket", {}, "the control socket '" + path_ + "' cannot be opened: " + system_reason());
     return false;
 }

@@ -29,7 +29,8 @@ bool read_text_file(const std::string& path, std::string& text, std::string& pro
     if (S_ISREG(about.st_mode)) text.reserve(static_cast<std::size_t>(about.st_size));
     std::array<char, 65536> part;
     ssize_t got;
-    while ((got = read(file, part.data(), part.size())) > 0 && text.size() <= most_bytes) text.append(part.data(), static_cast<std::size_t>(got));
+    while ((got = read(file, part.data(), part.size())) > 0 && text.size() <= most_bytes)
+        text.append(part.data(), static_cast<std::size_t>(got));
     if (got < 0) problem = std::strerror(errno);
     else if (got > 0) problem = "more than 1 GiB";
     close(file);

@@ -16,7 +16,11 @@ std::size_t sequence(std::string_view text) {
         if ((byte(i) & 0xC0) != 0x80) return 0;
     if (length < 3) return length;
     const unsigned char second = byte(1);  // no overlong forms, no surrogates, nothing beyond U+10FFFF
-    const bool good = first == 0xE0 ? second >= 0xA0 : first == 0xED ? second < 0xA0 : first == 0xF0 ? second >= 0x90 : first == 0xF4 ? second < 0x90 : true;
+    const bool good = first == 0xE0   ? second >= 0xA0
+                      : first == 0xED ? second < 0xA0
+                      : first == 0xF0 ? second >= 0x90
+                      : first == 0xF4 ? second < 0x90
+                                      : true;
     return good ? length : 0;
 }
 

@@ -24,7 +24,9 @@ bool is_parameter(const Pin& pin) {
     return pin.dir == HAL_DIR_PARAM || (!pin.instance && !pin.signal && pin.name.ends_with(".tmax-increased"));
 }
 
-const char* direction_text(const Pin& pin) { return pin.read_only() || (is_parameter(pin) && pin.dir != HAL_DIR_PARAM) ? "RO" : name(pin.dir); }
+const char* direction_text(const Pin& pin) {
+    return pin.read_only() || (is_parameter(pin) && pin.dir != HAL_DIR_PARAM) ? "RO" : name(pin.dir);
+}
 
 std::vector<const Pin*> pins_by_name(const Model& model, bool parameters, const Patterns& patterns) {
     std::vector<const Pin*> chosen;

@@ -56,7 +56,9 @@ std::string Processes::announce(pid_t pid, const std::string& name, std::uint64_
     if (entry && !entry->dead() && (entry->ready || entry->owner != 0)) return "a component '" + name + "' is there already";
     if (entry && entry->dead()) {
         // loadusr has entered the newcomer under a name of its own, because this one was taken: the two become one
-        const auto fresh = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return &e != entry && e.pid == pid && e.child && !e.ended && !e.ready && e.owner == 0; });
+        const auto fresh = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
+            return &e != entry && e.pid == pid && e.child && !e.ended && !e.ready && e.owner == 0;
+        });
         if (fresh != entries_.end()) {
             if (!fresh->name.empty()) session_.remove_process(fresh->name);
             entry->child = true;
@@ -76,9 +78,11 @@ std::string Processes::announce(pid_t pid, const std::string& name, std::uint64_
         entry->pins.clear();
         session_.set_process(name, pid);
     } else if (!entry) {
-        if (session_.model().find_component(name) || session_.model().find_instance(name)) return "a component '" + name + "' is there already";
+        if (session_.model().find_component(name) || session_.model().find_instance(name))
+            return "a component '" + name + "' is there already";
         entry = find(pid);
-        if (entry && entry->ready && owner == 0) return "process " + std::to_string(pid) + " is the component '" + entry->name + "' already";
+        if (entry && entry->ready && owner == 0)
+            return "process " + std::to_string(pid) + " is the component '" + entry->name + "' already";
         if (!entry || entry->ready || entry->owner != 0) entry = &entries_.emplace_back(Entry{.pid = pid});
         if (!entry->name.empty()) session_.remove_process(entry->name);
         entry->name = name;
@@ -203,7 +207,8 @@ void Processes::schedule(Entry& entry) {
     const std::int64_t now = steady_ns();
     std::erase_if(entry.restarts, [&](std::int64_t at) { return now - at > RestartPolicy::within_ns; });
     if (entry.restarts.size() >= RestartPolicy::most) {
-        entry.obituary += ", given up after " + std::to_string(RestartPolicy::most) + " restarts in " + format_duration(static_cast<double>(RestartPolicy::within_ns));
+        entry.obituary += ", given up after " + std::to_string(RestartPolicy::most) + " restarts in " +
+                          format_duration(static_cast<double>(RestartPolicy::within_ns));
         return;
     }
     entry.restart_ns = now + entry.restart.delay_ns;

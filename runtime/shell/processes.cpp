@@ -30,7 +30,8 @@ std::string with_folders(const char* variable, const std::vector<std::string>& f
     std::string all;
     for (const std::string& folder : folders) {
         std::error_code ignored;
-        if ((":" + there + ":").find(":" + folder + ":") == std::string::npos && std::filesystem::is_directory(folder, ignored)) all += folder + ":";
+        if ((":" + there + ":").find(":" + folder + ":") == std::string::npos && std::filesystem::is_directory(folder, ignored))
+            all += folder + ":";
     }
     all += there;
     if (all.ends_with(':')) all.pop_back();
@@ -48,7 +49,9 @@ std::vector<std::string> environment_of(const std::string& instance) {
         {"PYTHONPATH=", with_folders("PYTHONPATH", {std::string(paths::build_python), std::string(paths::install_python)})}};
     std::vector<std::string> all;
     for (char** entry = environ; *entry; ++entry)
-        if (std::none_of(std::begin(ours), std::end(ours), [&](const auto& one) { return std::string_view(*entry).starts_with(one.first); })) all.push_back(*entry);
+        if (std::none_of(std::begin(ours), std::end(ours),
+                         [&](const auto& one) { return std::string_view(*entry).starts_with(one.first); }))
+            all.push_back(*entry);
     for (const auto& [name, value] : ours)
         if (!value.empty()) all.push_back(name + value);
     return all;
@@ -144,7 +147,8 @@ pid_t Processes::spawn(const ProcessStart& start, std::string& problem) {
     auto arguments = start.arguments;
     auto environment = environment_of(session_.options().name);
     pid_t pid = 0;
-    const int error = posix_spawnp(&pid, program_in(environment, arguments[0]).c_str(), &actions, &attributes, pointers(arguments).data(), pointers(environment).data());
+    const int error = posix_spawnp(&pid, program_in(environment, arguments[0]).c_str(), &actions, &attributes, pointers(arguments).data(),
+                                   pointers(environment).data());
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     if (error != 0) {
@@ -179,7 +183,8 @@ Processes::Entry* Processes::find(std::string_view name) {
 }
 
 Processes::Entry* Processes::find(pid_t pid) {
-    const auto at = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.pid == pid && (!e.dead() || (e.child && !e.ended)); });
+    const auto at = std::find_if(entries_.begin(), entries_.end(),
+                                 [&](const Entry& e) { return e.pid == pid && (!e.dead() || (e.child && !e.ended)); });
     return at == entries_.end() ? nullptr : &*at;
 }
 

@@ -43,7 +43,8 @@ hal_value value_of(const Json& value, hal_type type, const std::string& of) {
 }
 
 bool good_pin_name(const std::string& name) {
-    return !name.empty() && name.size() <= longest_name && std::all_of(name.begin(), name.end(), [](unsigned char c) { return c > ' ' && c != 127 && c != '"' && c != '\\'; });
+    return !name.empty() && name.size() <= longest_name &&
+           std::all_of(name.begin(), name.end(), [](unsigned char c) { return c > ' ' && c != 127 && c != '"' && c != '\\'; });
 }
 
 OutsidePin pin_of(const Json& given, const std::string& prefix) {
@@ -57,10 +58,12 @@ OutsidePin pin_of(const Json& given, const std::string& prefix) {
     pin.type = *type;
     const std::string& dir = text_of(member(given, "dir"), "the dir of a pin");
     const auto direction = std::find_if(std::begin(directions), std::end(directions), [&](const Direction& d) { return dir == d.word; });
-    if (direction == std::end(directions)) throw Refusal{"the dir of '" + pin.name + "' must be in, out or io, or for a parameter ro or rw"};
+    if (direction == std::end(directions))
+        throw Refusal{"the dir of '" + pin.name + "' must be in, out or io, or for a parameter ro or rw"};
     pin.dir = direction->dir;
     pin.read_only = direction->read_only;
-    if (pin.type == HAL_TYPE_PORT && pin.dir != HAL_DIR_IN && pin.dir != HAL_DIR_OUT) throw Refusal{"port pin '" + pin.name + "' must be in or out"};
+    if (pin.type == HAL_TYPE_PORT && pin.dir != HAL_DIR_IN && pin.dir != HAL_DIR_OUT)
+        throw Refusal{"port pin '" + pin.name + "' must be in or out"};
     for (const auto& [key, value] : given.items()) {
         if (key == "value") pin.initial = value_of(value, pin.type, pin.name);
         else if (key == "safe") pin.safe = value_of(value, pin.type, pin.name);
@@ -81,7 +84,8 @@ Processes::Entry& owned(const Program& by, const std::string& name) {
 Pin* add_pin(const Program& by, const Processes::Entry& entry, const OutsidePin& wanted) {
     Pin* const there = by.session.model().find_pin(wanted.name);
     const bool left = there && there->name == wanted.name && there->instance && there->instance->component->process != 0 &&
-                      there->instance->component->name == entry.name && std::find(entry.pins.begin(), entry.pins.end(), there) == entry.pins.end();
+                      there->instance->component->name == entry.name &&
+                      std::find(entry.pins.begin(), entry.pins.end(), there) == entry.pins.end();
     if (left) {
         if (there->type == wanted.type && there->dir == wanted.dir && there->read_only() == wanted.read_only) {
             there->flags = wanted.safe ? there->flags | HAL_PIN_SAFE : there->flags & ~std::uint32_t{HAL_PIN_SAFE};
@@ -100,7 +104,8 @@ Pin* add_pin(const Program& by, const Processes::Entry& entry, const OutsidePin&
 
 void declare_component(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["component"], "component");
-    const Json &prefix = member(body, "prefix"), &pins = member(body, "pins"), &ready = member(body, "ready"), &timeout = member(body, "timeout_ms");
+    const Json &prefix = member(body, "prefix"), &pins = member(body, "pins"), &ready = member(body, "ready"),
+               &timeout = member(body, "timeout_ms");
     if (!ready.is_null() && !ready.is_boolean()) throw Refusal{"ready must be true or false"};
     const std::string before = prefix.is_null() ? name : text_of(prefix, "prefix");
     if (!good_pin_name(before)) throw Refusal{"'" + before.substr(0, 60) + "' is no good prefix"};
@@ -145,14 +150,16 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
 void exchange_values(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["exchange"], "exchange");
     const Json &write = member(body, "write"), &read = member(body, "read");
-    if (!write.is_null() && (!write.is_array() || write.size() % 2 != 0)) throw Refusal{"write must be an array of numbers of pins and their values, in turn"};
+    if (!write.is_null() && (!write.is_array() || write.size() % 2 != 0))
+        throw Refusal{"write must be an array of numbers of pins and their values, in turn"};
     if (!read.is_null() && !read.is_boolean()) throw Refusal{"read must be true or false"};
 
     const std::scoped_lock lock(by.session.mutex);
     const Processes::Entry& entry = owned(by, name);
     std::vector<std::pair<Pin*, hal_value>> values;
     for (std::size_t i = 0; i < write.size(); i += 2) {
-        const auto number = static_cast<std::size_t>(whole(write[i], "the number of a pin", 0, static_cast<std::int64_t>(entry.pins.size()) - 1));
+        const auto number =
+            static_cast<std::size_t>(whole(write[i], "the number of a pin", 0, static_cast<std::int64_t>(entry.pins.size()) - 1));
         Pin* const pin = entry.pins[number];
         values.emplace_back(pin, value_of(write[i + 1], pin->type, pin->name));
     }
@@ -163,7 +170,8 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
     for (Pin* const pin : entry.pins) {
         if (!own(*pin)) asked.push_back(pin);
         if (pin->dir != HAL_DIR_IN && pin->signal)
-            loops = loops || std::any_of(pin->signal->pins.begin(), pin->signal->pins.end(), [&](const Pin* other) { return other != pin && other->instance == pin->instance; });
+            loops = loops || std::any_of(pin->signal->pins.begin(), pin->signal->pins.end(),
+                                         [&](const Pin* other) { return other != pin && other->instance == pin->instance; });
     }
     const auto readings = by.session.peek_pins(asked);
     reply += ",\"values\":[";
@@ -221,7 +229,8 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
     if (!write.is_null() && pin->dir != HAL_DIR_OUT) throw Refusal{"port '" + name + "' is an input: it is read"};
     hal_port* const port = pin->signal ? pin->signal->port.get() : nullptr;
     const std::uint64_t capacity = port ? port->capacity : 0;
-    std::uint64_t head = port ? __atomic_load_n(&port->head, __ATOMIC_ACQUIRE) : 0, tail = port ? __atomic_load_n(&port->tail, __ATOMIC_ACQUIRE) : 0;
+    std::uint64_t head = port ? __atomic_load_n(&port->head, __ATOMIC_ACQUIRE) : 0,
+                  tail = port ? __atomic_load_n(&port->tail, __ATOMIC_ACQUIRE) : 0;
     // one byte stays free, as LinuxCNC has it
     const auto room = [&] { return capacity > 0 && head - tail < capacity - 1 ? capacity - 1 - (head - tail) : 0; };
     bool done = false;
@@ -240,8 +249,8 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
             __atomic_store_n(&port->head, head += bytes.size(), __ATOMIC_RELEASE);
         }
     }
-    reply += std::string(",\"done\":") + (done ? "true" : "false") + ",\"size\":" + std::to_string(capacity) + ",\"readable\":" + std::to_string(head - tail) +
-             ",\"writable\":" + std::to_string(room());
+    reply += std::string(",\"done\":") + (done ? "true" : "false") + ",\"size\":" + std::to_string(capacity) +
+             ",\"readable\":" + std::to_string(head - tail) + ",\"writable\":" + std::to_string(room());
 }
 
 // --- streams of records ----------------------------------------------------------------------------------------------------
@@ -263,7 +272,8 @@ void create_stream(const Program& by, const std::string& name, const Json& wante
     made->name = name;
     made->types = letters;
     made->memory.resize(std::size_t{depth} * (letters.size() + 1));
-    made->stream = {sizeof(hal_stream), static_cast<std::uint32_t>(letters.size()), depth, 1, made->types.c_str(), made->memory.data(), 0, 0, 0};
+    made->stream = {
+        sizeof(hal_stream), static_cast<std::uint32_t>(letters.size()), depth, 1, made->types.c_str(), made->memory.data(), 0, 0, 0};
     entry.streams.push_back(std::move(made));
 }
 
@@ -272,7 +282,8 @@ void create_stream(const Program& by, const std::string& name, const Json& wante
 void use_stream(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["stream"], "stream");
     const Json &take = member(body, "take"), &records = member(body, "records"), &create = member(body, "create");
-    if (!take.is_null() + !records.is_null() + !create.is_null() > 1) throw Refusal{"a stream is read (take), fed (records) or made (create), one at a time"};
+    if (!take.is_null() + !records.is_null() + !create.is_null() > 1)
+        throw Refusal{"a stream is read (take), fed (records) or made (create), one at a time"};
     const std::scoped_lock lock(by.session.mutex);
     if (!create.is_null()) create_stream(by, name, create, member(body, "owner"));
     hal_stream* stream = by.session.find_stream(name);
@@ -285,7 +296,10 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
         const auto more = by.shell.processes().stream_names();
         names.insert(names.end(), more.begin(), more.end());
         const std::string meant = did_you_mean(name, names);
-        throw Refusal{"there is no stream '" + name.substr(0, 60) + "'; " + (names.empty() ? "nothing here has one (sampler and streamer do)" : meant.empty() ? "there is: " + listed(names) : meant)};
+        throw Refusal{"there is no stream '" + name.substr(0, 60) + "'; " +
+                      (names.empty()   ? "nothing here has one (sampler and streamer do)"
+                       : meant.empty() ? "there is: " + listed(names)
+                                       : meant)};
     }
     std::string why;
     if (!take.is_null()) {

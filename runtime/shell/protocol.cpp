@@ -68,11 +68,11 @@ bool same(const std::vector<std::optional<Reading>>& a, const std::vector<std::o
     return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
         if (!x || !y) return !x && !y;
         return x->type == y->type && visit(x->type, x->value, [&](const auto& member) {
-                   return visit(y->type, y->value, [&](const auto& other) {
-                       if constexpr (std::is_same_v<decltype(member), decltype(other)>) return std::memcmp(&member, &other, sizeof member) == 0;
-                       else return false;
-                   });
-               });
+            return visit(y->type, y->value, [&](const auto& other) {
+                if constexpr (std::is_same_v<decltype(member), decltype(other)>) return std::memcmp(&member, &other, sizeof member) == 0;
+                else return false;
+            });
+        });
     });
 }
 
@@ -155,7 +155,8 @@ const Verb& verb_of(const Json& body) {
         const auto verb = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return entry.key() == v.name; });
         if (verb == std::end(verbs)) continue;
         if (found && listed_in(found->members, verb->name)) continue;  // read is a member of exchange, too
-        if (found && !listed_in(verb->members, found->name)) throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
+        if (found && !listed_in(verb->members, found->name))
+            throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
         found = verb;
     }
     if (!found) {
@@ -165,7 +166,8 @@ const Verb& verb_of(const Json& body) {
     }
     for (auto entry = body.begin(); entry != body.end(); ++entry) {
         const std::string& key = entry.key();
-        if (key != "id" && key != found->name && !listed_in(found->members, key)) throw Refusal{"'" + key.substr(0, 60) + "' is no member of a request to " + found->name};
+        if (key != "id" && key != found->name && !listed_in(found->members, key))
+            throw Refusal{"'" + key.substr(0, 60) + "' is no member of a request to " + found->name};
     }
     return *found;
 }
@@ -268,7 +270,8 @@ void Connection::State::set(const Json& body, std::string& reply) {
     const std::scoped_lock lock(session.mutex);
     Diagnostics diagnostics;
     for (Command& command : commands) {
-        if (!session.model().find_pin(command.args[0].text) && session.model().find_signal(command.args[0].text)) command.name.text = "sets";
+        if (!session.model().find_pin(command.args[0].text) && session.model().find_signal(command.args[0].text))
+            command.name.text = "sets";
         if (!check_lock(*find_command(command.name.text), command, session.lock, diagnostics)) break;
         session.apply(command, diagnostics);
     }
@@ -283,14 +286,17 @@ void Connection::State::subscribe(const Json& body, std::string& reply) {
     const std::int64_t every_ms = every.is_null() ? 100 : whole(every, "every_ms", 1, 3'600'000);
     const Json& changes = member(body, "changes");
     if (!changes.is_null() && !changes.is_boolean()) throw Refusal{"changes must be true or false"};
-    if (subscriptions.size() >= most_subscriptions) throw Refusal{"a client has at most " + std::to_string(most_subscriptions) + " subscriptions"};
-    subscriptions.push_back({next_subscription++, std::move(names), every_ms * 1'000'000, steady_ns(), changes.is_boolean() && changes.get<bool>()});
+    if (subscriptions.size() >= most_subscriptions)
+        throw Refusal{"a client has at most " + std::to_string(most_subscriptions) + " subscriptions"};
+    subscriptions.push_back(
+        {next_subscription++, std::move(names), every_ms * 1'000'000, steady_ns(), changes.is_boolean() && changes.get<bool>()});
     reply += ",\"subscription\":" + std::to_string(subscriptions.back().id);
 }
 
 void Connection::State::unsubscribe(const Json& body, std::string&) {
     const auto id = static_cast<std::uint64_t>(whole(body["unsubscribe"], "unsubscribe", 1, std::numeric_limits<std::int64_t>::max()));
-    if (std::erase_if(subscriptions, [&](const Subscription& s) { return s.id == id; }) == 0) throw Refusal{"there is no subscription " + std::to_string(id)};
+    if (std::erase_if(subscriptions, [&](const Subscription& s) { return s.id == id; }) == 0)
+        throw Refusal{"there is no subscription " + std::to_string(id)};
 }
 
 namespace {
@@ -335,7 +341,8 @@ void Connection::State::describe_kind(const Json& body, std::string& reply) {
 void Connection::State::complete(const Json& body, std::string& reply) {
     const std::string& line = text_of(body["complete"], "complete");
     const Json& cursor = member(body, "cursor");
-    const auto at = cursor.is_null() ? line.size() : static_cast<std::size_t>(whole(cursor, "cursor", 0, std::numeric_limits<std::int32_t>::max()));
+    const auto at =
+        cursor.is_null() ? line.size() : static_cast<std::size_t>(whole(cursor, "cursor", 0, std::numeric_limits<std::int32_t>::max()));
     const Completion completion = shell.complete(line, at);
     reply += ",\"begin\":" + std::to_string(completion.begin) + ",\"candidates\":[";
     for (const Candidate& candidate : completion.candidates) {
@@ -385,7 +392,9 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         ++state.rubbish;
         return refuse(body.is_discarded() ? "this is not JSON; a request is one JSON object in one line" : "a request is a JSON object");
     }
-    if (const Json& given = member(body, "id"); given.is_number() || (given.is_string() && given.get_ref<const std::string&>().size() <= 200)) id = dumped(given);
+    if (const Json& given = member(body, "id");
+        given.is_number() || (given.is_string() && given.get_ref<const std::string&>().size() <= 200))
+        id = dumped(given);
     const std::size_t before = replies.size();
     try {
         const Verb& verb = verb_of(body);
@@ -441,7 +450,8 @@ void Connection::publish(std::int64_t now_ns, bool congested, std::string& event
             time_ns = state_->session.now_ns();
         }
         if (subscription.changes_only && same(readings, subscription.last)) continue;
-        events += "{\"event\":\"values\",\"subscription\":" + std::to_string(subscription.id) + ",\"time_ns\":" + std::to_string(time_ns) + ",\"values\":";
+        events += "{\"event\":\"values\",\"subscription\":" + std::to_string(subscription.id) + ",\"time_ns\":" + std::to_string(time_ns) +
+                  ",\"values\":";
         state_->append_values(events, readings);
         if (subscription.skipped > 0) events += ",\"skipped\":" + std::to_string(std::exchange(subscription.skipped, 0));
         events += "}\n";

@@ -26,7 +26,8 @@ std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes)
 
 /// Edits that leave nothing in the model that points into their text.
 bool makes_nothing(const Command& command) {
-    static constexpr std::string_view names[] = {"setp", "sets", "delf", "delsig", "unlinkp", "unalias", "unload", "unloadrt", "reload", "delthread"};
+    static constexpr std::string_view names[] = {"setp",    "sets",   "delf",     "delsig", "unlinkp",
+                                                 "unalias", "unload", "unloadrt", "reload", "delthread"};
     if (!command.args.empty() && command.args[0].text == "=") return true;
     return std::find(std::begin(names), std::end(names), command.name.text) != std::end(names);
 }
@@ -88,7 +89,8 @@ void Script::take_part(std::uint32_t source, Parsed& parsed) {
         std::vector<std::string> names;
         for (const NodeLine& node : nodes) names.push_back(node.name);
         parsed.problems.clear();  // of a text that is nobody's; $(NODE) has no value here
-        parsed.problems.error("several-nodes", line->span, "this netlist is for " + counted(nodes.size(), "machine") + ": " + listed(names, 100), "",
+        parsed.problems.error("several-nodes", line->span,
+                              "this netlist is for " + counted(nodes.size(), "machine") + ": " + listed(names, 100), "",
                               "hal run " + session_.sources.get(source).name + " --node " + names.front() + " loads the part of one");
     }
     parsed.commands.clear();
@@ -105,7 +107,8 @@ int Script::run(std::uint32_t source) {
         const std::size_t lost = state_.collected.size();
         state_.collecting = false;
         state_.collected.clear();
-        pending_.error("open-transaction", {}, "'begin' without 'commit': " + counted(lost, "collected edit") + " did not take effect", "", "end the row of edits with commit");
+        pending_.error("open-transaction", {}, "'begin' without 'commit': " + counted(lost, "collected edit") + " did not take effect", "",
+                       "end the row of edits with commit");
         finish();
     }
     if (separately() && errors_ > 0 && file && shell_.options.level != Level::nothing)
@@ -137,7 +140,8 @@ void Script::run_line(const Command& command) {
     const CommandRow* const row = row_of(command);
     if (!row) {
         const bool argument = command.name.text.find('=') != std::string::npos;
-        pending_.error("unknown-command", command.name.span, "there is no command '" + command.name.text + "'", did_you_mean(command.name.text, command_names()),
+        pending_.error("unknown-command", command.name.span, "there is no command '" + command.name.text + "'",
+                       did_you_mean(command.name.text, command_names()),
                        argument ? "an assignment has blanks around the =: NAME = VALUE" : "`help` lists all commands");
         return;
     }
@@ -172,7 +176,8 @@ void Script::act(const Command& command, const CommandRow& row) {
     }
     if (!check_lock(row, command, session_.lock, pending_)) return finish();
     // Commands about one thing take a range of them: getp pid.[0..2].output
-    const bool about_one = row.handler == command_getp || row.handler == command_gets || row.handler == command_ptype || row.handler == command_stype;
+    const bool about_one =
+        row.handler == command_getp || row.handler == command_gets || row.handler == command_ptype || row.handler == command_stype;
     const auto plain = about_one ? expand(command, pending_) : std::vector<Command>{command};
     for (const Command& one : plain) {
         if (one.args.size() > 1 && about_one) {  // a range among the arguments is a list of names
@@ -196,10 +201,12 @@ void Script::transaction(const Command& command) {
     const std::string& name = command.name.text;
     if (name == "begin") {
         if (state_.collecting)
-            pending_.error("open-transaction", command.name.span, "edits are being collected already", "", "`commit` makes them take effect, `abort` forgets them");
+            pending_.error("open-transaction", command.name.span, "edits are being collected already", "",
+                           "`commit` makes them take effect, `abort` forgets them");
         state_.collecting = true;
     } else if (!state_.collecting) {
-        pending_.error("no-transaction", command.name.span, "there is nothing to " + name + ": no 'begin' came before", "", "`begin` starts to collect edits");
+        pending_.error("no-transaction", command.name.span, "there is nothing to " + name + ": no 'begin' came before", "",
+                       "`begin` starts to collect edits");
     } else {
         state_.collecting = false;
         const auto collected = std::exchange(state_.collected, {});
@@ -225,7 +232,8 @@ void Script::source(Context& context) {
     const std::string canonical = canonical_path(path);
     for (auto open = files_.begin(); open != files_.end(); ++open) {
         if (open->path != canonical) continue;
-        Diagnostic found{Severity::error, "recursive-source", "'" + given + "' is being read already", {{context.span(0), "reads it again"}}, {}};
+        Diagnostic found{
+            Severity::error, "recursive-source", "'" + given + "' is being read already", {{context.span(0), "reads it again"}}, {}};
         for (auto inner = open + 1; inner != files_.end(); ++inner) found.labels.push_back({inner->at, "reached from here"});
         context.diagnostics.add(std::move(found));
         return;
@@ -253,7 +261,8 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
             else if (is_include(command)) {
                 const std::string path = resolve_path(command.args[0].text, shell_.options.directory);
                 std::string content, problem;
-                const bool again = std::any_of(files_.begin(), files_.end(), [&](const Open& open) { return open.path == canonical_path(path); });
+                const bool again =
+                    std::any_of(files_.begin(), files_.end(), [&](const Open& open) { return open.path == canonical_path(path); });
                 if (again || !read_text_file(path, content, problem)) {
                     rest.push_back(std::move(command));  // run in its turn, it says what is wrong
                     continue;
@@ -338,7 +347,8 @@ void Script::report(Diagnostics& found, std::size_t edits, bool took_effect) {
 
 bool Script::interrupted(Context& context) {
     if (!state_.cancelled.load(std::memory_order_relaxed)) return false;
-    if (!context.diagnostics.failed()) context.diagnostics.error("interrupted", context.command.span, "'" + context.command.name.text + "' was interrupted");
+    if (!context.diagnostics.failed())
+        context.diagnostics.error("interrupted", context.command.span, "'" + context.command.name.text + "' was interrupted");
     return true;
 }
 

@@ -91,7 +91,9 @@ struct Server::State {
     void collect_worker(Client& client);
     void send_out(Client& client);
     void leave(Client& client);
-    bool listens_to(const Client& client) const { return client.waiting() <= options.queue && client.in.size() - client.taken <= options.max_request; }
+    bool listens_to(const Client& client) const {
+        return client.waiting() <= options.queue && client.in.size() - client.taken <= options.max_request;
+    }
     void log(const std::string& sentence) const {
         if (options.log) options.log(sentence);
     }
@@ -229,7 +231,8 @@ void Server::State::receive(Client& client) {
     client.in += text;
     if (client.in.size() > options.max_request && client.line_end() == std::string::npos) {
         ++rubbish;
-        client.out += "{\"id\":null,\"ok\":false,\"error\":\"the request is longer than " + std::to_string(options.max_request) + " bytes\"}\n";
+        client.out +=
+            "{\"id\":null,\"ok\":false,\"error\":\"the request is longer than " + std::to_string(options.max_request) + " bytes\"}\n";
         client.in.clear();
         client.in.shrink_to_fit();
         client.searched = 0;
@@ -323,7 +326,8 @@ void Server::State::send_out(Client& client) {
     if (client.stalled_since == 0) client.stalled_since = now;
     if (now - client.stalled_since < std::int64_t{options.stall_ms} * 1'000'000) return;
     ++dropped;
-    log("a client was dropped: " + std::to_string(client.waiting()) + " bytes of replies waited and it read nothing for " + std::to_string(options.stall_ms) + " ms");
+    log("a client was dropped: " + std::to_string(client.waiting()) + " bytes of replies waited and it read nothing for " +
+        std::to_string(options.stall_ms) + " ms");
     leave(client);
 }
 

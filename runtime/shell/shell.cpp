@@ -40,9 +40,11 @@ private:
 void ProcessOutput::out(std::string_view text) { write_all(stdout, stderr, text); }
 void ProcessOutput::err(std::string_view text) { write_all(stderr, stdout, text); }
 
-Shell::Shell(Session& session, ShellOptions o) : options(std::move(o)), state_(new State{session, std::make_shared<Processes>(session), false, {}, false, {}, {}}) {}
+Shell::Shell(Session& session, ShellOptions o)
+    : options(std::move(o)), state_(new State{session, std::make_shared<Processes>(session), false, {}, false, {}, {}}) {}
 
-Shell::Shell(Shell& sibling, ShellOptions o) : options(std::move(o)), state_(new State{sibling.session(), sibling.state_->processes, false, {}, false, {}, {}}) {}
+Shell::Shell(Shell& sibling, ShellOptions o)
+    : options(std::move(o)), state_(new State{sibling.session(), sibling.state_->processes, false, {}, false, {}, {}}) {}
 
 Shell::~Shell() = default;
 
@@ -88,9 +90,11 @@ int cannot_read(Shell& shell, Output& output, const std::string& path, const std
 int Shell::run_file(const std::string& path, Output& output) {
     if (path.ends_with(".ini")) return run_ini(path, output);
     if (path.ends_with(".tcl"))
-        return cannot_read(*this, output, path, "it is a Tcl script", "unsupported-file", "only .hal and .ini files are read; loops and name lists are written with [0..5] and {x,y,z}");
+        return cannot_read(*this, output, path, "it is a Tcl script", "unsupported-file",
+                           "only .hal and .ini files are read; loops and name lists are written with [0..5] and {x,y,z}");
     std::string text, problem;
-    if (!read_text_file(resolve_path(path, options.directory), text, problem)) return cannot_read(*this, output, path, problem, "unreadable-file", "");
+    if (!read_text_file(resolve_path(path, options.directory), text, problem))
+        return cannot_read(*this, output, path, problem, "unreadable-file", "");
     return run_text(path, std::move(text), output);
 }
 
@@ -98,7 +102,8 @@ int Shell::read_ini(const std::string& path, Output& output) {
     Diagnostics diagnostics;
     const std::scoped_lock lock(state_->session.mutex);
     Ini ini = Ini::read(state_->session.sources, resolve_path(path, options.directory), diagnostics);
-    if (!diagnostics.all().empty() && options.level != Level::nothing) output.err(render(diagnostics, state_->session.sources, options.color));
+    if (!diagnostics.all().empty() && options.level != Level::nothing)
+        output.err(render(diagnostics, state_->session.sources, options.color));
     if (diagnostics.failed()) return 1;
     state_->session.ini = std::move(ini);
     return 0;
@@ -120,8 +125,10 @@ int Shell::run_ini(const std::string& path, Output& output) {
             file = (library ? std::string(library) + "/" : "") + file.substr(4);
         }
         if (file.ends_with(".tcl")) {
-            status = cannot_read(*this, output, file, "it is a Tcl script", "unsupported-file", "write it as a .hal file; loops become ranges: pid.[0..5].command");
-        } else if (const std::string name = resolve_path(file, folder_of(path)); read_text_file(resolve_path(file, options.directory), text, problem)) {
+            status = cannot_read(*this, output, file, "it is a Tcl script", "unsupported-file",
+                                 "write it as a .hal file; loops become ranges: pid.[0..5].command");
+        } else if (const std::string name = resolve_path(file, folder_of(path));
+                   read_text_file(resolve_path(file, options.directory), text, problem)) {
             texts.emplace_back(name, std::move(text));
         } else {
             status = cannot_read(*this, output, file, problem, "unreadable-file", "named by [HAL]HALFILE in " + path);

@@ -67,7 +67,8 @@ bool feed_records(hal_stream& stream, const std::vector<std::vector<std::string>
     std::vector<hal_value> parsed;
     for (std::size_t i = 0; i < records.size(); ++i) {
         if (records[i].size() != columns.size()) {
-            why = "record " + std::to_string(i) + " has " + std::to_string(records[i].size()) + " values, the stream " + std::to_string(columns.size());
+            why = "record " + std::to_string(i) + " has " + std::to_string(records[i].size()) + " values, the stream " +
+                  std::to_string(columns.size());
             return false;
         }
         for (std::size_t c = 0; c < columns.size(); ++c) {

@@ -30,7 +30,8 @@ void component_has_the_files_name(const Checking& c) {
 }
 
 void license_is_given(const Checking& c) {
-    if (c.tree.license.empty()) c.error(c.tree.name.given() ? c.tree.name.span : c.first, "the file gives no license", "", "add: license \"GPL\";");
+    if (c.tree.license.empty())
+        c.error(c.tree.name.given() ? c.tree.name.span : c.first, "the file gives no license", "", "add: license \"GPL\";");
 }
 
 // The two name spaces of a netlist that a component's names go into.
@@ -39,7 +40,10 @@ void netlist_names_differ(const Checking& c) {
     const auto claim = [&](std::map<std::string, Span>& names, const std::string& name, Span at) {
         const auto [other, added] = names.emplace(name, at);
         if (added || other->second.begin == at.begin) return;
-        c.found.add({Severity::error, "bad-component-source", "the name '" + name + "' is there already", {{at, "again"}, {other->second, "first"}},
+        c.found.add({Severity::error,
+                     "bad-component-source",
+                     "the name '" + name + "' is there already",
+                     {{at, "again"}, {other->second, "first"}},
                      {"netlists see - for _, and no - or . at the end"}});
     };
     for (const Item& item : c.tree.items) {
@@ -48,26 +52,34 @@ void netlist_names_differ(const Checking& c) {
     }
     for (const Function& function : c.tree.functions) {
         claim(functions, function.name.hal, function.name.span);
-        for (const char* time : {"time", "tmax", "tmax-increased"}) claim(items, function.name.hal.empty() ? time : function.name.hal + "." + time, function.name.span);
+        for (const char* time : {"time", "tmax", "tmax-increased"})
+            claim(items, function.name.hal.empty() ? time : function.name.hal + "." + time, function.name.span);
     }
 }
 
 void c_names_differ(const Checking& c) {
-    static constexpr const char* reserved[] = {"comp_id", "fperiod", "rtapi_app_main", "rtapi_app_exit", "extra_setup", "extra_cleanup", "post_export"};
-    static constexpr const char* keywords[] = {"auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float",
-                                               "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof",
-                                               "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while"};
+    static constexpr const char* reserved[] = {"comp_id",     "fperiod",       "rtapi_app_main", "rtapi_app_exit",
+                                               "extra_setup", "extra_cleanup", "post_export"};
+    static constexpr const char* keywords[] = {
+        "auto",   "break",  "case",   "char",   "const",   "continue", "default",  "do",       "double",   "else",   "enum",  "extern",
+        "float",  "for",    "goto",   "if",     "inline",  "int",      "long",     "register", "restrict", "return", "short", "signed",
+        "sizeof", "static", "struct", "switch", "typedef", "union",    "unsigned", "void",     "volatile", "while"};
     std::map<std::string, Span> names;
     const auto claim = [&](const Name& name) {
         const bool keyword = std::find(std::begin(keywords), std::end(keywords), name.c) != std::end(keywords);
         if (keyword || name.c.starts_with("__comp_") || std::find(std::begin(reserved), std::end(reserved), name.c) != std::end(reserved))
-            return c.error(name.span, "the C code cannot use the name '" + name.c + "'", keyword ? "a word of C" : "taken by what hal compile adds",
+            return c.error(name.span, "the C code cannot use the name '" + name.c + "'",
+                           keyword ? "a word of C" : "taken by what hal compile adds",
                            "with a '_' behind it the netlist's name stays the same: " + name.text + "_");
         if (name.c.empty() || (name.c[0] >= '0' && name.c[0] <= '9'))
             return c.error(name.span, "the C code cannot use '" + name.text + "' as a name");
         const auto [other, added] = names.emplace(name.c, name.span);
         if (added) return;
-        c.found.add({Severity::error, "bad-component-source", "the C code would know two things as '" + name.c + "'", {{name.span, "second"}, {other->second, "first"}}, {}});
+        c.found.add({Severity::error,
+                     "bad-component-source",
+                     "the C code would know two things as '" + name.c + "'",
+                     {{name.span, "second"}, {other->second, "first"}},
+                     {}});
     };
     for (const Item& item : c.tree.items) claim(item.name);
     for (const Function& function : c.tree.functions) claim(function.name);
@@ -78,9 +90,11 @@ void arrays_have_their_hash(const Checking& c) {
     for (const Item& item : c.tree.items) {
         const std::size_t first = item.name.text.find('#'), behind = item.name.text.find_first_not_of('#', first);
         if (first == std::string::npos && item.size != 0)
-            c.error(item.name.span, "the names of the array '" + item.name.text + "' have no place for the number", "", "write " + item.name.text + "-#");
+            c.error(item.name.span, "the names of the array '" + item.name.text + "' have no place for the number", "",
+                    "write " + item.name.text + "-#");
         else if (first != std::string::npos && item.size == 0)
-            c.error(item.name.span, "'" + item.name.text + "' has a place for a number but is no array", "", "give its size: " + item.name.text + "[4]");
+            c.error(item.name.span, "'" + item.name.text + "' has a place for a number but is no array", "",
+                    "give its size: " + item.name.text + "[4]");
         else if (first != std::string::npos && behind != std::string::npos && item.name.text.find('#', behind) != std::string::npos)
             c.error(item.name.span, "'" + item.name.text + "' has two places for one number");
     }
@@ -89,13 +103,17 @@ void arrays_have_their_hash(const Checking& c) {
 void expressions_know_the_personality_only(const Checking& c) {
     const auto look = [&](const Text& expression) {
         for (std::size_t i = 0; i < expression.text.size(); ++i) {
-            const auto letter = [&](std::size_t at) { return at < expression.text.size() && (std::isalnum(static_cast<unsigned char>(expression.text[at])) || expression.text[at] == '_'); };
+            const auto letter = [&](std::size_t at) {
+                return at < expression.text.size() &&
+                       (std::isalnum(static_cast<unsigned char>(expression.text[at])) || expression.text[at] == '_');
+            };
             if (!letter(i)) continue;
             std::size_t end = i;
             while (letter(end)) ++end;
             const std::string word = expression.text.substr(i, end - i);
             if (!std::isdigit(static_cast<unsigned char>(word[0])) && word != "personality")
-                return c.error(expression.span, "a condition knows numbers and the personality, not '" + word + "'", "", "for instance: if personality & 0x100");
+                return c.error(expression.span, "a condition knows numbers and the personality, not '" + word + "'", "",
+                               "for instance: if personality & 0x100");
             i = end;
         }
     };
@@ -105,17 +123,21 @@ void expressions_know_the_personality_only(const Checking& c) {
 void ports_have_no_start(const Checking& c) {
     for (const Item& item : c.tree.items)
         if (item.type == HAL_TYPE_PORT && (item.start.given() || item.parameter))
-            c.error(item.start.given() ? item.start.span : item.name.span, item.parameter ? "a parameter cannot be a port" : "a port has no start value");
+            c.error(item.start.given() ? item.start.span : item.name.span,
+                    item.parameter ? "a parameter cannot be a port" : "a port has no start value");
 }
 
 void functions_are_there(const Checking& c) {
     if (c.tree.has("userspace") && !c.tree.functions.empty())
-        return c.error(c.tree.functions[0].name.span, "a program has no functions for threads", "", "its user_mainloop() does all, or leave out: option userspace");
+        return c.error(c.tree.functions[0].name.span, "a program has no functions for threads", "",
+                       "its user_mainloop() does all, or leave out: option userspace");
     const Option* const app = c.tree.option("rtapi_app");
     if (app && !app->on() && find_word(c.code, "rtapi_app_main") == std::string_view::npos)
-        c.error(app->name.span, "the C code has no rtapi_app_main() for this option", "", "write: int rtapi_app_main(void) { … export(\"name\", 0) … }");
+        c.error(app->name.span, "the C code has no rtapi_app_main() for this option", "",
+                "write: int rtapi_app_main(void) { … export(\"name\", 0) … }");
     if (!c.tree.code.known() && !c.tree.functions.empty())
-        return c.error(c.tree.functions[0].name.span, "the file has no C code for its functions", "", "write it behind a line that consists of ;;");
+        return c.error(c.tree.functions[0].name.span, "the file has no C code for its functions", "",
+                       "write it behind a line that consists of ;;");
     if (implicit_function(c.tree, c.code)) return;
     for (const Function& function : c.tree.functions) {
         bool there = false;
@@ -126,7 +148,8 @@ void functions_are_there(const Checking& c) {
             there = find_word(inside, function.name.c) != std::string_view::npos;
         }
         if (!there)
-            c.error(function.name.span, "the C code does not define function '" + function.name.text + "'", "", "write: FUNCTION(" + function.name.c + ") { … }");
+            c.error(function.name.span, "the C code does not define function '" + function.name.text + "'", "",
+                    "write: FUNCTION(" + function.name.c + ") { … }");
     }
 }
 
@@ -135,14 +158,17 @@ void hooks_are_there(const Checking& c) {
     struct Hook {
         const char *option, *word, *text;
     };
-    for (const Hook& hook : {Hook{"extra_setup", "EXTRA_SETUP", "EXTRA_SETUP() { … return 0; }"}, Hook{"extra_cleanup", "EXTRA_CLEANUP", "EXTRA_CLEANUP() { … }"},
-                             Hook{"post_export", "POST_EXPORT", "POST_EXPORT() { … return 0; }"}, Hook{"count_function", "get_count", "int get_count(void) { … }"},
+    for (const Hook& hook : {Hook{"extra_setup", "EXTRA_SETUP", "EXTRA_SETUP() { … return 0; }"},
+                             Hook{"extra_cleanup", "EXTRA_CLEANUP", "EXTRA_CLEANUP() { … }"},
+                             Hook{"post_export", "POST_EXPORT", "POST_EXPORT() { … return 0; }"},
+                             Hook{"count_function", "get_count", "int get_count(void) { … }"},
                              Hook{"userspace", "user_mainloop", "void user_mainloop(void) { for (;;) { … } }"},
                              Hook{"userinit", "userinit", "void userinit(int argc, char **argv) { … }"}}) {
         const std::size_t at = find_word(c.code, hook.word);
         const bool there = at != std::string_view::npos;
         if (c.tree.has(hook.option) && !there)
-            c.error(c.tree.option(hook.option)->name.span, "the C code has no " + std::string(hook.word) + " for this option", "", "write: " + std::string(hook.text));
+            c.error(c.tree.option(hook.option)->name.span, "the C code has no " + std::string(hook.word) + " for this option", "",
+                    "write: " + std::string(hook.text));
         if (!c.tree.has(hook.option) && there && std::string_view(hook.option) != "count_function") {
             const auto begin = static_cast<std::uint32_t>(c.tree.code.begin + at);
             const Span span{c.tree.code.source, begin, begin + static_cast<std::uint32_t>(std::string_view(hook.word).size())};
@@ -152,9 +178,25 @@ void hooks_are_there(const Checking& c) {
 }
 
 void options_are_known(const Checking& c) {
-    static const std::vector<std::string> known{
-        "singleton", "default_count", "count_function", "rtapi_app", "data", "extra_setup", "extra_cleanup", "post_export", "userspace", "userinit",
-        "extra_link_args", "extra_compile_args", "constructable", "no_convenience_defines", "default_personality", "personality", "homemod", "tpmod", "period"};
+    static const std::vector<std::string> known{"singleton",
+                                                "default_count",
+                                                "count_function",
+                                                "rtapi_app",
+                                                "data",
+                                                "extra_setup",
+                                                "extra_cleanup",
+                                                "post_export",
+                                                "userspace",
+                                                "userinit",
+                                                "extra_link_args",
+                                                "extra_compile_args",
+                                                "constructable",
+                                                "no_convenience_defines",
+                                                "default_personality",
+                                                "personality",
+                                                "homemod",
+                                                "tpmod",
+                                                "period"};
     for (const Option& option : c.tree.options)
         if (std::find(known.begin(), known.end(), option.name.text) == known.end()) {
             std::string help = did_you_mean(option.name.text, known);
@@ -170,8 +212,10 @@ void numbers_are_numbers(const Checking& c) {
         const std::string& text = option->value.text;
         const bool hex = text.starts_with("0x") && std::string_view(name) == "default_personality";
         const std::string digits = hex ? text.substr(2) : text;
-        if (digits.empty() || digits.size() > 8 || digits.find_first_not_of(hex ? "0123456789abcdefABCDEF" : "0123456789") != std::string::npos)
-            c.error(option->value.given() ? option->value.span : option->name.span, "option " + std::string(name) + " takes a whole number");
+        if (digits.empty() || digits.size() > 8 ||
+            digits.find_first_not_of(hex ? "0123456789abcdefABCDEF" : "0123456789") != std::string::npos)
+            c.error(option->value.given() ? option->value.span : option->name.span,
+                    "option " + std::string(name) + " takes a whole number");
     }
 }
 
@@ -180,14 +224,17 @@ void it_can_be_made(const Checking& c) {
     const auto refuse = [&](const char* option, bool asked, std::string why, std::string help) {
         if (asked) c.found.error("unsupported-component", c.tree.option(option)->name.span, std::move(why), "", std::move(help));
     };
-    refuse("homemod", c.tree.has("homemod"), "this is a part of LinuxCNC's motion controller, which is not here", "only components that need nothing but HAL can be compiled");
-    refuse("tpmod", c.tree.has("tpmod"), "this is a part of LinuxCNC's motion controller, which is not here", "only components that need nothing but HAL can be compiled");
+    refuse("homemod", c.tree.has("homemod"), "this is a part of LinuxCNC's motion controller, which is not here",
+           "only components that need nothing but HAL can be compiled");
+    refuse("tpmod", c.tree.has("tpmod"), "this is a part of LinuxCNC's motion controller, which is not here",
+           "only components that need nothing but HAL can be compiled");
 }
 
 }  // namespace
 
 void check(const Tree& tree, const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) {
-    const Checking c{tree, sources.get(source).name, tree.code.known() ? sources.text(tree.code) : std::string_view(), diagnostics, {source, 0, 0}};
+    const Checking c{
+        tree, sources.get(source).name, tree.code.known() ? sources.text(tree.code) : std::string_view(), diagnostics, {source, 0, 0}};
     options_are_known(c);
     it_can_be_made(c);
     if (diagnostics.failed()) return;

@@ -33,8 +33,9 @@ std::string inline_text(std::string_view line) {
             const std::string_view name = line.substr(i + 1, 2);
             i += 2;
             static constexpr std::pair<std::string_view, const char*> characters[] = {
-                {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"}, {"di", "÷"}, {"+-", "±"}, {"<=", "≤"}, {">=", "≥"}, {"!=", "≠"}, {"->", "→"},
-                {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""}, {"lq", "“"}, {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"}, {"sr", "√"}};
+                {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"}, {"di", "÷"}, {"+-", "±"}, {"<=", "≤"},
+                {">=", "≥"}, {"!=", "≠"}, {"->", "→"}, {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""},
+                {"lq", "“"}, {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"}, {"sr", "√"}};
             for (const auto& [key, character] : characters)
                 if (key == name) out += character;
         } else if (c == 'e' || c == '\\') out += '\\';
@@ -112,8 +113,9 @@ private:
         if (name == "nf" || name == "EX") verbatim(true);
         else if (name == "fi" || name == "EE") verbatim(false);
         else if (name == "P" || name == "PP" || name == "LP" || name == "sp" || name == "RS" || name == "RE") paragraph();
-        else if (name == "br") { if (!out_.empty() && !verbatim_) out_ += out_.ends_with('\n') ? (out_.insert(out_.size() - 1, "\\"), "") : "\\\n"; }
-        else if (name == "TP" || name == "TQ") paragraph(), tag_ = true;
+        else if (name == "br") {
+            if (!out_.empty() && !verbatim_) out_ += out_.ends_with('\n') ? (out_.insert(out_.size() - 1, "\\"), "") : "\\\n";
+        } else if (name == "TP" || name == "TQ") paragraph(), tag_ = true;
         else if (name == "IP" || name == "HP") {
             paragraph();
             const std::string mark = words.empty() ? "" : plain(words[0]);
@@ -128,7 +130,9 @@ private:
                 out_ += mark + words[i] + mark;
             }
             out_ += '\n';
-        } else if (name.empty() || name.starts_with("\\\"") || name == "TH" || name == "ft" || name == "ad" || name == "na" || name == "in" || name == "ti") return;
+        } else if (name.empty() || name.starts_with("\\\"") || name == "TH" || name == "ft" || name == "ad" || name == "na" ||
+                   name == "in" || name == "ti")
+            return;
         else (out_ += inline_text(line)) += '\n';  // not a macro after all: ".5 is a half"
     }
     static std::string plain(std::string text) {
@@ -166,7 +170,8 @@ std::string line_of(std::string_view text) {
 std::string manual(const Tree& tree) {
     std::string all = joined(tree.description, "\n\n");
     const auto section = [&](const char* title, const std::vector<Text>& texts, const char* between) {
-        if (const std::string text = joined(texts, between); !text.empty()) all += (all.empty() ? "## " : "\n\n## ") + std::string(title) + "\n\n" + text;
+        if (const std::string text = joined(texts, between); !text.empty())
+            all += (all.empty() ? "## " : "\n\n## ") + std::string(title) + "\n\n" + text;
     };
     // what an instance without load arguments does not show
     std::vector<Text> personal;

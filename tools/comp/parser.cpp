@@ -88,7 +88,8 @@ Tree Parser::parse() {
 bool Parser::declaration() {
     if (in_.take(';')) return true;  // an empty one
     const Text keyword = in_.word();
-    if (!keyword.given()) return fail("a declaration starts with a word: pin, param, function, …", "put C code behind a line that consists of ;;");
+    if (!keyword.given())
+        return fail("a declaration starts with a word: pin, param, function, …", "put C code behind a line that consists of ;;");
     const Keyword* found = nullptr;
     std::vector<std::string> all;
     for (const Keyword& row : keywords) {
@@ -153,7 +154,8 @@ bool Parser::array(Item& item) {
     const auto read = std::from_chars(size.text.data() + (hex ? 2 : 0), end, item.size, hex ? 16 : 10);
     if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 || item.size > largest_array) {
         item.size = 1;
-        in_.error(size.given() ? size.span : in_.here(), "the size of an array is a whole number from 1 to " + std::to_string(largest_array), "",
+        in_.error(size.given() ? size.span : in_.here(),
+                  "the size of an array is a whole number from 1 to " + std::to_string(largest_array), "",
                   "what depends on the personality stands behind it: [16 : personality & 0xff]");
     }
     if (in_.take(':')) {
@@ -186,7 +188,8 @@ bool Parser::item(const Text& keyword) {
     else for (const Direction& row : of_pins) look(row);
     if (!known) {
         const Span at = word.given() ? word.span : in_.here();
-        if (item.parameter) in_.error(at, "a parameter is r (the component sets it) or rw", "", "param rw float gain = 1.0 \"what it is\";");
+        if (item.parameter)
+            in_.error(at, "a parameter is r (the component sets it) or rw", "", "param rw float gain = 1.0 \"what it is\";");
         else in_.error(at, "a pin is in, out or io", "", "pin in float angle \"what it is\";");
         return false;
     }
@@ -220,7 +223,8 @@ bool Parser::variable(const Text&) {
     if (!variable.type.given()) return fail("here the type of the variable is missing", "variable double old;");
     while (in_.take('*')) variable.stars += '*';
     const Text written = in_.word();
-    if (!written.given()) return fail("here the name of the variable is missing", "the type is one word: use a typedef for struct, long long, …");
+    if (!written.given())
+        return fail("here the name of the variable is missing", "the type is one word: use a typedef for struct, long long, …");
     variable.name = spelled(written);
     variable.name.c = written.text;
     while (in_.take('[')) {  // several make a table
@@ -256,7 +260,9 @@ bool Parser::modparam(const Text&) {
     Parameter parameter;
     const Text type = in_.word();
     if (!(type == "int") && !(type == "dummy"))
-        return in_.error(type.given() ? type.span : in_.here(), "a module parameter is int, or dummy when the C code declares it", "", "modparam int channels = 4 \"what it is\";"), false;
+        return in_.error(type.given() ? type.span : in_.here(), "a module parameter is int, or dummy when the C code declares it", "",
+                         "modparam int channels = 4 \"what it is\";"),
+               false;
     parameter.dummy = type == "dummy";
     parameter.name = in_.word();
     if (!parameter.name.given()) return fail("here the name of the parameter is missing");
@@ -280,14 +286,17 @@ template <std::vector<Text> Tree::* list>
 bool Parser::prose(const Text& keyword) {
     Text text;
     doc(text);
-    if (!text.given()) return fail("here a text is missing", keyword.text + " \"a line\"; or " + keyword.text + " \"\"\"several lines\"\"\";");
+    if (!text.given())
+        return fail("here a text is missing", keyword.text + " \"a line\"; or " + keyword.text + " \"\"\"several lines\"\"\";");
     (tree_.*list).push_back(std::move(text));
     return true;
 }
 
 }  // namespace
 
-bool Option::on() const { return value.text != "no" && value.text != "No" && value.text != "NO" && value.text != "0" && value.text != "false"; }
+bool Option::on() const {
+    return value.text != "no" && value.text != "No" && value.text != "NO" && value.text != "0" && value.text != "false";
+}
 
 const Option* Tree::option(std::string_view wanted) const {
     const Option* found = nullptr;

@@ -14,7 +14,9 @@ bool is_hal(char c) { return is_letter(c) || is_digit(c) || c == '#' || c == '.'
 void append_utf8(std::string& to, unsigned long code) {
     if (code < 0x80) to += static_cast<char>(code);
     else if (code < 0x800) (to += static_cast<char>(0xC0 | (code >> 6))) += static_cast<char>(0x80 | (code & 0x3F));
-    else ((to += static_cast<char>(0xE0 | (code >> 12))) += static_cast<char>(0x80 | ((code >> 6) & 0x3F))) += static_cast<char>(0x80 | (code & 0x3F));
+    else
+        ((to += static_cast<char>(0xE0 | (code >> 12))) += static_cast<char>(0x80 | ((code >> 6) & 0x3F))) +=
+            static_cast<char>(0x80 | (code & 0x3F));
 }
 
 // The escapes that C and Python have in common; any other backslash is one.
@@ -190,7 +192,9 @@ Text Scanner::expression(std::string_view stops) {
         }
         std::size_t length = comparison || starts("!=") || starts("<=") || starts(">=") ? 2 : 1;
         if (is_letter(c) || is_digit(c)) {
-            while (at_ + length < text_.size() && (is_letter(text_[at_ + length]) || is_digit(text_[at_ + length]) || text_[at_ + length] == '.')) ++length;
+            while (at_ + length < text_.size() &&
+                   (is_letter(text_[at_ + length]) || is_digit(text_[at_ + length]) || text_[at_ + length] == '.'))
+                ++length;
             if (depth == 0 && text_.substr(at_, length) == "if") break;
         } else if (c == '\'') {
             const std::size_t close = text_.find('\'', at_ + 2);

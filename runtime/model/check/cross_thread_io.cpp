@@ -11,9 +11,12 @@ void check_cross_thread_io(const Model& model, Diagnostics& diagnostics) {
             if (!thread) continue;
             if (!first) first = pin;
             if (thread == thread_of(*first)) continue;
-            Diagnostic d{Severity::note, "cross-thread-io",
-                         "I/O pins of '" + signal->name + "' are in threads '" + thread_of(*first)->name + "' and '" + thread->name + "': not coherent with its neighbours",
-                         {{pin->linked_at, "in " + thread->name}, {first->linked_at, "in " + thread_of(*first)->name}}, {}};
+            Diagnostic d{Severity::note,
+                         "cross-thread-io",
+                         "I/O pins of '" + signal->name + "' are in threads '" + thread_of(*first)->name + "' and '" + thread->name +
+                             "': not coherent with its neighbours",
+                         {{pin->linked_at, "in " + thread->name}, {first->linked_at, "in " + thread_of(*first)->name}},
+                         {}};
             diagnostics.add(std::move(d));
             break;
         }

@@ -11,10 +11,12 @@ void check_periods(const Model& model, Diagnostics& diagnostics) {
         const std::int64_t period = thread->options.period_ns;
         if (period % base == 0) continue;
         const std::int64_t lower = period / base * base;
-        Diagnostic d{Severity::error, "period-multiple",
-                     "the period of thread '" + thread->name + "' (" + std::to_string(period) + " ns) is not a multiple of the fastest's (" + fastest.name + ", " +
-                         std::to_string(base) + " ns)",
-                     {{thread->made, ""}}, {}};
+        Diagnostic d{Severity::error,
+                     "period-multiple",
+                     "the period of thread '" + thread->name + "' (" + std::to_string(period) +
+                         " ns) is not a multiple of the fastest's (" + fastest.name + ", " + std::to_string(base) + " ns)",
+                     {{thread->made, ""}},
+                     {}};
         if (fastest.made.known()) d.labels.push_back({fastest.made, "fastest thread"});
         d.help.push_back("use " + std::to_string(lower) + " or " + std::to_string(lower + base));
         diagnostics.add(std::move(d));

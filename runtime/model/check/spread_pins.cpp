@@ -15,9 +15,10 @@ void check_spread_pins(const Model& model, Diagnostics& diagnostics) {
                 if (!function->thread) continue;
                 if (!first) first = function;
                 if (function->thread == first->thread) continue;
-                Diagnostic d{Severity::error, "spread-pins",
-                             "functions of '" + instance->name + "' are in two threads, '" + first->thread->name + "' and '" + function->thread->name + "', but its pin '" +
-                                 shared->name + "' belongs to all of them",
+                Diagnostic d{Severity::error,
+                             "spread-pins",
+                             "functions of '" + instance->name + "' are in two threads, '" + first->thread->name + "' and '" +
+                                 function->thread->name + "', but its pin '" + shared->name + "' belongs to all of them",
                              {{function->added, "in " + function->thread->name}, {first->added, "in " + first->thread->name}},
                              {"add both to one thread: addf " + function->name + " " + first->thread->name}};
                 diagnostics.add(std::move(d));

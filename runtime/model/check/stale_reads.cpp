@@ -68,7 +68,9 @@ std::vector<Delay> delays(const Model& model) {
                 const Thread* const from = thread_of(*writer);
                 if (!from || !to) kind = Kind::unscheduled;
                 else if (from != to) kind = Kind::other_thread;
-                else kind = positions.of(*writer, later) < positions.of(*reader, later) || writer->of_thread ? Kind::same_cycle : Kind::next_cycle;
+                else
+                    kind = positions.of(*writer, later) < positions.of(*reader, later) || writer->of_thread ? Kind::same_cycle
+                                                                                                            : Kind::next_cycle;
             } else if (signal->ios != 0) {
                 kind = Kind::cell;
             }
@@ -89,8 +91,10 @@ void check_stale_reads(const Model& model, Diagnostics& diagnostics) {
     }
     if (names.empty()) return;
     diagnostics.note("stale-read", first,
-                     names.size() == 1 ? "signal '" + names.front() + "' is read one cycle late: its reader runs before its writer"
-                                       : std::to_string(names.size()) + " signals are read one cycle late, their readers run before their writers: " + listed(names, 6),
+                     names.size() == 1
+                         ? "signal '" + names.front() + "' is read one cycle late: its reader runs before its writer"
+                         : std::to_string(names.size()) +
+                               " signals are read one cycle late, their readers run before their writers: " + listed(names, 6),
                      names.size() == 1 ? "" : "the first", "show latency tells it of every link; addf --auto chooses the order");
 }
 

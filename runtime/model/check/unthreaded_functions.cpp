@@ -10,11 +10,13 @@ void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics) {
         for (const auto& function : component->functions) {
             if (function->thread) continue;
             const bool linked = std::any_of(function->instances.begin(), function->instances.end(), [&](const Instance* instance) {
-                return std::any_of(instance->pins.begin(), instance->pins.end(), [&](const auto& pin) { return pin->signal && (!pin->function || pin->function == function.get()); });
+                return std::any_of(instance->pins.begin(), instance->pins.end(),
+                                   [&](const auto& pin) { return pin->signal && (!pin->function || pin->function == function.get()); });
             });
             if (!linked) continue;
             const std::string thread = model.threads.empty() ? "THREAD" : model.threads.back()->name;
-            diagnostics.warning("unthreaded-function", function->instances.front()->loaded, "function '" + function->name + "' is in no thread, so its linked pins stand still", "",
+            diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
+                                "function '" + function->name + "' is in no thread, so its linked pins stand still", "",
                                 "addf " + function->name + " " + thread);
         }
 }

@@ -23,7 +23,8 @@ class Queue {
 
 public:
     /// Room for at least `capacity` items. [setup]
-    explicit Queue(std::size_t capacity) : mask_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity) - 1), items_(std::make_unique<T[]>(mask_ + 1)) {}
+    explicit Queue(std::size_t capacity)
+        : mask_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity) - 1), items_(std::make_unique<T[]>(mask_ + 1)) {}
 
     /// False, and nothing done, when full. [realtime] writer
     bool push(const T& item) noexcept {
