@@ -57,6 +57,7 @@ void Device::reset_communication(Time now) noexcept {
     sync_.set_active(false);
     pdos_.set_operational(false, now);
     srdos_.set_operational(false, now);
+    emcy_.clear(0x8150);
     emcy_.reset(false);
     emcy_consumer_.reset();
     sync_.reset();
@@ -159,7 +160,11 @@ void Device::handle(const Frame& f, Time now) noexcept {
         return;
     }
     if (!usable(node_id_)) return;
-    if (error_control_.handle(f, now, events_) || state_ == NmtState::stopped) return;
+    if (error_control_.handle(f, now, events_)) {
+        if (error_control_.collided()) emcy_.raise(0x8150, error_communication, {node_id_});
+        return;
+    }
+    if (state_ == NmtState::stopped) return;
     if (sync_.handle(f, now)) return take_sync(now);
     if (srdos_.handle(f, now)) return;
     for (auto& s : servers_)

@@ -67,6 +67,9 @@ constexpr std::uint32_t map_entry(std::uint16_t index, std::uint8_t sub, unsigne
     return std::uint32_t{index} << 16 | std::uint32_t{sub} << 8 | bits;
 }
 
+/// What stands in the count of a mapping when the PDO is a multiplexed one: each frame names the object whose value it carries.
+enum class Multiplex : std::uint8_t { none = 0, from_source = 0xfe, to_destination = 0xff };
+
 /// Communication and mapping parameters of one PDO.
 struct PdoDescription {
     std::uint32_t cob = 0;             ///< 0: the predefined one of PDO 1–4, none of the others
@@ -75,6 +78,7 @@ struct PdoDescription {
     std::uint16_t inhibit_100us = 0, event_ms = 0;
     std::uint8_t sync_start = 0;
     std::vector<std::uint32_t> mapping{};
+    Multiplex multiplex = Multiplex::none;  ///< with it `mapping` is empty
     unsigned room = 8;                 ///< entries that can be mapped, at least those of `mapping`, at most 64
 };
 /// PDO `number` counts from 1. [setup]

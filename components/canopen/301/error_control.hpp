@@ -30,6 +30,8 @@ public:
 
     /// Every node of 1016h is heard. Nodes not heard yet do not count as lost.
     bool all_alive() const noexcept { return lost_ == 0 && !life_lost_; }
+    /// Somebody else sent with our node-id since communication was reset.
+    bool collided() const noexcept { return collided_; }
 
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
     void written(Entry&) noexcept override;

@@ -44,6 +44,8 @@ public:
     virtual void on_rpdo(unsigned number, Time) noexcept { (void)number; }
     /// It did not come within its event timer.
     virtual void on_rpdo_late(unsigned number, Time) noexcept { (void)number; }
+    /// It came with fewer bytes than are mapped and was not processed. Told once, until one of the right length has come.
+    virtual void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept { (void)number, (void)bytes; }
     virtual void on_node(std::uint8_t node, NodeEvent, NmtState, Time) noexcept { (void)node; }
     virtual void on_emergency(std::uint8_t node, const Emergency&) noexcept { (void)node; }
     /// A communication error after which outputs belong in their safe state: heartbeat or guarding lost, bus off.

@@ -2,11 +2,12 @@
 #include "pdo.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace hal::canopen {
 
 namespace {
-constexpr std::uint16_t rpdo_base = 0x1400, tpdo_base = 0x1800, mapping_offset = 0x200;
+constexpr std::uint16_t rpdo_base = 0x1400, tpdo_base = 0x1800, mapping_offset = 0x200, scanner_first = 0x1fa0, scanner_last = 0x1fcf;
 constexpr bool event_driven(std::uint8_t transmission) noexcept { return transmission >= 254; }
 constexpr bool on_request(std::uint8_t transmission) noexcept { return transmission == 252 || transmission == 253; }
 constexpr bool synchronous(std::uint8_t transmission) noexcept { return transmission <= 240; }
@@ -40,6 +41,9 @@ Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, Events& events, 
             tpdos_.emplace_back(n, room_of(static_cast<std::uint16_t>(tpdo_base + mapping_offset + n - 1)));
         }
     }
+    bool scans = false;
+    for (unsigned list = scanner_first; list <= scanner_last; ++list) scans = dictionary.handle(static_cast<std::uint16_t>(list), *this) || scans;
+    if (scans) scanned_.reserve(most_scanned);
     index_identifiers();
 }
 
@@ -116,6 +120,7 @@ void Pdos::reset(std::uint8_t node_id) noexcept {
         read_communication(p);
         read_mapping(p, false);
     }
+    read_scanner_list();
     index_identifiers();
 }
 
@@ -126,6 +131,7 @@ void Pdos::set_operational(bool operational, Time now) noexcept {
     synced_ = 0;
     for (auto& p : rpdos_) p.fresh = p.supervised = p.late = false;
     for (auto& p : tpdos_) restart(p, now);
+    for (auto& s : scanned_) s.told = false;
 }
 
 Abort Pdos::check_communication(const Entry& e, std::span<const std::uint8_t> value, bool received, Pdo& p) noexcept {
@@ -166,6 +172,7 @@ Abort Pdos::check_mapping(const Entry& e, std::span<const std::uint8_t> value, b
 }
 
 Abort Pdos::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
+    if (e.index >= scanner_first) return Abort::none;
     const bool received = e.index < tpdo_base;
     const unsigned number = ((e.index - (received ? rpdo_base : tpdo_base)) & 0x1ff) + 1U;
     Pdo* p = nullptr;
@@ -177,6 +184,7 @@ Abort Pdos::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
 }
 
 void Pdos::written(Entry& e) noexcept {
+    if (e.index >= scanner_first) return read_scanner_list();
     const bool received = e.index < tpdo_base, mapping = (e.index & mapping_offset) != 0;
     const unsigned number = ((e.index - (received ? rpdo_base : tpdo_base)) & 0x1ff) + 1U;
     if (received) {
@@ -228,7 +236,7 @@ bool Pdos::receive(Rpdo& p, const Frame& f, Time now) noexcept {
     if (f.length != bytes) {
         const Emcy::Bytes about{static_cast<std::uint8_t>(p.number), static_cast<std::uint8_t>(p.number >> 8), f.length, bytes};
         if (f.length < bytes) {
-            p.wrong_length = true;
+            if (!std::exchange(p.wrong_length, true)) events_.on_rpdo_short(p.number, f.length, now);
             emcy_.raise(0x8210, error_communication, about);
             return false;
         }
@@ -238,17 +246,20 @@ bool Pdos::receive(Rpdo& p, const Frame& f, Time now) noexcept {
         if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.wrong_length; }))
             emcy_.clear(0x8210), emcy_.clear(0x8220);
     }
-    p.last = now;
-    p.supervised = true;
-    if (p.late) {
-        p.late = false;
-        if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.late; })) emcy_.clear(0x8250);
-    }
+    came(p, now);
     if (!synchronous(p.transmission)) return take_over(p, data_of(f), now), true;
     if (window_ != 0 && synced_ != 0 && now - synced_ > window_) return false;  // came too late for its SYNC
     p.image = data_of(f);
     p.fresh = true;
     return true;
+}
+
+/// Its deadline begins anew.
+void Pdos::came(Rpdo& p, Time now) noexcept {
+    p.last = now;
+    p.supervised = true;
+    if (!std::exchange(p.late, false)) return;
+    if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.late; })) emcy_.clear(0x8250);
 }
 
 void Pdos::take_over(Rpdo& p, std::uint64_t image, Time now) noexcept {
@@ -274,6 +285,7 @@ bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
             emcy_.raise(0x8230, error_communication, {f.data[1], f.data[2], f.data[3]});
             return false;
         }
+        emcy_.clear(0x8230);
     } else {
         if (p.kind != Kind::from_source) return false;
         // 1FD0h–1FFFh: block size, own object, and node and object of the producer, from the highest byte down.
@@ -290,7 +302,7 @@ bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
         }
         if (!found) return true;  // of no concern here
     }
-    p.last = now;
+    came(p, now);
     ++p.count;
     events_.on_rpdo(p.number, now);
     return true;
@@ -380,6 +392,7 @@ void Pdos::poll(Time now) noexcept {
     now_ = now;
     if (!operational_) return;
     for (auto& p : tpdos_) {
+        if (p.valid() && p.kind == Kind::from_source && event_driven(p.transmission)) scan(p, now);
         if (!p.valid() || p.kind != Kind::plain) continue;
         if (p.again && synchronous(p.transmission)) {
             if (window_ != 0 && now - synced_ > window_) p.again = false;
@@ -426,6 +439,36 @@ bool Pdos::send_from(unsigned number, std::uint16_t index, std::uint8_t sub) noe
     if (!out_.push(f)) return false;
     ++p->count, p->last = now_;
     return true;
+}
+
+/// Rows of 1FA0h–1FCFh: block size, index and first sub-index of objects here, from the highest byte down.
+void Pdos::read_scanner_list() noexcept {
+    scanned_.clear();
+    for (unsigned list = scanner_first; list <= scanner_last; ++list) {
+        for (const auto& row : dictionary_.object(static_cast<std::uint16_t>(list))) {
+            const auto value = row.sub != 0 && row.size == 4 ? load<std::uint32_t>(row.data) : 0;
+            if (value == 0) continue;
+            for (unsigned n = 0; n < std::max(value >> 24, 1U) && (value & 0xff) + n <= 0xff; ++n) {
+                Entry* e = dictionary_.find(static_cast<std::uint16_t>(value >> 8), static_cast<std::uint8_t>((value & 0xff) + n));
+                if (e != nullptr && e->tpdo && e->size <= 4 && scanned_.size() < scanned_.capacity()) scanned_.push_back({e});
+            }
+        }
+    }
+}
+
+/// In turn, so that one that changes all the time keeps none of the others back.
+void Pdos::scan(Tpdo& p, Time now) noexcept {
+    for (std::size_t n = scanned_.size(); n > 0; --n, next_scanned_ = (next_scanned_ + 1) % scanned_.size()) {
+        auto& s = scanned_[next_scanned_ % scanned_.size()];
+        std::uint32_t value = 0;
+        if (s.entry->handler != nullptr) s.entry->handler->reading(*s.entry);
+        std::memcpy(&value, s.entry->data, s.entry->size);
+        if (s.told && value == s.said) continue;
+        if (p.sent_once && now - p.last < p.inhibit) return;
+        if (!send_from(p.number, s.entry->index, s.entry->sub)) return;
+        s.said = value, s.told = p.sent_once = true;
+        p.last = now;
+    }
 }
 
 Pdos::Status Pdos::rpdo(unsigned number) const noexcept {

@@ -42,7 +42,7 @@ public:
     bool send_on_change(unsigned number, bool on = true) noexcept;
     /// Asks the producer of RPDO `number` for it by a remote frame. [realtime]
     bool request(unsigned number) noexcept;
-    /// A multiplexed PDO by TPDO `number`: to an object of node `destination` (0: all), or of one of ours to whom it concerns. [realtime]
+    /// A multiplexed PDO by TPDO `number`, besides those of the scanner list, which are sent by themselves: to an object of node `destination` (0: all), or of one of ours to whom it concerns. [realtime]
     bool send_to(unsigned number, std::uint8_t destination, std::uint16_t index, std::uint8_t sub, std::uint32_t value) noexcept;
     bool send_from(unsigned number, std::uint16_t index, std::uint8_t sub) noexcept;
 
@@ -87,6 +87,13 @@ private:
         using Pdo::Pdo;
     };
     static constexpr std::size_t extended_slot = 2048;
+    /// An object of the scanner list 1FA0h–1FCFh: a multiplexed TPDO that tells sources tells it whenever it changes.
+    struct Scanned {
+        Entry* entry = nullptr;
+        std::uint32_t said = 0;
+        bool told = false;  // since the node is operational
+    };
+    static constexpr std::size_t most_scanned = 1024;
 
     Rpdo* find_rpdo(unsigned number) noexcept;
     Tpdo* find_tpdo(unsigned number) noexcept;
@@ -98,6 +105,9 @@ private:
     bool receive(Rpdo&, const Frame&, Time now) noexcept;
     bool receive_multiplexed(Rpdo&, const Frame&, Time now) noexcept;
     void take_over(Rpdo&, std::uint64_t image, Time now) noexcept;
+    void came(Rpdo&, Time now) noexcept;
+    void read_scanner_list() noexcept;
+    void scan(Tpdo&, Time now) noexcept;
     bool send(Tpdo&, std::uint64_t image, Time now) noexcept;
     Abort check_communication(const Entry&, std::span<const std::uint8_t>, bool received, Pdo&) noexcept;
     Abort check_mapping(const Entry&, std::span<const std::uint8_t>, bool received, Pdo&) noexcept;
@@ -112,6 +122,8 @@ private:
     Time now_ = 0, window_ = 0, synced_ = 0;
     std::vector<Rpdo> rpdos_;
     std::vector<Tpdo> tpdos_;
+    std::vector<Scanned> scanned_;  // its room is taken in setup, where there is such a list
+    std::size_t next_scanned_ = 0;
     std::array<std::int16_t, most + 1> rpdo_of_{}, tpdo_of_{};               // number to place, -1: none
     std::array<std::int16_t, extended_slot + 1> rpdo_heads_{}, tpdo_heads_{};  // identifier to the first place; 29-bit ones share one
 };

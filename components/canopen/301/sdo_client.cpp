@@ -68,7 +68,8 @@ void SdoClient::give_up(Abort why) noexcept {
     finish(why);
 }
 
-/// A transfer that broke for a reason that need not come again is begun anew.
+/// A transfer that broke for a reason that need not come again is begun anew; by segments where nobody asked for blocks, because some
+/// servers have them and cannot do them.
 void SdoClient::broke(Abort why, bool there) noexcept {
     if (restarts_left_ == 0) {
         if (!there) send_initiate(0x80, static_cast<std::uint32_t>(why));
@@ -77,7 +78,7 @@ void SdoClient::broke(Abort why, bool there) noexcept {
     if (!there) send_initiate(0x80, static_cast<std::uint32_t>(why));
     --restarts_left_;
     ++retries_, ++first_->retries;
-    begin_mode(in_block_);
+    begin_mode(in_block_ && first_->mode == SdoMode::block);
 }
 
 void SdoClient::send(const Bytes& bytes) noexcept {

@@ -17,7 +17,7 @@
 namespace hal::canopen {
 
 enum class SdoMode : std::uint8_t {
-    automatic,  ///< downloads of many bytes go by blocks, the rest expedited or by segments
+    automatic,  ///< downloads of many bytes go by blocks, the rest expedited or by segments; by segments, too, when blocks broke
     segmented,
     block,      ///< by segments when the server refuses
 };

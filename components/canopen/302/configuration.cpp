@@ -19,9 +19,10 @@ std::vector<ObjectWrite> pdo_writes(std::uint16_t communication, unsigned number
     std::uint32_t cob = wished.cob;
     if (cob == 0) cob = number <= 4 ? predefined + (number - 1) * 0x100 + node : cob_invalid;
     else if (wished.plus_node_id) cob += node;
-    if (wished.mapping.empty()) cob |= cob_invalid;
+    const bool multiplexed = wished.multiplex != Multiplex::none;
+    if (wished.mapping.empty() && !multiplexed) cob |= cob_invalid;
     std::vector<ObjectWrite> writes{object_write(index, 1, cob | cob_invalid, pdo + "COB-ID")};
-    if (wished.mapping.empty()) return writes;
+    if (wished.mapping.empty() && !multiplexed) return writes;
     const auto add = [&](std::uint16_t at, std::uint8_t sub, auto value, const std::string& name) -> ObjectWrite& {
         writes.push_back(object_write(at, sub, value, pdo + name));
         return writes.back();
@@ -29,7 +30,7 @@ std::vector<ObjectWrite> pdo_writes(std::uint16_t communication, unsigned number
     add(mapping, 0, std::uint8_t{0}, "mapping");
     for (std::size_t n = 0; n < wished.mapping.size(); ++n)
         add(mapping, static_cast<std::uint8_t>(n + 1), wished.mapping[n], "entry " + std::to_string(n + 1));
-    add(mapping, 0, static_cast<std::uint8_t>(wished.mapping.size()), "mapping");
+    add(mapping, 0, multiplexed ? static_cast<std::uint8_t>(wished.multiplex) : static_cast<std::uint8_t>(wished.mapping.size()), "mapping");
     add(index, 2, wished.transmission, "transmission type");
     add(index, 3, wished.inhibit_100us, "inhibit time").optional = wished.inhibit_100us == 0;
     add(index, 5, wished.event_ms, "event timer").optional = wished.event_ms == 0;

@@ -35,6 +35,8 @@ Master::Node::Node(const NodeSetup& node_setup, RemoteNode& remote, Master& mast
     request_.context = this;
     request_.on_done = [](SdoRequest&, void* self) noexcept { static_cast<Node*>(self)->answered(); };
     make_groups();
+    patience(0);
+    if (setup.sdo_resends >= 0) remote_.sdo().settings().resends = static_cast<unsigned>(setup.sdo_resends);
     std::size_t longest = std::max<std::size_t>(64, setup.program.version.size() + 16);
     for (const auto& w : setup.writes) longest = std::max(longest, w.data.size() + 1);
     room_.resize(longest);
@@ -85,7 +87,7 @@ void Master::Node::unwatch() noexcept {
 
 /// Some answers take longer than usual: flash is written first. 0: as usual.
 void Master::Node::patience(Time time) noexcept {
-    remote_.sdo().settings().timeout = std::max(time, master_.setup_.sdo.timeout);
+    remote_.sdo().settings().timeout = std::max(time, setup.sdo_timeout > 0 ? setup.sdo_timeout : master_.setup_.sdo.timeout);
 }
 
 void Master::Node::leave(Step step, Cause cause) noexcept {

@@ -47,6 +47,8 @@ struct NodeSetup {
     bool restore = false;         ///< factory settings before it is configured (1011h; 1F81h bit 7)
     bool save = false;            ///< when something was written, it is saved (1010h)
     NodeProgram program{};            ///< (1F81h bits 5 and 6)
+    Time sdo_timeout = 0;             ///< of this node; 0: MasterSetup::sdo
+    int sdo_resends = -1;             ///< of this node; below 0: MasterSetup::sdo
 
     std::uint16_t heartbeat_ms = 100;   ///< what it shall produce (1017h); 0: its own, if any, counts
     Time heartbeat_limit = 0;           ///< silence that is a loss; 0: two and a half of its periods; < 0: it is not watched

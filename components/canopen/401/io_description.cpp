@@ -140,6 +140,9 @@ Description io_description(const IoSettings& s) {
     add_analog_outputs(d, s.analog_outputs);
     add_pdos(d, add_rpdo, 0x6200, s.digital_outputs, 0x6411, s.analog_outputs);
     add_pdos(d, add_tpdo, 0x6000, s.digital_inputs, 0x6401, s.analog_inputs);
+    constexpr std::uint8_t scanned = 20;  // every block of inputs
+    d.add(0x1fa0, 0, u8, Access::constant, scanned, "Highest sub-index");
+    for (std::uint8_t n = 1; n <= scanned; ++n) d.add(0x1fa0, n, Type::unsigned32, rw, 0, "Scanned object");
     return d;
 }
 

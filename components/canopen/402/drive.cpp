@@ -83,6 +83,7 @@ void Drive::on_sync_lost(Time now) noexcept { also_.on_sync_lost(now); }
 void Drive::on_time(const TimeOfDay& time, Time now) noexcept { also_.on_time(time, now); }
 void Drive::on_rpdo(unsigned number, Time now) noexcept { also_.on_rpdo(number, now); }
 void Drive::on_rpdo_late(unsigned number, Time now) noexcept { also_.on_rpdo_late(number, now); }
+void Drive::on_rpdo_short(unsigned number, unsigned bytes, Time now) noexcept { also_.on_rpdo_short(number, bytes, now); }
 void Drive::on_node(std::uint8_t node, NodeEvent event, NmtState state, Time now) noexcept { also_.on_node(node, event, state, now); }
 void Drive::on_emergency(std::uint8_t node, const Emergency& emergency) noexcept { also_.on_emergency(node, emergency); }
 void Drive::on_life_guarding(bool lost, Time now) noexcept { also_.on_life_guarding(lost, now); }

@@ -136,6 +136,7 @@ private:
     void on_time(const TimeOfDay&, Time) noexcept override;
     void on_rpdo(unsigned number, Time) noexcept override;
     void on_rpdo_late(unsigned number, Time) noexcept override;
+    void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override;
     void on_node(std::uint8_t node, NodeEvent, NmtState, Time) noexcept override;
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
     void on_communication_error(Time) noexcept override;

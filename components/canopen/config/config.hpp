@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "../301/description.hpp"
 #include "../302/flying.hpp"
 #include "../302/setup.hpp"
 
@@ -83,6 +84,8 @@ struct Pdo {
     std::uint8_t        transmission = 255;
     std::uint16_t       inhibit_100us = 0, event_ms = 0;
     std::uint8_t        sync_start = 0;
+    Multiplex           multiplex = Multiplex::none;  ///< what the node sends from itself, or receives for its objects, one in each frame
+    Time                request = 0;  ///< one the node sends: how often it is asked for by a remote frame; 0: it is not
     Time                limit = 0;  ///< one the node sends: silence that is a fault; 0: none
     std::vector<Object> objects;
     Place               at{};
@@ -90,13 +93,15 @@ struct Pdo {
 
     bool     synchronous() const { return transmission <= 240; }
     unsigned bits() const;
-    unsigned bytes() const { return (bits() + 7) / 8; }
+    unsigned bytes() const { return multiplexed() ? 8 : (bits() + 7) / 8; }
+    bool     multiplexed() const { return multiplex != Multiplex::none; }
 };
 
 struct Node {
     NodeSetup        setup;
     std::string      name;  ///< of its pins
     std::vector<Pdo> pdos;
+    bool             dated_by_content = false;  ///< 1020h gets a number made of what is written instead of a date
     Place            at{};
 };
 

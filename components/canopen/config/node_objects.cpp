@@ -180,6 +180,7 @@ bool NodeReader::set_safe(Object& o, const Line& line) {
 void NodeReader::finish_objects() {
     std::set<std::string>      pins;
     std::vector<const Object*> seen;
+    std::vector<std::string>   told_alone;  // by multiplexed PDOs
     for (Pdo& pdo : node_.pdos)
         for (Object& o : pdo.objects) {
             if (o.filler) continue;
@@ -189,6 +190,10 @@ void NodeReader::finish_objects() {
             if (lines && o.bit_pins.empty()) name_bits(o);
             // A second PDO with the same object shares its pins.
             const bool again = std::any_of(seen.begin(), seen.end(), [&](const Object* s) { return s->same(o); });
+            if (again && (pdo.multiplexed() || std::find(told_alone.begin(), told_alone.end(), o.pin) != told_alone.end()))
+                report_.error(Topic::object, pdo.at, "object '" + o.pin + "' is in two PDOs, and one of them is a multiplexed one",
+                              "leave it in one of the two");
+            if (pdo.multiplexed()) told_alone.push_back(o.pin);
             if (again) continue;
             seen.push_back(&o);
             const auto claim = [&](const std::string& name) {
@@ -207,7 +212,7 @@ void NodeReader::leftover() {
         "serial", "mandatory", "configure", "keep-alive", "start", "start-order", "restore", "save",
         "boot-time", "retry", "retry-most", "on-failure", "on-loss", "heartbeat", "silence", "guarding",
         "watch-master", "firmware", "firmware-number", "firmware-id", "firmware-version", "firmware-time", "tpdo1", "rpdo1", "tsrdo1", "rsrdo2",
-        "write OBJECT"};
+        "sdo-timeout", "sdo-retries", "configured", "write OBJECT", "command OBJECT"};
     for (Line* line : keys_.rest()) {
         line->used = true;
         const std::string near = did_you_mean(line->key.text, all);

@@ -2,7 +2,10 @@
 #include "node_reader.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <utility>
 
 #include "../306/concise.hpp"
 #include "../311/xdd.hpp"
@@ -30,6 +33,27 @@ std::string upper(std::string text) {
     return text;
 }
 constexpr const char* type_words = "u8, u16, u32, u64, i8, i16, i32, i64, real32, real64 or bool";
+
+/// "2026-03-01", "2026-03-01 14:30", "2026-03-01 14:30:05" as 1020h has it: days since 1984-01-01, and ms since midnight.
+std::optional<std::pair<std::uint32_t, std::uint32_t>> since_1984(const std::string& text) {
+    using namespace std::chrono;
+    int      read = 0, hour = 0, minute = 0, second = 0, y = 0;
+    unsigned m = 0, d = 0;
+    if (std::sscanf(text.c_str(), "%4d-%2u-%2u%n", &y, &m, &d, &read) != 3) return {};
+    int more = 0;
+    if (std::sscanf(text.c_str() + read, " %2d:%2d%n", &hour, &minute, &more) == 2) {
+        read += std::exchange(more, 0);
+        std::sscanf(text.c_str() + read, ":%2d%n", &second, &more);
+        read += more;
+    }
+    const year_month_day date{year(y), month(m), day(d)};
+    if (static_cast<std::size_t>(read) != text.size() || !date.ok() || hour < 0 || hour > 23 || minute < 0 || minute > 59 || second < 0 ||
+        second > 59)
+        return {};
+    const auto days = (sys_days(date) - sys_days(year(1984) / 1 / 1)).count();
+    if (days < 1 || days > 0xffff) return {};
+    return std::pair(static_cast<std::uint32_t>(days), static_cast<std::uint32_t>(((hour * 60 + minute) * 60 + second) * 1000));
+}
 
 /// INDEX or INDEX:SUB with a hexadecimal index; none when it is something else.
 std::optional<std::pair<std::uint16_t, std::uint8_t>> address(std::string_view text, bool& has_sub) {
@@ -89,6 +113,7 @@ void NodeReader::read() {
     object_options();
     finish_objects();
     leftover();
+    scanner_list();
     for (Pdo& pdo : node_.pdos)
         if (!pdo.safety) configure(pdo);
     configure_srdos();
@@ -135,6 +160,15 @@ void NodeReader::settings() {
     keys_.take_flag("restore", s.restore);
     keys_.take_flag("save", s.save);
     keys_.take_small("start-order", s.start_order, 0, 127);
+    keys_.take_time("sdo-timeout", s.sdo_timeout, millisecond, 60 * second);
+    keys_.take_small("sdo-retries", s.sdo_resends, 0, 20);
+    if (const Line* line = keys_.find("configured")) {
+        const std::string text = lower(line->value.text);
+        const auto        date = since_1984(text);
+        node_.dated_by_content = text == "by-content";
+        if (date) s.configuration_date = date->first, s.configuration_time = date->second;
+        else if (!node_.dated_by_content && text != "no") keys_.refuse(*line, "by-content, a date such as 2026-03-01 14:30, or no");
+    }
     keys_.take_time("boot-time", s.boot_limit, millisecond, 3600 * second);
     keys_.take_time("retry", s.retry, millisecond, 3600 * second);
     keys_.take_time("retry-most", s.retry_most, millisecond, 3600 * second);
@@ -188,22 +222,45 @@ void NodeReader::writes() {
     if (bus_.sync_counter != 0) agree(0x1019, bus_.sync_counter);
     if (bus_.sync_window != 0) agree(0x1007, static_cast<std::uint32_t>(bus_.sync_window / microsecond));
     if (bus_.sync_cob != 0x80) agree(0x1005, bus_.sync_cob);
-    if (eds_ != nullptr && eds_->commissioning) {
-        const auto configuration = eds::configuration_of(*eds_, node_.setup.id);
-        for (const auto& w : configuration.writes)
-            if ((w.index < 0x1400 || w.index > 0x1bff) && w.index != 0x1016 && w.index != 0x1017) node_.setup.writes.push_back({w, {}});
-    }
-    for (Line* line : keys_.all_of("write ")) write_one(*line);
+    if (eds_ != nullptr && eds_->commissioning) values_of_dcf();
+    std::vector<Line*> lines = keys_.all_of("write "), commands = keys_.all_of("command ");
+    lines.insert(lines.end(), commands.begin(), commands.end());
+    std::sort(lines.begin(), lines.end(), [](const Line* a, const Line* b) { return a->key.at.offset < b->key.at.offset; });
+    for (Line* line : lines) write_one(*line);
+}
+
+/// What a DCF says of the node, but for what this file says: its PDOs, and how it is watched.
+void NodeReader::values_of_dcf() {
+    const Word& file = keys_.find("eds")->value;
+    const auto  configuration = eds::configuration_of(*eds_, node_.setup.id);
+    for (const auto& m : configuration.messages)
+        report_.warning(Topic::value, file.at, "line " + std::to_string(m.at.line) + " of '" + file.text + "': " + m.sentence, m.help);
+    for (const auto& w : configuration.writes)
+        if ((w.index < 0x1400 || w.index > 0x1bff) && w.index != 0x1016 && w.index != 0x1017) node_.setup.writes.push_back({w, {}});
+    const std::size_t slash = file.text.rfind('/');
+    for (const eds::Object& o : eds_->objects)
+        for (const eds::Entry& e : o.entries) {
+            if (e.download_file.empty()) continue;
+            const bool whole = e.download_file.front() == '/' || slash == file.text.npos;
+            ObjectWrite write{{o.index, e.sub, {}}, e.name.empty() ? o.name : e.name};
+            if (!descriptions_.bytes({whole ? e.download_file : file.text.substr(0, slash + 1) + e.download_file, file.at}, write.data, report_))
+                continue;
+            if (write.data.empty())
+                report_.warning(Topic::value, file.at, "the file '" + e.download_file + "' for object " + object_label(o.index, e.sub) +
+                                                           " is empty, and is not written");
+            else node_.setup.writes.push_back(std::move(write));
+        }
 }
 
 void NodeReader::write_one(const Line& line) {
     const_cast<Line&>(line).used = true;
-    auto words = words_of(line.key);
+    auto              words = words_of(line.key);
+    const std::string verb = words[0].text;
     words.erase(words.begin());
     const auto refuse = [&](std::string sentence, std::string help) {
         report_.error(Topic::object, line.key.at, std::move(sentence), std::move(help));
     };
-    if (words.empty() || words.size() > 2) return refuse("what is written is missing", "write OBJECT = VALUE, as in: write 0x6083 = 1000");
+    if (words.empty() || words.size() > 2) return refuse("what is written is missing", verb + " OBJECT = VALUE, as in: " + verb + " 0x6083 = 1000");
     bool                has_sub = false;
     const auto          place = address(words[0].text, has_sub);
     const Known*        known = place ? catalog_->find(place->first, place->second) : catalog_->find(words[0].text);
@@ -212,7 +269,7 @@ void NodeReader::write_one(const Line& line) {
     if (known == nullptr && !(place && type)) {
         if (!place) return refuse("the node has no object '" + words[0].text + "'", did_you_mean(words[0].text, catalog_->names()));
         return refuse("the description has no object " + object_label(place->first, place->second),
-                      "give its type: write " + words[0].text + " u16 = " + line.value.text);
+                      "give its type: " + verb + " " + words[0].text + " u16 = " + line.value.text);
     }
     const std::uint16_t index = known != nullptr ? known->index : place->first;
     const std::uint8_t  sub = known != nullptr ? known->sub : place->second;
@@ -228,6 +285,7 @@ void NodeReader::write_one(const Line& line) {
         return;
     }
     node_.setup.writes.push_back({{index, sub, value.bytes}, known != nullptr ? known->about : std::string()});
+    node_.setup.writes.back().always = verb == "command";
 }
 
 // PDOs.
@@ -300,6 +358,13 @@ void NodeReader::pdo(const PdoWish& wish) {
         pdo.transmission = static_cast<std::uint8_t>(catalog_->number(base, 2, 255));
         pdo.inhibit_100us = static_cast<std::uint16_t>(catalog_->number(base, 3, 0));
         pdo.event_ms = static_cast<std::uint16_t>(catalog_->number(base, 5, 0));
+    } else if (word.starts_with("mpdo ")) {
+        pdo.multiplex = wish.to_node ? Multiplex::to_destination : Multiplex::from_source;
+        pdo.transmission = 255;
+        Word rest = wish.objects->value;
+        rest.text.erase(0, 5), rest.at.offset += 5, rest.at.column += 5, rest.at.length -= 5;
+        objects_of(rest, pdo);
+        std::erase_if(pdo.objects, [&](const Object& o) { return !multiplexable(o, pdo); });
     } else {
         objects_of(wish.objects->value, pdo);
     }
@@ -307,13 +372,29 @@ void NodeReader::pdo(const PdoWish& wish) {
     if ((described & cob_invalid) == 0 && cob_id(described) != 0) pdo.cob = described & (cob_extended | 0x1fffffff);
     else if (wish.number <= 4) pdo.cob = (wish.to_node ? 0x100U : 0x80U) + 0x100 * wish.number + node_.setup.id;
     pdo_options(wish, pdo);
-    if (pdo.bits() > 64)
+    if (pdo.multiplexed()) {
+        for (const char* key : {"transmission", "request"})
+            if (const auto given = wish.options.find(key); given != wish.options.end() && pdo.transmission < 254)
+                report_.error(Topic::node, given->second->value.at, "a multiplexed PDO is sent when an object changes",
+                              "write transmission = event, or leave it out");
+        if (!pdo.objects.empty()) node_.pdos.push_back(std::move(pdo));
+    } else if (pdo.bits() > 64)
         report_.error(Topic::object, pdo.at, "these objects are " + std::to_string(pdo.bits()) + " bits together; a PDO carries 64",
                       "move some to another PDO");
     else if (!pdo.objects.empty()) node_.pdos.push_back(std::move(pdo));
 }
 
+bool NodeReader::multiplexable(const Object& o, const Pdo& pdo) {
+    if (!o.filler && o.bits <= 32 && o.bits % 8 == 0) return true;
+    report_.error(Topic::object, pdo.at,
+                  o.filler ? std::string("a multiplexed PDO has no gaps") : "object '" + o.pin + "' has " + std::to_string(o.bits) + " bits",
+                  "a multiplexed PDO carries one object of 8, 16, 24 or 32 bits at a time");
+    return false;
+}
+
 void NodeReader::pdo_options(const PdoWish& wish, Pdo& pdo) {
+    const bool asked = wish.options.contains("request");
+    if (asked) pdo.transmission = 253;
     for (const auto& [name, line] : wish.options) {
         const std::string value = lower(line->value.text);
         if (name == "transmission") {
@@ -324,8 +405,18 @@ void NodeReader::pdo_options(const PdoWish& wish, Pdo& pdo) {
             else if (value == "event") pdo.transmission = 255;
             else if (value == "sync on change") pdo.transmission = 0;
             else if (every && *every >= 1 && *every <= 240) pdo.transmission = static_cast<std::uint8_t>(*every);
-            else if (number && (*number <= 240 || *number == 254 || *number == 255)) pdo.transmission = static_cast<std::uint8_t>(*number);
+            else if (number && (*number <= 240 || *number == 254 || *number == 255 || (asked && (*number == 252 || *number == 253))))
+                pdo.transmission = static_cast<std::uint8_t>(*number);
+            else if (number && (*number == 252 || *number == 253) && !wish.to_node)
+                report_.error(Topic::node, line->value.at, "such a PDO is sent only when it is asked for",
+                              "write tpdo" + std::to_string(wish.number) + ".request = 100ms");
             else keys_.refuse(*line, "sync, sync N, sync on change, or event");
+        } else if (name == "request") {
+            const auto time = duration(value);
+            if (wish.to_node)
+                report_.error(Topic::value, line->key.at, "only what a node sends can be asked for", "an rpdo is sent by the master");
+            else if (!time || *time < millisecond || *time > 3600 * second) keys_.refuse(*line, "a time from 1ms to 3600s");
+            else pdo.request = *time;
         } else if (name == "inhibit" || name == "event-timer" || name == "timeout") {
             const auto time = duration(value);
             const Time most = name == "inhibit" ? 6553 * millisecond : 65535 * millisecond;
@@ -353,7 +444,7 @@ void NodeReader::pdo_options(const PdoWish& wish, Pdo& pdo) {
             else pdo.sync_start = static_cast<std::uint8_t>(*number);
         } else {
             report_.error(Topic::line, line->key.at, "a PDO has no '" + name + "'",
-                          "there are transmission, inhibit, event-timer, timeout, cob-id, sync-start");
+                          "there are transmission, inhibit, event-timer, timeout, request, cob-id, sync-start");
         }
     }
     if (pdo.synchronous() && bus_.sync == SyncMode::none)
@@ -464,15 +555,38 @@ bool NodeReader::object(const Word& word, Pdo& pdo, Object& out) {
     return true;
 }
 
+/// The objects that a node tells by multiplexed PDOs stand in its scanner list. One without it, or with a fixed one, knows by itself.
+void NodeReader::scanner_list() {
+    constexpr unsigned rows = 254;  // of one object
+    unsigned           count = 0;
+    for (const Pdo& pdo : node_.pdos) {
+        if (pdo.multiplex != Multiplex::from_source) continue;
+        for (const Object& o : pdo.objects) {
+            const auto   list = static_cast<std::uint16_t>(0x1fa0 + count / rows);
+            const auto   row = static_cast<std::uint8_t>(count++ % rows + 1);
+            const Known* known = catalog_->find(list, row);
+            if (known != nullptr ? !known->writable : catalog_->has(list)) continue;
+            node_.setup.writes.push_back(object_write(list, row, 1U << 24 | std::uint32_t{o.index} << 8 | o.sub, "Object scanner list"));
+            node_.setup.writes.back().optional = true;
+        }
+    }
+}
+
 void NodeReader::configure(Pdo& pdo) {
-    PdoDescription d;
-    d.cob = pdo.cob, d.transmission = pdo.transmission, d.inhibit_100us = pdo.to_node ? std::uint16_t{0} : pdo.inhibit_100us;
-    // Sent at least so often; the node misses it when three in a row did not come.
-    d.event_ms = static_cast<std::uint16_t>(std::min(pdo.to_node ? 3U * pdo.event_ms : pdo.event_ms, 65535U)), d.sync_start = pdo.to_node ? std::uint8_t{0} : pdo.sync_start;
-    for (const Object& o : pdo.objects) d.mapping.push_back(map_entry(o.index, o.sub, o.bits));
     if (pdo.cob == 0) return;  // gets one when all nodes are known
-    auto writes = pdo.to_node ? rpdo_writes(pdo.number, d, node_.setup.id) : tpdo_writes(pdo.number, d, node_.setup.id);
-    std::move(writes.begin(), writes.end(), std::back_inserter(node_.setup.writes));
+    configure_pdo(node_.setup, pdo);
+}
+
+void configure_pdo(NodeSetup& node, const Pdo& pdo) {
+    PdoDescription d;
+    d.cob = pdo.cob, d.transmission = pdo.transmission, d.multiplex = pdo.multiplex;
+    if (!pdo.to_node) d.inhibit_100us = pdo.inhibit_100us, d.sync_start = pdo.sync_start;
+    // Sent at least so often; the node misses it when three in a row did not come.
+    d.event_ms = static_cast<std::uint16_t>(std::min(pdo.to_node ? 3U * pdo.event_ms : pdo.event_ms, 65535U));
+    if (!pdo.multiplexed())
+        for (const Object& o : pdo.objects) d.mapping.push_back(map_entry(o.index, o.sub, o.bits));
+    auto writes = pdo.to_node ? rpdo_writes(pdo.number, d, node.id) : tpdo_writes(pdo.number, d, node.id);
+    std::move(writes.begin(), writes.end(), std::back_inserter(node.writes));
 }
 
 }  // namespace hal::canopen::config

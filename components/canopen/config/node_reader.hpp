@@ -47,6 +47,7 @@ private:
     void                                         settings();
     void                                         firmware();
     void                                         writes();
+    void                                         values_of_dcf();
     void                                         write_one(const Line& line);
     void                                         pdos();
     std::map<std::pair<bool, unsigned>, PdoWish> wishes(const char* what = "pdo", unsigned most = 512);
@@ -57,9 +58,11 @@ private:
     void                                         srdo(const PdoWish& wish);
     void                                         srdo_options(const PdoWish& wish, Pdo& pdo);
     void                                         configure_srdos();
+    bool                                         multiplexable(const Object& o, const Pdo& pdo);
     bool                                         default_objects(const PdoWish& wish, Pdo& pdo);
     bool                                         object(const Word& word, Pdo& pdo, Object& out);
     Object                                       known_object(const Known& known, unsigned bits) const;
+    void                                         scanner_list();
     void                                         configure(Pdo& pdo);
     void                                         object_options();
     void                                         option(Object& object, const std::string& property, const Line& line);
@@ -75,6 +78,9 @@ private:
     const eds::DeviceDescription* eds_ = nullptr;
     std::unique_ptr<Catalog>      catalog_;
 };
+
+/// What the node is told of a PDO that has its identifier. [setup]
+void configure_pdo(NodeSetup&, const Pdo&);
 
 /// An SRDO as the node has to be configured. [setup]
 SrdoDescription node_srdo(const Pdo&);

@@ -164,13 +164,21 @@ void share_out_identifiers(MasterConfig& config, Report& report) {
                              "give it one of 29 bits: " + std::string(p.to_node ? "rpdo" : "tpdo") + std::to_string(p.number) +
                                  ".cob-id = 0x10000000");
             taken.insert(p.cob);
-            PdoDescription d;
-            d.cob = p.cob, d.transmission = p.transmission, d.event_ms = p.event_ms;
-            if (!p.to_node) d.inhibit_100us = p.inhibit_100us, d.sync_start = p.sync_start;
-            for (const Object& o : p.objects) d.mapping.push_back(map_entry(o.index, o.sub, o.bits));
-            auto writes = p.to_node ? rpdo_writes(p.number, d, n.setup.id) : tpdo_writes(p.number, d, n.setup.id);
-            std::move(writes.begin(), writes.end(), std::back_inserter(n.setup.writes));
+            configure_pdo(n.setup, p);
         }
+}
+
+/// In place of date and time: the same writes have the same number, others most probably another one.
+void date_by_content(NodeSetup& node) {
+    std::uint64_t sum = 0xcbf29ce484222325;  // FNV-1a
+    const auto    add = [&](unsigned byte) { sum = (sum ^ byte) * 0x100000001b3; };
+    for (const ObjectWrite& w : node.writes) {
+        add(w.index & 0xff), add(w.index >> 8U), add(w.sub), add(w.data.size() & 0xff);
+        for (const std::uint8_t byte : w.data) add(byte);
+    }
+    constexpr std::uint64_t days = 49'000, day_ms = 86'400'000;
+    node.configuration_date = static_cast<std::uint32_t>(1 + sum % days);
+    node.configuration_time = static_cast<std::uint32_t>((sum >> 20) % day_ms);
 }
 
 /// The bits of a PDO that are objects, not gaps.
@@ -189,6 +197,7 @@ std::uint64_t used_bits(const Pdo& pdo) {
 std::string why_not_shared(const Pdo& a, const Pdo& b) {
     if (a.safety || b.safety) return "an SRDO has its identifiers alone";
     if (!a.to_node || !b.to_node) return "two senders of one identifier destroy each other's frames";
+    if (a.multiplexed() || b.multiplexed()) return "a multiplexed PDO has its identifier alone";
     if (a.bits() != b.bits()) return "nodes that share a message have to map the same length; fill it with gap 8, gap 16 or gap 32";
     if ((used_bits(a) & used_bits(b)) != 0)
         return "nodes that share a message have objects at different places in it; put gap 16 or gap 32 before";
@@ -270,6 +279,8 @@ public:
         if (nodes_.empty() && bus_ != nullptr && foreign_.empty())
             report_.error(Topic::line, bus_->at, "there is no node on this bus", "write [node 5 NAME] and what it is below it");
         share_out_identifiers(out_.config, report_);
+        for (Node& n : out_.config.nodes)
+            if (n.dated_by_content) date_by_content(n.setup);
         check_whole(out_.config, report_);
         finish();
         return std::move(out_);

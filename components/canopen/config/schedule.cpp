@@ -15,6 +15,8 @@ Time event_period(const Pdo& pdo, Time otherwise) {
     return otherwise;
 }
 
+bool event_driven(const Pdo& pdo) { return pdo.transmission >= 254; }
+
 std::string ms(Time t) {
     char text[40];
     std::snprintf(text, sizeof text, "%.3f", static_cast<double>(t) / 1e6);
@@ -60,9 +62,13 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
             }
             std::string name = n.name + (p.to_node ? " rpdo" : " tpdo") + std::to_string(p.number);
             const bool  of_sync = p.synchronous() && sync != 0;
-            const Time  every = of_sync ? sync * std::max<Time>(p.transmission, 1) : event_period(p, cycle);
+            if (p.request != 0) {
+                add(p.cob, 0, p.request, name + " request", p.at, false);
+                out.messages.back().remote = true;
+            }
+            const Time  every = p.request != 0 && !event_driven(p) ? p.request : of_sync ? sync * std::max<Time>(p.transmission, 1) : event_period(p, cycle);
             add(p.cob, p.bytes(), every, std::move(name), p.at, of_sync);
-            out.assumed.back() = !of_sync && p.inhibit_100us == 0;
+            out.assumed.back() = !of_sync && p.inhibit_100us == 0 && p.request == 0;
         }
     for (const Node& n : config.nodes) {
         if (n.setup.heartbeat_ms != 0) add(0x700U + n.setup.id, 1, n.setup.heartbeat_ms * millisecond, n.name + " heartbeat", n.at, false);

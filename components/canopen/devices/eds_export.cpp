@@ -31,6 +31,8 @@ constexpr Name names[] = {
     {0x1f51, 0x1f51, "Program control"},
     {0x1f56, 0x1f56, "Program software identification"},
     {0x1f57, 0x1f57, "Flash status identification"},
+    {0x1fa0, 0x1fcf, "Object scanner list #"},
+    {0x1fd0, 0x1fff, "Object dispatching list #"},
 };
 constexpr Name drive_names[] = {
     {0x6046, 0x6046, "vl velocity min max amount"}, {0x6048, 0x6048, "vl velocity acceleration"},

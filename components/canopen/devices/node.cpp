@@ -17,6 +17,9 @@ void add_storage(Description& d) {
         for (std::uint8_t sub = 1; sub <= 4; ++sub)
             d.add(index, sub, Type::unsigned32, Access::read_write, 1, std::string(stores ? "Save " : "Restore ") + what[sub - 1]);
     }
+    d.add(0x1020, 0, Type::unsigned8, Access::constant, 2, "Highest sub-index");
+    d.add(0x1020, 1, Type::unsigned32, Access::read_write, 0, "Configuration date");
+    d.add(0x1020, 2, Type::unsigned32, Access::read_write, 0, "Configuration time");
 }
 
 Node::Node(Program& program, std::unique_ptr<can::Link> link, const DeviceSettings& settings)

@@ -65,7 +65,7 @@ private:
 /// The identity of the devices of this project; none of them has a vendor-ID given by CiA.
 inline constexpr std::uint32_t example_vendor = 0x48414c;
 
-/// Objects 1010h and 1011h, all sub-indices. [setup]
+/// Objects 1010h and 1011h, all sub-indices, and 1020h, which tells whether what was stored is what the master wants. [setup]
 void add_storage(Description&);
 
 }  // namespace hal::canopen

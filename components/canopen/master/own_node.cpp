@@ -11,7 +11,7 @@ namespace hal::canopen {
 
 namespace {
 
-constexpr std::uint16_t received_base = 0x2000, sent_base = 0x4000, filler = 0x5fff;
+constexpr std::uint16_t received_base = 0x2000, sent_base = 0x4000, filler = 0x5fff, dispatcher_list = 0x1fd0;
 constexpr unsigned      per_index = 254;
 
 Type own_type(Type type) { return is_real(type) ? type : is_signed(type) ? Type::integer64 : Type::unsigned64; }
@@ -41,6 +41,7 @@ public:
         for (std::size_t n = 0; n < config_.nodes.size(); ++n)
             for (const config::Pdo& pdo : config_.nodes[n].pdos) pdo.safety ? safety(n, pdo) : pdo.to_node ? send(n, pdo) : receive(n, pdo);
         for (Sent& sent : out_.sent) finish(sent);
+        if (dispatched_ != 0) finish_dispatcher_list();
         add_master_objects(d, config_.setup());
         if (config_.flying.enabled) flying(d);
         add_srdos(d, srdos_);
@@ -64,12 +65,31 @@ private:
         p.cob = pdo.cob;
         p.transmission = 255;  // what came is seen in the cycle it came in, not after the next SYNC
         p.event_ms = static_cast<std::uint16_t>(std::min<Time>(pdo.limit / millisecond, 65535));
-        for (const config::Object& object : pdo.objects) {
+        p.multiplex = pdo.multiplex;
+        if (pdo.multiplexed())
+            for (const config::Object& object : pdo.objects) dispatch(node, object);
+        else for (const config::Object& object : pdo.objects) {
             const Placed* at = object.filler ? nullptr : &out_.placed[place(node, false, object)];
             p.mapping.push_back(at == nullptr ? map_entry(filler, 0, object.bits) : map_entry(at->index, at->sub, object.bits));
         }
         out_.received.push_back({node, &pdo, static_cast<unsigned>(out_.received.size() + 1)});
         add_rpdo(out_.description, out_.received.back().number, p);
+    }
+
+    /// A row of 1FD0h–1FFFh: which of our objects takes that of the node.
+    void dispatch(std::size_t node, const config::Object& object) {
+        const Placed&      at = out_.placed[place(node, false, object, object.type)];
+        const std::uint8_t id = config_.nodes[node].setup.id;
+        const auto         row = std::uint64_t{1} << 56 | std::uint64_t{at.index} << 40 | std::uint64_t{at.sub} << 32 |
+                         std::uint64_t{object.index} << 16 | std::uint64_t{object.sub} << 8 | id;
+        out_.description.add(static_cast<std::uint16_t>(dispatcher_list + dispatched_ / per_index),
+                             static_cast<std::uint8_t>(dispatched_ % per_index + 1), Type::unsigned64, Access::read_only, row);
+        ++dispatched_;
+    }
+    void finish_dispatcher_list() {
+        for (unsigned n = 0; n < dispatched_; n += per_index)
+            out_.description.add(static_cast<std::uint16_t>(dispatcher_list + n / per_index), 0, Type::unsigned8, Access::constant,
+                                 std::min(dispatched_ - n, per_index), "Object dispatching list");
     }
 
     void send(std::size_t node, const config::Pdo& pdo) {
@@ -106,6 +126,8 @@ private:
         p.cob = sent.pdo->cob;
         p.transmission = sent.pdo->transmission;
         p.inhibit_100us = sent.pdo->inhibit_100us, p.event_ms = sent.pdo->event_ms;
+        p.multiplex = sent.pdo->multiplex;
+        if (sent.pdo->multiplexed()) return add_tpdo(out_.description, sent.number, p);
         unsigned   bit = 0;
         const auto fill = [&](unsigned until) {
             if (until > bit) p.mapping.push_back(map_entry(filler, 0, until - bit));
@@ -120,7 +142,7 @@ private:
         add_tpdo(out_.description, sent.number, p);
     }
 
-    std::size_t place(std::size_t node, bool to_node, const config::Object& object) {
+    std::size_t place(std::size_t node, bool to_node, const config::Object& object, Type type = Type::none) {
         for (std::size_t i = 0; i < out_.placed.size(); ++i)
             if (out_.placed[i].node == node && out_.placed[i].to_node == to_node && out_.placed[i].object->same(object)) return i;
         unsigned&  count = to_node ? sent_objects_ : received_objects_;
@@ -128,7 +150,7 @@ private:
         const auto sub = static_cast<std::uint8_t>(count % per_index + 1);
         ++count;
         const std::string name = config_.nodes[node].name + "." + object.pin;
-        out_.description.add(index, sub, own_type(object.type), Access::read_write, 0, name).mappable();
+        out_.description.add(index, sub, type != Type::none ? type : own_type(object.type), Access::read_write, 0, name).mappable();
         out_.placed.push_back({node, to_node, &object, index, sub});
         return out_.placed.size() - 1;
     }
@@ -136,7 +158,7 @@ private:
     const config::MasterConfig& config_;
     OwnNode                      out_;
     std::vector<SrdoDescription> srdos_;
-    unsigned                    sent_objects_ = 0, received_objects_ = 0;
+    unsigned                    sent_objects_ = 0, received_objects_ = 0, dispatched_ = 0;
 };
 
 }  // namespace

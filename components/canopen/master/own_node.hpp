@@ -10,7 +10,8 @@
 
 namespace hal::canopen {
 
-/// An object of a node and the one of ours that stands for it: a signed or unsigned number of 64 bits, or a real.
+/// An object of a node and the one of ours that stands for it: a signed or unsigned number of 64 bits, or a real; of one that comes by a
+/// multiplexed PDO the node's own type.
 struct Placed {
     std::size_t           node = 0;                    ///< in MasterConfig::nodes
     bool                  to_node = false;
@@ -26,7 +27,8 @@ struct Received {
     unsigned           number = 0;
 };
 
-/// A TPDO of ours. Several nodes may take their parts of it: then it stands for an RPDO of each, all with the same identifier.
+/// A TPDO of ours. Several nodes may take their parts of it: then it stands for an RPDO of each, all with the same identifier. Of a
+/// multiplexed one each part goes alone, with the object it is for.
 struct Sent {
     struct Part {
         std::size_t  placed = 0;

@@ -89,7 +89,7 @@ public:
         const auto slots = runner.slots();
         const auto raw = [&](std::size_t n) noexcept {
             const Slot& s = slots[n];
-            return s.has_safe && !runner.operational(s.node) ? s.safe : Dictionary::value<std::uint64_t>(*s.entry);
+            return s.has_safe && !runner.operational(s.node) ? s.safe : number_in(*s.entry);
         };
         for (auto& b : out_bits_) b.pin = b.bit == whole ? raw(b.slot) != 0 : (raw(b.slot) >> b.bit & 1) != 0;
         for (auto& b : out_real_) b.pin = (real_of(b.type, raw(b.slot)) - b.offset) / b.scale;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <time.h>
+#include <utility>
 
 namespace hal::canopen {
 
@@ -10,8 +11,7 @@ namespace {
 
 constexpr std::size_t most_frames = 4096;  // taken in one cycle
 
-std::uint64_t value_of(const Entry& e) noexcept { return Dictionary::value<std::uint64_t>(e); }
-void          set_value(Entry& e, std::uint64_t value) noexcept { std::memcpy(e.data, &value, e.size < 8 ? e.size : 8); }
+void set_value(Entry& e, std::uint64_t value) noexcept { std::memcpy(e.data, &value, e.size < 8 ? e.size : 8); }
 
 DeviceSettings device_settings(const config::MasterConfig& config) {
     DeviceSettings s;
@@ -55,6 +55,12 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
         if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) device_.pdos().send_on_change(sent.number);
         outputs_.push_back({&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
     }
+    for (const Sent& sent : own_.sent)
+        if (sent.pdo->multiplexed())
+            for (const Sent::Part& part : sent.parts)
+                alone_.push_back({sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
+    for (const Received& r : own_.received)
+        if (r.pdo->request != 0) asked_.push_back({r.number, r.node, r.pdo->request});
     device_.srdos().listen(*this);
     for (const OwnSrdo& s : own_.srdos)
         if (s.pdo->to_node) device_.srdos().invert_here(s.number);
@@ -122,7 +128,8 @@ void Runner::receive(Time now) noexcept {
         const std::size_t count = link_->receive(frames, now);
         for (std::size_t i = 0; i < count; ++i) {
             // Another master of this process makes our heartbeat, and its NMT commands are no stranger's.
-            if (!leads_ && (frames[i].id == 0x700U + config_.node_id || frames[i].id == 0)) continue;
+            const bool own_beat = frames[i].id == 0x700U + config_.node_id && !frames[i].extended;
+            if ((own_beat && (frames[i].own || !leads_)) || (frames[i].id == 0 && !leads_)) continue;
             note_sync(frames[i], now);
             if (config_.flying.enabled && flying_.handle(frames[i], now)) continue;
             device_.handle(frames[i], now);
@@ -153,6 +160,9 @@ void Runner::take_wishes() noexcept {
             for (const Output& out : outputs_)
                 for (const Sent::Part& part : out.sent->parts)
                     if (slots_[part.placed].node == n) device_.pdos().trigger(out.sent->number);
+        if (now && was_operational_[n] == 0)
+            for (Alone& a : alone_)
+                if (slots_[a.slot].node == n) a.told = false;
         was_operational_[n] = now ? 1 : 0;
         if (now) ever_operational_[n] = 1;
     }
@@ -162,6 +172,28 @@ void Runner::take_wishes() noexcept {
         const bool kept = config_.nodes[s.node].setup.keep_alive && ever_operational_[s.node] == 0;
         if (statuses_[s.node]->operational || kept) set_value(*s.entry, s.wish);
         else if (s.has_safe) set_value(*s.entry, s.safe);
+    }
+}
+
+/// In turn, so that one that changes in every cycle keeps none of the others back.
+void Runner::tell_alone(Time now) noexcept {
+    for (std::size_t n = alone_.size(); n > 0; --n, next_alone_ = (next_alone_ + 1) % alone_.size()) {
+        Alone&      a = alone_[next_alone_ % alone_.size()];
+        const Slot& s = slots_[a.slot];
+        const auto  value = static_cast<std::uint32_t>(number_in(*s.entry) & (~std::uint64_t{0} >> (64 - s.object->bits)));
+        if (!statuses_[s.node]->operational || (a.told && value == a.said)) continue;
+        const auto sent = device_.pdos().tpdo(a.number);
+        if (a.inhibit != 0 && sent.count != 0 && now - sent.last < a.inhibit) continue;
+        if (!device_.pdos().send_to(a.number, statuses_[s.node]->id, s.object->index, s.object->sub, value)) return;
+        a.said = value, a.told = true;
+    }
+}
+
+/// PDOs that nodes send on request.
+void Runner::ask(Time now) noexcept {
+    for (Asked& a : asked_) {
+        if (!statuses_[a.node]->operational || now < a.next || !device_.pdos().request(a.number)) continue;
+        a.next = std::max(a.next + a.every, now + a.every / 2);
     }
 }
 
@@ -183,6 +215,7 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
     take_wishes();
     if (produces_ && leads && active()) produce_sync(now, period);
     if (config_.time_period > 0 && leads && active()) produce_time(now);
+    if (active()) tell_alone(now), ask(now);
     device_.poll(now);
     leads_ = leads;
     send(now);
@@ -223,10 +256,12 @@ void Runner::produce_time(Time now) noexcept {
 
 void Runner::send(Time now) noexcept {
     const bool stuck = is_stuck(now);
+    if (!stuck && std::exchange(kept_back_, false)) tell_again();
     while (const Frame* f = device_.out().front()) {
         const bool heartbeat = f->id == 0x700U + config_.node_id && !f->extended;
         if (stuck && is_process_data(*f)) {
             ++withheld_;
+            kept_back_ = true;
             device_.out().drop();
             continue;
         }
@@ -235,6 +270,12 @@ void Runner::send(Time now) noexcept {
         device_.out().drop();
     }
     link_->flush(now);
+}
+
+/// What is sent on a change only was lost with what was kept back.
+void Runner::tell_again() noexcept {
+    for (const Output& out : outputs_) device_.pdos().trigger(out.sent->number);
+    for (Alone& a : alone_) a.told = false;
 }
 
 /// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would wait in the queue, and move the
@@ -250,7 +291,8 @@ bool Runner::is_stuck(Time now) noexcept {
 
 bool Runner::is_process_data(const can::Frame& f) const noexcept {
     const auto same = [&](const can::Frame& other) { return f.id == other.id && f.extended == other.extended; };
-    return same(sync_frame_) || std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& o) { return same(o.frame); });
+    const bool asks = f.remote && (f.extended || f.id < 0x700);  // not the guarding of a node
+    return asks || same(sync_frame_) || std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& o) { return same(o.frame); });
 }
 
 void Runner::make_safe() noexcept {
@@ -258,10 +300,14 @@ void Runner::make_safe() noexcept {
     if (!active()) return;                                  // the network is another one's
     bool synchronous = false;
     for (Output& out : outputs_) {
+        if (out.sent->pdo->multiplexed()) {
+            make_safe_alone(out);
+            continue;
+        }
         std::uint64_t image = 0;
         for (const Sent::Part& part : out.sent->parts) {
             const Slot&         s = slots_[part.placed];
-            const std::uint64_t value = s.has_safe ? s.safe : value_of(*s.entry);
+            const std::uint64_t value = s.has_safe ? s.safe : number_in(*s.entry);
             image |= (part.bits >= 64 ? value : value & ((std::uint64_t{1} << part.bits) - 1)) << part.first;
         }
         store(out.frame.data.data(), image);
@@ -276,7 +322,7 @@ void Runner::make_safe() noexcept {
         for (const std::size_t n : srdo.placed) {
             const Slot&         s = slots_[n];
             const unsigned      bits = s.object->bits;
-            const std::uint64_t value = s.has_safe ? s.safe : value_of(*s.entry);
+            const std::uint64_t value = s.has_safe ? s.safe : number_in(*s.entry);
             image |= (bits >= 64 ? value : value & ((std::uint64_t{1} << bits) - 1)) << bit;
             bit += bits;
         }
@@ -291,6 +337,18 @@ void Runner::make_safe() noexcept {
     link_->flush(now_);
 }
 
+void Runner::make_safe_alone(const Output& out) noexcept {
+    for (const Sent::Part& part : out.sent->parts) {
+        const Slot& s = slots_[part.placed];
+        can::Frame  f = out.frame;
+        f.data[0] = static_cast<std::uint8_t>(0x80 | statuses_[s.node]->id);
+        store(f.data.data() + 1, s.object->index);
+        f.data[3] = s.object->sub;
+        store(f.data.data() + 4, static_cast<std::uint32_t>(s.has_safe ? s.safe : number_in(*s.entry)));
+        link_->send(f, now_);
+    }
+}
+
 void Runner::on_step(const NodeStatus& status) noexcept {
     if (place_[status.id & 0x7f] != 255) events_.on_step(place_[status.id & 0x7f], status);
 }
@@ -298,6 +356,5 @@ void Runner::on_network(const NetworkStatus& status) noexcept { events_.on_netwo
 void Runner::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
     if (place_[node & 0x7f] != 255) events_.on_emergency(place_[node & 0x7f], e);
 }
-void Runner::on_rpdo_late(unsigned number, Time) noexcept { events_.on_late(own_.received[number - 1]); }
 
 }  // namespace hal::canopen

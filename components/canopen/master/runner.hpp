@@ -34,6 +34,14 @@ struct Slot {
     const config::Object* object = nullptr;
 };
 
+/// The value in an object: of a real its bits, of a number all 64. [realtime]
+inline std::uint64_t number_in(const Entry& e) noexcept {
+    const auto raw = Dictionary::value<std::uint64_t>(e);
+    if (!is_signed(e.type) || e.size == 0 || e.size >= 8) return raw;
+    const unsigned bits = 8 * e.size;
+    return (raw >> (bits - 1) & 1) != 0 ? raw | ~std::uint64_t{0} << bits : raw;
+}
+
 /// What the runner noticed. [realtime]
 class RunnerEvents {
 public:
@@ -41,8 +49,12 @@ public:
     virtual void on_step(std::size_t node, const NodeStatus&) noexcept { (void)node; }
     virtual void on_network(const NetworkStatus&) noexcept {}
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
-    /// It did not come for its time-out.
-    virtual void on_late(const Received& pdo) noexcept { (void)pdo; }
+    /// A PDO of a node did not come for its time-out. `place` is that in OwnNode::received.
+    virtual void on_late(std::size_t place) noexcept { (void)place; }
+    /// It came with fewer bytes than its objects have; they keep their values. `place` is that in OwnNode::received.
+    virtual void on_short(std::size_t place, unsigned bytes) noexcept { (void)place, (void)bytes; }
+    /// Another device has the master's own node-id.
+    virtual void on_own_id_taken() noexcept {}
     /// An SRDO is not to be believed (any more); its objects have their safe values. `place` is that in OwnNode::srdos.
     virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
     virtual void on_bus_state(can::State) noexcept {}
@@ -108,6 +120,14 @@ private:
         const Sent* sent;
         can::Frame  frame;
     };
+    /// An object that goes alone, by a multiplexed PDO, whenever its value is another.
+    struct Alone {
+        unsigned      number = 0;  // of our TPDO
+        std::size_t   slot = 0;
+        Time          inhibit = 0;
+        std::uint32_t said = 0;
+        bool          told = false;  // since the node is operational
+    };
     void begin(Time now) noexcept;
     void boot(Time now) noexcept;
     void fly(Time now) noexcept;
@@ -118,12 +138,18 @@ private:
     void produce_sync(Time now, Time period) noexcept;
     void produce_time(Time now) noexcept;
     void take_wishes() noexcept;
+    void tell_alone(Time now) noexcept;
+    void ask(Time now) noexcept;
+    void tell_again() noexcept;
+    void make_safe_alone(const Output&) noexcept;
     void watch_srdos(Time now) noexcept;
 
     void on_step(const NodeStatus&) noexcept override;
     void on_network(const NetworkStatus&) noexcept override;
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
-    void on_rpdo_late(unsigned number, Time) noexcept override;
+    void on_rpdo_late(unsigned number, Time) noexcept override { events_.on_late(number - 1); }
+    void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override { events_.on_short(number - 1, bytes); }
+    void on_id_collision(Time) noexcept override { events_.on_own_id_taken(); }
     void on_srdo_fault(unsigned number, SrdoFault fault, Time) noexcept override { events_.on_srdo_fault(number - 1, fault); }
 
     const config::MasterConfig&    config_;
@@ -139,6 +165,15 @@ private:
     std::array<std::uint8_t, 128>  place_{};     // node-id to place in the configuration; 255: none
     std::vector<std::uint8_t> was_operational_, ever_operational_;  // by node; ever: since the network was booted
     std::vector<Output>            outputs_;
+    /// A PDO of a node that is asked for.
+    struct Asked {
+        unsigned    number = 0;  // of our RPDO
+        std::size_t node = 0;
+        Time        every = 0, next = 0;
+    };
+    std::vector<Asked>             asked_;
+    std::vector<Alone>             alone_;
+    std::size_t                    next_alone_ = 0;
     std::vector<can::Frame>        farewell_;          // NMT commands for make_safe()
     can::Frame                     sync_frame_;
     can::Statistics                statistics_{};
@@ -148,6 +183,7 @@ private:
     Time                           sync_came_ = 0;
     std::uint64_t                  sent_before_ = 0, withheld_ = 0;  // for is_stuck()
     Time                           moved_ = 0;
+    bool                           kept_back_ = false;  // something was withheld since the bus took the last
     bool                           sync_ours_ = false, was_active_ = false, had_bus_ = false;
     FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
     bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;

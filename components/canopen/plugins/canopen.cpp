@@ -3,8 +3,10 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "canopen/config/config.hpp"
+#include "canopen/config/lines.hpp"
 #include "canopen/config/schedule.hpp"
 #include "canopen/master/pins.hpp"
 #include "canopen/master/reporter.hpp"
@@ -51,6 +53,22 @@ struct FaultWords {
     }
 };
 
+/// Of a PDO that a node sends.
+struct PdoWords {
+    std::string late, cut;
+    bool        cut_told = false;  // since the node was booted
+
+    PdoWords(const config::Node& n, const config::Pdo& pdo) {
+        const std::string number = "tpdo" + std::to_string(pdo.number);
+        char              id[16];
+        std::snprintf(id, sizeof id, "%03X", cob_id(pdo.cob));
+        const std::string who = "node " + std::to_string(n.setup.id) + " (" + n.name + "): its " + number + " (" + id + ") ";
+        late = who + "did not come for {} s";
+        cut = who + "has {} bytes where its objects need " + std::to_string(pdo.bytes()) +
+              "; its pins keep their values; what the node maps is said by: hal can pdo show";
+    }
+};
+
 class Canopen : public hal::Component, private RunnerEvents {
 public:
     explicit Canopen(const hal_host* host) : Component(host), name_(name_of(host)) {
@@ -73,7 +91,10 @@ public:
             const Slot& s = runner_->slots()[i];
             objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
         }
+        for (const Received& r : runner_->own().received) pdo_words_.emplace_back(config_.nodes[r.node], *r.pdo);
         safety_.emplace(*this, shows, *runner_);
+        own_id_words_ = "another device on the bus has the node-id of the master, " + std::to_string(config_.node_id) +
+                        "; give one of the two another: node-id in [bus], or masternodeid=";
         reporter_ = std::make_unique<Reporter>(name_, config_, file_);
     }
 
@@ -191,11 +212,21 @@ private:
             if (!reading.good()) throw std::invalid_argument(first_error(reading));
             if (reading.config.nodes.size() == 1 && reading.config.nodes[0].pdos.empty())
                 throw std::invalid_argument("no object is named: inputs=24831 outputs=24675");
-            if (!bit_rate_.get().empty())
-                reading.config.bit_rate = static_cast<std::uint32_t>(std::strtoul(bit_rate_.get().c_str(), nullptr, 0));
+            if (const std::string& text = bit_rate_.get(); !text.empty()) {
+                const auto bits = config::rate(text);
+                if (!bits) throw std::invalid_argument("bitrate=" + text + ": '" + text + "' is no bit rate; write 1M, 500k or 125000");
+                reading.config.bit_rate = *bits;
+            }
         } else if (!file_argument_.get().empty()) {
             if (by_index())
                 throw std::invalid_argument("slavenodeid= and config= are both given; the configuration says which nodes there are");
+            for (const auto& [argument, name] : {std::pair{&inputs_, "inputs"}, {&outputs_, "outputs"}, {&eds_, "eds"}, {&bit_rate_, "bitrate"}})
+                if (!argument->get().empty())
+                    throw std::invalid_argument(std::string(name) + "=" + argument->get() +
+                                                ": the configuration says this; take the argument out, or config=");
+            if (own_id_ != 127)
+                throw std::invalid_argument("masternodeid=" + std::to_string(static_cast<unsigned>(own_id_)) +
+                                            ": the configuration says this, node-id in [bus]; take the argument out, or config=");
             file_ = texts.find(file_argument_.get());
             std::string text;
             if (!config::read_from_disk(file_, text))
@@ -281,6 +312,9 @@ private:
             reporter_->node(s);
         }
         if (s.step == Step::running) tell_notes(place, s);
+        if (s.step == Step::running)
+            for (std::size_t n = 0; n < pdo_words_.size(); ++n)
+                if (runner_->own().received[n].node == place) pdo_words_[n].cut_told = false;
     }
     /// What should be known of a node, once; that it is there twice, after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
@@ -298,9 +332,13 @@ private:
         reporter_->network(n, *about);
     }
     void on_emergency(std::size_t place, const Emergency& e) noexcept override { reporter_->emergency(runner_->status(place), e); }
-    void on_late(const Received& late) noexcept override {
-        raise("a PDO of a node did not come for {} s", static_cast<double>(late.pdo->limit) * 1e-9);
+    void on_late(std::size_t place) noexcept override {
+        raise(pdo_words_[place].late.c_str(), static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9);
     }
+    void on_short(std::size_t place, unsigned bytes) noexcept override {
+        if (!std::exchange(pdo_words_[place].cut_told, true)) raise(pdo_words_[place].cut.c_str(), bytes);
+    }
+    void on_own_id_taken() noexcept override { raise(own_id_words_.c_str(), not_a_number); }
     void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override { raise(safety_->words(place, fault), not_a_number); }
     void on_bus_state(hal::can::State state) noexcept override {
         if (state == hal::can::State::bus_off)
@@ -340,6 +378,8 @@ private:
     std::optional<SyncFollower>  follower_;
     std::deque<NodePins>         nodes_;
     std::deque<FaultWords>       words_;
+    std::deque<PdoWords>         pdo_words_;  // by place in OwnNode::received
+    std::string                  own_id_words_;
     std::optional<ObjectPins>    objects_;
     std::optional<SafetyPins>    safety_;
     std::unique_ptr<Reporter>    reporter_;

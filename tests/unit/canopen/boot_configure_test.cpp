@@ -199,6 +199,19 @@ TEST(Configure, Is_skipped_when_date_and_time_agree) {
     EXPECT_EQ(without.value(0, 0x2000, 0), 9U);
 }
 
+TEST(Configure, Waits_for_a_slow_node_as_long_as_it_is_told_to) {
+    const auto boots = [](Time own, int resends) {
+        Configured b([&](NodeSetup& n) { n.sdo_timeout = own, n.sdo_resends = resends, n.heartbeat_limit = -1; });
+        b.station.delay = 700 * millisecond;  // longer than the master's own patience
+        b.start();
+        return b.operational(20 * second);
+    };
+    EXPECT_FALSE(boots(0, -1));
+    EXPECT_TRUE(boots(second, 0));
+    EXPECT_FALSE(boots(500 * millisecond, 0));
+    EXPECT_TRUE(boots(500 * millisecond, 2));
+}
+
 TEST(Configure, Restores_defaults_first_and_saves_last) {
     Configured b([](NodeSetup& n) {
         n.writes = {object_write(0x2001, 0, std::int16_t{7})};

@@ -2,6 +2,7 @@
 // The configuration of a network: what it makes, and what is said of a wrong one.
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <map>
 
 #include "canopen/config/node_reader.hpp"
@@ -95,8 +96,23 @@ AccessType=rww
 PDOMapping=1
 )";
 
+/// The same device as a DCF: a value that fits, one that does not, and two tables in files.
+std::string dcf_text() {
+    std::string       text = eds_text;
+    const std::string list = "SupportedObjects=2\n1=0x2000\n2=0x2001\n";
+    text.replace(text.find(list), list.size(), "SupportedObjects=6\n1=0x2000\n2=0x2001\n3=0x2002\n4=0x2003\n5=0x2004\n6=0x2005\n");
+    text += "[2002]\nParameterName=Ramp\nDataType=0x0006\nAccessType=rw\nDefaultValue=1\nParameterValue=7\n";
+    text += "[2003]\nParameterName=Limit\nDataType=0x0006\nAccessType=rw\nParameterValue=70000\n";
+    text += "[2004]\nParameterName=Cam\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=cam.bin\n";
+    text += "[2005]\nParameterName=Gear\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=empty.bin\n";
+    return text + "[DeviceComissioning]\nNodeID=5\nBaudrate=1000\n";
+}
+
 bool files(const std::string& path, std::string& bytes) {
     if (path == "machine/drive.eds") return bytes = eds_text, true;
+    if (path == "machine/unit/drive.dcf") return bytes = dcf_text(), true;
+    if (path == "machine/unit/cam.bin") return bytes = std::string("\0\1\2", 3), true;
+    if (path == "machine/unit/empty.bin") return bytes.clear(), true;
     return bytes = "No such file or directory", false;
 }
 
@@ -216,6 +232,132 @@ TEST(CanopenConfig, writes_are_made_of_the_object_s_type) {
     for (const auto& w : c.nodes[0].setup.writes)
         if (w.index >= 0x2000) seen.emplace_back(w.index, w.data.size());
     EXPECT_EQ(seen, (std::vector<std::pair<std::uint16_t, std::size_t>>{{0x6060, 1}, {0x6099, 4}, {0x2001, 2}}));
+}
+
+const ObjectWrite* write_of(const Node& n, std::uint16_t index, std::uint8_t sub = 0) {
+    for (const ObjectWrite& w : n.setup.writes)
+        if (w.index == index && w.sub == sub) return &w;
+    return nullptr;
+}
+
+TEST(CanopenConfig, what_a_DCF_says_is_written_with_the_files_it_names) {
+    const Reading r = read_text("[bus]\n[node 5]\neds = unit/drive.dcf\n");
+    ASSERT_TRUE(r.good()) << to_string(r, "arm");
+    const Node& n = r.config.nodes[0];
+    ASSERT_NE(write_of(n, 0x2002), nullptr);
+    EXPECT_EQ(write_of(n, 0x2002)->data, (std::vector<std::uint8_t>{7, 0}));
+    EXPECT_EQ(write_of(n, 0x2003), nullptr);
+    ASSERT_NE(write_of(n, 0x2004), nullptr);
+    EXPECT_EQ(write_of(n, 0x2004)->data, (std::vector<std::uint8_t>{0, 1, 2}));
+    EXPECT_EQ(write_of(n, 0x2004)->name, "Cam");
+    EXPECT_EQ(write_of(n, 0x2005), nullptr);
+    std::vector<std::string> said;
+    for (const Message& m : r.messages) said.push_back(std::to_string(m.at.line) + ": " + m.sentence);
+    EXPECT_EQ(said, (std::vector<std::string>{"3: line 94 of 'unit/drive.dcf': the value of 2003sub0 is not configured: '70000' does not fit into "
+                                              "UNSIGNED16 (0..65535)",
+                                              "3: the file 'empty.bin' for object 0x2005:0 is empty, and is not written"}));
+}
+
+TEST(CanopenConfig, a_command_is_written_at_each_boot_and_not_read_back) {
+    const auto c = good(
+        "[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\nwrite 0x2001 u8 = 1\ncommand 0x2002 u16 = 5\nwrite 0x2003 u8 = 2\n");
+    std::vector<std::pair<std::uint16_t, bool>> seen;
+    for (const auto& w : c.nodes[0].setup.writes)
+        if (w.index >= 0x2000) seen.emplace_back(w.index, w.always);
+    EXPECT_EQ(seen, (std::vector<std::pair<std::uint16_t, bool>>{{0x2001, false}, {0x2002, true}, {0x2003, false}}));
+    EXPECT_EQ(said("[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\ncommand 0x2002 = 5\n"),
+              "arm:5:1: the description has no object 0x2002:0; give its type: command 0x2002 u16 = 5");
+}
+
+TEST(CanopenConfig, a_slow_node_has_a_time_out_of_its_own) {
+    const auto c = good("[bus]\nsdo-timeout = 100ms\n[node 1]\nsdo-timeout = 3s\nsdo-retries = 0\n[node 2]\n");
+    EXPECT_EQ(c.master.sdo.timeout, 100 * millisecond);
+    EXPECT_EQ(c.nodes[0].setup.sdo_timeout, 3 * second);
+    EXPECT_EQ(c.nodes[0].setup.sdo_resends, 0);
+    EXPECT_EQ(c.nodes[1].setup.sdo_timeout, 0);
+    EXPECT_LT(c.nodes[1].setup.sdo_resends, 0);
+}
+
+TEST(CanopenConfig, a_configuration_has_a_date_or_a_number_made_of_what_is_written) {
+    const auto dated = [](const std::string& key, const std::string& more = "") {
+        const auto         c = good("[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\n" + key + more);
+        const NodeSetup&   s = c.nodes[0].setup;
+        return std::pair(s.configuration_date, s.configuration_time);
+    };
+    using Date = std::pair<std::uint32_t, std::uint32_t>;
+    EXPECT_EQ(dated(""), Date(0, 0));
+    EXPECT_EQ(dated("configured = no\n"), Date(0, 0));
+    EXPECT_EQ(dated("configured = 1984-01-02\n"), Date(1, 0));
+    EXPECT_EQ(dated("configured = 2026-03-01 14:30\n"), Date(15400, (14 * 60 + 30) * 60'000));
+    EXPECT_EQ(dated("configured = 2026-03-01 00:00:05\n"), Date(15400, 5000));
+    const Date one = dated("configured = by-content\n");
+    EXPECT_NE(one.first, 0U);
+    EXPECT_LT(one.second, 86'400'000U);
+    EXPECT_EQ(one, dated("configured = by-content\n"));
+    EXPECT_NE(one, dated("configured = by-content\n", "write 0x2001 u8 = 1\n"));
+    EXPECT_NE(dated("configured = by-content\n", "write 0x2001 u8 = 2\n"), dated("configured = by-content\n", "write 0x2001 u8 = 1\n"));
+    EXPECT_NE(one, dated("configured = by-content\n", "tpdo1.inhibit = 5ms\n"));
+    for (const char* wrong : {"2026-02-30", "2026-03-01 25:00", "2026-03-01 14:30x", "1983-12-31", "yes", "14:30"})
+        EXPECT_EQ(said(std::string("[bus]\n[node 1]\nconfigured = ") + wrong + "\n"),
+                  "arm:3:14: 'configured' cannot be '" + std::string(wrong) + "'; write by-content, a date such as 2026-03-01 14:30, or no");
+}
+
+TEST(CanopenConfig, a_PDO_may_be_asked_for) {
+    const std::string node = "[bus]\nsync = cycle\n[node 5 x]\ndevice = cia402\n";
+    const auto c = good(node + "tpdo1 = statusword\ntpdo1.request = 100ms\ntpdo2 = modes-of-operation-display\ntpdo2.request = 1s\n"
+                        "tpdo2.transmission = 252\n");
+    EXPECT_EQ(find(c.nodes[0], false, 1)->transmission, 253);
+    EXPECT_EQ(find(c.nodes[0], false, 1)->request, 100 * millisecond);
+    EXPECT_EQ(find(c.nodes[0], false, 2)->transmission, 252);
+    const Schedule s = schedule_of(c, millisecond);
+    unsigned       requests = 0, answers = 0;
+    for (const plan::Message& m : s.messages)
+        if (m.id == 0x185 && m.period == 100 * millisecond) ++(m.remote ? requests : answers);
+    EXPECT_EQ(requests, 1U);
+    EXPECT_EQ(answers, 1U);
+    EXPECT_EQ(said(node + "tpdo1 = statusword\ntpdo1.transmission = 253\n"),
+              "arm:6:22: such a PDO is sent only when it is asked for; write tpdo1.request = 100ms");
+    EXPECT_EQ(said(node + "rpdo1 = controlword\nrpdo1.request = 10ms\n"),
+              "arm:6:1: only what a node sends can be asked for; an rpdo is sent by the master");
+    EXPECT_EQ(said(node + "tpdo1 = statusword\ntpdo1.request = often\n"),
+              "arm:6:17: 'tpdo1.request' cannot be 'often'; write a time from 1ms to 3600s");
+}
+
+TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
+    const auto c = good(
+        "[bus]\nsync = cycle\n[node 3 panel]\ndevice = cia401\ntpdo2 = mpdo read-inputs-1, 0x6401:1\nrpdo2 = mpdo write-outputs-1\n"
+        "rpdo2.inhibit = 5ms\ntpdo2.inhibit = 2ms\n");
+    const Node& n = c.nodes[0];
+    const Pdo * in = find(n, false, 2), *out = find(n, true, 2);
+    ASSERT_NE(in, nullptr);
+    ASSERT_NE(out, nullptr);
+    EXPECT_EQ(in->multiplex, Multiplex::from_source);
+    EXPECT_EQ(out->multiplex, Multiplex::to_destination);
+    EXPECT_EQ(in->transmission, 255);
+    EXPECT_EQ(in->bytes(), 8U);
+    EXPECT_EQ(in->objects[0].bit_pins.size(), 8U);
+    std::string written;
+    for (const ObjectWrite& w : n.setup.writes) {
+        std::uint64_t value = 0;
+        std::memcpy(&value, w.data.data(), w.data.size());
+        char text[40];
+        std::snprintf(text, sizeof text, "%04X:%u=%llX ", w.index, unsigned{w.sub}, static_cast<unsigned long long>(value));
+        written += text;
+    }
+    EXPECT_EQ(written,
+              "1400:1=80000203 1800:1=80000183 1FA0:1=1600001 1FA0:2=1640101 "
+              "1401:1=80000303 1601:0=0 1601:0=FF 1401:2=FF 1401:3=0 1401:5=0 1401:1=303 "
+              "1801:1=80000283 1A01:0=0 1A01:0=FE 1801:2=FF 1801:3=14 1801:5=0 1801:6=0 1801:1=283 ");
+    const std::string node = "[bus]\nsync = cycle\n[node 3 panel]\ndevice = cia401\n";
+    EXPECT_EQ(said(node + "rpdo2 = mpdo gap 8, write-outputs-1\n"),
+              "arm:5:9: a multiplexed PDO has no gaps; a multiplexed PDO carries one object of 8, 16, 24 or 32 bits at a time");
+    EXPECT_EQ(said(node + "rpdo2 = mpdo 0x2000 u64\n"),
+              "arm:5:9: object '0x2000' has 64 bits; a multiplexed PDO carries one object of 8, 16, 24 or 32 bits at a time");
+    EXPECT_EQ(said(node + "tpdo2 = mpdo read-inputs-1\ntpdo2.transmission = sync\n"),
+              "arm:6:22: a multiplexed PDO is sent when an object changes; write transmission = event, or leave it out");
+    EXPECT_EQ(said(node + "tpdo2 = mpdo read-inputs-1\ntpdo1 = read-inputs-1\n"),
+              "arm:5:9: object 'read-inputs-1' is in two PDOs, and one of them is a multiplexed one; leave it in one of the two");
+    EXPECT_EQ(said(node + "tpdo2 = mpdo read-inputz\n").substr(0, 50), "arm:5:14: the node has no object 'read-inputz'; di");
 }
 
 TEST(CanopenConfig, a_safe_value_is_in_the_pin_s_unit) {

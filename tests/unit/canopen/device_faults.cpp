@@ -144,6 +144,11 @@ TEST(FaultyTransfers, end_as_the_protocol_wants) {
     set("block-crc");
     EXPECT_EQ(bench.read(0x2000, 0, back, SdoMode::block), Abort::crc);
     EXPECT_EQ(bench.write(0x2000, 0, data, SdoMode::block), Abort::crc);
+    std::vector<std::uint8_t> many(1000, 0x5a);  // goes by blocks if nobody says otherwise, and by segments when they break
+    EXPECT_EQ(bench.write(0x2000, 0, many), Abort::none);
+    EXPECT_EQ(bench.read(0x2000, 0, back), Abort::none);
+    EXPECT_EQ(back, many);
+    ASSERT_EQ(bench.write(0x2000, 0, data, SdoMode::segmented), Abort::none);
     set("stale-abort");
     EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 1), 1U);  // what the aborts are about
     EXPECT_EQ(bench.read(0x2000, 0, back, SdoMode::block), Abort::none);

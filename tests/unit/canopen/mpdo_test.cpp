@@ -50,11 +50,89 @@ TEST_F(Mpdo, Own_node_and_object_go_out_with_the_value) {
     EXPECT_FALSE(device->pdos().send_to(1, 9, 0x2001, 0, 1)) << "this one says sources";
 }
 
+/// With a scanner list: two of the four values of 2008h, and 2001h.
+struct Scanner : Mpdo {
+    void make_scanner(std::uint16_t inhibit_100us = 0) {
+        auto d = example();
+        *d.find(0x1a00, 0)->value.data() = 0xfe;
+        d.find(0x1800, 3)->value = {static_cast<std::uint8_t>(inhibit_100us), static_cast<std::uint8_t>(inhibit_100us >> 8)};
+        d.add(0x1fa0, 0, Type::unsigned8, Access::constant, 3);
+        d.add(0x1fa0, 1, Type::unsigned32, Access::read_write, 0x02'2008'01);
+        d.add(0x1fa0, 2, Type::unsigned32, Access::read_write, 0x01'2001'00);
+        d.add(0x1fa0, 3, Type::unsigned32, Access::read_write, 0);
+        bus = Bus{};
+        make(d);
+        nmt(NmtCommand::start);
+        run(0);
+    }
+    /// Index, sub-index and value of each multiplexed PDO since the last call.
+    std::vector<std::array<unsigned, 3>> told() {
+        std::vector<std::array<unsigned, 3>> all;
+        for (const Frame& f : since(0x185)) {
+            EXPECT_EQ(f.length, 8);
+            EXPECT_EQ(f.data[0], 5);
+            all.push_back({load<std::uint16_t>(f.data.data() + 1), f.data[3], load<std::uint32_t>(f.data.data() + 4)});
+        }
+        bus.log.clear();
+        return all;
+    }
+    using Told = std::vector<std::array<unsigned, 3>>;
+};
+
+TEST_F(Scanner, Tells_what_is_in_its_list_once_and_then_what_changes) {
+    make_scanner();
+    EXPECT_EQ(told(), (Told{{0x2008, 1, 1}, {0x2008, 2, 2}, {0x2001, 0, 0}}));
+    run(5);
+    EXPECT_EQ(told(), Told{});
+    device->dictionary().set<std::uint8_t>(0x2008, 2, 0x55);
+    device->dictionary().set<std::uint8_t>(0x2008, 3, 0x66);  // not in the list
+    device->dictionary().set<std::int16_t>(0x2001, 0, -2);
+    run(1);
+    EXPECT_EQ(told(), (Told{{0x2008, 2, 0x55}, {0x2001, 0, 0xfffe}}));
+    ASSERT_EQ(write(0x1fa0, 3, 0x01'2008'03, 4), Abort::none);
+    bus.log.clear();
+    run(1);
+    EXPECT_EQ(told(), (Told{{0x2008, 1, 1}, {0x2008, 2, 0x55}, {0x2001, 0, 0xfffe}, {0x2008, 3, 0x66}})) << "a list that is new is told anew";
+    nmt(NmtCommand::enter_pre_operational);
+    device->dictionary().set<std::uint8_t>(0x2008, 1, 9);
+    run(1);
+    EXPECT_EQ(told(), Told{});
+}
+
+TEST_F(Scanner, Keeps_its_inhibit_time_and_lets_none_wait_for_ever) {
+    make_scanner(50);  // 5 ms
+    told();
+    Told all;
+    std::uint8_t beat = 10;
+    for (int n = 0; n < 40; ++n) {
+        device->dictionary().set<std::uint8_t>(0x2008, 1, ++beat);
+        device->dictionary().set<std::uint8_t>(0x2008, 2, ++beat);
+        device->dictionary().set<std::int16_t>(0x2001, 0, static_cast<std::int16_t>(n));
+        run(1);
+        const auto more = told();
+        all.insert(all.end(), more.begin(), more.end());
+    }
+    EXPECT_NEAR(static_cast<double>(all.size()), 8, 1);
+    std::array<int, 3> each{};
+    for (const auto& t : all) ++each[t[0] == 0x2001 ? 2 : t[1] - 1];
+    for (const int n : each) EXPECT_GE(n, 2);
+}
+
 TEST_F(Mpdo, Addressed_to_all_reaches_us_and_to_another_does_not) {
     make_multiplexed(0xff);
     send({0x205, {0x80, 0x08, 0x20, 2, 0x33, 0, 0, 0}});
     EXPECT_EQ(value(2), 0x33);
     send({0x205, {0x89, 0x08, 0x20, 2, 0x44, 0, 0, 0}});
+    EXPECT_EQ(value(2), 0x33);
+}
+
+TEST_F(Mpdo, Destination_that_is_not_there_is_an_error_until_one_is) {
+    make_multiplexed(0xff);
+    send({0x205, {0x85, 0x55, 0x55, 1, 1, 0, 0, 0}});
+    EXPECT_TRUE(device->emcy().active(0x8230));
+    EXPECT_EQ(device->pdos().rpdo(1).errors, 1U);
+    send({0x205, {0x85, 0x08, 0x20, 2, 0x33, 0, 0, 0}});
+    EXPECT_FALSE(device->emcy().active(0x8230));
     EXPECT_EQ(value(2), 0x33);
 }
 

@@ -15,12 +15,12 @@
 namespace hal::canopen::test {
 namespace {
 
-constexpr const char* one_axis =
+const std::string one_axis =
     "[bus]\nlink = sim:runner-wire\nbitrate = 1M\nsync = cycle\n"
     "[node 2 x]\ndevice = cia402\ntpdo1 = statusword\nrpdo1 = controlword, target-position\n";
 
 struct Wire : RunnerEvents {
-    Wire() : reading(config::read(one_axis, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
+    explicit Wire(const std::string& more = "") : reading(config::read(one_axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
         EXPECT_TRUE(reading.good());
         node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2});
         runner.open(*link);
@@ -40,18 +40,32 @@ struct Wire : RunnerEvents {
     /// A cycle, whose set-point is its number; what others hear of it is kept.
     void step() {
         now += millisecond;
-        ++number;
+        if (!number_stands) ++number;
         runner.receive(now);
         if (target != nullptr) target->wish = static_cast<std::uint64_t>(number);
         runner.transmit(now, millisecond);
         node->turn(now);
         for (Frame f; ear->receive(f, now);) {
+            if (f.id == 0x282) ++(f.remote ? asked : answered);
             if (f.id != 0x202 || f.length != 6) continue;
             std::int32_t value = 0;
             std::memcpy(&value, f.data.data() + 2, sizeof value);
             if (value != 0) heard.push_back(value);
         }
     }
+    /// Others keep the bus for `cycles`: twelve frames of eight bytes take longer than a millisecond.
+    void flood(int cycles) {
+        for (; cycles > 0; --cycles, step()) {
+            for (int n = 0; n < 12; ++n) ear->send({0x001, {1, 2, 3, 4, 5, 6, 7, 8}}, now);
+            ear->flush(now);
+        }
+    }
+    void on_sync_overrun() noexcept override { ++overruns; }
+    void on_own_id_taken() noexcept override { ++own_id_taken; }
+    void on_short(std::size_t place, unsigned bytes) noexcept override { cut.emplace_back(place, bytes); }
+
+    unsigned                                      overruns = 0, own_id_taken = 0, asked = 0, answered = 0;
+    std::vector<std::pair<std::size_t, unsigned>> cut;
     config::Reading            reading;
     Runner                     runner;
     std::unique_ptr<can::Link> link, ear;
@@ -60,8 +74,57 @@ struct Wire : RunnerEvents {
     Slot*                      target = nullptr;
     Time                       now = second;
     std::int32_t               number = 0;
+    bool                       number_stands = false;
     std::vector<std::int32_t>  heard;
 };
+
+TEST(Runner, Counts_the_syncs_that_are_due_before_what_belongs_to_the_last_is_sent) {
+    Wire w;
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    for (int n = 0; n < 100; ++n) w.step();
+    EXPECT_EQ(w.runner.sync_overruns(), 0U);
+    w.flood(5);
+    EXPECT_GE(w.runner.sync_overruns(), 3U);
+    for (int n = 0; n < 20; ++n) w.step();
+    const auto overruns = w.runner.sync_overruns();
+    EXPECT_EQ(w.overruns, overruns);
+    for (int n = 0; n < 100; ++n) w.step();
+    EXPECT_EQ(w.runner.sync_overruns(), overruns);
+    EXPECT_TRUE(w.runner.operational(0));
+}
+
+TEST(Runner, Tells_a_PDO_that_is_too_short_once_until_a_whole_one_comes) {
+    Wire w;
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    for (int n = 0; n < 10; ++n) w.step();
+    const auto value = [&] {
+        for (const Slot& s : w.runner.slots())
+            if (!s.to_node) return Dictionary::value<std::uint64_t>(*s.entry);
+        return std::uint64_t{0};
+    };
+    const std::uint64_t before = value();
+    EXPECT_NE(before, 0U);
+    w.node->faults().set(Fault::short_pdo, {.every = 1});
+    for (int n = 0; n < 10; ++n) w.step();
+    EXPECT_EQ(w.cut, (std::vector<std::pair<std::size_t, unsigned>>{{0, 1}}));
+    EXPECT_EQ(value(), before);
+    w.node->faults().set(Fault::short_pdo, {});
+    for (int n = 0; n < 10; ++n) w.step();
+    w.node->faults().set(Fault::short_pdo, {.every = 1});
+    for (int n = 0; n < 10; ++n) w.step();
+    EXPECT_EQ(w.cut.size(), 2U);
+}
+
+TEST(Runner, Notices_another_device_with_the_master_s_node_id) {
+    Wire w;
+    for (int n = 0; n < 300; ++n) w.step();
+    EXPECT_EQ(w.own_id_taken, 0U);
+    w.ear->send({0x77f, {0x05}}, w.now), w.ear->flush(w.now);
+    for (int n = 0; n < 3; ++n) w.step();
+    EXPECT_EQ(w.own_id_taken, 1U);
+}
 
 TEST(Runner, Set_points_that_a_dead_wire_kept_back_are_not_sent_when_it_is_back) {
     Wire w;
@@ -85,6 +148,40 @@ TEST(Runner, Set_points_that_a_dead_wire_kept_back_are_not_sent_when_it_is_back)
     EXPECT_LE(old, 22);  // what was on its way when it was noticed: 20 ms
     EXPECT_GE(w.heard.size(), 90U);
     EXPECT_LE(w.number - w.heard.back(), 2);
+}
+
+TEST(Runner, Asks_for_what_a_node_sends_on_request_as_often_as_it_is_told_to) {
+    Wire w("tpdo2 = modes-of-operation-display\ntpdo2.request = 10ms\n");
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    for (int n = 0; n < 10; ++n) w.step();
+    w.asked = w.answered = 0;
+    for (int n = 0; n < 200; ++n) w.step();
+    EXPECT_EQ(w.asked, 20U);
+    EXPECT_EQ(w.answered, 20U);
+    w.node->power(false);
+    for (int n = 0; n < 1000; ++n) w.step();
+    w.asked = 0;
+    for (int n = 0; n < 100; ++n) w.step();
+    EXPECT_EQ(w.asked, 0U);
+}
+
+TEST(Runner, What_is_sent_on_a_change_is_sent_again_when_a_dead_wire_is_back) {
+    Wire w("rpdo1.transmission = event\n");
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    for (int n = 0; n < 20; ++n) w.step();
+    auto* simulation = w.link->simulation();
+    simulation->cut(simulation->node(), true);
+    for (int n = 0; n < 80; ++n) w.step();
+    const std::int32_t last = w.number;
+    w.number_stands = true;  // it changes no more: nothing else would send it
+    for (int n = 0; n < 20; ++n) w.step();
+    w.heard.clear();
+    simulation->cut(simulation->node(), false);
+    for (int n = 0; n < 50; ++n) w.step();
+    ASSERT_FALSE(w.heard.empty());
+    EXPECT_EQ(w.heard.back(), last);
 }
 
 }  // namespace

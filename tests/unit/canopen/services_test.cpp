@@ -158,8 +158,16 @@ TEST_F(Heartbeat, Error_behaviour_decides_the_state) {
     }
 }
 TEST_F(Heartbeat, Another_node_with_our_id_is_noticed) {
+    bus.log.clear();
     send({0x705, {0x05}});
+    send({0x705, {0x05}});
+    run(1);
     EXPECT_EQ(events.collisions, 1);
+    ASSERT_EQ(since(0x85).size(), 1U);
+    EXPECT_EQ(load<std::uint16_t>(since(0x85)[0].data.data()), 0x8150);
+    nmt(reset_communication);
+    EXPECT_FALSE(device->emcy().active(0x8150));
+    EXPECT_EQ(device->emcy().error_register(), 0);
 }
 
 struct Guarding : Node {};
