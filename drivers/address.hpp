@@ -30,6 +30,14 @@ struct Driver {
     Opened (*open)(const std::string& place, const Options&);
     bool (*is_own_option)(std::string_view key) = nullptr;
     std::string (*own_options)() = nullptr;  ///< their names, for people
+    std::string_view without = {};           ///< those of all drivers that mean nothing to this one, with a blank between two
+
+    bool lacks(std::string_view key) const {
+        const auto at = without.find(key);
+        if (key.empty() || at == without.npos) return false;
+        const auto end = at + key.size();
+        return (at == 0 || without[at - 1] == ' ') && (end == without.size() || without[end] == ' ');
+    }
 };
 
 /// Opens by the driver that the address names. `apply(key, value, has_value, options)` says what is wrong with an option, or nothing;
@@ -60,6 +68,8 @@ Opened open_address(std::string_view address, Options options, std::span<const D
         std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
         if (problem.starts_with(no_option) && driver->own_options != nullptr)
             problem += ", and of " + std::string(driver->name) + ": " + driver->own_options();
+        if (problem.empty() && driver->lacks(key))
+            problem = "the option " + quoted(key) + " means nothing to " + std::string(driver->name) + "; take it out";
         if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
     }
     try {

@@ -18,8 +18,12 @@ namespace hal::can {
 namespace {
 
 constexpr link::Driver<Opened, Options> drivers[] = {
-    {"can", socketcan::open}, {"sim", simbus::open},    {"udp", canudp::open},
-    {"slcan", slcan::open},   {"replay", replay::open}, {"cane", cane::open, cane::is_own_option, cane::own_options},
+    {"can", socketcan::open},
+    {"sim", simbus::open},
+    {"udp", canudp::open, nullptr, nullptr, "restart"},
+    {"slcan", slcan::open, nullptr, nullptr, "own errors restart receivequeue"},
+    {"replay", replay::open, nullptr, nullptr, "own restart sendqueue receivequeue"},
+    {"cane", cane::open, cane::is_own_option, cane::own_options, "bitrate datarate own errors restart"},
 };
 
 using link::quoted;

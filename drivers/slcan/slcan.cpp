@@ -210,6 +210,9 @@ Opened open(const std::string& device, const Options& options) {
     if (options.bit_rate != 0 && options.bit_rate != unlimited && rate_command(options.bit_rate) == nullptr)
         return {nullptr, "a serial-line adapter cannot be told " + std::to_string(options.bit_rate) +
                              " bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M"};
+    if (options.data_rate != 0 && options.data_rate != 2'000'000 && options.data_rate != 5'000'000)
+        return {nullptr, "a serial-line adapter cannot be told a data rate of " + std::to_string(options.data_rate) +
+                             " bit/s; it knows 2M and 5M"};
     std::string problem;
     Descriptor line = open_line(device, options, problem);
     if (!line) return {nullptr, problem};

@@ -155,8 +155,10 @@ void Keeper::look() {
     counting_.bit_rate.store(now.bit_rate != 0 ? now.bit_rate : counting_.bit_rate.load());
     counting_.data_rate.store(now.data_rate != 0 ? now.data_rate : counting_.data_rate.load());
     if (now.has_counters) counting_.send_errors.store(now.send_errors), counting_.receive_errors.store(now.receive_errors);
-    const State state = now.has_state ? now.state : before == State::down ? State::active : before;
-    counting_.state.store(state);
+    State state = before;  // what an interface without a state of its own is in is told by error frames, meanwhile too
+    if (now.has_state) counting_.state.store(state = now.state);
+    else if (before != State::down || !counting_.state.compare_exchange_strong(state, State::active)) state = counting_.state.load();
+    else state = State::active;
     if (before == State::down && state != State::down) Counting::add(counting_.restarts);
 
     if (state != State::bus_off) return void(off_since_ns_ = 0);

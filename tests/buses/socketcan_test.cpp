@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Needs vcan0, vcan1 and the pair vxcan0/vxcan1: on this machine, or in the kernel that uml/run starts (socketcan_test.py does).
 #include <gtest/gtest.h>
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
 #include <net/if.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -185,6 +191,89 @@ TEST_F(Socketcan, an_interface_is_removed_and_comes_back) {
     ASSERT_TRUE(next(*b, f));
     EXPECT_EQ(f.data[0], 9);
     run("ip link del vcan7; ip link del vcan8");
+}
+
+/// What a controller's driver tells of it, here by hand: a virtual interface has no controller.
+struct Controller {
+    Controller() : socket(::socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW)) {
+        sockaddr_can address{};
+        address.can_family = AF_CAN;
+        address.can_ifindex = static_cast<int>(if_nametoindex("vcan0"));
+        EXPECT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    }
+    void tell(canid_t classes, std::uint8_t what = 0, std::uint8_t send_errors = 0, std::uint8_t receive_errors = 0) {
+        can_frame f{};
+        f.can_id = CAN_ERR_FLAG | classes, f.can_dlc = CAN_ERR_DLC;
+        f.data[1] = what, f.data[6] = send_errors, f.data[7] = receive_errors;
+        ASSERT_EQ(::write(socket.get(), &f, sizeof f), static_cast<ssize_t>(sizeof f));
+    }
+    Descriptor socket;
+};
+
+TEST_F(Socketcan, error_frames_tell_the_state_of_the_controller_its_counters_and_what_it_lost) {
+    Controller controller;
+    auto a = link("can:vcan0"), b = link("can:vcan0?errors");
+    const struct {
+        std::uint8_t what;
+        State state;
+    } steps[] = {{CAN_ERR_CRTL_TX_WARNING, State::warning}, {CAN_ERR_CRTL_RX_PASSIVE, State::passive}, {CAN_ERR_CRTL_RX_WARNING, State::warning},
+                 {CAN_ERR_CRTL_TX_PASSIVE, State::passive}, {CAN_ERR_CRTL_ACTIVE, State::active}};
+    std::uint8_t count = 90;
+    for (const auto& step : steps) {
+        controller.tell(CAN_ERR_CRTL, step.what, ++count, 7);
+        until(*a, step.state);
+        until(*b, step.state);
+        EXPECT_EQ(a->statistics().send_errors, count);
+        EXPECT_EQ(a->statistics().receive_errors, 7);
+    }
+    EXPECT_EQ(a->statistics().lost, 0U);
+    controller.tell(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW);
+    controller.tell(CAN_ERR_PROT | CAN_ERR_BUSERROR);
+    a->send({0x123, {1}}, unclocked), a->flush(unclocked);
+    Frame f;
+    ASSERT_TRUE(next(*b, f));  // an error frame comes only to who asked for it: the overflow
+    EXPECT_TRUE(f.error);
+    EXPECT_EQ(f.id, error_controller);
+    ASSERT_TRUE(next(*b, f));
+    EXPECT_EQ(f.id, error_protocol | error_bus);
+    ASSERT_TRUE(next(*b, f));
+    EXPECT_FALSE(f.error);
+    b->send({0x124, {2}}, unclocked), b->flush(unclocked);
+    ASSERT_TRUE(next(*a, f));
+    EXPECT_EQ(f.id, 0x124U);
+    EXPECT_EQ(a->statistics().lost, 1U);
+    EXPECT_EQ(a->statistics().errors, 7U);
+    EXPECT_EQ(a->statistics().received, 1U);
+}
+
+TEST_F(Socketcan, bus_off_is_told_nothing_is_sent_meanwhile_and_it_ends_when_the_controller_is_back) {
+    Controller controller;
+    auto a = link("can:vcan0?restart=0"), b = link("can:vcan0");
+    controller.tell(CAN_ERR_BUSOFF);
+    until(*a, State::bus_off);
+    EXPECT_EQ(a->send({0x1, {}}, unclocked), Sent::bus_off);
+    EXPECT_EQ(a->statistics().bus_offs, 1U);
+    EXPECT_EQ(a->statistics().dropped, 1U);
+    a->restart();  // a virtual interface cannot be told to; the controller of a real one can, as it does here
+    EXPECT_FALSE(a->wait(50'000'000));
+    EXPECT_EQ(a->state(), State::bus_off);
+    controller.tell(CAN_ERR_RESTARTED);
+    until(*a, State::active);
+    EXPECT_EQ(a->statistics().restarts, 1U);
+    a->send({0x2, {}}, unclocked), a->flush(unclocked);
+    Frame f;
+    ASSERT_TRUE(next(*b, f));
+    EXPECT_EQ(f.id, 0x2U);
+}
+
+TEST_F(Socketcan, a_link_that_only_listens_says_nothing) {
+    auto a = link("can:vcan0?listen"), b = link("can:vcan0");
+    EXPECT_EQ(a->send({0x1, {}}, unclocked), Sent::refused);
+    b->send({0x2, {}}, unclocked), b->flush(unclocked);
+    Frame f;
+    ASSERT_TRUE(next(*a, f));
+    EXPECT_EQ(f.id, 0x2U);
+    EXPECT_FALSE(b->wait(20'000'000));
 }
 
 TEST_F(Socketcan, what_is_wrong_is_said_with_what_to_type) {
