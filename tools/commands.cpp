@@ -118,7 +118,7 @@ void declare_compile(CLI::App& app, Options& o) {
     words(app, o, "FILE", "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or .c (LinuxCNC's hal.h)");
     app.add_option("-o,--output", o.output, "install here; default: ~/.local/share/halcyon/components")->type_name("DIR");
     app.add_flag("--check-rt", o.check_rt, "run it 1000 cycles with random and extreme values; name what is not real time");
-    app.add_flag("--keep", o.keep, "of a .comp file: leave the C++ it was translated to in this folder");
+    app.add_flag("--keep", o.keep, "of a .comp file: leave the C text that was made of it in this folder");
 }
 
 void declare_explain(CLI::App& app, Options& o) {
@@ -244,6 +244,19 @@ void declare_can_sdo_write(CLI::App& app, Options& o) {
     app.add_option("--from", o.input, "the bytes of this file instead of a value")->type_name("FILE");
 }
 
+void declare_can_dcf_read(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE", "the bus; a node 1-127");
+    described(app, o, "the node's description, EDS, DCF or XDD: which objects it has");
+    app.add_option("-o,--output", o.output, "the DCF; without it: standard output")->type_name("FILE");
+    answered(app, o);
+}
+
+void declare_can_dcf_write(CLI::App& app, Options& o) {
+    words(app, o, "ADDRESS NODE FILE", "the bus; a node 1-127; a DCF");
+    app.add_flag("--check", o.check, "only say what differs; exit code 1 if anything does");
+    answered(app, o);
+}
+
 void declare_can_pdo(CLI::App& app, Options& o) {
     words(app, o, "ADDRESS NODE", "the bus; a node 1-127");
     described(app, o);
@@ -344,6 +357,8 @@ constexpr Subcommand table[] = {
     {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", ON_BUS(run_can_scan), declare_can_scan},
     {"can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node", ON_BUS(run_can_sdo_read), declare_can_sdo_read},
     {"can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node", ON_BUS(run_can_sdo_write), declare_can_sdo_write},
+    {"can dcf read", "ADDRESS NODE --eds FILE [-o FILE]", "the settings of a node into a DCF", ON_BUS(run_can_dcf_read), declare_can_dcf_read},
+    {"can dcf write", "ADDRESS NODE FILE [--check]", "the settings of a DCF into a node: what differs, verified", ON_BUS(run_can_dcf_write), declare_can_dcf_write},
     {"can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry", ON_BUS(run_can_pdo_show), declare_can_pdo_show},
     {"can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301", ON_BUS(run_can_pdo_map), declare_can_pdo_map},
     {"can pdo enable", "ADDRESS NODE PDO", "switch a PDO on", ON_BUS(run_can_pdo_enable), declare_can_pdo_switch},
@@ -375,7 +390,7 @@ struct Group {
 };
 
 constexpr Group groups[] = {
-    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, pdo, lss, drive, gateway; eds check"},
+    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, dcf, pdo, lss, drive, gateway; eds check"},
     {"canopen", "checks and plans a CANopen network"},
     {"tdma", "plans the time slots of an Ethernet segment"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; what they can do wrong: faults"},

@@ -79,6 +79,8 @@ int run_can_scan(const Options&);
 int run_can_drive(const Options&);
 int run_can_sdo_read(const Options&);
 int run_can_sdo_write(const Options&);
+int run_can_dcf_read(const Options&);
+int run_can_dcf_write(const Options&);
 int run_can_pdo_show(const Options&);
 int run_can_pdo_map(const Options&);
 int run_can_pdo_enable(const Options&);

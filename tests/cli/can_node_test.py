@@ -114,6 +114,51 @@ class Sdo(Node):
                          self.bad_can("sdo", "read", self.bus, "5", "1000", "--eds", "node.log"))
 
 
+class Dcf(Node):
+    def dcf(self, *words):
+        return self.run_program("can", "dcf", "write", self.bus, "5", "io.dcf", *words)
+
+    def test_settings_are_kept_and_put_back(self):
+        self.can("sdo", "write", self.bus, "5", "6207:1", "0x0f", "--type", "u8")
+        self.can("pdo", "map", self.bus, "5", "tpdo2", "6401:2", "--transmission", "3", "--inhibit", "5ms")
+        self.assertRegex(self.can("dcf", "read", self.bus, "5", "--eds", "io.eds", "-o", "io.dcf"), r"^io\.dcf: \d+ settings of node 5\n$")
+        self.assertRegex(self.run_program("can", "eds", "check", "io.dcf").stderr, r"^io\.dcf: configuration of node 5; .*; 0 warnings, 0 notes\n$")
+        text = (self.folder / "io.dcf").read_text()
+        self.assertTrue("ParameterValue=$NODEID+0x00000180\n" in text, "what is as the EDS has it serves another node, too")
+        self.assertTrue("\nNodeID=5\n" in text)
+        done = self.dcf("--check")
+        self.assertRegex(done.stdout, r"^node 5: 0 of \d+ settings differ\n$")
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        # its replacement knows nothing of it
+        self.can("sdo", "write", self.bus, "5", "6207:1", "0", "--type", "u8")
+        self.can("pdo", "map", self.bus, "5", "tpdo2", "6401:1", "6401:2", "--transmission", "255", "--inhibit", "0ms")
+        done = self.dcf("--check")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("6207:1 Error value output 8-bit, Output block 1 is 0x00 (0), the file has 0x0F (15)\n", done.stdout)
+        self.assertRegex(done.stdout, r"\nnode 5: 5 of \d+ settings differ\n$")
+        done = self.dcf()
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertRegex(done.stdout, r"\nnode 5: 5 of \d+ settings differed and were written\n"
+                                      r"they last until its power goes; to store them: hal can sdo write \S+ 5 1010:1 0x65766173 --type u32\n$")
+        self.assertRegex(self.dcf("--check").stdout, r"^node 5: 0 of \d+ settings differ\n$")
+        shown = {p["pdo"]: p for p in map(json.loads, self.can("pdo", "show", self.bus, "5", "--json").splitlines())}
+        self.assertEqual((True, [(0x6401, 2, 16)]), (shown["TPDO2"]["on"], [(m["index"], m["sub"], m["bits"]) for m in shown["TPDO2"]["mapping"]]))
+
+    def test_wrong_words(self):
+        self.assertEqual("hal can dcf read: which objects the node has is not known; add --eds FILE\n", self.bad_can("dcf", "read", self.bus, "5"))
+        self.assertEqual("hal can dcf read: two words are needed; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf\n",
+                         self.bad_can("dcf", "read", self.bus, "--eds", "io.eds"))
+        self.assertEqual("hal can dcf write: three words are needed; type: hal can dcf write ADDRESS NODE FILE.dcf\n",
+                         self.bad_can("dcf", "write", self.bus, "5"))
+        self.assertEqual("hal can dcf write: cannot read 'none.dcf': No such file or directory\n",
+                         self.bad_can("dcf", "write", self.bus, "5", "none.dcf"))
+        self.assertEqual("hal can dcf write: 'io.eds' has no settings: it has no ParameterValue that could be written; hal can dcf read makes such a file\n",
+                         self.bad_can("dcf", "write", self.bus, "5", "io.eds"))
+        self.assertEqual(f"hal can dcf read: node 9 did not answer within 0.15 s (asked for 1005:0 COB-ID SYNC); the bus is active; "
+                         f"hal can scan {self.bus} shows who is there\n",
+                         self.bad_can("dcf", "read", self.bus, "9", "--eds", "io.eds", "--timeout", "50ms"))
+
+
 class Pdo(Node):
     def shown(self):
         return {p["pdo"]: p for p in map(json.loads, self.can("pdo", "show", self.bus, "5", "--json").splitlines())}

@@ -167,6 +167,8 @@ std::string pin_text(const config::Node& node, const config::Object& object, boo
 }
 
 std::string transmission_text(const config::Pdo& pdo) {
+    if (pdo.multiplexed()) return "multiplexed: one object at a time, when it changes";
+    if (pdo.request != 0) return fmt::format("asked for every {} ms", pdo.request / canopen::millisecond);
     if (pdo.transmission == 0) return "with the SYNC when changed";
     if (pdo.transmission == 1) return "with every SYNC";
     if (pdo.transmission <= 240) return fmt::format("with every SYNC number {}", pdo.transmission);
