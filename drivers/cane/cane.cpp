@@ -18,6 +18,7 @@ namespace hal::can::cane {
 namespace {
 
 constexpr unsigned most_messages = 255;  // of one packed frame: its count is a byte
+constexpr std::uint16_t services_alone = 0x8000;  // in the session of frames without process data
 constexpr std::size_t most_payload = ethernet::largest_frame - ethernet::header_bytes;
 
 /// What share of the line this link's frames take, both ways. The sending and the receiving thread add; the receiving one closes windows.
@@ -64,6 +65,7 @@ public:
             return why;
         };
         if (!frame.valid() || frame.fd || options_.listen_only) return drop(Sent::refused);
+        if (is_replaced(frame)) return Sent::queued;
         auto& queue = is_service(frame) ? service_data_ : process_data_;
         if (queue.push(frame)) return Sent::queued;
         flush(now_ns);
@@ -73,6 +75,7 @@ public:
     void flush(std::int64_t now_ns) noexcept override {
         if (settings_.format == Format::packed) flush_packed(now_ns);
         else flush_single(now_ns);
+        held_ = process_data_.size();
     }
 
     std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
@@ -109,6 +112,20 @@ public:
 private:
     /// SDO, heartbeat, boot-up and LSS wait for process data, SYNC, NMT and EMCY: those have a cycle to keep.
     static bool is_service(const Frame& f) noexcept { return f.id >= 0x580; }
+    /// Of SYNC and the PDOs of the predefined connection set the newest counts.
+    static bool is_state(const Frame& f) noexcept { return !f.extended && !f.remote && (f.id == 0x080 || (f.id >= 0x180 && f.id < 0x580)); }
+    /// It took the place of an older one that found no room in the last cycle: what is late must not make everything behind it late, too.
+    bool is_replaced(const Frame& frame) noexcept {
+        if (held_ == 0 || !is_state(frame)) return false;
+        for (std::size_t n = 0; n < held_; ++n) {
+            Frame& older = *process_data_.at(n);
+            if (older.id != frame.id || !is_state(older)) continue;
+            older = frame;
+            Counting::add(counting_.dropped);
+            return true;
+        }
+        return false;
+    }
 
     /// Room for payload, as it is now; 0: nothing can leave.
     std::size_t room() const noexcept {
@@ -193,10 +210,13 @@ private:
                 const auto& destination = to_all ? ethernet::broadcast : *to;
                 address_to(destination);
                 const auto length = ethernet::header_bytes + packed_header + bytes;
+                const bool service = counts[0] == 0;
+                auto& sequences = service ? service_sequences_ : sequences_;
+                const auto session = static_cast<std::uint16_t>(service ? session_ ^ services_alone : session_);
                 close_packed(std::span(frame_.data(), length), static_cast<std::uint8_t>(counts[0] + counts[1]),
-                             {session_, sequences_.next(destination)});
-                sent = launch(length, counts[0] == 0, now_ns);
-                if (sent == ethernet::Sent::full) return sequences_.take_back(destination);
+                             {session, sequences.next(destination)});
+                sent = launch(length, service, now_ns);
+                if (sent == ethernet::Sent::full) return sequences.take_back(destination);
             }
             done(process_data_, counts[0], sent);
             done(service_data_, counts[1], sent);
@@ -259,8 +279,9 @@ private:
     Nodes nodes_;
     std::atomic<bool> line_up_{true};  // written by the receiving thread
 
-    Ring<Frame> process_data_, service_data_;  // the sending thread's, as the next two
-    Sequences sequences_;
+    Ring<Frame> process_data_, service_data_;  // the sending thread's, as the next four
+    std::size_t held_ = 0;                     // at the front of the first: what the last flush() left
+    Sequences sequences_, service_sequences_;  // frames of services alone leave later, and are counted apart
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};
 
     Streams streams_;  // from here on: the receiving thread's

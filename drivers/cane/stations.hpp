@@ -52,7 +52,7 @@ public:
     Verdict take(const Address& from, bool to_all, Stamp, std::int64_t now_ns) noexcept;
 
 private:
-    static constexpr unsigned most = 64;       ///< senders; the one silent for longest makes room
+    static constexpr unsigned most = 128;      ///< sessions, one or two of a sender; the one silent for longest makes room
     static constexpr unsigned stale_most = 8;  ///< old ones in a row: it is the memory here that is wrong
     struct Sender {
         std::uint64_t key = 0;

@@ -102,6 +102,8 @@ struct Options {
     bool transmit_stamps = false;        ///< the kernel stamps what leaves: true times in Statistics, for two system calls a frame
     bool promiscuous = false;            ///< frames to other stations are received too
     std::uint32_t speed = 0;             ///< Mbit/s of a segment in memory; 0: as it is, 100 when it is new
+    std::int64_t forward_ns = -1;        ///< in its switch, between its two lines; -1: as it is, 2 us when it is new
+    std::int64_t noise_ns = 0;           ///< on it the stamps of this port scatter by that much (sigma), as a kernel's do
     std::size_t send_capacity = 64;
     std::size_t receive_capacity = 256;  ///< frames
 };
@@ -150,7 +152,7 @@ struct Opened {
 };
 
 /// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&…`: `speed=100`, `policy=block`, `spin=50us`, `mac=02:00:00:00:00:07`,
-/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`. They win over the options given.
+/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`, `forward=2us`, `noise=1us`. They win over the options given.
 Opened open(std::string_view address, const Options& options = {});
 
 /// "02:00:00:00:00:07", and back; nothing when it is none. [any]
@@ -161,8 +163,9 @@ std::optional<Address> parse_address(std::string_view text) noexcept;
 class Discipline {
 public:
     virtual ~Discipline() = default;
-    /// Queues a frame for slot `slot` (RTnet's slot id; 0 the default one), `priority` 0 first … 31 last. It leaves in the slot's
-    /// next turn. [realtime] the thread of the discipline's transmit function
+    /// Queues a frame for slot `slot` (RTnet's slot id; 0 the default one), `priority` 0 first … 31 last. It leaves in the slot's next
+    /// turn; `full`: that turn belongs to frames as urgent already, and the caller keeps this one. [realtime] the thread of the discipline's
+    /// transmit function
     virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority) noexcept = 0;
     /// Payload bytes that a frame in this slot may have; 0: there is no such slot. [any]
     virtual std::size_t room(unsigned slot) const noexcept = 0;

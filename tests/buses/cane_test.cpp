@@ -333,6 +333,10 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     ASSERT_EQ(u.open(slots.queue[0].first), Wrong::none);
     EXPECT_EQ(u.stamp().sequence, 2);
     EXPECT_EQ(slots.queue.back().second, 9U);  // ten of process data fill two frames, the request is alone
+    const auto session = u.stamp().session;
+    ASSERT_EQ(u.open(slots.queue.back().first), Wrong::none);
+    EXPECT_EQ(u.stamp().session, session ^ 0x8000);
+    EXPECT_EQ(u.stamp().sequence, 0) << "frames of services alone may be overtaken, and have numbers of their own";
     slots.is_ready = false;
     Frame f;
     x->receive(f, 2'000'000);
@@ -347,6 +351,39 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     ASSERT_TRUE(ethernet::offer_discipline("sim:slots/x", &slots));
     x->receive(f, 5'000'000);
     EXPECT_EQ(x->state(), State::active);
+    ethernet::withdraw_discipline(&slots);
+}
+
+TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {
+    Slots slots;
+    ASSERT_TRUE(ethernet::offer_discipline("sim:slots/late", &slots));
+    for (const char* format : {"packed", "single"}) {
+        auto x = opened(std::string("cane:sim:slots/late?slot=2&format=") + format);
+        slots.most = 0;  // the last cycle's frames wait in the slot
+        for (std::uint8_t cycle = 1; cycle <= 5; ++cycle) {
+            x->send(message(0x080, {}), 0);
+            x->send(message(0x000, {1, cycle}), 0);  // each NMT command counts
+            x->send(message(0x201, {cycle}), 0);
+            x->send(message(0x605, {0x40, cycle}), 0);
+            if (cycle == 4) x->send(message(0x202, {cycle}), 0);
+            x->flush(0);
+        }
+        slots.most = 100;
+        x->flush(0);
+        Bytes sent;  // the cycle that each message is of; SYNC has none
+        const auto note = [&sent](const Frame& f) { sent.push_back(f.id == 0x080 ? 0x80 : f.data[f.length - 1]); };
+        for (auto& [whole, priority] : slots.queue) {
+            Frame f;
+            Unpacker packed_frame;
+            if (packed_frame.open(whole) == Wrong::none)
+                while (packed_frame.next(f)) note(f);
+            else if (get_single(std::span(whole).subspan(ethernet::header_bytes), Order::big, f) == Wrong::none)
+                note(f);
+        }
+        EXPECT_EQ(sent, (Bytes{0x80, 1, 5, 2, 3, 4, 4, 5, 1, 2, 3, 4, 5})) << format;
+        EXPECT_EQ(x->statistics().dropped, 8U) << "four SYNCs, four PDOs";
+        slots.queue.clear();
+    }
     ethernet::withdraw_discipline(&slots);
 }
 

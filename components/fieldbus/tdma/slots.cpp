@@ -10,7 +10,8 @@ Slot::Slot(const SlotSetup& setup, std::size_t queue)
 
 bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority) noexcept {
     if (frame.size() < ethernet::header_bytes || frame.size() > ethernet::header_bytes + setup_.size ||
-        frame.size() > ethernet::largest_frame || waiting_ == count_)
+        frame.size() > ethernet::largest_frame || waiting_ == count_ ||
+        ahead_of(priority) + ethernet::wire_bytes(frame.size()) > turn_bytes())
         return false;
     for (std::size_t i = 0; i < count_; ++i) {
         Place& place = places_[i];
@@ -23,6 +24,13 @@ bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority) noexcept
         return true;
     }
     return false;
+}
+
+std::size_t Slot::ahead_of(unsigned priority) const noexcept {
+    std::size_t bytes = 0;
+    for (std::size_t i = 0; waiting_ != 0 && i < count_; ++i)
+        if (const Place& p = places_[i]; p.length != 0 && p.priority <= priority) bytes += ethernet::wire_bytes(p.length);
+    return bytes;
 }
 
 std::size_t Slot::most_urgent() const noexcept {

@@ -21,8 +21,11 @@ public:
     void change(const SlotSetup& setup) noexcept { setup_ = setup, clear(); }
     bool used_in(std::uint32_t cycle) const noexcept { return setup_.id != unused_slot && cycle % setup_.period == setup_.phasing; }
     std::size_t room() const noexcept { return setup_.size; }  ///< bytes behind the Ethernet header
+    /// Bytes of the wire that all frames of a turn have together.
+    std::size_t turn_bytes() const noexcept { return ethernet::wire_bytes(ethernet::header_bytes + setup_.size); }
 
-    /// Copies it; false: the queue is full or the frame too long. [realtime]
+    /// Copies it. False: the frame is too long, or the next turn belongs to frames that are as urgent already. More must not wait here: after
+    /// a turn that the thread missed, everything would be late by a cycle for ever. [realtime]
     bool push(std::span<const std::uint8_t> frame, unsigned priority) noexcept;
     /// The most urgent, and among them the oldest; empty: none waits. Valid until the next push(). [realtime]
     std::span<const std::uint8_t> front() const noexcept;
@@ -38,6 +41,7 @@ private:
         std::array<std::uint8_t, ethernet::largest_frame> bytes;
     };
     std::size_t most_urgent() const noexcept;
+    std::size_t ahead_of(unsigned priority) const noexcept;  // bytes of the wire
 
     SlotSetup                setup_;
     std::size_t              count_ = 0, waiting_ = 0;

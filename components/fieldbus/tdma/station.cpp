@@ -48,6 +48,7 @@ void Station::attach(ethernet::Port& port) {
     address_ = port.address();
     for (Slot& s : slots_) s.clear();
     status_.count = {};
+    told_unheard_ = false;
     begin();
 }
 
@@ -121,7 +122,7 @@ ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot,
     if (s == nullptr || frame.size() < ethernet::header_bytes || frame.size() > ethernet::header_bytes + s->room()) result = refused;
     else if (!ready()) result = down;
     else if (!s->push(frame, std::min(priority, last_priority))) result = full;
-    if (result != queued) ++status_.count.dropped;
+    if (result != queued && result != full) ++status_.count.dropped;  // full: its sender has it still
     return result;
 }
 

@@ -123,8 +123,9 @@ private:
     Time start_of(std::uint32_t cycle) const noexcept {  // global; numbers wrap
         return start_ + static_cast<Time>(static_cast<std::int32_t>(cycle - number_)) * setup_.cycle;
     }
-    Time wire(std::size_t length) const noexcept {
-        return static_cast<Time>(ethernet::wire_bytes(length)) * 8000 / static_cast<Time>(setup_.speed == 0 ? 100 : setup_.speed);
+    Time wire(std::size_t length) const noexcept { return wire_time(ethernet::wire_bytes(length)); }
+    Time wire_time(std::size_t wire_bytes) const noexcept {
+        return static_cast<Time>(wire_bytes) * 8000 / static_cast<Time>(setup_.speed == 0 ? 100 : setup_.speed);
     }
 
     StationSetup                      setup_;
@@ -169,6 +170,7 @@ private:
     std::uint32_t           punctual_row_ = 0;  // its syncs in a row that a master sent, not a backup
     std::uint32_t           out_of_step_ = 0;  // cycles it has been synchronising for
     bool                    told_schedule_ = false;
+    bool                    told_unheard_ = false;  // since attach()
     std::uint32_t           limit_ = 32;  // frames of one station in a cycle
 };
 

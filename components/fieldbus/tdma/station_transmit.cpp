@@ -45,12 +45,11 @@ void Station::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
         }
     }
     if (status_.state != State::running) return;
-    const Time own = wire(ethernet::header_bytes + slot.setup().size);
-    Time       used = 0;
+    std::size_t used = 0;
     for (auto frame = slot.front(); !frame.empty(); frame = slot.front()) {
-        const Time takes = wire(frame.size());
-        if (used + takes > own) break;
-        if (launch(frame, {.at_ns = at + used, .guard_ns = setup_.guard})) ++status_.count.sent;
+        const std::size_t takes = ethernet::wire_bytes(frame.size());
+        if (used + takes > slot.turn_bytes()) break;
+        if (launch(frame, {.at_ns = at + wire_time(used), .guard_ns = setup_.guard})) ++status_.count.sent;
         slot.pop();
         used += takes;
     }

@@ -38,14 +38,13 @@ bool is_packet(const Decoded& d, const Address& own) noexcept {
     return type >= smallest_type && type != rtmac_type && type != rtcfg_type && type != cane_type && is_whole(type, d.tunnelled.payload);
 }
 
-Tunnel::Tunnel(Station& station) : station_(station) { look_at_slot(); }
-
-void Tunnel::look_at_slot() noexcept {
-    std::size_t mtu = 0;
-    for (const SlotSetup& s : station_.setup().slots)
-        if (s.id == tunnel_slot) mtu = tunnel_mtu(s.size);
-    mtu_.store(mtu, std::memory_order_relaxed);
+std::size_t tunnel_mtu(const StationSetup& setup) noexcept {
+    for (const SlotSetup& s : setup.slots)
+        if (s.id == tunnel_slot) return tunnel_mtu(s.size);
+    return 0;
 }
+
+Tunnel::Tunnel(Station& station) : station_(station), mtu_(tunnel_mtu(station.setup())) {}
 
 void Tunnel::arrived(std::span<const std::uint8_t> frame, Time) noexcept {
     if (!is_packet(decode(frame), station_.address())) return count(refused_);
@@ -58,15 +57,16 @@ void Tunnel::arrived(std::span<const std::uint8_t> frame, Time) noexcept {
 }
 
 void Tunnel::before_slots(Time now) noexcept {
-    look_at_slot();
+    mtu_.store(tunnel_mtu(station_.setup()), std::memory_order_relaxed);
     // Calls come once a cycle while the station runs.
     if (now - last_ > 2 * station_.setup().cycle)
         for (; out_.front() != nullptr; out_.pop()) count(dropped_old_);
     last_ = now;
     if (mtu() == 0) return;
-    for (const Packet* p = nullptr; station_.waiting(tunnel_slot) < ahead && (p = out_.front()) != nullptr; out_.pop()) {
-        const bool queued = station_.send({p->bytes.data(), p->length}, tunnel_slot, last_priority) == ethernet::Sent::queued;
-        count(queued ? sent_ : dropped_old_);
+    for (const Packet* p = nullptr; (p = out_.front()) != nullptr; out_.pop()) {
+        const auto sent = station_.send({p->bytes.data(), p->length}, tunnel_slot, last_priority);
+        if (sent == ethernet::Sent::full) break;  // until the next turn
+        count(sent == ethernet::Sent::queued ? sent_ : dropped_old_);
     }
 }
 

@@ -19,6 +19,9 @@ constexpr std::size_t tunnel_mtu(std::size_t size) noexcept {
     return size < smallest + rtmac_bytes ? 0 : size - rtmac_bytes < largest ? size - rtmac_bytes : largest;
 }
 
+/// Of a station's slot for ordinary packets; 0: it has none. [any]
+std::size_t tunnel_mtu(const StationSetup&) noexcept;
+
 /// A tunnelled frame that may be handed to the IP stack of `own`: for it or for a group, from one station, of an Ethertype that is
 /// none of the segment's own, and at least as long as its IP or ARP header says. [any]
 bool is_packet(const Decoded& frame, const Address& own) noexcept;
@@ -26,7 +29,6 @@ bool is_packet(const Decoded& frame, const Address& own) noexcept;
 class Tunnel final : public Companion {
 public:
     static constexpr std::size_t capacity = 64;  ///< packets that may wait, each way
-    static constexpr std::size_t ahead = 8;      ///< of them in the slot's own queue: short ones leave together
 
     /// Of a station that outlives it; it is given to Station::accompany. [setup]
     explicit Tunnel(Station& station);
@@ -58,7 +60,6 @@ private:
     using Counter = std::atomic<std::uint64_t>;
     static std::uint64_t read(const Counter& c) noexcept { return c.load(std::memory_order_relaxed); }
     static void          count(Counter& c) noexcept { c.store(read(c) + 1, std::memory_order_relaxed); }  // each has one writer
-    void                 look_at_slot() noexcept;
 
     Station&                 station_;
     can::Ring<Packet>        out_{capacity}, in_{capacity};  // thread to cycle, cycle to thread; whole RTmac frames

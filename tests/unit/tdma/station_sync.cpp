@@ -195,6 +195,32 @@ TEST(Station_fills_a_slot, with_several_frames_of_its_time_most_urgent_first) {
     EXPECT_NEAR(ms, static_cast<double>(times[2] - times[0]), 2'000) << "the third in the next cycle";
 }
 
+TEST(Station_that_missed_a_slot, is_up_to_date_a_few_cycles_later) {
+    Bed bed;
+    bed.add(1, master());
+    Machine& s = bed.add(2, slave(300'000));
+    bed.run(600 * ms);
+    ASSERT_TRUE(s.station.ready());
+    std::vector<Time> begun;
+    s.in_cycle = [&](Machine& m) {
+        m.station.send(some_frame(2, 60, static_cast<std::uint8_t>(begun.size())), 0, 8);
+        begun.push_back(bed.now);
+    };
+    bed.run(5 * ms);
+    s.next += 400'000;  // its thread is held up beyond the slot
+    bed.run(4 * ms);
+    bed.wire.watching = true;
+    bed.run(10 * ms);
+    int frames = 0;
+    for (const Wire::Frame& f : bed.wire.seen) {
+        if (f.from != 2) continue;
+        EXPECT_NEAR(300'000, static_cast<double>(f.left - begun.at(f.bytes[20])), 5'000) << frames;
+        ++frames;
+    }
+    EXPECT_NEAR(10, frames, 1);
+    EXPECT_EQ(0U, s.station.waiting(0));
+}
+
 TEST(Station_drops_frames, that_find_no_room_or_no_sync) {
     Bed bed;
     StationSetup setup = slave(300'000);
