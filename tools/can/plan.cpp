@@ -187,8 +187,8 @@ std::string network_text(const std::string& file, const config::MasterConfig& c)
                                     p.safety->refresh / canopen::millisecond, p.safety->sct / canopen::millisecond,
                                     p.safety->srvt / canopen::millisecond);
             else
-                text += fmt::format("  {}{} {:X}, {} bytes, {}\n", p.to_node ? "rpdo" : "tpdo", p.number, canopen::cob_id(p.cob), p.bytes(),
-                                    transmission_text(p));
+                text += fmt::format("  {}{} {:X}, {} byte{}, {}\n", p.to_node ? "rpdo" : "tpdo", p.number, canopen::cob_id(p.cob), p.bytes(),
+                                    p.bytes() == 1 ? "" : "s", transmission_text(p));
             for (const config::Object& o : p.objects)
                 if (!o.filler) text += pin_text(n, o, p.to_node);
         }

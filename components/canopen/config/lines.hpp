@@ -39,6 +39,9 @@ public:
     void warning(Topic topic, Place at, std::string sentence, std::string help = {}, std::string label = {}) {
         messages.push_back({Severity::warning, topic, at, std::move(sentence), std::move(label), std::move(help)});
     }
+    void note(Topic topic, Place at, std::string sentence, std::string help = {}) {
+        messages.push_back({Severity::note, topic, at, std::move(sentence), {}, std::move(help)});
+    }
     std::vector<Message> messages;
 };
 

@@ -111,7 +111,7 @@ void NodeReader::object_options() {
                 found = true;
                 wishes.push_back({&o, {property, line}});
             }
-        if (found) continue;
+        if (found || undescribed_) continue;
         std::vector<std::string> mapped;
         for (const Pdo& pdo : node_.pdos)
             for (const Object& o : pdo.objects)

@@ -68,9 +68,11 @@ std::optional<std::pair<std::uint16_t, std::uint8_t>> address(std::string_view t
 
 }  // namespace
 
+std::string Descriptions::path(const Word& file) const { return file.text.front() == '/' ? file.text : folder_ + file.text; }
+
 bool Descriptions::read(const Word& file, std::string& bytes, Report& report) {
     const bool whole = file.text.front() == '/';
-    if (read_(whole || folder_.empty() ? file.text : folder_ + file.text, bytes)) return true;
+    if (read_(path(file), bytes)) return true;
     report.error(Topic::value, file.at, "the file '" + file.text + "' cannot be read: " + bytes,
                  whole ? "" : "a name without / at its beginning is looked for beside this file");
     return false;
@@ -87,9 +89,12 @@ const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report
         for (const auto& m : reading.messages)
             if (m.severity == eds::Severity::error) why = "line " + std::to_string(m.at.line) + ": " + m.sentence;
         report.error(Topic::value, file.at, "the device description '" + file.text + "' cannot be used: " + why,
-                     "hal can eds check " + file.text + " says more");
+                     "hal can eds check " + path(file) + " says more");
         return nullptr;
     }
+    if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0)
+        report.note(Topic::value, file.at, "'" + file.text + "' has " + std::to_string(warnings) + (warnings == 1 ? " warning" : " warnings"),
+                    "hal can eds check " + path(file) + " says which; what it says of an object that is used here counts");
     std::vector<eds::Message> ignored;
     eds::connect_modules(*reading.description, ignored);
     description = std::make_unique<eds::DeviceDescription>(std::move(*reading.description));
@@ -130,6 +135,7 @@ void NodeReader::describe() {
         catalog_ = std::make_unique<Catalog>(lower(profile->value.text), axes);
         if (catalog_->empty()) keys_.refuse(*profile, listed(Catalog::profiles()) + "; or give the device's EDS: eds = FILE");
     }
+    undescribed_ = (file != nullptr && eds_ == nullptr) || (profile != nullptr && file == nullptr && catalog_->empty());
     if (!catalog_) catalog_ = std::make_unique<Catalog>("", 1);
 }
 
@@ -267,6 +273,7 @@ void NodeReader::write_one(const Line& line) {
     std::optional<Type> type = words.size() == 2 ? type_named(words[1].text) : std::nullopt;
     if (words.size() == 2 && !type) return refuse("'" + words[1].text + "' is no type", std::string("write ") + type_words + " or text");
     if (known == nullptr && !(place && type)) {
+        if (undescribed_) return;
         if (!place) return refuse("the node has no object '" + words[0].text + "'", did_you_mean(words[0].text, catalog_->names()));
         return refuse("the description has no object " + object_label(place->first, place->second),
                       "give its type: " + verb + " " + words[0].text + " u16 = " + line.value.text);
@@ -526,6 +533,7 @@ bool NodeReader::object(const Word& word, Pdo& pdo, Object& out) {
     if (words.size() > 2 || (words.size() == 2 && !type))
         return refuse("'" + word.text + "' is no object", std::string("write a name, or INDEX:SUB TYPE, the type one of ") + type_words);
     if (known == nullptr) {
+        if (undescribed_ && !(place && type)) return false;
         if (!place && catalog_->empty())
             return refuse("nothing is known of this node's objects",
                           "give its description: eds = FILE, or device = " + listed(Catalog::profiles()));

@@ -22,7 +22,8 @@ public:
     bool bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report);
 
 private:
-    bool read(const Word& file, std::string& bytes, Report& report);
+    std::string path(const Word& file) const;
+    bool        read(const Word& file, std::string& bytes, Report& report);
 
     const ReadFile&                                                read_;
     std::string                                                    folder_;
@@ -77,6 +78,7 @@ private:
     Node&                         node_;
     const eds::DeviceDescription* eds_ = nullptr;
     std::unique_ptr<Catalog>      catalog_;
+    bool undescribed_ = false;  // its description was no good, which was said: what is not known without it need not be
 };
 
 /// What the node is told of a PDO that has its identifier. [setup]

@@ -64,7 +64,7 @@ struct PdoWords {
         std::snprintf(id, sizeof id, "%03X", cob_id(pdo.cob));
         const std::string who = "node " + std::to_string(n.setup.id) + " (" + n.name + "): its " + number + " (" + id + ") ";
         late = who + "did not come for {} s";
-        cut = who + "has {} bytes where its objects need " + std::to_string(pdo.bytes()) +
+        cut = who + "has length {} where its objects need " + std::to_string(pdo.bytes()) +
               "; its pins keep their values; what the node maps is said by: hal can pdo show";
     }
 };
@@ -240,7 +240,8 @@ private:
             if (!texts.offered() && !reading.good()) throw std::invalid_argument(config::to_string(reading, file_));
             texts.begin(file_, text);
             for (const config::Message& m : reading.messages)
-                texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
+                if (m.severity != config::Severity::note)  // those are for `hal canopen check`
+                    texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
                           m.sentence, m.label, m.help);
             if (!reading.good()) hal::Texts::refuse();
         } else if (texts.offered()) {

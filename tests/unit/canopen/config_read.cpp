@@ -253,7 +253,9 @@ TEST(CanopenConfig, what_a_DCF_says_is_written_with_the_files_it_names) {
     EXPECT_EQ(write_of(n, 0x2005), nullptr);
     std::vector<std::string> said;
     for (const Message& m : r.messages) said.push_back(std::to_string(m.at.line) + ": " + m.sentence);
-    EXPECT_EQ(said, (std::vector<std::string>{"3: line 94 of 'unit/drive.dcf': the value of 2003sub0 is not configured: '70000' does not fit into "
+    EXPECT_EQ(r.messages[0].help,
+              "hal can eds check machine/unit/drive.dcf says which; what it says of an object that is used here counts");
+    EXPECT_EQ(said, (std::vector<std::string>{"3: 'unit/drive.dcf' has 1 warning", "3: line 94 of 'unit/drive.dcf': the value of 2003sub0 is not configured: '70000' does not fit into "
                                               "UNSIGNED16 (0..65535)",
                                               "3: the file 'empty.bin' for object 0x2005:0 is empty, and is not written"}));
 }
@@ -383,9 +385,11 @@ TEST(CanopenConfig, values_beyond_an_object_are_cut_off) {
 TEST(CanopenConfig, what_is_wrong_is_said_with_its_place_and_what_to_type) {
     EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statuswort\n"),
               "arm:4:9: the node has no object 'statuswort'; did you mean 'statusword'?");
-    EXPECT_EQ(said("[bus]\n[node 5]\neds = motor.eds\n"),
+    EXPECT_EQ(said("[bus]\n[node 5]\neds = motor.eds\ntpdo1 = speed\nspeed.scale = 5\nwrite gain = 1\nmandatroy = no\n"),
               "arm:3:7: the file 'motor.eds' cannot be read: No such file or directory; a name without / at its beginning is looked for "
-              "beside this file");
+              "beside this file\narm:7:1: a node has no 'mandatroy'; did you mean 'mandatory'?");
+    EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia410\ntpdo1 = 0x6000\n"),
+              "arm:3:10: 'device' cannot be 'cia410'; write cia401, cia402, jr3; or give the device's EDS: eds = FILE");
     EXPECT_EQ(said("[bus]\n[node 128]\n"),
               "arm:2:7: a node section is named by the node's id, 1 to 127, and a name of your own; write [node 5 NAME]");
     EXPECT_EQ(said("[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statusword, position-actual-value, velocity-actual-value\n"),
