@@ -3,10 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cctype>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 #include <string_view>
@@ -259,16 +258,7 @@ private:
     static std::string size(Eigen::Index rows, Eigen::Index columns) { return std::to_string(rows) + " x " + std::to_string(columns); }
 
     void read_file() {
-        const std::string path = texts_.find(file_.get());
-        std::ifstream     stream(path, std::ios::binary);
-        std::string       text(65536, '\0');
-        stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-        if (!stream.eof() || stream.bad()) {
-            if (stream.gcount() == static_cast<std::streamsize>(text.size()))
-                throw std::invalid_argument(path + " is longer than 64 KiB: that is no file of matrices");
-            throw std::invalid_argument("cannot read " + path + "; file= is looked for beside the netlist");
-        }
-        text.resize(static_cast<std::size_t>(stream.gcount()));
+        const std::string text = texts_.read("file", file_.get());
         texts_.begin(file_.get(), text);
         MatrixText reader;
         reader.read_file(text);

@@ -22,11 +22,12 @@ public:
                 "file beside the netlist with points of the ground, u v x y with x forward and y to the left in mm, as of "
                 "vision_homography; in "
                 "place of focal, camera_height, pitch and forward") {
-        if (!(focal_ > 0.0 && height_ > 0.0 && pitch_ > 0.0 && pitch_ < 1.6))
-            throw std::invalid_argument(
-                "focal and camera_height have to be above 0, and pitch above 0 and below 1.6 rad: the camera looks down");
+        if (!(focal_ > 0.0)) throw std::invalid_argument("focal= is not above 0; it is in px, often about the width of the picture");
+        if (!(height_ > 0.0)) throw std::invalid_argument("camera_height= is not above 0; it is in m above the ground");
+        if (!(pitch_ > 0.0 && pitch_ < 1.6))
+            throw std::invalid_argument("pitch= is not above 0 and below 1.6; it is in rad, and the camera looks down: 0 is straight ahead");
         if (file_.get().empty()) return;
-        const std::string text = read_text(texts, "ground", file_.get());
+        const std::string text = texts.read("ground", file_.get());
         GroundText        read = read_ground(text);
         measured_.emplace(read, std::nullopt);
         refuse(texts, file_.get(), text, "camera-text", read.problems);

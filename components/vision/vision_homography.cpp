@@ -31,7 +31,7 @@ private:
         if (!file.empty() && !points.empty())
             throw std::invalid_argument("file= and points= are both given; one of them says where the ground is");
         // a bare loadrt: a ground of a millimetre per pixel, so that the component can be looked at
-        const std::string text = !file.empty()    ? read_text(texts, "file", file)
+        const std::string text = !file.empty()    ? texts.read("file", file)
                                  : points.empty() ? "0 0 0 0; 1 0 1 0; 1 1 1 1; 0 1 0 1"
                                                   : points;
         GroundText        read = read_ground(text);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <utility>
+
 #include "vision/camera_component.hpp"
 #include "vision/detect/pendulum.hpp"
 
@@ -19,8 +21,11 @@ struct Settings {
 
 struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     explicit VisionPendulum(const hal_host* host) : CameraComponent(host) {
-        if (!(focal > 0.0 && distance > arm_length + rod_length && arm_length > 0.0 && rod_length > 0.0))
-            throw std::invalid_argument("focal, arm_length and rod_length have to be above 0, and distance above arm_length + rod_length");
+        for (const auto& [name, value] :
+             {std::pair{"focal", double{focal}}, std::pair{"arm_length", double{arm_length}}, std::pair{"rod_length", double{rod_length}}})
+            if (!(value > 0.0)) throw std::invalid_argument(std::string(name) + "= is not above 0");
+        if (!(distance > arm_length + rod_length))
+            throw std::invalid_argument("distance= is not above arm_length + rod_length: the pendulum would hit the camera");
     }
 
     hal::RealArgument focal{*this, "focal", 280.0, "focal length of the camera, px"};
@@ -65,7 +70,7 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     }
 
     void detect(const Frame& frame, const Settings& of, Found& result) {
-        if (frame.format != Format::bgr) throw std::runtime_error("the balls are told by their colours and this camera sees none");
+        if (frame.format != Format::bgr) throw std::runtime_error("the balls are told by their colours and these frames have none; take a camera of colours, without grey in source=");
         PendulumView   view;
         PendulumLimits limits;
         view.focal_u = view.focal_v = focal;

@@ -178,6 +178,22 @@ TEST(Camera, that_cannot_be_read_says_where_and_why) {
     EXPECT_EQ(said(read_camera(millimetres), millimetres), "focal 4.5|these focal lengths fit no picture 640 px wide\n");
     const std::string empty;
     EXPECT_EQ(said(read_camera(empty), empty), "|there is no size\n|there is no focal\n");
+    const auto own_refusal = [](const std::string& lines) { return read_camera("size 640 480\n" + lines).problems.at(0).sentence; };
+    EXPECT_EQ(own_refusal("focal 0\n"), "a focal length is not positive");
+    EXPECT_EQ(own_refusal("focal 600\ncentre 5000 200\n"), "the centre is far outside of the picture");
+    EXPECT_EQ(own_refusal("focal 600\ndistortion 4000\n"), "this distortion bends the picture beyond use");
+    EXPECT_EQ(own_refusal("focal 600\nfocal 600\n"), "'focal' is there twice");
+    const auto opencv_refusal = [](const std::string& matrix, const std::string& distortion = "") {
+        return read_camera("%YAML:1.0\nimage_width: 640\nimage_height: 480\n" + matrix + distortion).problems.at(0).sentence;
+    };
+    const std::string good = "camera_matrix: !!opencv-matrix\n   data: [ 600, 0, 320, 0, 600, 240, 0, 0, 1 ]\n";
+    EXPECT_EQ(opencv_refusal(""), "there is no camera_matrix");
+    EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   rows: 3\n"), "camera_matrix has no data");
+    EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   data: [ 600, 0, 320, 7, 600, 240, 0, 0, 1 ]\n"),
+              "camera_matrix is no camera's matrix");
+    EXPECT_EQ(opencv_refusal(good, "distortion_coefficients: !!opencv-matrix\n   data: [ 0, 0, 0, 0, 0, 0.1, 0.1, 0.1 ]\n"),
+              "the distortion has 8 coefficients");
+    EXPECT_EQ(read_camera("%YAML:1.0\n" + good).problems.at(0).sentence, "there is no image_width and image_height");
     const std::string yaml = "image_width: 640\nimage_height: -1\ncamera_matrix: !!opencv-matrix\n data: [ 1, 2 ]\n";
     EXPECT_EQ(said(read_camera(yaml), yaml),
               "-1|'-1' is no width or height of a picture\ncamera_matrix|camera_matrix has 2 numbers, not 9\n");

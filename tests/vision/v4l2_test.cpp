@@ -19,7 +19,8 @@ public:
     std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
     std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
     std::uint32_t gives_width = width, gives_height = height, gives_format = 0, line = 0;
-    int open_error = 0, format_error = 0, fail_call = -1, calls = 0;
+    int open_error = 0, format_error = 0, rate_error = 0, fail_call = -1, calls = 0;
+    v4l2_fract gives_period{0, 0};  ///< 0: what is asked for
     bool gone = false, no_camera = false, monotonic = true;
     std::uint32_t bytes = width * height * 2;
     int open_now = 0, mapped = 0;
@@ -67,6 +68,10 @@ public:
             if (gives_format != 0) pix.pixelformat = gives_format;
             return 0;
         }
+        case VIDIOC_S_PARM:
+            if (rate_error != 0) return errno = rate_error, -1;
+            if (gives_period.numerator != 0) static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe = gives_period;
+            return 0;
         case VIDIOC_REQBUFS: static_cast<v4l2_requestbuffers*>(argument)->count = 3; return 0;
         case VIDIOC_QUERYBUF: {
             auto& b = *static_cast<v4l2_buffer*>(argument);
@@ -199,6 +204,30 @@ TEST_F(V4l2, stamp_is_the_arrival_where_the_driver_has_another_clock) {
     EXPECT_EQ(frame.stamp_ns, 1234);
 }
 
+TEST_F(V4l2, rate_that_a_camera_does_not_have_is_said_and_counts) {
+    ASSERT_TRUE(camera->open(0));
+    EXPECT_EQ(camera->remark(), "");
+    EXPECT_DOUBLE_EQ(camera->patience_s(), 1.1);
+    camera->close();
+    kernel.gives_period = {2, 1};  // a frame in two seconds: it is not silent before three did not come
+    ASSERT_TRUE(camera->open(0));
+    EXPECT_EQ(camera->remark(),
+              "/dev/video0 gives 0.5 frames per second, not 30; those that it has at each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    EXPECT_DOUBLE_EQ(camera->patience_s(), 7.0);
+    camera->close();
+    kernel.gives_period = {1001, 30'000};  // 29.97: what is called 30
+    ASSERT_TRUE(camera->open(0));
+    EXPECT_EQ(camera->remark(), "");
+    camera->close();
+    kernel.rate_error = ENOTTY;
+    ASSERT_TRUE(camera->open(0));
+    EXPECT_EQ(camera->remark(), "/dev/video0 has no choice of its rate; fps=30 does nothing");
+    EXPECT_DOUBLE_EQ(camera->patience_s(), 1.1);
+    camera = make("v4l2:/dev/video0?width=16&height=4");
+    ASSERT_TRUE(camera->open(0));
+    EXPECT_EQ(camera->remark(), "") << "nobody asked for one";
+}
+
 TEST_F(V4l2, refusals_say_what_to_do) {
     kernel.open_error = ENOENT;
     EXPECT_EQ(refusal(), "there is no camera /dev/video0; those that there are: ls -l /dev/v4l/by-id");
@@ -235,7 +264,7 @@ TEST_F(V4l2, every_call_may_fail_and_nothing_is_left_open) {
             EXPECT_EQ(kernel.open_now, 0);
             return;
         }
-        EXPECT_NE(camera->problem().text, "") << nth;
+        EXPECT_TRUE(camera->problem().text.starts_with("/dev/video0 ") || camera->problem().text.starts_with("/dev/video0: ")) << nth << camera->problem().text;
         EXPECT_EQ(kernel.open_now, 0) << nth;
         EXPECT_EQ(kernel.mapped, 0) << nth;
     }
@@ -300,6 +329,15 @@ TEST_F(SharedCamera, that_is_unplugged_is_lost_to_all_and_comes_back_to_all) {
     kernel.shoot(0, 50);
     EXPECT_EQ(a->next(0, 0, frame), Got::frame);
     EXPECT_EQ(b->next(0, 0, frame), Got::frame);
+}
+
+TEST_F(SharedCamera, says_what_the_camera_says) {
+    kernel.gives_period = {1, 5};
+    EXPECT_EQ(a->remark(), "");
+    ASSERT_TRUE(a->open(0));
+    EXPECT_EQ(a->remark(),
+              "/dev/video0 gives 5 frames per second, not 30; those that it has at each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    EXPECT_DOUBLE_EQ(a->patience_s(), 1.6);
 }
 
 TEST_F(SharedCamera, that_cannot_be_opened_says_why_to_each) {

@@ -18,6 +18,7 @@ public:
     std::uint8_t brightness = 100;
     bool still = false, gives = true, damaged = false;
     int width = 8, opened = 0, closed = 0;
+    std::string other;
     std::int64_t taken = -1;
 
     bool open(std::int64_t) override {
@@ -42,6 +43,7 @@ public:
         return Got::frame;
     }
     void close() noexcept override { ++closed; }
+    std::string remark() const override { return other; }
 };
 
 struct Rig : testing::Test {
@@ -108,6 +110,19 @@ TEST_F(Rig, Worker_goes_on_by_itself_after_the_camera_was_unplugged) {
     EXPECT_TRUE(status().ok);
     EXPECT_EQ(status().openings, 2u);
     EXPECT_EQ(status().trouble, Trouble::none);
+}
+
+TEST_F(Rig, Worker_says_once_what_the_camera_does_other_than_it_was_told) {
+    camera->other = "/dev/video9 gives 15 frames per second, not 30";
+    run(second);
+    camera->cut = true;
+    run(second);
+    camera->cut = false;
+    run(second + 10 * ms);
+    EXPECT_EQ(status().openings, 2u);
+    EXPECT_EQ(lines, (std::vector<std::string>{"eye: /dev/video9 gives 15 frames per second, not 30",
+                                               "eye: /dev/video9 was unplugged; it is tried again every second",
+                                               "eye: frames are good again, after 1.0 s"}));
 }
 
 TEST_F(Rig, Worker_says_once_that_frames_are_black_and_counts_them) {

@@ -47,6 +47,10 @@ Address::Option* Address::find(const char* name) {
     return found;
 }
 
+bool Address::has(const char* name) const {
+    return std::any_of(options_.begin(), options_.end(), [name](const Option& option) { return option.name == name; });
+}
+
 double Address::number(const char* name, double fallback, double least, double most) {
     const Option* const option = find(name);
     if (!option) return fallback;

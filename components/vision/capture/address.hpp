@@ -19,6 +19,7 @@ public:
     const std::string& driver() const { return driver_; }  ///< "v4l2", "frames", "sim"
     const std::string& place() const { return place_; }
 
+    bool has(const char* name) const;  ///< the option is written
     /// The option's number, `fallback` without it. Throws when it is no number or outside of the limits. [setup]
     double number(const char* name, double fallback, double least, double most);
     /// The same, a whole number.

@@ -84,7 +84,8 @@ public:
         return Got::frame;
     }
     void          close() noexcept override { hub_.reset(); }
-    double        patience_s() const override { return model_->patience_s(); }
+    std::string   remark() const override { return hub_ ? hub_->camera->remark() : std::string(); }
+    double        patience_s() const override { return hub_ ? hub_->camera->patience_s() : model_->patience_s(); }
     std::uint32_t frozen_after() const override { return model_->frozen_after(); }
 
 private:

@@ -53,6 +53,8 @@ public:
     virtual Got    next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) = 0;
     virtual void   close() noexcept = 0;
     const Problem& problem() const { return problem_; }
+    /// Of the source that is open: what it does other than its address says, a sentence without its end; empty when there is nothing.
+    virtual std::string remark() const { return {}; }
     /// Frames that were there and were not given, since open(). What the sender lost counts too.
     std::uint64_t skipped() const { return skipped_; }
     /// How long no frame may come before that is worth a line, s.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <fcntl.h>
 #include <poll.h>
@@ -69,7 +70,8 @@ public:
     V4l2(Address address, VideoSystem& system) : system_(system), device_(address.place()) {
         width_ = address.whole("width", 640, 2, most_wide);
         height_ = address.whole("height", 480, 2, most_high);
-        fps_ = address.number("fps", 30.0, 0.1, 1000.0);
+        asked_ = address.has("fps");
+        fps_ = given_fps_ = address.number("fps", 30.0, 0.1, 1000.0);
         grey_ = address.flag("grey");
         address.finish();
         if (device_.empty()) throw std::invalid_argument("source=" + address.text() + " names no camera; write v4l2:/dev/video0");
@@ -120,7 +122,8 @@ public:
         system_.close(fd_);
         fd_ = -1;
     }
-    double        patience_s() const override { return 1.0 + 3.0 / fps_; }
+    std::string   remark() const override { return remark_; }
+    double        patience_s() const override { return 1.0 + 3.0 / given_fps_; }
     std::uint32_t frozen_after() const override { return 10; }
 
 private:
@@ -208,12 +211,25 @@ private:
                         "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
         return true;
     }
+    /// A camera may have other rates, or no choice of them: that is said, and the frames are taken as they come.
     bool choose_rate() {
         v4l2_streamparm parameters{};
         parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-        parameters.parm.capture.timeperframe = {1000, static_cast<std::uint32_t>(std::lround(fps_ * 1000.0))};
-        system_.control(fd_, VIDIOC_S_PARM, &parameters);  // a camera without a choice keeps its own rate
+        v4l2_fract& period = parameters.parm.capture.timeperframe;
+        period = {1000, static_cast<std::uint32_t>(std::lround(fps_ * 1000.0))};
+        const bool chosen = system_.control(fd_, VIDIOC_S_PARM, &parameters) != -1 && period.numerator != 0 && period.denominator != 0;
+        given_fps_ = chosen ? std::clamp(static_cast<double>(period.denominator) / period.numerator, 0.1, 1000.0) : fps_;
+        if (chosen && std::fabs(given_fps_ - fps_) > 0.01 * fps_)
+            remark_ = device_ + " gives " + rate(given_fps_) + " frames per second, not " + rate(fps_) +
+                      "; those that it has at each size: v4l2-ctl -d " + device_ + " --list-formats-ext";
+        else if (!chosen && asked_) remark_ = device_ + " has no choice of its rate; fps=" + rate(fps_) + " does nothing";
+        else remark_.clear();
         return true;
+    }
+    static std::string rate(double fps) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.4g", fps);
+        return text;
     }
     bool map() {
         v4l2_requestbuffers request{};
@@ -268,8 +284,9 @@ private:
     VideoSystem&      system_;
     const std::string device_;
     int               width_ = 0, height_ = 0, fd_ = -1;
-    double            fps_ = 30.0;
-    bool              grey_ = false, is_yuyv_ = false, any_ = false;
+    double            fps_ = 30.0, given_fps_ = 30.0;  // asked for; what the camera makes of it
+    std::string       remark_;
+    bool              asked_ = false, grey_ = false, is_yuyv_ = false, any_ = false;
     std::size_t       line_ = 0;  // bytes from row to row
     std::uint32_t     last_ = 0;  // sequence number of the frame before
     std::vector<Map>  maps_;

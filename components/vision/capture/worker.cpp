@@ -108,6 +108,10 @@ void Worker::open(std::int64_t now) {
         dropped_before_ = status_.dropped;
         equal_ = 0;
         if (status_.trouble == Trouble::absent && !told_) status_.trouble = Trouble::none;  // nothing was wrong so far
+        if (std::string remark = source_->remark(); remark != remark_) {  // once, not each time that it is plugged in
+            remark_ = std::move(remark);
+            if (!remark_.empty()) say(remark_);
+        }
         return;
     }
     try_again_ns_ = now + again_after;

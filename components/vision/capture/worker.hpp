@@ -61,7 +61,7 @@ private:
     std::function<void(const std::string&)>  say_;
     Frame                                    frame_;
     Status                                   status_;
-    std::string                              file_;
+    std::string                              file_, remark_;
     int                                      width_ = 0, height_ = 0;  // 0: any
     std::uint32_t                            frozen_after_ = 0, equal_ = 0, dropped_before_ = 0;
     std::uint64_t                            picture_ = 0;  // a hash of the last one

@@ -2,6 +2,10 @@
 // For components that read a file of the user's: where it is, and what is wrong in it, said as the netlist's own errors are.
 #pragma once
 
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -18,6 +22,21 @@ public:
     bool offered() const { return texts_ != nullptr; }
     /// Beside the netlist, or else as it is written. [setup]
     std::string find(const std::string& file) const { return texts_ ? texts_->find(detail::creating, file.c_str()) : file; }
+    /// The text of `file`, which the argument `argument` names. Throws when it cannot be read or is longer than 64 KiB. [setup]
+    std::string read(const char* argument, const std::string& file) const {
+        constexpr std::size_t most = 65536;
+        const std::string path = find(file);
+        errno = 0;
+        std::ifstream stream(path, std::ios::binary);
+        std::string text(most + 1, '\0');
+        stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+        text.resize(static_cast<std::size_t>(stream.gcount()));
+        const std::string problem = text.size() > most               ? "is longer than 64 KiB; is it the right one?"
+                                    : stream.eof() && !stream.bad() ? ""
+                                                                    : std::string("cannot be read: ") + std::strerror(errno);
+        if (!problem.empty()) throw std::invalid_argument(std::string(argument) + "=" + file + ": the file '" + path + "' " + problem);
+        return text;
+    }
     /// The text the next messages are about. [setup]
     void begin(const std::string& name, std::string_view text) const {
         if (texts_) texts_->begin(detail::creating, name.c_str(), text.data(), text.size());
