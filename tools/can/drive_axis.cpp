@@ -16,6 +16,7 @@ using canopen::SdoRequest;
 namespace {
 
 constexpr std::int64_t rest_ns = 100'000'000;     // as long without a count it stands
+constexpr std::int64_t pause_ns = 10'000'000;     // between two looks: the bus is there for others, too
 constexpr std::int64_t stall_ns = 2'000'000'000;  // as long without a count, and not there: it will not arrive
 
 }  // namespace
@@ -165,6 +166,7 @@ bool HandAxis::until(const Ready& ready, bool (HandAxis::*still)()) {
             const bool stopped = machine_.enabled() && stop();
             return refuse(stopped ? "interrupted; it was stopped" : "interrupted");
         }
+        station_.until([&] { return interrupted && interrupted(); }, pause_ns);
     }
 }
 
