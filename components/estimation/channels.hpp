@@ -18,7 +18,7 @@ public:
     Channels(hal::Component& component, Eigen::Index count, const std::vector<std::string>& names = {})
         : gate(component, "gate", "a measurement farther off than so many standard deviations is left out; 0: none is"),
           timeout(component, "timeout", "valid falls when no measurement was used for so long; 0: never", {.unit = "s"}),
-          valid(component, "valid", "a measurement was used, and within timeout"),
+          valid(component, "valid", "a measurement was used, and within timeout", {.safe = false}),
           skipped(component, "skipped", "measurements that were no number"),
           late(component, "late", "measurements older than the history"),
           outliers(component, "outliers", "measurements beyond the gate"),

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <deque>
-#include <fstream>
-#include <iterator>
-#include <numbers>
 
 #include "estimation/channels.hpp"
 #include "estimation/model.hpp"
@@ -72,7 +69,7 @@ public:
         for (std::size_t i = 0; i < model_.inputs.size(); ++i) values_[most_slopes + i] = Dual{moment.u(static_cast<Eigen::Index>(i))};
         const Dual expected = m.value(values_.data(), n);
         double     off = moment.z(channel) - expected.value;
-        if (m.wrap) off = std::remainder(off, 2.0 * std::numbers::pi);
+        if (m.wrap > 0.0) off = std::remainder(off, m.wrap);
         Vector row(static_cast<Eigen::Index>(n));
         for (std::size_t i = 0; i < n; ++i) row(static_cast<Eigen::Index>(i)) = expected.slope[i];
         if (!std::isfinite(off) || !finite(row)) return Fate::outlier;  // a formula that has no value here
@@ -168,17 +165,7 @@ private:
         return p;
     }
     Nonlinear read() const {
-        std::string text = example;
-        if (!file_.get().empty()) {
-            const std::string path = texts_.find(file_.get());
-            std::ifstream     stream(path, std::ios::binary);
-            text.assign(65537, '\0');
-            stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-            text.resize(static_cast<std::size_t>(stream.gcount()));
-            if (!stream.eof())
-                throw std::invalid_argument(text.size() > 65536 ? path + " is longer than 64 KiB: that is no model"
-                                                                : "cannot read " + path + "; model= is looked for beside the netlist");
-        }
+        const std::string text = file_.get().empty() ? example : texts_.read("model", file_.get());
         texts_.begin(file_.get(), text);
         Model model;
         model.read(text);
@@ -221,8 +208,9 @@ The model is a file of lines:
     measure camera  = l * sin(angle)  sigma 0.005
 
 At most 8 states, 8 inputs, 12 measurements. Formulas have + - * / ^, brackets, pi and sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max.
-`wrap` behind a measurement says that it is an angle: 359 degrees are 1 degree off from 0. Pins are named as in the file (`_` is a dash): here `torque`,
-`encoder`, `encoder-age`, `encoder-new`, `camera` and so on, and `x-angle`, `sigma-angle`, `x-speed`, `sigma-speed`.
+`wrap` behind a measurement says that it is an angle: 359 degrees are 1 degree off from 0; `wrap 65536` that it is a counter of 16 bits. Pins are
+named as in the file (`_` is a dash): here `torque`, `encoder`, `encoder-age`, `encoder-new`, `camera` and so on, and `x-angle`, `sigma-angle`,
+`x-speed`, `sigma-speed`.
 
 A period is one step of Runge and Kutta's; the derivatives of everything by the states are exact, by forward differentiation. Late and bad measurements
 are treated as in kalman: see its manual for age, new, gate, timeout and the counters. A formula that has no value where the

@@ -2,6 +2,7 @@
 // Formulas of a user's, compiled when they are read and evaluated in the cycle together with their derivatives.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -123,6 +124,8 @@ private:
     }
 
     struct Parser {
+        static constexpr const char* a_value = "a value is a number, a name, a function such as sin(x), or a formula in brackets";
+
         std::string_view       text;
         std::uint32_t          at;
         const Lookup&          lookup;
@@ -181,24 +184,24 @@ private:
             skip();
             if (problem) return;
             if (place >= text.size())
-                return fail(text.empty() ? 0 : text.size() - 1, text.size(), "the formula ends where a value should stand", "");
+                return fail(text.empty() ? 0 : text.size() - 1, text.size(), "the formula ends where a value should stand", a_value);
             const std::size_t begin = place;
             if (take('(')) {
                 sum();
-                if (!problem && !take(')')) fail(begin, begin + 1, "this bracket is not closed", "");
+                if (!problem && !take(')')) fail(begin, begin + 1, "this bracket is not closed", "write a ) where it ends");
                 return;
             }
             const unsigned char c = static_cast<unsigned char>(text[place]);
             if (std::isdigit(c) || c == '.') return number();
             if (std::isalpha(c) || c == '_') return word();
             fail(begin, begin + 1, "'" + std::string(1, text[begin]) + "' is no value",
-                 "a value is a number, a name, a function such as sin(x), or a formula in brackets");
+                 a_value);
         }
         void number() {
             const std::string rest(text.substr(place));
             char*             end = nullptr;
             const double      v = std::strtod(rest.c_str(), &end);
-            if (end == rest.c_str()) return fail(place, place + 1, "'.' is no number", "");
+            if (end == rest.c_str()) return fail(place, place + 1, "'.' is no number", "numbers are written as in 9.81 or 2e-3");
             place += static_cast<std::size_t>(end - rest.c_str());
             push({Kind::number, 0, v});
         }
@@ -214,14 +217,15 @@ private:
                 };
                 if (const int i = find(ones, 1); i >= 0) {
                     sum();
-                    if (!problem && !take(')')) fail(begin, begin + name.size(), name + " takes one value in brackets", "");
+                    if (!problem && !take(')')) fail(begin, begin + name.size(), name + " takes one value in brackets", "as in " + name + "(x)");
                     return push({Kind::one, static_cast<std::uint16_t>(i), 0.0});
                 }
                 if (const int i = find(twos, 5); i >= 0) {
                     sum();
-                    if (!problem && !take(',')) fail(begin, begin + name.size(), name + " takes two values with a comma between them", "");
-                    sum();
-                    if (!problem && !take(')')) fail(begin, begin + name.size(), name + " takes two values with a comma between them", "");
+                    const bool comma = take(',');
+                    if (comma) sum();
+                    if (!problem && !(comma && take(')')))
+                        fail(begin, begin + name.size(), name + " takes two values with a comma between them", "as in " + name + "(y, x)");
                     return push({Kind::two, static_cast<std::uint16_t>(i), 0.0});
                 }
                 return fail(begin, begin + name.size(), "there is no function '" + name + "'",

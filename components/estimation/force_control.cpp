@@ -47,6 +47,7 @@ struct ForceControl : hal::Component {
         if (!std::isfinite(e + path + velocity + position)) {
             bad_inputs = bad_inputs + 1;
             effort = velocity_out = 0.0;
+            saturated = false;
             return;
         }
         error = e;

@@ -87,9 +87,9 @@ private:
         double highest = 0.0;
         for (std::size_t i = 0; i < 6; ++i) {
             const double size = std::fabs(load[i]);
-            beyond = beyond || size > full_[i];
+            beyond = beyond || !(size <= full_[i]);  // a limit that is no number is one that is exceeded
             if (limit_[i] > 0.0) highest = std::fmax(highest, size / limit_[i]);
-            if (size > limit_[i] && !overload) overload = true, overload_axis = static_cast<std::uint32_t>(i + 1);
+            if (!(size <= limit_[i]) && !overload) overload = true, overload_axis = static_cast<std::uint32_t>(i + 1);
         }
         beyond_scale = beyond;
         load_ratio = highest;
@@ -134,7 +134,7 @@ public:
     hal::Param<double>        centre_z{*this, "tool-centre-z", "its centre of mass in the sensor's frame", {.unit = "m"}};
     hal::Param<std::uint32_t> tare_samples{*this, "tare-samples", "cycles that a tare averages", {.initial = 100}};
     hal::Out<bool>            taring{*this, "taring", "a tare is going on: do not touch"};
-    hal::Out<bool>            valid{*this, "valid", "all six channels are numbers"};
+    hal::Out<bool>            valid{*this, "valid", "all six channels are numbers", {.safe = false}};
     hal::Out<bool>            beyond_scale{*this, "beyond-scale", "an axis is beyond its full scale"};
     hal::Out<bool>            overload{*this, "overload", "an axis was beyond its overload limit; stays until reset"};
     hal::Out<std::uint32_t>   overload_axis{*this, "overload-axis", "which was the first: 1 to 6 for fx fy fz mx my mz; 0 none"};

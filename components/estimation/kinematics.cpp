@@ -141,8 +141,17 @@ private:
         const Eigen::Matrix3d wanted = rotation(target[3], target[4], target[5]),
                               turn = wanted.lazyProduct(t.block<3, 3>(0, 0).transpose());
         const Eigen::Vector3d axis(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1));
-        const double          sine = 0.5 * axis.norm(), angle = std::atan2(sine, 0.5 * (turn.trace() - 1.0));
-        for (Eigen::Index i = 0; i < 3; ++i) off(3 + i) = sine > 1e-12 ? weight * 0.5 * axis(i) / sine * angle : 0.0;
+        const double          sine = 0.5 * axis.norm(), cosine = 0.5 * (turn.trace() - 1.0), angle = std::atan2(sine, cosine);
+        if (sine > 1e-12) {
+            for (Eigen::Index i = 0; i < 3; ++i) off(3 + i) = weight * 0.5 * axis(i) / sine * angle;
+        } else if (cosine < 0.0) {  // half a turn: 2 a a' - 1, of which each column that is not 0 has the axis a
+            Eigen::Index k = 0;
+            for (Eigen::Index i = 1; i < 3; ++i)
+                if (turn(i, i) > turn(k, k)) k = i;
+            Eigen::Vector3d column = turn.col(k);
+            column(k) += 1.0;
+            for (Eigen::Index i = 0; i < 3; ++i) off(3 + i) = weight * pi * column(i) / column.norm();
+        }
     }
     /// Damped least squares (Y. Nakamura, H. Hanafusa, *Inverse Kinematic Solutions with Singularity Robustness*, 1986):
     ///     step = J' (J J' + damping² I)^-1 off

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
+#include <new>
 #include <thread>
 
 #include "estimation/design/riccati.hpp"
 #include "estimation/matrices.hpp"
+#include "hal/background.hpp"
 #include "hal/component.hpp"
 #include "hal/queue.hpp"
 
@@ -42,53 +43,41 @@ struct Delivery {
     std::uint32_t number = 0;
 };
 
-/// Solves Riccati's equation outside of the cycle. The cycle is the one writer of the orders and the one reader of the deliveries.
+/// Solves Riccati's equation outside of the cycle, which is the one writer of the orders and the one reader of the deliveries.
 class Designer {
 public:
     explicit Designer(Problem problem) : problem_(std::move(problem)) {}
-    ~Designer() { stop(); }
-    /// [setup]
-    void start() {
-        ending_ = false;
-        thread_ = std::thread([this] { work(); });
-    }
-    /// [setup]
-    void stop() noexcept {
-        if (!thread_.joinable()) return;
-        {
-            const std::lock_guard lock(mutex_);
-            ending_ = true;
-        }
-        wake_.notify_all();
-        thread_.join();
-    }
+    void start() { background_.start(); }  ///< [setup]
+    void stop() noexcept { background_.stop(); }  ///< [setup]
+
     hal::Mailbox<Order>    orders;
     hal::Mailbox<Delivery> deliveries;
 
 private:
     static constexpr auto look_every = std::chrono::milliseconds(2);  // a cycle may not wake a thread, so this one looks
 
-    void work() {
-        for (std::unique_lock lock(mutex_); !ending_; wake_.wait_for(lock, look_every, [this] { return ending_; })) {
-            bool        fresh = false;
-            const Order order = orders.get(&fresh);
-            if (!fresh) continue;
+    void turn(bool may_wait) noexcept {
+        bool         fresh = false;
+        const Order& order = orders.get(&fresh);
+        if (fresh) deliveries.put(designed(order));
+        else if (may_wait) std::this_thread::sleep_for(look_every);
+    }
+    Delivery designed(const Order& order) const noexcept {
+        Delivery delivery;
+        delivery.number = order.number;
+        if (!finite(order.q) || !finite(order.r)) return delivery;
+        try {
             Problem problem = problem_;
             problem.q.diagonal() = order.q;
             problem.r.diagonal() = order.r;
             problem.period = static_cast<double>(order.period_ns) * 1e-9;
-            Delivery delivery;
-            delivery.number = order.number;
-            if (finite(order.q) && finite(order.r) && positive(problem.q, true) && positive(problem.r))
-                if (const auto solved = problem.solve()) delivery.gain = solved->gain, delivery.good = finite(delivery.gain);
-            deliveries.put(delivery);
-        }
+            if (!positive(problem.q, true) || !positive(problem.r)) return delivery;
+            if (const auto solved = problem.solve()) delivery.gain = solved->gain, delivery.good = finite(delivery.gain);
+        } catch (const std::bad_alloc&) { delivery.good = false; }
+        return delivery;
     }
-    const Problem           problem_;
-    std::thread             thread_;
-    std::mutex              mutex_;  // of ending_; never taken in a cycle
-    std::condition_variable wake_;
-    bool                    ending_ = false;
+    const Problem   problem_;
+    hal::Background background_{[this](std::int64_t, bool may_wait) { turn(may_wait); }};
 };
 
 class Lqr : public hal::Component {
@@ -177,7 +166,7 @@ private:
             throw std::invalid_argument("plant=" + plant_.get() + " is not continuous, sampled or discrete");
         p.period = period_;
         if (!(p.period > 0.0 && p.period <= 3600.0))
-            throw std::invalid_argument("period=" + std::to_string(p.period) + " is not between 0 and 3600 s");
+            throw std::invalid_argument("period= is not between 0 and 3600 s; write the thread's period in s, 0.001 for one of 1 ms");
         const Matrices given(*this, {{"A", "0,1;0,0", "n x n: how the states drive each other"},
                                      {"B", "0;1", "n x m: how the inputs drive the states"},
                                      {"Q", "1,0;0,1", "n x n: what states cost; symmetric, not negative"},
@@ -268,8 +257,8 @@ HAL_COMPONENT(Lqr, "lqr", "Linear-quadratic regulator: plant and weights in, gai
 `sampled` is what a thread is: the gain suits its period, and is made anew when the thread has another one than `period=` says. Matrices are load
 arguments, a comma between numbers and a `;` between rows, or stand in a `file=` (see state_space). Riccati's equation is solved by
 structure-preserving doubling (E. Chu, H. Fan, W. Lin, 2004 and 2005) when the component is loaded, and later in a thread of its own: a change of
-the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the cycle swaps the gain in when it is done. Under `hal sim` cycles
-take no time, so how many of them a new design takes is not fixed there.
+the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the cycle swaps the gain in when it is done. Under `hal sim` that is the
+next cycle, so that each run comes out the same.
 
 A plant with an unstable mode that no input reaches, or that Q does not see, is refused with its name. A state that is no number is left
 out: for `hold-cycles` its last number stays, then `valid` falls and all u are 0 until it is a number again. `gain-I-J` can be linked to a

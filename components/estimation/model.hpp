@@ -2,7 +2,9 @@
 // A nonlinear plant as a user writes it: states with their derivatives, inputs, constants and what is measured.
 #pragma once
 
+#include <algorithm>
 #include <map>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,7 +14,7 @@
 namespace hal::estimation {
 
 /// The lines of a model: `constant NAME = FORMULA`, `input NAME`, `state NAME = START sigma S noise N`, `NAME' = FORMULA`,
-/// `measure NAME = FORMULA sigma S`, with `wrap` behind an angle. [setup]
+/// `measure NAME = FORMULA sigma S`, with `wrap` behind an angle, `wrap PERIOD` behind a counter. [setup]
 class Model {
 public:
     static constexpr std::size_t most_inputs = 8, most_measures = 12, most_constants = 32;
@@ -26,8 +28,7 @@ public:
     };
     struct Measure {
         std::string name;
-        double      sigma;
-        bool        wrap;
+        double      sigma, wrap;  // wrap: it begins anew after that much; 0: never
         Expression  value;
     };
 
@@ -72,8 +73,14 @@ private:
         return {all.begin, stop};
     }
     void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-        problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(std::max(end, begin + 1)), std::move(sentence),
-                            std::move(help)});
+        add({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+    }
+    /// At least a letter wide, if there is one.
+    void add(Expression::Problem problem) {
+        const auto size = static_cast<std::uint32_t>(text_.size());
+        problem.begin = std::min(problem.begin, std::max(size, 1u) - 1);
+        problem.end = std::min(std::max(problem.end, problem.begin + 1), size);
+        problems.push_back(std::move(problem));
     }
     void read_line(std::size_t begin, std::size_t end) {
         const Words line = trim(begin, end);
@@ -92,17 +99,17 @@ private:
         say(first.begin, first.end, "a line cannot begin with '" + std::string(what) + "'",
             "lines begin with constant, input, state, measure or NAME'");
     }
-    bool fresh(Words name, std::size_t limit, std::size_t count) {
+    bool fresh(Words name, std::size_t limit, std::size_t count, const char* what) {
         const std::string text(piece(name));
         if (text.empty()) return say(name.begin, name.end, "a name is missing", "names are letters, digits and _"), false;
         if (count >= limit)
-            return say(name.begin, name.end, "there are more than " + std::to_string(limit) + " of these", "a smaller model"), false;
+            return say(name.begin, name.end, "there are more than " + std::to_string(limit) + " " + what, "leave out what matters least"), false;
         if (index_.contains(text) || text == "pi") return say(name.begin, name.end, "'" + text + "' is there twice", "another name"), false;
         return true;
     }
     void input(std::size_t begin, std::size_t end) {
         const Words name = word(begin, end);
-        if (!fresh(name, most_inputs, inputs.size())) return;
+        if (!fresh(name, most_inputs, inputs.size(), "inputs")) return;
         index_[std::string(piece(name))] = static_cast<std::uint16_t>(static_cast<std::size_t>(most_slopes) + inputs.size());
         inputs.emplace_back(piece(name));
     }
@@ -114,18 +121,18 @@ private:
             return found != index_.end() && found->second >= most_slopes + most_inputs ? std::optional(found->second) : std::nullopt;
         };
         if (auto problem = Expression::compile(piece(formula), static_cast<std::uint32_t>(formula.begin), constants_only, e)) {
-            problems.push_back(*problem);
+            add(*problem);
             return 1.0;
         }
         std::vector<Dual> values(variables() + 1);
         for (std::size_t i = 0; i < constants.size(); ++i) values[most_slopes + most_inputs + i].value = constants[i];
         const double v = e(values.data(), 0).value;
-        if (!std::isfinite(v)) say(formula.begin, formula.end, "this is no finite number", "");
+        if (!std::isfinite(v)) say(formula.begin, formula.end, "this is no finite number", "is something divided by 0, or the root of a negative number taken?");
         return v;
     }
     void constant(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
-        if (!fresh(name, most_constants, constants.size())) return;
+        if (!fresh(name, most_constants, constants.size(), "constants")) return;
         const double v = fixed(trim(sign + 1, end));
         index_[std::string(piece(name))] = static_cast<std::uint16_t>(most_slopes + most_inputs + constants.size());
         constants.push_back(v);
@@ -141,13 +148,13 @@ private:
     }
     void state(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
-        if (!fresh(name, most_slopes, states.size())) return;
+        if (!fresh(name, most_slopes, states.size(), "states")) return;
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), noise = keyword(sign + 1, end, "noise");
         if (sigma == end || noise == end || noise < sigma)
             return say(name.begin, end, "a state has a start, a sigma and a noise",
                        "write state " + std::string(piece(name)) + " = 0 sigma 1 noise 0.1");
         const double start = fixed(trim(sign + 1, sigma)), wide = fixed(trim(sigma + 5, noise)), wanders = fixed(trim(noise + 5, end));
-        if (wide < 0.0 || wanders < 0.0) say(sigma, end, "sigma and noise are not negative", "");
+        if (wide < 0.0 || wanders < 0.0) say(sigma, end, "a sigma or a noise is negative", "0 is what is known exactly, and what does not wander");
         index_[std::string(piece(name))] = static_cast<std::uint16_t>(states.size());
         states.push_back({std::string(piece(name)),
                           start,
@@ -164,9 +171,7 @@ private:
             return found != index_.end() ? std::optional(found->second) : std::nullopt;
         };
         if (auto problem = Expression::compile(piece(words), static_cast<std::uint32_t>(words.begin), any, to)) {
-            if (problem->begin >= text_.size())
-                problem->begin = static_cast<std::uint32_t>(text_.size() - 1), problem->end = problem->begin + 1;
-            problems.push_back(*problem);
+            add(*problem);
         }
     }
     void rate(Words name, std::size_t sign, std::size_t end) {
@@ -182,12 +187,18 @@ private:
     void measure(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
         if (piece(name).empty()) return say(begin, sign, "a name is missing", "names are letters, digits and _");
-        if (measures.size() >= most_measures) return say(name.begin, name.end, "there are more than 12 measurements", "a smaller model");
+        if (measures.size() >= most_measures) return say(name.begin, name.end, "there are more than 12 measurements", "leave out what matters least");
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), wrap = keyword(sign + 1, end, "wrap");
         if (sigma == end)
             return say(name.begin, end, "a measurement has a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
-        Measure m{std::string(piece(name)), fixed(trim(sigma + 5, wrap)), wrap != end, {}};
-        if (!(m.sigma > 0.0)) say(sigma, end, "sigma is above 0", "each measurement has some noise");
+        Measure m{std::string(piece(name)), fixed(trim(sigma + 5, wrap)), 0.0, {}};
+        if (!(m.sigma > 0.0)) say(sigma, end, "sigma is not above 0", "each measurement has some noise: write how much, as in sigma 0.01");
+        if (wrap != end) {
+            const Words period = trim(wrap + 4, end);
+            m.wrap = period.begin == period.end ? 2.0 * std::numbers::pi : fixed(period);
+            if (!(m.wrap > 0.0))
+                say(wrap, end, "what it wraps after is above 0", "write wrap for an angle, wrap 65536 for a counter of 16 bits");
+        }
         formula(trim(sign + 1, sigma), m.value);
         measures.push_back(std::move(m));
     }

@@ -103,6 +103,19 @@ TEST(Kalman, Outliers_stay_beyond_the_gate_and_silence_makes_it_invalid) {
     EXPECT_FALSE(filter.get<bool>("valid"));
 }
 
+TEST(Kalman, A_covariance_that_is_lost_starts_again_and_is_counted) {
+    Instance filter("kalman", {{"a", "2"}, {"c", "1"}, {"qn", "1"}, {"rn", "1"}});
+    filter.set("z-0", 3.0);
+    filter.set("new-0", false);
+    filter.run("update", 1'000'000, 600);  // it grows fourfold in each cycle, beyond all numbers
+    EXPECT_EQ(filter.get<std::uint32_t>("renewals"), 1u);
+    EXPECT_TRUE(std::isfinite(filter.get<double>("sigma-0")));
+    filter.set("new-0", true);
+    filter.run("update", 1'000'000, 100);
+    EXPECT_TRUE(filter.get<bool>("valid"));
+    EXPECT_NEAR(filter.get<double>("sigma-0"), std::sqrt((2 + std::sqrt(5)) / (3 + std::sqrt(5))), 1e-9);  // Riccati's equation for these
+}
+
 TEST(Kalman, Measurements_with_dependent_noises_are_taken_together_or_not_at_all) {
     Instance filter("kalman", {{"a", "1"}, {"c", "1;1"}, {"qn", "1e-4"}, {"rn", "1,0.5;0.5,1"}});
     filter.set("z-0", 1.0);

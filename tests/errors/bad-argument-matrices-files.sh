@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: MIT
+# files of matrices and models that are not there, a folder, or something else altogether
+cp bad-argument-matrices-files.inc "$HOME/files.hal"
+cd "$HOME"
+mkdir folder
+head -c 65537 /dev/zero >long
+hal check files.hal
