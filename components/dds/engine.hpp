@@ -26,7 +26,7 @@ struct Settings {
     std::vector<std::string> interfaces;  ///< addresses or names of interfaces, or "all"; empty: 127.0.0.1, nothing leaves the machine
     std::vector<std::string> peers;  ///< addresses where participants are looked for beside the multicast group
     std::vector<std::string> servers;  ///< ADDRESS:PORT of discovery servers; then nothing is multicast
-    bool                     shared_memory = false;  ///< beside UDP; leaves files in /dev/shm behind when the process is killed
+    bool                     shared_memory = false;  ///< beside UDP; what a killed process leaves in /dev/shm the next one removes
     std::string              profile;  ///< FILE.xml or FILE.xml:PROFILE of Fast DDS: a participant profile, used as it is
     std::string security;  ///< a folder: identity_ca.cert.pem cert.pem key.pem permissions_ca.cert.pem governance.p7s permissions.p7s
     std::string user_data;  ///< announced with the participant; see Participant::known()

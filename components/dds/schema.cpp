@@ -78,12 +78,12 @@ hal_value value_of(std::string_view text, hal_type type, const std::string& whol
     return value;
 }
 
-void name_ok(std::string_view name, const std::string& whole) {
+void name_ok(std::string_view name, const std::string& whole, const std::string& argument = "fields") {
     const auto good = [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
     };
     if (name.empty() || !std::all_of(name.begin(), name.end(), good))
-        refuse("fields: '" + whole + "': '" + std::string(name) + "' cannot be a pin's name; letters, digits, - _ and . can");
+        refuse(argument + ": '" + whole + "': '" + std::string(name) + "' cannot be a pin's name; letters, digits, - _ and . can");
 }
 
 /// "NAME:TYPE[*N][=SAFE]" to one or N fields.
@@ -139,10 +139,10 @@ void ros_header(Schema& schema, Writer& writer, std::string_view frame) {
 
 void joint_state(Schema& schema, Writer& writer, const std::vector<std::string>& names) {
     if (names.empty()) refuse("a JointState needs the names of its joints: joints=shoulder,elbow");
-    if (names.size() > 256) refuse("joints: more than 256");
+    if (names.size() > 256) refuse("joints: more than 256 joints; make two topics of them");
     writer.number(static_cast<std::uint32_t>(names.size()));
     for (const std::string& n : names) {
-        name_ok(n, n);
+        name_ok(n, n, "joints");
         if (std::count(names.begin(), names.end(), n) > 1) refuse("joints: there are two joints '" + n + "'");
         writer.text(n);
     }
@@ -281,7 +281,6 @@ Schema Schema::of_fields(std::string_view text, std::string type) {
         place(schema, writer, f.name, f.type);
     }
     for (std::size_t i = 0; i < fields.size(); ++i) schema.fields[i].safe = fields[i].safe;
-    if (schema.sample.size() > most_bytes) refuse("fields: more than " + std::to_string(most_bytes) + " bytes");
     schema.type = std::move(type);
     if (schema.type.empty()) {
         std::uint64_t hash = 14695981039346656037u;  // FNV-1a, 64 bits (RFC 9923)
@@ -335,6 +334,9 @@ Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& name
                ": there are std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist WrenchStamped, " +
                "sensor_msgs/JointState Image; other types: fields= and type=, when they consist of plain numbers");
     }
+    if (schema.sample.size() > most_bytes)
+        refuse("ros=" + std::string(ros) + ": the message has more than " + std::to_string(most_bytes) +
+               " bytes; shorten joints=, frame= or encoding=");
     const auto slash = ros.find('/');
     schema.type = std::string(ros.substr(0, slash)) + "::msg::dds_::" + std::string(ros.substr(slash + 1)) + "_";
     return schema;

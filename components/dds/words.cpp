@@ -89,8 +89,12 @@ std::string difference(const std::string& sends, const std::string& sender, cons
 
 std::string shown(std::string words) {
     words.resize(std::min<std::size_t>(words.size(), 600));
-    for (char& c : words)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
+    unsigned char before = 0;
+    for (char& c : words) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (byte < 0x20 || byte == 0x7F || (before == 0xC2 && byte < 0xA0)) c = '?';  // control characters, U+0080 to U+009F too
+        before = byte;
+    }
     return words;
 }
 

@@ -4,6 +4,7 @@
 where that cannot be made."""
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import unittest
@@ -39,6 +40,22 @@ class Network(DdsCase):
         self.becomes("sub.valid", "TRUE")
         self.shows("1.5")
         self.says("sub: topic 'arm/state' is valid again\n")
+
+    def test_a_process_that_stood_still_is_found_again(self):
+        """It begins anew, and does not count on being remembered: what Fast DDS 2.9 keeps of another that it has forgotten may not fit any more."""
+        self.subscriber(more="timeout_ms=300")
+        publisher = self.publisher(1.5)
+        self.becomes("sub.valid", "TRUE")
+        publisher.send_signal(signal.SIGSTOP)
+        self.addCleanup(publisher.send_signal, signal.SIGCONT)
+        self.becomes("sub.matched", "0")  # forgotten, after 5 s
+        wait_until(lambda: float(self.value("sub.age-ms", "subscriber")) > 7000, "it stands still for longer than it is remembered")
+        self.assertEqual("FALSE", self.value("sub.valid", "subscriber"))
+        publisher.send_signal(signal.SIGCONT)
+        self.becomes("sub.valid", "TRUE")
+        self.shows("1.5")
+        self.becomes("pub.matched", "1", "publisher")
+        self.assertRegex(self.words("publisher"), r"dds: this process stood still for \d+\.\d s, so others may have forgotten it; it makes itself known anew\n")
 
     def test_nothing_leaves_the_machine_unless_asked(self):
         ip("link", "add", "out0", "type", "veth", "peer", "name", "out1")

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Two machines on a topic, and what may go wrong: one is killed, one has another type, a flood, a clock that is off, bytes of nobody."""
+import os
+import re
 import signal
 import unittest
 
@@ -137,9 +139,27 @@ class Topics(DdsCase):
 
     def test_shared_memory_carries_it_when_asked(self):
         publisher = self.publisher(1.5, more="shared_memory=1")
-        self.subscriber(more="shared_memory=1")
+        subscriber = self.subscriber(more="shared_memory=1")
         self.becomes("sub.valid", "TRUE")
         self.assertIn("/dev/shm/fastrtps_", (Path("/proc") / str(publisher.pid) / "maps").read_text())
+
+        def segments(process):
+            """Those it has made: it holds the files that lock them."""
+            held = [str(fd.readlink()) for fd in (Path("/proc") / str(process.pid) / "fd").iterdir()]
+            return [lock[:-len("_el")] for lock in held if re.fullmatch(r"/dev/shm/fastrtps_[0-9a-f]+_el", lock)]
+        left = segments(publisher)
+        self.assertTrue(left)
+
+        publisher.send_signal(signal.SIGKILL)
+        publisher.wait()
+        for path in left:
+            self.assertTrue(os.path.exists(path), path)
+            os.utime(path + "_el", (1, 1))  # who has just made one may not have locked it yet
+        self.publisher(2.5, more="shared_memory=1")
+        self.shows("2.5")
+        self.assertEqual([], [path for path in left if os.path.exists(path)])
+        self.assertRegex(self.words("publisher"), r"dds: removed from /dev/shm what killed processes have left: \d segments? of shared memory, \d\.\d MB\n")
+        self.assertTrue(all(map(os.path.exists, segments(subscriber))), "those that are in use stay")
 
     def test_a_profile_of_fast_dds_counts(self):
         self.write("profile.xml", PROFILE)
@@ -160,13 +180,18 @@ class Topics(DdsCase):
                                   ("topic=t fields=valid:bit", "'sub.valid'")):
             self.write("bad.hal", f"loadrt dds_subscribe names=sub {arguments}\n")
             self.assertIn(reason, self.bad("check", "bad.hal"), arguments)
+        self.write("profile.xml", PROFILE)
+        self.write("empty.xml", "no profile\n")
         self.write("bad.hal", "loadrt dds_publish names=pub topic=t fields=a:bit rate=-1\n")
         self.assertIn("rate= is below 0; write samples per second, or 0 for every cycle", self.bad("check", "bad.hal"))
         for arguments, reason in (("interfaces=nosuch0", "interfaces: this machine has no interface or address 'nosuch0'; it has "),
                                   ("peers=here", "peers: 'here' is not an address, as in 192.168.1.7"),
                                   ("server=10.0.0.1", "server=10.0.0.1 is not an address and a port, as in 192.168.1.7:11811"),
                                   ("security=nowhere", "security: there is no folder "),
-                                  ("profile=none.xml", "profile: there is no file ")):
+                                  ("profile=none.xml", "profile: there is no file "),
+                                  ("profile=empty.xml", "empty.xml; its own message says where"),
+                                  ("profile=profile.xml:robot", "profile.xml has no participant profile 'robot'; write profile="),
+                                  ("\nloadrt dds_subscribe names=two topic=t fields=a:float", "topic 't' has the type hal::Pins_")):
             self.write("bad.hal", f"loadrt threads name1=servo period1=1000000\nloadrt dds_subscribe names=sub topic=t fields=a:bit {arguments}\n")
             self.assertIn(reason, self.run_program("run", "--for", "10ms", "bad.hal").stderr, arguments)
 

@@ -39,6 +39,8 @@ TEST(DdsWords, the_first_difference_of_two_layouts_is_named) {
 
 TEST(DdsWords, what_comes_from_the_network_is_shown_on_one_short_line) {
     EXPECT_EQ("a?[2Jb?c", shown("a\x1b[2Jb\nc"));
+    EXPECT_EQ("a\xc2?2Jb", shown("a\xc2\x9b" "2Jb"));  // the control sequence introducer of 8 bits
+    EXPECT_EQ("Stra\xc3\x9f" "e", shown("Stra\xc3\x9f" "e"));
     EXPECT_EQ(600u, shown(std::string(5000, 'x')).size());
 }
 

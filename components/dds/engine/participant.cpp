@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Participants, writers and readers on Fast DDS 2.9. A sample is bytes here: the types have names and no fields.
-#include <pthread.h>
-#include <sched.h>
-#include <sys/resource.h>
+#include "participant.hpp"
+
 #include <time.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cstdio>
 #include <cstring>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -30,7 +29,9 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "dds/engine.hpp"
 #include "dds/words.hpp"
+#include "ordinary_thread.hpp"
 #include "settings.hpp"
 
 namespace hal::dds {
@@ -49,47 +50,6 @@ std::int64_t now(clockid_t clock) noexcept {
 eprosima::fastrtps::Duration_t duration(std::int64_t ns) {
     return {static_cast<std::int32_t>(ns / 1'000'000'000), static_cast<std::uint32_t>(ns % 1'000'000'000)};
 }
-
-/// What the library's threads get: an ordinary policy, and stacks that may be resident (mlockall makes them so).
-class OrdinaryThread {
-public:
-    template <class F>
-    static void run(F&& work) {
-        pthread_attr_t attributes, before;
-        pthread_attr_init(&attributes);
-        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-        pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-        const sched_param none{};
-        pthread_attr_setschedparam(&attributes, &none);
-        pthread_attr_setstacksize(&attributes, stack);
-        pthread_getattr_default_np(&before);
-        pthread_attr_t small = before;
-        pthread_attr_setstacksize(&small, stack);
-        pthread_setattr_default_np(&small);
-        struct Call {
-            F&                 work;
-            std::exception_ptr error;
-        } call{work, {}};
-        pthread_t thread{};
-        const int failed = pthread_create(&thread, &attributes, [](void* p) -> void* {
-            auto& c = *static_cast<Call*>(p);
-            setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // inherited by the library's threads; where it is allowed
-            try {
-                c.work();
-            } catch (...) { c.error = std::current_exception(); }
-            return nullptr;
-        }, &call);
-        if (failed == 0) pthread_join(thread, nullptr);
-        pthread_setattr_default_np(&before);
-        pthread_attr_destroy(&before);
-        pthread_attr_destroy(&attributes);
-        if (failed != 0) throw std::runtime_error("no thread for DDS could be started");
-        if (call.error) std::rethrow_exception(call.error);
-    }
-
-private:
-    static constexpr std::size_t stack = std::size_t{512} * 1024;
-};
 
 /// A sample on its way in or out.
 struct Bytes {
@@ -184,11 +144,37 @@ void common(Qos& qos, const Quality& q) {
 
 class ParticipantImpl;
 
-class WriterImpl final : public Writer, private fd::DataWriterListener {
+/// What writers and readers have in common: their participant makes them, and again when it is made again itself.
+class Endpoint {
+public:
+    Endpoint(std::shared_ptr<ParticipantImpl> owner, const TopicType& t, const Quality& q, Listener* l)
+        : topic(t), quality(q), gate(std::make_shared<Gate>(l)), owner_(std::move(owner)) {}
+    Endpoint(const Endpoint&) = delete;
+
+    virtual const char* kind() const noexcept = 0;  ///< "writer", "reader"
+    virtual bool        make(fd::Topic*) = 0;  ///< false: Fast DDS refused
+    virtual void        unmake() noexcept = 0;  ///< also when it is not made
+
+    const TopicType             topic;
+    const Quality               quality;
+    const std::shared_ptr<Gate> gate;
+
+protected:
+    ~Endpoint() = default;
+    void count_matched(int count, int change) {
+        matched_.store(count, std::memory_order_relaxed);
+        gate->event(change > 0 ? Event::matched : Event::unmatched, count);
+    }
+    std::shared_ptr<ParticipantImpl> owner_;
+    std::atomic<int>                 matched_{0};
+};
+
+class WriterImpl final : public Writer, private Endpoint, private fd::DataWriterListener {
 public:
     WriterImpl(std::shared_ptr<ParticipantImpl> owner, const TopicType&, const Quality&, Listener*);
     ~WriterImpl() override;
     bool write(std::span<const std::uint8_t> bytes, std::int64_t source_ns) noexcept override {
+        if (writer_ == nullptr) return false;
         Bytes sample{bytes, {}};
         try {
             if (source_ns == 0) return writer_->write(&sample);
@@ -199,36 +185,37 @@ public:
     }
     int  matched() const noexcept override { return matched_.load(std::memory_order_relaxed); }
     bool wait_for_acknowledgments(std::int64_t timeout_ns) noexcept override {
-        return writer_->wait_for_acknowledgments(duration(timeout_ns)) == ReturnCode_t::RETCODE_OK;
+        return writer_ != nullptr && writer_->wait_for_acknowledgments(duration(timeout_ns)) == ReturnCode_t::RETCODE_OK;
     }
 
 private:
-    void on_publication_matched(fd::DataWriter*, const fd::PublicationMatchedStatus& s) override {
-        matched_.store(s.current_count, std::memory_order_relaxed);
-        gate_->event(s.current_count_change > 0 ? Event::matched : Event::unmatched, s.current_count);
+    const char* kind() const noexcept override { return "writer"; }
+    bool        make(fd::Topic*) override;
+    void        unmake() noexcept override;
+    void        on_publication_matched(fd::DataWriter*, const fd::PublicationMatchedStatus& s) override {
+        count_matched(s.current_count, s.current_count_change);
     }
     void on_offered_deadline_missed(fd::DataWriter*, const fd::OfferedDeadlineMissedStatus& s) override {
-        gate_->event(Event::deadline_missed, static_cast<int>(s.total_count));
+        gate->event(Event::deadline_missed, static_cast<int>(s.total_count));
     }
     void on_offered_incompatible_qos(fd::DataWriter*, const fd::OfferedIncompatibleQosStatus& s) override {
-        gate_->event(Event::wrong_quality, static_cast<int>(s.total_count), policy_name(s.last_policy_id));
+        gate->event(Event::wrong_quality, static_cast<int>(s.total_count), policy_name(s.last_policy_id));
     }
-    std::shared_ptr<ParticipantImpl> owner_;
-    const std::string                topic_;
-    std::shared_ptr<Gate>            gate_;
-    std::atomic<int>                 matched_{0};
-    fd::DataWriter*                  writer_ = nullptr;
+    fd::DataWriter* writer_ = nullptr;  // of the thread that writes; the DDS thread, which is that one, makes it anew
 };
 
-class ReaderImpl final : public Reader, private fd::DataReaderListener {
+class ReaderImpl final : public Reader, private Endpoint, private fd::DataReaderListener {
 public:
     ReaderImpl(std::shared_ptr<ParticipantImpl> owner, const TopicType&, const Quality&, Listener*);
     ~ReaderImpl() override;
     int matched() const noexcept override { return matched_.load(std::memory_order_relaxed); }
 
 private:
-    void on_data_available(fd::DataReader* reader) override {
-        gate_->with([&](Listener& listener) {
+    const char* kind() const noexcept override { return "reader"; }
+    bool        make(fd::Topic*) override;
+    void        unmake() noexcept override;
+    void        on_data_available(fd::DataReader* reader) override {
+        gate->with([&](Listener& listener) {
             fd::SampleInfo info;
             while (reader->take_next_sample(&sample_, &info) == ReturnCode_t::RETCODE_OK) {
                 if (!info.valid_data) continue;
@@ -242,49 +229,27 @@ private:
         });
     }
     void on_subscription_matched(fd::DataReader*, const fd::SubscriptionMatchedStatus& s) override {
-        matched_.store(s.current_count, std::memory_order_relaxed);
-        gate_->event(s.current_count_change > 0 ? Event::matched : Event::unmatched, s.current_count);
+        count_matched(s.current_count, s.current_count_change);
     }
     void on_requested_deadline_missed(fd::DataReader*, const fd::RequestedDeadlineMissedStatus& s) override {
-        gate_->event(Event::deadline_missed, static_cast<int>(s.total_count));
+        gate->event(Event::deadline_missed, static_cast<int>(s.total_count));
     }
     void on_requested_incompatible_qos(fd::DataReader*, const fd::RequestedIncompatibleQosStatus& s) override {
-        gate_->event(Event::wrong_quality, static_cast<int>(s.total_count), policy_name(s.last_policy_id));
+        gate->event(Event::wrong_quality, static_cast<int>(s.total_count), policy_name(s.last_policy_id));
     }
     void on_liveliness_changed(fd::DataReader*, const fd::LivelinessChangedStatus& s) override {
-        gate_->event(s.alive_count_change > 0 ? Event::alive : Event::not_alive, s.alive_count);
+        gate->event(s.alive_count_change > 0 ? Event::alive : Event::not_alive, s.alive_count);
     }
-    std::shared_ptr<ParticipantImpl> owner_;
-    const std::string                topic_;
-    std::shared_ptr<Gate>            gate_;
-    std::atomic<int>                 matched_{0};
-    Bytes                            sample_;  // under the gate's lock
-    fd::DataReader*                  reader_ = nullptr;
+    Bytes           sample_;  // under the gate's lock
+    fd::DataReader* reader_ = nullptr;
 };
 
 class ParticipantImpl final : public Participant,
                               public std::enable_shared_from_this<ParticipantImpl>,
                               private fd::DomainParticipantListener {
 public:
-    explicit ParticipantImpl(const Settings& s) : settings_(s) {
-        OrdinaryThread::run([&] {
-            const fd::DomainParticipantQos qos = participant_qos(s);
-            fd::StatusMask                 none = fd::StatusMask::none();
-            participant_ =
-                fd::DomainParticipantFactory::get_instance()->create_participant(static_cast<std::uint32_t>(s.domain), qos, this, none);
-            if (participant_ == nullptr)
-                throw std::runtime_error(s.security.empty()
-                                             ? "Fast DDS made no participant; its own message says why"
-                                             : "Fast DDS refuses the files in " + s.security + "; its own message says which");
-            publisher = participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT);
-            subscriber = participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
-        });
-    }
-    ~ParticipantImpl() override {
-        participant_->set_listener(nullptr);
-        participant_->delete_contained_entities();
-        fd::DomainParticipantFactory::get_instance()->delete_participant(participant_);
-    }
+    explicit ParticipantImpl(const Settings& s) : settings_(s) { make(); }
+    ~ParticipantImpl() override { unmake(); }
     std::unique_ptr<Writer> writer(const TopicType& t, const Quality& q, Listener* l) override {
         return std::make_unique<WriterImpl>(shared_from_this(), t, q, l);
     }
@@ -300,40 +265,56 @@ public:
     }
     const Settings& settings() const noexcept override { return settings_; }
 
-    /// The topic, of this type; told apart by name. Give it back with release(). [setup]
-    fd::Topic* acquire(const TopicType& t) {
+    /// Makes a writer or reader, and from now on tells it when somebody has its topic with another type. [setup]
+    void join(Endpoint& e, bool writes) {
         const std::lock_guard lock(setup_);
-        auto&                 type = types_[t.type];
-        if (type == nullptr) {
-            type = new BytesType(t.type, t.largest);
-            fd::TypeSupport(type).register_type(participant_, t.type);
+        if (participant_ == nullptr) throw std::runtime_error("DDS could not begin anew so far; its own message says why");
+        fd::Topic* const topic = acquire(e.topic);
+        bool             made = false;
+        try {
+            OrdinaryThread::run([&] { made = e.make(topic); });
+            if (!made) throw std::runtime_error(std::string("Fast DDS made no ") + e.kind() + " of '" + e.topic.name + "'; its own message says why");
+            endpoints_.push_back(&e);
+        } catch (...) {
+            e.unmake();
+            release(e.topic.name);
+            throw;
         }
-        type->grow(t.largest);
-        auto& [topic, users] = topics_[t.name];
-        if (topic == nullptr) topic = participant_->create_topic(t.name, t.type, fd::TOPIC_QOS_DEFAULT);
-        if (topic == nullptr) throw std::runtime_error("Fast DDS made no topic '" + t.name + "'");
-        if (topic->get_type_name() != t.type)
-            throw std::runtime_error("topic '" + t.name + "' has the type " + topic->get_type_name() +
-                                     " in this process already, and here " + t.type + "; give both the same fields, or another topic=");
-        ++users;
-        return topic;
+        const std::lock_guard of_remote(mutex_);
+        watched_.push_back({e.topic.name, e.topic.type, writes, e.gate});
+        for (const auto& [guid, r] : remote_) compare(watched_.back(), r);
     }
-    void release(const std::string& name) {
+    /// Its listener is not called any more when this returns. [setup]
+    void leave(Endpoint& e) {
+        {
+            const std::lock_guard lock(mutex_);
+            std::erase_if(watched_, [&e](const Watched& w) { return w.gate == e.gate; });
+        }
+        e.gate->close();
         const std::lock_guard lock(setup_);
-        const auto            at = topics_.find(name);
-        if (at == topics_.end() || --at->second.second > 0) return;
-        participant_->delete_topic(at->second.first);
-        topics_.erase(at);
+        e.unmake();
+        std::erase(endpoints_, &e);
+        release(e.topic.name);
     }
-    /// Told from now on when somebody has this topic with another type.
-    void watch(const TopicType& t, bool writes, std::shared_ptr<Gate> gate) {
-        const std::lock_guard lock(mutex_);
-        watched_.push_back({t.name, t.type, writes, std::move(gate)});
-        for (const auto& [guid, e] : remote_) compare(watched_.back(), e);
-    }
-    void forget(const std::shared_ptr<Gate>& gate) {
-        const std::lock_guard lock(mutex_);
-        std::erase_if(watched_, [&gate](const Watched& w) { return w.gate == gate; });
+    /// All of it under a new identity. False: it did not go, and nothing is there; to be tried again. [the DDS thread]
+    bool renew() noexcept {
+        const std::lock_guard lock(setup_);
+        try {
+            unmake();
+            make();
+            for (auto& [name, t] : topics_) t.topic = topic_of(name, t.type);
+            OrdinaryThread::run([this] {
+                for (Endpoint* e : endpoints_)
+                    if (!e->make(topics_.at(e->topic.name).topic)) throw std::runtime_error("no " + std::string(e->kind()) + " of '" + e->topic.name + "'");
+            });
+            complained_ = false;
+            return true;
+        } catch (const std::exception& why) {
+            if (!complained_) std::fputs((std::string("dds: it cannot begin anew: ") + why.what() + "; it is tried again every second\n").c_str(), stderr);
+            complained_ = true;
+            unmake();
+            return false;
+        }
     }
 
     fd::Publisher*  publisher = nullptr;
@@ -349,6 +330,70 @@ private:
         std::string topic, type;
         bool        writes;
     };
+    struct Used {
+        fd::Topic*  topic = nullptr;
+        std::string type;
+        int         users = 0;
+    };
+
+    void make() {
+        OrdinaryThread::run([this] {
+            const fd::DomainParticipantQos qos = participant_qos(settings_);
+            participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(static_cast<std::uint32_t>(settings_.domain), qos,
+                                                                                            this, fd::StatusMask::none());
+            if (participant_ == nullptr)
+                throw std::runtime_error(settings_.security.empty()
+                                             ? "Fast DDS made no participant; its own message says why"
+                                             : "Fast DDS refuses the files in " + settings_.security + "; its own message says which");
+            publisher = participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT);
+            subscriber = participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
+        });
+    }
+    void unmake() noexcept {
+        if (participant_ == nullptr) return;
+        for (Endpoint* e : endpoints_) e->unmake();
+        participant_->set_listener(nullptr);
+        participant_->delete_contained_entities();
+        fd::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+        participant_ = nullptr;
+        for (auto& [name, t] : topics_) t.topic = nullptr;
+        const std::lock_guard lock(mutex_);
+        remote_.clear();
+        known_.clear();
+    }
+    fd::Topic* topic_of(const std::string& name, const std::string& type) {
+        types_.at(type).register_type(participant_, type);
+        fd::Topic* const topic = participant_->create_topic(name, type, fd::TOPIC_QOS_DEFAULT);
+        if (topic == nullptr) throw std::runtime_error("Fast DDS made no topic '" + name + "'; its own message says why");
+        return topic;
+    }
+    /// The topic, of this type; told apart by name. Give it back with release(). Both with `setup_`.
+    fd::Topic* acquire(const TopicType& t) {
+        auto& type = types_[t.type];
+        if (type.empty()) type.reset(new BytesType(t.type, t.largest));
+        static_cast<BytesType*>(type.get())->grow(t.largest);
+        if (const auto known = topics_.find(t.name); known != topics_.end() && known->second.type != t.type)
+            throw std::runtime_error("topic '" + t.name + "' has the type " + known->second.type + " in this process already, and here " + t.type +
+                                     "; give both the same fields, or another topic=");
+        Used& used = topics_[t.name];
+        if (used.users == 0) {
+            used.type = t.type;
+            try {
+                used.topic = topic_of(t.name, t.type);
+            } catch (...) {
+                topics_.erase(t.name);
+                throw;
+            }
+        }
+        ++used.users;
+        return used.topic;
+    }
+    void release(const std::string& name) {
+        const auto at = topics_.find(name);
+        if (at == topics_.end() || --at->second.users > 0) return;
+        if (participant_ != nullptr) participant_->delete_topic(at->second.topic);
+        topics_.erase(at);
+    }
     static void compare(const Watched& ours, const Remote& theirs) {
         if (ours.topic != theirs.topic || ours.writes == theirs.writes || ours.type == theirs.type) return;
         ours.gate->event(Event::wrong_type, 0,
@@ -386,84 +431,105 @@ private:
         known_[prefix] = std::move(k);
     }
 
-    const Settings                                    settings_;
-    fd::DomainParticipant*                            participant_ = nullptr;
-    mutable std::mutex                                mutex_;  // of these; nothing of Fast DDS is called under it
-    std::vector<Watched>                              watched_;
-    std::map<rtps::GUID_t, Remote>                    remote_;
-    std::map<rtps::GuidPrefix_t, Known>               known_;
-    std::mutex                                        setup_;  // of these; not taken by callbacks
-    std::map<std::string, BytesType*>                 types_;  // owned by the participant
-    std::map<std::string, std::pair<fd::Topic*, int>> topics_;
+    const Settings                         settings_;
+    mutable std::mutex                     mutex_;  // of these; nothing of Fast DDS is called under it
+    std::vector<Watched>                   watched_;
+    std::map<rtps::GUID_t, Remote>         remote_;
+    std::map<rtps::GuidPrefix_t, Known>    known_;
+    std::mutex                             setup_;  // of these; not taken by callbacks
+    fd::DomainParticipant*                 participant_ = nullptr;
+    std::map<std::string, fd::TypeSupport> types_;
+    std::map<std::string, Used>            topics_;
+    std::vector<Endpoint*>                 endpoints_;
+    bool                                   complained_ = false;
 };
 
 WriterImpl::WriterImpl(std::shared_ptr<ParticipantImpl> owner, const TopicType& t, const Quality& q, Listener* l)
-    : owner_(std::move(owner)), topic_(t.name), gate_(std::make_shared<Gate>(l)) {
-    fd::Topic* topic = owner_->acquire(t);
-    OrdinaryThread::run([&] {
-        fd::DataWriterQos qos = fd::DATAWRITER_QOS_DEFAULT;
-        if (!owner_->settings().profile.empty()) owner_->publisher->get_datawriter_qos_from_profile(t.name, qos);
-        common(qos, q);
-        if (q.lease_ns > 0) qos.liveliness().announcement_period = duration(std::max<std::int64_t>(q.lease_ns / 3, 1'000'000));
-        qos.reliable_writer_qos().times.heartbeatPeriod = duration(100'000'000);  // a lost sample is asked for at most so much later
-        writer_ = owner_->publisher->create_datawriter(topic, qos, this);
-    });
-    if (writer_ == nullptr) {
-        owner_->release(topic_);
-        throw std::runtime_error("Fast DDS made no writer of '" + t.name + "'; its own message says why");
-    }
-    owner_->watch(t, true, gate_);
+    : Endpoint(std::move(owner), t, q, l) {
+    owner_->join(*this, true);
 }
 
-WriterImpl::~WriterImpl() {
-    owner_->forget(gate_);
-    gate_->close();
+WriterImpl::~WriterImpl() { owner_->leave(*this); }
+
+bool WriterImpl::make(fd::Topic* to) {
+    fd::DataWriterQos qos = fd::DATAWRITER_QOS_DEFAULT;
+    if (!owner_->settings().profile.empty()) owner_->publisher->get_datawriter_qos_from_profile(topic.name, qos);
+    common(qos, quality);
+    if (quality.lease_ns > 0) qos.liveliness().announcement_period = duration(std::max<std::int64_t>(quality.lease_ns / 3, 1'000'000));
+    qos.reliable_writer_qos().times.heartbeatPeriod = duration(100'000'000);  // a lost sample is asked for at most so much later
+    writer_ = owner_->publisher->create_datawriter(to, qos, this);
+    return writer_ != nullptr;
+}
+
+void WriterImpl::unmake() noexcept {
+    if (writer_ == nullptr) return;
     owner_->publisher->delete_datawriter(writer_);
-    owner_->release(topic_);
+    writer_ = nullptr;
+    count_matched(0, -1);
 }
 
 ReaderImpl::ReaderImpl(std::shared_ptr<ParticipantImpl> owner, const TopicType& t, const Quality& q, Listener* l)
-    : owner_(std::move(owner)), topic_(t.name), gate_(std::make_shared<Gate>(l)) {
-    fd::Topic* topic = owner_->acquire(t);
+    : Endpoint(std::move(owner), t, q, l) {
     sample_.in.reserve(t.largest);
-    OrdinaryThread::run([&] {
-        fd::DataReaderQos qos = fd::DATAREADER_QOS_DEFAULT;
-        if (!owner_->settings().profile.empty()) owner_->subscriber->get_datareader_qos_from_profile(t.name, qos);
-        common(qos, q);
-        reader_ = owner_->subscriber->create_datareader(topic, qos, this);
-    });
-    if (reader_ == nullptr) {
-        owner_->release(topic_);
-        throw std::runtime_error("Fast DDS made no reader of '" + t.name + "'; its own message says why");
-    }
-    owner_->watch(t, false, gate_);
+    owner_->join(*this, false);
 }
 
-ReaderImpl::~ReaderImpl() {
-    owner_->forget(gate_);
-    gate_->close();
+ReaderImpl::~ReaderImpl() { owner_->leave(*this); }
+
+bool ReaderImpl::make(fd::Topic* from) {
+    fd::DataReaderQos qos = fd::DATAREADER_QOS_DEFAULT;
+    if (!owner_->settings().profile.empty()) owner_->subscriber->get_datareader_qos_from_profile(topic.name, qos);
+    common(qos, quality);
+    reader_ = owner_->subscriber->create_datareader(from, qos, this);
+    return reader_ != nullptr;
+}
+
+void ReaderImpl::unmake() noexcept {
+    if (reader_ == nullptr) return;
     owner_->subscriber->delete_datareader(reader_);
-    owner_->release(topic_);
+    reader_ = nullptr;
+    count_matched(0, -1);
+}
+
+/// All that are open. Never destroyed, see pump.cpp.
+struct Participants {
+    std::mutex                                  mutex;
+    std::vector<std::weak_ptr<ParticipantImpl>> all;
+};
+Participants& participants() {
+    static Participants& one = *new Participants;
+    return one;
 }
 
 }  // namespace
 
 std::shared_ptr<Participant> open(const Settings& s) {
-    static std::mutex&                                  mutex = *new std::mutex;  // never destroyed, see pump.cpp
-    static std::vector<std::weak_ptr<ParticipantImpl>>& all = *new std::vector<std::weak_ptr<ParticipantImpl>>;
-    const std::lock_guard                               lock(mutex);
+    Participants&         known = participants();
+    const std::lock_guard lock(known.mutex);
     prepare_library();
-    std::erase_if(all, [](const auto& w) { return w.expired(); });
+    std::erase_if(known.all, [](const auto& w) { return w.expired(); });
     const auto same = [&s](const Settings& x) {
         Settings wanted = s;
         wanted.name = x.name;
         return wanted == x;
     };
-    for (const auto& w : all)
+    for (const auto& w : known.all)
         if (auto p = w.lock(); p && same(p->settings())) return p;
     auto p = std::make_shared<ParticipantImpl>(s);
-    all.push_back(p);
+    known.all.push_back(p);
     return p;
+}
+
+bool announce_anew() noexcept {
+    std::vector<std::shared_ptr<ParticipantImpl>> all;  // destroyed without the lock
+    {
+        const std::lock_guard lock(participants().mutex);
+        for (const auto& w : participants().all)
+            if (auto p = w.lock()) all.push_back(std::move(p));
+    }
+    bool good = true;
+    for (const auto& p : all) good = p->renew() && good;
+    return good;
 }
 
 }  // namespace hal::dds

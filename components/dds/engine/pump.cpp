@@ -4,16 +4,20 @@
 #include <sched.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "dds/engine.hpp"
+#include "participant.hpp"
 
 namespace hal::dds {
 namespace {
@@ -40,6 +44,13 @@ public:
     }
 
 private:
+    /// Goes on while the machine sleeps.
+    static std::int64_t awake_ns() noexcept {
+        timespec t{};
+        clock_gettime(CLOCK_BOOTTIME, &t);
+        return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+    }
+
     struct Entry {
         Served*      served;
         std::int64_t next;
@@ -70,7 +81,8 @@ private:
         setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // as urgent as an ordinary thread may be, where that is allowed
         prctl(PR_SET_TIMERSLACK, 1UL);  // it is woken beside a cycle, which is not to wait 50 us for it
         std::unique_lock lock(mutex_);
-        while (running_) {
+        for (last_ns_ = awake_ns(); running_;) {
+            look_for_standstill();
             const auto   now = Clock::now().time_since_epoch();
             std::int64_t next = now.count() + 1'000'000'000;
             for (Entry& e : entries_) {
@@ -81,11 +93,26 @@ private:
         }
     }
 
+    /// The thread wakes every second at least; when it has not, others may have forgotten this process.
+    void look_for_standstill() {
+        const std::int64_t now = awake_ns(), gone = now - std::exchange(last_ns_, now);
+        if (gone > participant_lease_ns) {
+            std::fprintf(stderr, "dds: this process stood still for %.1f s, so others may have forgotten it; it makes itself known anew\n",
+                         static_cast<double>(gone) * 1e-9);
+            anew_at_ns_ = now;
+        }
+        if (now < anew_at_ns_) return;
+        const bool known = announce_anew();
+        last_ns_ = awake_ns();
+        anew_at_ns_ = known ? INT64_MAX : last_ns_ + 1'000'000'000;
+    }
+
     std::mutex              mutex_;  // of everything; held while served, so that remove() waits for it
     std::condition_variable wake_;
     std::vector<Entry>      entries_;
     pthread_t               thread_{};
     bool                    running_ = false;
+    std::int64_t            last_ns_ = 0, anew_at_ns_ = INT64_MAX;  // of the thread
 };
 
 Pump& pump() {

@@ -17,6 +17,9 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "leftovers.hpp"
+#include "participant.hpp"
+
 namespace hal::dds {
 namespace {
 
@@ -76,13 +79,16 @@ void transports(DomainParticipantQos& qos, const Settings& s) {
     }
     qos.transport().use_builtin_transports = false;
     qos.transport().user_transports.push_back(udp);
-    if (s.shared_memory) qos.transport().user_transports.push_back(std::make_shared<fastdds::rtps::SharedMemTransportDescriptor>());
+    if (!s.shared_memory) return;
+    remove_leftovers();
+    qos.transport().user_transports.push_back(std::make_shared<fastdds::rtps::SharedMemTransportDescriptor>());
 }
 
 void discovery(DomainParticipantQos& qos, const Settings& s) {
     auto& builtin = qos.wire_protocol().builtin;
     auto& config = builtin.discovery_config;
-    config.leaseDuration = {5, 0};  // a process that was killed is forgotten then; validity does not wait for it
+    // a process that was killed is forgotten then; validity does not wait for it
+    config.leaseDuration = {static_cast<std::int32_t>(participant_lease_ns / 1'000'000'000), 0};
     config.leaseDuration_announcementperiod = {1, 0};
     config.initial_announcements.count = 10;
     config.initial_announcements.period = {0, 50'000'000};
