@@ -14,6 +14,7 @@
 #include <thread>
 #include <unistd.h>
 
+#include "base/text.hpp"
 #include "base/types.hpp"
 #include "options.hpp"
 #include "say.hpp"
@@ -46,11 +47,7 @@ T number(std::string_view text) {
 }
 
 /// What comes over the network is shown on a terminal: nothing in it may steer it.
-std::string printable(std::string_view text) {
-    std::string clean;
-    for (const char c : text.substr(0, 300)) clean += static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? '?' : c;
-    return clean;
-}
+std::string clean(std::string_view text) { return printable(text.substr(0, 300)); }
 
 /// The statuses that come over DDS.
 class Network {
@@ -155,17 +152,17 @@ bool read_status(std::string_view text, SeenInstance& seen) {
         text.remove_prefix(std::min(end + 1, text.size()));
         const std::size_t blank = std::min(line.find(' '), line.size());
         const std::string_view key = line.substr(0, blank), value = line.substr(std::min(blank + 1, line.size()));
-        if (key == "instance") seen.instance = printable(value);
-        else if (key == "host") seen.host = printable(value);
+        if (key == "instance") seen.instance = clean(value);
+        else if (key == "host") seen.host = clean(value);
         else if (key == "pid") seen.pid = number<std::int64_t>(value);
         else if (key == "running") seen.running = value == "1";
-        else if (key == "cell") seen.cell = printable(value);
-        else if (key == "node") seen.node = printable(value);
+        else if (key == "cell") seen.cell = clean(value);
+        else if (key == "node") seen.node = clean(value);
         else if (key == "faults") seen.faults = number<std::uint64_t>(value);
-        else if (key == "fault") seen.fault = printable(value);
+        else if (key == "fault") seen.fault = clean(value);
         else if (key == "thread" && seen.threads.size() < 100) {
             if (const auto words = words_of(value); words.size() >= 5)
-                seen.threads.push_back({printable(words[0]), number<std::int64_t>(words[1]), number<std::uint64_t>(words[2]),
+                seen.threads.push_back({clean(words[0]), number<std::int64_t>(words[1]), number<std::uint64_t>(words[2]),
                                         number<std::uint64_t>(words[3]), words[4] == "1"});
         }
     }

@@ -101,6 +101,10 @@ class Language(Case):
         path = self.write("cell.hal", CELL)
         self.assertIn("write --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
 
+    def test_dds_without_a_node_is_refused(self):
+        self.assertEqual("hal run: --dds is about the nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take "
+                         "domain=3 themselves\n", self.bad("run", self.write("cell.hal", CELL), "--dds", "domain=3"))
+
     @unittest.skipIf(HAVE_DDS, "DDS is there")
     def test_run_without_dds_says_which_package(self):
         said = self.bad("run", self.write("cell.hal", CELL), "--node", "taker", "--for", "1s")
