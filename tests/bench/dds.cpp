@@ -18,19 +18,26 @@
 namespace hal::bench {
 namespace {
 
-/// What a thread on the virtual clock spends on a function per cycle, by its own statistics' difference: with it less without.
-double cycle_ns(const std::string& text, std::uint64_t cycles) {
+/// Time of the processor that a cycle of a thread on the virtual clock takes, the best of 40 runs; those in which `dropped` counted are none:
+/// a sample that finds no place in the queue costs less than one that is stored.
+double cycle_ns(const std::string& text, std::uint64_t cycles, const std::vector<std::string>& dropped = {}) {
     Runtime runtime(true);
     runtime.apply("newthread t 1000000\n" + text);
     runtime.session.start_threads();
     runtime.session.advance_cycles(100);
+    const auto lost = [&] { return dropped.empty() ? 0 : runtime.session.read(dropped).at(0).value().value.u64; };
     double best = 1e18;
-    for (int run = 0; run < 40; ++run) {  // the queue has 64 places: what finds none is not what is measured
-        usleep(20'000);
+    for (int run = 0, good = 0; good < 40 && run < 400; ++run) {
+        usleep(20'000);  // the queue has 64 places, which the DDS thread empties meanwhile
+        const auto before = lost();
         const CpuStopwatch watch;
         runtime.session.advance_cycles(cycles);
-        best = std::min(best, watch.ms() * 1e6 / static_cast<double>(cycles));
+        const double ns = watch.ms() * 1e6 / static_cast<double>(cycles);
+        if (lost() != before) continue;
+        best = std::min(best, ns);
+        ++good;
     }
+    if (best == 1e18) throw std::runtime_error("the DDS thread never emptied its queue: this machine is too busy to measure");
     return best;
 }
 
@@ -63,8 +70,8 @@ void dds(const Options& options, Report& report) {
     report.section("DDS, 64 pins of type float");
     if (!std::filesystem::exists(options.programs + "/dds_peer")) return report.note("not measured: this build is without Fast DDS");
     const std::uint64_t cycles = 50;
-    const double without = cycle_ns("loadrt sum2 names=s\naddf s t\n", cycles);
-    const double with = cycle_ns("loadrt dds_publish names=p topic=bench/cost fields=v:float*64 rate=0 domain=231\naddf p t\n", cycles);
+    const double without = cycle_ns("", cycles);
+    const double with = cycle_ns("loadrt dds_publish names=p topic=bench/cost fields=v:float*64 rate=0 domain=231\naddf p t\n", cycles, {"p.dropped"});
     report.row({.what = "publishing in the cycle", .unit = "ns", .ours = with - without, .goal = limit(150)});
 
     const int rounds = options.quick ? 2 : 5;

@@ -14,6 +14,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/cli"))
+from own_network import own_network  # noqa: E402
+
 COMMANDS = ("loadrt", "addf", "initf", "net", "setp", "sets", "newsig", "newthread", "linkps", "linksp", "linkpp", "alias", "unlinkp", "start")
 PERIODS = {"base": 50_000, "fast": 100_000, "servo": 1_000_000, "slow": 10_000_000}  # by how the name begins; else as servo
 
@@ -83,6 +86,7 @@ def check(hal, name):
 
 
 def main():
+    own_network()  # the examples of DDS and of buses over UDP meet nobody else's; where it cannot be made they are on this machine's loopback
     arguments = sys.argv[1:]
     hal = program(arguments)
     names = arguments or [line.split()[0] for line in run(hal, "doc").stdout.splitlines() if line.split()[0] != "threads"]
