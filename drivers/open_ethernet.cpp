@@ -63,6 +63,8 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     if (key == "promiscuous") return to_flag(o.promiscuous);
     if (key == "txstamps") return to_flag(o.transmit_stamps);
     if (key == "speed") return to_number(key, value, o.speed, 1, 100'000);
+    if (key == "forward") return to_duration(key, value, o.forward_ns);
+    if (key == "noise") return to_duration(key, value, o.noise_ns);
     if (key == "sendqueue") return to_number(key, value, o.send_capacity, 1, 4096);
     if (key == "receivequeue") return to_number(key, value, o.receive_capacity, 1, 16384);
     if (key == "mac") {
@@ -73,7 +75,7 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
         return {};
     }
     return std::string(link::no_option) + quoted(key) +
-           "; there are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, sendqueue, receivequeue";
+           "; there are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, forward, noise, sendqueue, receivequeue";
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace hal::can::cane {
 
 namespace {
 
-constexpr std::string_view segment_keys[] = {"mac", "speed", "policy", "spin", "promiscuous"};
+constexpr std::string_view segment_keys[] = {"mac", "speed", "policy", "spin", "promiscuous", "forward", "noise"};
 constexpr std::string_view own_keys[] = {"format", "order", "slot", "priority", "learn", "to"};
 
 bool is_in(const auto& keys, std::string_view key) { return std::find(std::begin(keys), std::end(keys), key) != std::end(keys); }

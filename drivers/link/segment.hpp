@@ -35,7 +35,7 @@ struct Disturbance {
 };
 
 /// The segment behind a `sim:` port: full-duplex lines to one store-and-forward switch. A frame takes wire_bytes / speed on its
-/// sender's line, `forward_ns` in the switch, and again its wire time on each receiver's line, where it waits its turn.
+/// sender's line, Options::forward_ns in the switch, and again its wire time on each receiver's line, where it waits its turn.
 /// [setup] unless marked; takes effect with the next frame that starts.
 class Segment {
 public:
@@ -43,9 +43,6 @@ public:
 
     virtual int port() const noexcept = 0;  ///< this port's number
     virtual void seed(std::uint64_t) = 0;
-    virtual void set_forward(std::int64_t ns) = 0;
-    /// Timestamps of this port scatter by that much (sigma), as those of a kernel do.
-    virtual void set_stamp_noise(std::int64_t ns) = 0;
     virtual int disturb(const Disturbance&) = 0;         ///< its number, or -1 when there are too many
     virtual std::uint64_t hits(int number) const = 0;
     virtual void calm() = 0;                             ///< ends all disturbances, babbling and cuts

@@ -82,12 +82,6 @@ public:
     void seed(std::uint64_t value) override {
         switch_->exclusively([&] { switch_->random = value; });
     }
-    void set_forward(std::int64_t ns) override {
-        switch_->exclusively([&] { switch_->forward_ns = std::clamp<std::int64_t>(ns, 0, 1'000'000'000); });
-    }
-    void set_stamp_noise(std::int64_t ns) override {
-        switch_->exclusively([&] { user_.noise_ns = std::clamp<std::int64_t>(ns, 0, 1'000'000'000); });
-    }
     int disturb(const Disturbance& what) override {
         return switch_->exclusively([&] {
             if (switch_->disturbances.size() >= most_disturbances) return -1;

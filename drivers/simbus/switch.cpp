@@ -33,12 +33,14 @@ User::User(const Options& o)
       outgoing(o.send_capacity),
       incoming(o.receive_capacity),
       types(o.types),
-      promiscuous(o.promiscuous) {
+      promiscuous(o.promiscuous),
+      noise_ns(o.noise_ns) {
     for (std::uint32_t i = 0; i < places.size(); ++i) unused.push(i);
     waiting.reserve(places.size());
 }
 
-Switch::Switch(std::string its_name, std::uint32_t its_speed) : name(std::move(its_name)), speed(its_speed) {
+Switch::Switch(std::string its_name, const Options& o)
+    : name(std::move(its_name)), speed(o.speed != 0 ? o.speed : 100), forward_ns(o.forward_ns >= 0 ? o.forward_ns : 2000) {
     events_.reserve(most_events);
     disturbances.reserve(most_disturbances);
     stations.reserve(most_stations);
@@ -49,12 +51,15 @@ std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& opt
     const std::lock_guard lock(all.mutex);
     auto& known = all.segments[name];
     if (auto segment = known.lock()) {
-        if (options.speed == 0 || options.speed == segment->speed) return segment;
-        problem = "the segment runs at " + std::to_string(segment->speed) +
-                  " Mbit/s already; open it with the same speed everywhere, or give it in one place only";
-        return nullptr;
+        if (options.speed != 0 && options.speed != segment->speed)
+            problem = "the segment runs at " + std::to_string(segment->speed) +
+                      " Mbit/s already; open it with the same speed everywhere, or give it in one place only";
+        else if (options.forward_ns >= 0 && options.forward_ns != segment->forward_ns)
+            problem = "a frame takes " + std::to_string(segment->forward_ns) +
+                      " ns in the switch already; open the segment with the same forward everywhere, or give it in the first place only";
+        return problem.empty() ? segment : nullptr;
     }
-    auto segment = std::make_shared<Switch>(name, options.speed != 0 ? options.speed : 100);
+    auto segment = std::make_shared<Switch>(name, options);
     known = segment;
     std::erase_if(all.segments, [](const auto& entry) { return entry.second.expired(); });
     return segment;

@@ -62,7 +62,7 @@ struct User {
     std::vector<std::uint16_t> types;
     bool promiscuous = false;
     bool leaving = false;          ///< its port is gone
-    std::int64_t noise_ns = 0;
+    const std::int64_t noise_ns;
     Station* station = nullptr;    ///< for its life
 
     std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, thrown_away{0}, late{0}, runts{0};
@@ -87,7 +87,7 @@ struct Station {
 
 class Switch {
 public:
-    Switch(std::string name, std::uint32_t speed);
+    Switch(std::string name, const Options&);
 
     /// The segment of that name, made when there is none. Lives as long as one of its ports. [setup]
     static std::shared_ptr<Switch> find(const std::string& name, const Options&, std::string& problem);
@@ -117,10 +117,10 @@ public:
     std::vector<Active> disturbances;
     std::vector<std::unique_ptr<Station>> stations;  ///< in order of their numbers
     std::uint64_t random = 1;
-    std::int64_t forward_ns = 2000;
 
     const std::string name;
     const std::uint32_t speed;  ///< Mbit/s
+    const std::int64_t forward_ns;
 
 private:
     struct Hold {

@@ -68,16 +68,21 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
     case HAL_FAULT_EXCEPTION: {
         const LoadedFunction* const function = function_with_id(model, event.subject);
         const std::string who = function ? "function '" + function->name + "' (" + function->component->name + ")" : "a function";
-        return {"exception", thread.name + ": " + who + " threw an exception" + at + "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start"};
+        return {"exception",
+                thread.name + ": " + who + " threw an exception" + at +
+                    "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start"};
     }
     case HAL_FAULT_NOT_FINITE: {
         const Pin* const pin = pin_with_id(model, event.subject);
         const std::string who = pin ? "pin '" + pin->name + "' (" + pin->instance->component->name + ")" : "a pin";
         const std::string to = pin ? format_value(HAL_TYPE_FLOAT, pin->safe) : "0";
-        return {"not-finite", thread.name + ": " + who + " became " + format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value}) + at + "; it was set to " + to + (pin ? "; see: show pin " + pin->instance->name : "")};
+        return {"not-finite", thread.name + ": " + who + " became " + format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value}) + at +
+                                  "; it was set to " + to + (pin ? "; see: show pin " + pin->instance->name : "")};
     }
     case HAL_FAULT_BUDGET:
-        return {"budget", thread.name + ": the cycle took " + format_duration(event.value) + " (budget " + format_duration(static_cast<double>(thread.options.budget_ns)) + ")" + at + "; see: show thread " + thread.name};
+        return {"budget", thread.name + ": the cycle took " + format_duration(event.value) + " (budget " +
+                              format_duration(static_cast<double>(thread.options.budget_ns)) + ")" + at + "; see: show thread " +
+                              thread.name};
     case HAL_FAULT_COMPONENT: {
         const Instance* const instance = instance_at(model, event.self);
         // "what happened {}; what was done": the number where the braces are, in {x} hexadecimal, the cycle before the semicolon
@@ -87,7 +92,8 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event)
         if (const auto braces = what.find("{}"); braces != std::string::npos) what.replace(braces, 2, number);
         else if (const auto code = what.find("{x}"); code != std::string::npos) what.replace(code, 3, hexadecimal(event.value));
         else if (!std::isnan(event.value)) what += " (" + number + ")";
-        return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at + done + (instance ? "; see: show pin " + instance->name : "")};
+        return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at + done +
+                                 (instance ? "; see: show pin " + instance->name : "")};
     }
     case HAL_FAULT_SILENT_THREAD:
     case HAL_FAULT_NONE: break;
@@ -192,7 +198,8 @@ std::vector<std::string> Session::missing_privileges() const {
     const std::string grant = "; grant it with: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep $(readlink -f PROGRAM)";
     if (scheduling) missing.push_back("no real-time scheduling here: threads run as ordinary ones and are late under load" + grant);
     for (const std::string& one : s.refused)
-        missing.push_back("no " + one + " here: a page fault can delay a cycle" + (scheduling ? "; the same setcap grants it" : grant) + ", or 'memlock unlimited' in /etc/security/limits.conf");
+        missing.push_back("no " + one + " here: a page fault can delay a cycle" + (scheduling ? "; the same setcap grants it" : grant) +
+                          ", or 'memlock unlimited' in /etc/security/limits.conf");
     return missing;
 }
 
@@ -205,12 +212,22 @@ std::vector<std::string> Session::latency_lines() const {
         const std::string reader = delay.reader->name;
         const auto thread_name = [](const Pin& pin) { const Thread* t = thread_of(pin); return t ? t->name : std::string("no thread"); };
         switch (delay.kind) {
-        case Delay::Kind::same_cycle: line += delay.writer->name + " => " + reader + "  0 cycles (" + thread_name(*delay.reader) + ", writer runs first)"; break;
-        case Delay::Kind::next_cycle: line += delay.writer->name + " => " + reader + "  1 cycle (" + thread_name(*delay.reader) + ", reader runs first)"; break;
-        case Delay::Kind::other_thread: line += delay.writer->name + " => " + reader + "  the last finished cycle of " + thread_name(*delay.writer) + ", read in " + thread_name(*delay.reader); break;
+        case Delay::Kind::same_cycle:
+            line += delay.writer->name + " => " + reader + "  0 cycles (" + thread_name(*delay.reader) + ", writer runs first)";
+            break;
+        case Delay::Kind::next_cycle:
+            line += delay.writer->name + " => " + reader + "  1 cycle (" + thread_name(*delay.reader) + ", reader runs first)";
+            break;
+        case Delay::Kind::other_thread:
+            line += delay.writer->name + " => " + reader + "  the last finished cycle of " + thread_name(*delay.writer) + ", read in " +
+                    thread_name(*delay.reader);
+            break;
         case Delay::Kind::session: line += "=> " + reader + "  no writer: as set by sets"; break;
         case Delay::Kind::cell: line += "<=> " + reader + "  I/O pins: at once within a thread"; break;
-        case Delay::Kind::unscheduled: line += delay.writer->name + " => " + reader + "  never: " + (thread_of(*delay.writer) ? "the reader" : "the writer") + " is in no thread"; break;
+        case Delay::Kind::unscheduled:
+            line += delay.writer->name + " => " + reader + "  never: " + (thread_of(*delay.writer) ? "the reader" : "the writer") +
+                    " is in no thread";
+            break;
         }
         lines.push_back(std::move(line));
     }

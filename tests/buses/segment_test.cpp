@@ -66,6 +66,18 @@ TEST(Segment, a_frame_takes_its_time_on_two_lines_and_in_the_switch) {
     EXPECT_EQ(to_string(a->address()), "02:48:41:4c:00:01");
 }
 
+TEST(Segment, a_slower_switch_keeps_a_frame_longer) {
+    const auto net = fresh();
+    auto a = open_or_fail(net + "?forward=12.5us"), b = open_or_fail(net);
+    a->send(frame(broadcast, *a, 0x88b5, {7}), {}, ms);
+    const auto got = all(*b, 2 * ms);
+    ASSERT_EQ(got.size(), 1U);
+    EXPECT_EQ(got[0].time_ns, ms + 2 * minimum_ns + 12'500);
+    EXPECT_EQ(open(net + "?forward=2us").problem, net + "?forward=2us: a frame takes 12500 ns in the switch already; open the segment with the "
+                                                        "same forward everywhere, or give it in the first place only");
+    EXPECT_TRUE(open(net + "?forward=12500ns"));
+}
+
 TEST(Segment, a_long_frame_takes_longer_and_a_faster_line_less) {
     auto net = fresh();
     auto a = open_or_fail(net + "?speed=1000"), b = open_or_fail(net);
@@ -283,8 +295,7 @@ TEST(Segment, a_babbling_station_fills_the_lines_of_the_others_but_not_the_memor
 
 TEST(Segment, stamps_scatter_when_asked_to_and_nothing_else_does) {
     const auto net = fresh();
-    auto a = open_or_fail(net), b = open_or_fail(net), c = open_or_fail(net);
-    b->segment()->set_stamp_noise(1000);
+    auto a = open_or_fail(net), b = open_or_fail(net + "?noise=1us"), c = open_or_fail(net);
     double sum = 0, squares = 0;
     for (int i = 1; i <= 1000; ++i) {
         a->send(frame(broadcast, *a, 0x9021, {1}), {}, i * ms);
@@ -302,10 +313,9 @@ TEST(Segment, the_order_of_the_calls_of_one_instant_changes_nothing) {
     const auto run = [](bool turned) {
         const auto net = fresh();
         std::vector<std::unique_ptr<Port>> ports;
-        for (int i = 0; i < 4; ++i) ports.push_back(open_or_fail(net));
+        for (int i = 0; i < 4; ++i) ports.push_back(open_or_fail(net, {.noise_ns = i == 3 ? 500 : 0}));
         ports[0]->segment()->disturb({.fault = Fault::loss, .probability = 0.2});
         ports[0]->segment()->disturb({.fault = Fault::delay, .probability = 0.2, .to = 2, .delay_ns = 40 * us});
-        ports[3]->segment()->set_stamp_noise(500);
         std::string text;
         for (int cycle = 1; cycle < 200; ++cycle) {
             const auto now = cycle * 100 * us;

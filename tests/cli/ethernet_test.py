@@ -60,11 +60,12 @@ class Segment(Case):
         self.assertIn("nothing can be written in '/nowhere', where what the processes say would be; set TMPDIR=FOLDER\n", done.stdout)
 
     def test_wrong_words_are_named(self):
-        done = subprocess.run([ROOT / "halfiles/ethernet-cnc/bring-up", "fast"], env={**self.environment, "HAL": str(HAL)}, text=True,
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        if done.returncode == 77:
-            self.skipTest("no network namespaces here")
-        self.assertEqual((1, True), (done.returncode, "'fast' means nothing; write bring-up [--lose-clock] [SECONDS]" in done.stdout), done.stdout)
+        for machine, option in (("cnc", "--lose-clock"), ("furuta", "--swing-up")):
+            done = subprocess.run([ROOT / f"halfiles/ethernet-{machine}/bring-up", "fast"], env={**self.environment, "HAL": str(HAL)}, text=True,
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+            if done.returncode == 77:
+                self.skipTest("no network namespaces here")
+            self.assertEqual((1, True), (done.returncode, f"'fast' means nothing; write bring-up [{option}] [SECONDS]" in done.stdout), done.stdout)
 
     def test_a_station_says_what_to_type(self):
         tdma = self.folder / "one.tdma"
@@ -74,7 +75,7 @@ class Segment(Case):
         self.assertIn("write --link cane:eth0 with --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
         self.assertIn("--skew is of a station in a TDMA; add --tdma FILE, its schedule\n", node("--link", "cane:lo", "--skew", "200ppm"))
         self.assertIn("there is no option 'slots'; there are bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue, "
-                      "and of cane: format, order, slot, priority, learn, to, mac, speed, policy, spin, promiscuous, node5\n",
+                      "and of cane: format, order, slot, priority, learn, to, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
                       node("--link", "cane:lo?slots=3"))
         self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
         self.assertIn("there are axis, furuta", node("--link", "cane:lo", "--plant", "robot"))

@@ -5,8 +5,11 @@
 #include <sys/mman.h>
 
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <fmt/core.h>
+#include <thread>
 
 #include "link/system.hpp"
 
@@ -24,10 +27,6 @@ std::optional<double> parts_per_million(std::string_view text) {
     if (wrong != std::errc{} || unit != "ppm" || !(std::abs(value) <= 500.0)) return std::nullopt;
     return value * 1e-6;
 }
-
-struct Quiet final : tdma::Events {
-    void on_event(tdma::Event, const tdma::Address&, tdma::Time) noexcept override {}
-};
 
 }  // namespace
 
@@ -60,7 +59,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
     if (by_rtcfg) {
         tdma::StationSetup unknown;
         unknown.configured = false, unknown.room_for_slots = tdma::most_slots;
-        made.reset(new TdmaStation(unknown, segment, std::move(opened.port), *skew, *drift));
+        made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift));
         if (std::string problem = made->take_schedule(options, ended); !problem.empty()) return problem;
         entry = &made->applicant_->accepted()->schedule.stations.front();
     } else {
@@ -71,24 +70,26 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
                                tdma::config::names(reading.schedule));
         entry = &reading.schedule.stations[*which];
         if (entry->slots.empty())
-            return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", options.station, options.tdma);
-        made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which), segment, std::move(opened.port), *skew, *drift));
+            return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", entry->name, options.tdma);
+        made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which), reading.schedule, segment, std::move(opened.port), *skew,
+                                   *drift));
     }
-    if (link.find("slot=") == std::string::npos)
-        link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', entry->slots.front().setup.id);
+    if (link.find("slot=") == std::string::npos) {
+        made->slot_ = entry->slots.front().setup.id;
+        link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', *made->slot_);
+    }
     if (!ethernet::offer_discipline(segment, &made->station_)) return segment + " has a TDMA station already";
     return options.tunnel.empty() ? std::string{} : made->open_tunnel(options, *entry);
 }
 
 std::string TdmaStation::take_schedule(const NodeOptions& options, const std::function<bool()>& ended) {
-    static Quiet quiet;
     tdma::rtcfg::Logical own;
     if (!options.station.empty()) {
         const auto ip = tdma::config::parse_ip(options.station);
         if (!ip) return "with --tdma auto, --station is the station's IP address, as in 10.0.0.3; without it its MAC address counts";
         own = {true, *ip};
     }
-    applicant_ = std::make_unique<tdma::rtcfg::Applicant>("hal node", station_, own, "", quiet);
+    applicant_ = std::make_unique<tdma::rtcfg::Applicant>("hal node", station_, own, "", static_cast<tdma::Events&>(*this));
     station_.accompany(&applicant_->client(), nullptr);
     const std::string who = own.by_ip ? "ip " + options.station : "mac " + ethernet::to_string(station_.address());
     fmt::print(stderr,
@@ -97,7 +98,7 @@ std::string TdmaStation::take_schedule(const NodeOptions& options, const std::fu
     while (applicant_->accepted() == nullptr) {
         if (ended()) return fmt::format("no master on {} had a schedule for '{}'", segment_, who);
         station_.receive(clock_.local(can::monotonic_ns()));
-        applicant_->work();
+        look();
         applicant_->cycle();
     }
     return {};
@@ -115,9 +116,10 @@ std::string TdmaStation::open_tunnel(const NodeOptions& options, const tdma::con
     return {};
 }
 
-TdmaStation::TdmaStation(const tdma::StationSetup& setup, std::string segment, std::unique_ptr<ethernet::Port> port, double skew,
-                         double drift)
-    : clock_(can::monotonic_ns(), skew, drift), segment_(std::move(segment)), port_(std::move(port), clock_), station_(setup) {
+TdmaStation::TdmaStation(const tdma::StationSetup& setup, tdma::config::Schedule schedule, std::string segment,
+                         std::unique_ptr<ethernet::Port> port, double skew, double drift)
+    : schedule_(std::move(schedule)), clock_(can::monotonic_ns(), skew, drift), segment_(std::move(segment)), port_(std::move(port), clock_),
+      station_(setup, this) {
     station_.attach(port_);
 }
 
@@ -132,13 +134,35 @@ std::int64_t TdmaStation::sleep_until(std::int64_t local_ns) const noexcept {
     return clock_.local(can::monotonic_ns());
 }
 
+void TdmaStation::take_over() noexcept {
+    const tdma::rtcfg::Accepted& accepted = *applicant_->accepted();
+    if (tap_) tap_->scheduled(accepted.schedule.stations.front().ip, tdma::tunnel_mtu(accepted.setup));
+    if (slot_ && station_.room(*slot_) == 0) lacks_slot_ = true;
+}
+
+void TdmaStation::look() noexcept {
+    if (applicant_) applicant_->work();
+    const auto say = [](const std::string& sentence) { std::fputs(("hal node: " + sentence + "\n").c_str(), stderr); };
+    for (tdma::Happened h; told_.pop(h);) say(words_(h));
+    if (lacks_slot_.exchange(false))
+        say("the new schedule has no slot " + std::to_string(*slot_) + " for this station, in which it sends; start it again, or write one");
+}
+
 void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
+    std::jthread beside([this](const std::stop_token& ended) {
+        while (!ended.stop_requested()) {
+            look();
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
+        look();
+    });
     mlockall(MCL_CURRENT | MCL_FUTURE);
     const sched_param real_time{priority};
     sched_setscheduler(0, SCHED_FIFO, &real_time);  // without the right to it it runs all the same, with more jitter
-    const auto cycle = station_.setup().cycle;
-    auto due = clock_.local(can::monotonic_ns()) + cycle;
+    auto due = clock_.local(can::monotonic_ns()) + station_.setup().cycle;
     for (bool goes_on = true; goes_on; ++cycles_) {
+        if (applicant_ && applicant_->cycle()) take_over();
+        const auto cycle = station_.setup().cycle;
         const auto now = sleep_until(due);
         for (; due < now - cycle / 2; due += cycle) ++missed_;
         station_.receive(due);

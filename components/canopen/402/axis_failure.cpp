@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <limits>
 
 namespace hal::canopen::cia402 {
 
@@ -111,7 +112,7 @@ std::uint32_t key_of(const Failure& f) noexcept {
     unsigned a = 0, b = 0;
     switch (f.cause) {
     case Cause::stays: a = static_cast<unsigned>(f.step), b = static_cast<unsigned>(f.state); break;
-    case Cause::drive_fault: a = static_cast<unsigned>(f.step); break;
+    case Cause::drive_fault: a = static_cast<unsigned>(f.step), b = f.error_code != 0; break;
     case Cause::left: a = static_cast<unsigned>(f.before), b = static_cast<unsigned>(f.state); break;
     case Cause::mode_refused: a = known(f.mode), b = known(f.shown); break;
     case Cause::homing_error: a = static_cast<unsigned>(homing_of(f.statusword)); break;
@@ -124,13 +125,17 @@ std::uint32_t key_of(const Failure& f) noexcept {
 
 /// Where the number stands, and what was done.
 std::string reason(const Failure& f) {
-    const char* number = " (statusword {})";
+    const char* number = " (statusword {x})";
     switch (f.cause) {
+    case Cause::lost:
+    case Cause::not_enabled: number = ""; break;
     case Cause::stays:
     case Cause::mode_refused:
     case Cause::homing_late:
     case Cause::set_point: number = " for {} s"; break;
-    case Cause::drive_fault: number = " (error code {})"; break;
+    case Cause::drive_fault:
+        if (f.error_code != 0) number = " (error code {x})";
+        break;
     case Cause::following_error:
     case Cause::step_refused:
     case Cause::bad_command:
@@ -156,7 +161,10 @@ Sentences::Sentences() {
                                   Cause::not_enabled})
             add(cause, request);
         for (unsigned step = 0; step < steps; ++step) {
-            add(Cause::drive_fault, request).step = static_cast<Step>(step);
+            for (const std::uint16_t code : {0, 1}) {
+                Failure& f = add(Cause::drive_fault, request);
+                f.step = static_cast<Step>(step), f.error_code = code;
+            }
             for (unsigned state = 0; state < states_and_none; ++state) {
                 Failure& f = add(Cause::stays, request);
                 f.step = static_cast<Step>(step), f.state = static_cast<State>(state);
@@ -196,7 +204,9 @@ double Sentences::number(const Failure& f) noexcept {
     case Cause::mode_refused:
     case Cause::homing_late:
     case Cause::set_point: return seconds(f.after);
-    case Cause::drive_fault: return f.error_code;
+    case Cause::drive_fault: return f.error_code != 0 ? f.error_code : f.statusword;
+    case Cause::lost:
+    case Cause::not_enabled: return std::numeric_limits<double>::quiet_NaN();
     case Cause::following_error:
     case Cause::step_refused:
     case Cause::bad_command:

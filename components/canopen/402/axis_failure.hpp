@@ -61,7 +61,7 @@ std::string sentence(const Failure&);
 /// With all numbers and what they hint at. [setup]
 std::string text(const Failure&);
 
-/// Every sentence there is, made beforehand, for a cycle that reports failures to hal.faults/1: {} in it is where the number goes.
+/// Every sentence there is, made beforehand, for a cycle that reports failures to hal.faults/1: {} or {x} in it is where the number goes.
 class Sentences {
 public:
     Sentences();  // [setup]

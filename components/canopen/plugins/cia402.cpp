@@ -77,7 +77,7 @@ struct Cia402 : hal::Component {
     hal::In<std::int32_t> velocity{*this, "velocity-actual-value", "606Ch; may stay unlinked"};
     hal::In<std::int32_t> vl_velocity{*this, "vl-velocity-actual-value", "6044h; velocity-fb of mode vl when linked"};
     hal::In<std::int32_t> torque{*this, "torque-actual-value", "6077h"};
-    hal::In<std::uint32_t> error_code{*this, "error-code", "603Fh; may stay unlinked"};
+    hal::In<std::uint32_t> error_code{*this, "error-code", "603Fh, or the emcy pin of its node; may stay unlinked"};
     hal::Out<std::uint32_t> controlword{*this, "controlword", "6040h", {.safe = 0U}};
     hal::Out<std::int32_t> mode_out{*this, "modes-of-operation", "6060h"};
     hal::Out<std::int32_t> target_position{*this, "target-position", "607Ah"};

@@ -44,6 +44,13 @@ double number(const std::string& part, std::string_view text, const char*& unit)
     return value;
 }
 
+double number(const std::string& part, std::string_view text) {
+    const char*  end = nullptr;
+    const double value = number(part, text, end);
+    if (end != text.data() + text.size()) refuse(part, "'" + std::string(text) + "' is no number");
+    return value;
+}
+
 /// 1s, 20ms, 500us.
 std::int64_t duration(const std::string& part, std::string_view text) {
     const char*            end = nullptr;
@@ -58,7 +65,7 @@ std::int64_t duration(const std::string& part, std::string_view text) {
 Disturbance parse(const std::string& part) {
     const char* help =
         "write loss, duplicate, delay, cut or garble, and behind it "
-        ":every=50:count=3:from=1s:until=2s:type=0x9023:frame=reply:time=2ms:length=30";
+        ":every=50:probability=0.02:count=3:from=1s:until=2s:type=0x9023:frame=reply:time=2ms:length=30";
     std::string_view rest(part);
     const auto       word = rest.substr(0, rest.find(':'));
     rest.remove_prefix(std::min(word.size() + 1, rest.size()));
@@ -71,22 +78,23 @@ Disturbance parse(const std::string& part) {
     while (!rest.empty()) {
         const auto item = rest.substr(0, rest.find(':'));
         rest.remove_prefix(std::min(item.size() + 1, rest.size()));
-        const auto  equals = std::min(item.find('='), item.size());
-        const auto  key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
-        const char* end = nullptr;
+        const auto equals = std::min(item.find('='), item.size());
+        const auto key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
         if (key == "from") d.from_ns = duration(part, value);
         else if (key == "until") d.until_ns = duration(part, value);
         else if (key == "time") d.delay_ns = duration(part, value);
-        else if (key == "every") d.every = static_cast<std::uint32_t>(number(part, value, end));
-        else if (key == "count") d.count = static_cast<std::uint64_t>(number(part, value, end));
-        else if (key == "length") d.length = static_cast<std::size_t>(number(part, value, end));
+        else if (key == "every") d.every = static_cast<std::uint32_t>(number(part, value));
+        else if (key == "probability") d.probability = number(part, value), d.every = 0;
+        else if (key == "count") d.count = static_cast<std::uint64_t>(number(part, value));
+        else if (key == "length") d.length = static_cast<std::size_t>(number(part, value));
         else if (key == "type" && value == "0x9021") d.type = 0x9021;
         else if (key == "type" && value == "0x9022") d.type = 0x9022;
         else if (key == "type" && value == "0x9023") d.type = 0x9023;
         else if (const auto* kind = kind_of(key == "frame" ? value : ""); kind != nullptr) d.type = 0x9021, d.at = kind_at, d.is = kind->id;
         else refuse(part, help);
     }
-    if (d.every == 0) refuse(part, "every counts from 1");
+    if (d.every == 0 && d.probability == 0.0) refuse(part, "every counts from 1, and a probability is above 0");
+    if (d.probability > 1.0) refuse(part, "a probability is 1 at most");
     return d;
 }
 
@@ -163,9 +171,9 @@ Frames of a `sim:` segment are lost, come twice, late, cut short or with a byte 
 threads, the same in every run.
 
 `faults` is a list by commas of loss, duplicate, delay, cut and garble, each with what it strikes: `every=50` (every 50th frame; without it
-all), `count=3` (then it is over), `from=1s`, `until=2s`, `type=0x9023` (of that Ethertype only), `frame=reply` (of TDMA's sync,
-request or reply only), `time=2ms` (delay), `length=30` (cut:
-bytes that are left). `garble` is what a hostile station does: the check sequence of Ethernet is right.
+all), `probability=0.02` (each frame, drawn; the same ones for the same `seed`), `count=3` (then it is over), `from=1s`, `until=2s`,
+`type=0x9023` (of that Ethertype only), `frame=reply` (of TDMA's sync, request or reply only), `time=2ms` (delay), `length=30` (cut: bytes that
+are left). `garble` is what a hostile station does: the check sequence of Ethernet is right.
 
 The station `link` names can also babble: while `babble` is true it sends a frame every `babble-period`, without asking anybody.
 

@@ -157,10 +157,18 @@ private:
                   std::string("it is written ") + key->second.usage);
             return;
         }
+        if (first.text != "slot" && first.text != "cycle") {
+            const auto [before, is_new] = (key->second.of_station ? given_ : given_to_all_).emplace(first.text, first.at.line);
+            if (!is_new) {
+                error(Topic::line, first.at, "'" + first.text + "' is given already, in line " + std::to_string(before->second));
+                return;
+            }
+        }
         (this->*key->second.take)(words);
     }
 
     void head(const std::vector<Word>& words) {
+        given_.clear();
         const Word&                                 first = words.front();
         constexpr std::pair<std::string_view, Role> blocks[] = {
             {"master:", Role::master}, {"backup-master:", Role::backup}, {"slave:", Role::slave}};
@@ -338,6 +346,7 @@ private:
     Reading       out_;
     StationEntry  ignored_;
     StationEntry* station_ = nullptr;
+    std::map<std::string, std::uint32_t> given_, given_to_all_;  // keys that are there once: of the block, of the segment; their lines
 };
 
 }  // namespace

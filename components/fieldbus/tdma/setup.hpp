@@ -71,6 +71,7 @@ enum class Event : std::uint8_t {
     other_schedule,  ///< syncs come, but not in this station's cycle. who; value: ns from one to the next
     no_carrier,     ///< the port's line went away: a cable, a switch
     carrier,        ///< and is back
+    unheard,        ///< no sync came since the station was switched on
     out_of_step,    ///< the sync is followed, but this thread does not come to it. who; value: ns it is off
 
     wrong_period,   ///< the thread's period is not the cycle: nothing is done. value: ns

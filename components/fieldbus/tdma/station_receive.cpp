@@ -13,6 +13,7 @@ constexpr std::uint32_t rows = 3;              // that often in a row makes it a
 constexpr std::uint32_t silence_after = 1000;  // cycles until the same complaint is repeated
 constexpr std::uint32_t soon_back = 100;       // cycles that a master may be away without being measured again
 constexpr Time          unfit_for = 100'000'000;         // a master does not begin so soon after another's sync
+constexpr Time          too_long_unheard = 5'000'000'000;
 constexpr Time          too_long_out = 5'000'000'000;    // to come into phase takes a fraction of it
 
 }  // namespace
@@ -326,6 +327,9 @@ void Station::count_silence(Time now) noexcept {
             based_ = false;
             start_leading(now);
             advance(now);
+        } else if (!told_unheard_ && status_.count.syncs == 0 && now - began_ > too_long_unheard) {
+            told_unheard_ = true;
+            say(Event::unheard);
         }
         return;
     case State::withdrawn:

@@ -2,10 +2,18 @@
 // For components whose instances, functions or number of instances have names of their own in LinuxCNC.
 #pragma once
 
+#include <string>
+
 #include "hal/component.hpp"
 #include "hal/naming.h"
 
 namespace hal {
+
+/// What the instance is called that is being made; `otherwise` where the host does not say. In a component's constructor. [setup]
+inline std::string own_name(const char* otherwise) {
+    const auto* naming = extension<hal_naming>(HAL_NAMING);
+    return naming != nullptr ? naming->name(detail::creating) : otherwise;
+}
 
 /// Names the instance PREFIX.N instead of COMPONENT.N, N with at least `digits` digits. A member before all pins.
 class InstanceName {
@@ -28,7 +36,8 @@ class InstanceCount {
 public:
     InstanceCount(Component& component, const char* name, std::int64_t fallback, const char* doc)
         : count_(component, name, fallback, doc, {.min = 1, .max = 10'000'000}) {
-        if (const auto* naming = extension<hal_naming>(HAL_NAMING)) naming->count(detail::creating, name, static_cast<std::uint64_t>(count_));
+        if (const auto* naming = extension<hal_naming>(HAL_NAMING))
+            naming->count(detail::creating, name, static_cast<std::uint64_t>(count_));
     }
 
 private:

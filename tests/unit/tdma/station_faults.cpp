@@ -205,6 +205,29 @@ TEST(Master_that_returns, knows_its_backup_though_the_guard_is_longer_than_the_b
     EXPECT_EQ(0, m.events[Event::master_there] + m.events[Event::other_master] + s.events[Event::sync_lost]);
 }
 
+TEST(Station_that_hears_no_sync, says_so_once) {
+    Bed bed;
+    Machine& m = bed.add(1, master());
+    Machine& s = bed.add(2, slave(300'000));
+    Machine& b = bed.add(3, backup(200'000, 500'000));
+    m.off = true;
+    bed.run(4'900 * ms);
+    EXPECT_EQ(0, s.events[Event::unheard]);
+    bed.run(20'000 * ms);
+    EXPECT_EQ(1, s.events[Event::unheard]);
+    EXPECT_EQ(1, b.events[Event::unheard]);
+    // One that was heard and is lost is named; that is not said of it.
+    m.off = false;
+    m.next = m.port.clock().local(bed.now);
+    b.off = true;
+    bed.run(1000 * ms);
+    ASSERT_TRUE(s.station.ready());
+    m.off = true;
+    bed.run(10'000 * ms);
+    EXPECT_EQ(1, s.events[Event::sync_lost]);
+    EXPECT_EQ(1, s.events[Event::unheard]);
+}
+
 TEST(Station_in_another_cycle, says_so_once_and_follows_nobody) {
     Bed bed;
     bed.add(1, master(2'000'000));

@@ -29,7 +29,7 @@ std::atomic<const void*> leading_instance{nullptr};  // written in start and sto
 
 class Tdma : public hal::Component, private Events {
 public:
-    explicit Tdma(const hal_host* host) : Component(host), name_(name_of(host)) {
+    explicit Tdma(const hal_host* host) : Component(host) {
         load();
         station_ = std::make_unique<Station>(setup_, static_cast<Events*>(this));
         own_words_ = std::make_unique<FaultWords>(setup_);
@@ -144,11 +144,7 @@ private:
     /// A schedule that RTcfg brought. [realtime]
     void take_over(const rtcfg::Accepted& accepted) noexcept {
         words_ = &accepted.words, told_period_ = false;
-        if (!tap_) return;
-        std::size_t mtu = 0;
-        for (const SlotSetup& s : accepted.setup.slots)
-            if (s.id == tunnel_slot) mtu = tunnel_mtu(s.size);
-        tap_->scheduled(accepted.schedule.stations.front().ip, mtu);
+        if (tap_) tap_->scheduled(accepted.schedule.stations.front().ip, tunnel_mtu(accepted.setup));
     }
 
     bool turns_in(hal::Cycle cycle) const noexcept { return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle; }
@@ -157,11 +153,6 @@ private:
     }
 
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-
-    static std::string name_of(const hal_host* host) {
-        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
-        return naming != nullptr ? naming->name(host) : "tdma.0";
-    }
 
     void load() {
         const hal::Texts texts(*this);
@@ -386,7 +377,7 @@ private:
         reporter_->event(e, who, value);
     }
 
-    const std::string name_;
+    const std::string name_ = hal::own_name("tdma.0");
     hal::TextArgument link_{*this, "link", "", "the segment: eth:enp3s0, or in memory sim:NAME/STATION", {.per_instance = true}};
     hal::TextArgument file_argument_{*this, "config", "", "the schedule of the segment: RTnet's tdma.conf and a few keys more"};
     hal::TextArgument inline_argument_{*this, "schedule", "", "the same as a text, with ; at the ends of its lines"};
@@ -440,7 +431,7 @@ private:
     hal::Out<std::uint64_t> syncs{*this, receive_, "syncs", "sent or received"};
     hal::Out<std::uint64_t> syncs_lost{*this, receive_, "syncs-lost", "cycles in which none came"};
     hal::Out<std::uint64_t> sent{*this, receive_, "frames-sent", "in slots"};
-    hal::Out<std::uint64_t> dropped{*this, receive_, "frames-dropped", "found no room in their slot's queue, or no link"};
+    hal::Out<std::uint64_t> dropped{*this, receive_, "frames-dropped", "longer than their slot, or there was no link"};
     hal::Out<std::uint64_t> late{*this, receive_, "frames-late", "not sent, as their slot had passed"};
     hal::Out<std::uint64_t> foreign{*this, receive_, "frames-foreign", "cut, of another version, syncs of another schedule: not acted on"};
     hal::Out<std::uint64_t> intruders{*this, receive_, "frames-intruding", "of other stations in slots of this one"};
