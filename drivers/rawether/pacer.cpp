@@ -17,6 +17,7 @@ namespace hal::ethernet::rawether {
 namespace {
 
 constexpr std::int64_t wake_up_ns = 30'000;  // what waking a thread on another CPU costs
+constexpr std::int64_t nothing_new_ns = 10'000;  // before a frame's time: one that comes only then leaves behind it, even if it is due earlier
 
 }  // namespace
 
@@ -65,7 +66,7 @@ void Pacer::prepare(const Options& options) {
 Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept {
     const auto asleep_until = asleep_until_.load(std::memory_order_relaxed);
     if (launch.at_ns - now_ns < wake_up_ns && asleep_until > launch.at_ns) {
-        while (can::monotonic_ns() < launch.at_ns) pause_processor();
+        sender_.await(launch.at_ns);
         return sender_.leave(frame, launch);
     }
     const std::uint32_t* unused = unused_.front();
@@ -134,10 +135,13 @@ void Pacer::run() noexcept {
             sleep(next.at_ns - spin_ns_);
             continue;
         }
-        if (!look_until(next.at_ns)) continue;
+        if (!look_until(next.at_ns - nothing_new_ns)) continue;
         std::pop_heap(waiting_.begin(), waiting_.end());
         waiting_.pop_back();
         const Place& place = places_[next.place];
+        const auto began = can::monotonic_ns();
+        sender_.await(next.at_ns);
+        (void)budget_.spent(began, can::monotonic_ns());
         sender_.leave({place.bytes.data(), place.length}, place.launch);
         unused_.push(next.place);
     }

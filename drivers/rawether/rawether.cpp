@@ -48,7 +48,7 @@ public:
         if (now >= launch.at_ns) return sender_.leave(frame, launch);
         if (pacer_) return frame.size() <= largest_frame ? pacer_->send(frame, launch, now) : sender_.drop(Sent::refused);
         if (launch.at_ns - now > options_.spin_ns) return sender_.drop(Sent::full);
-        while (can::monotonic_ns() < launch.at_ns) pause_processor();
+        sender_.await(launch.at_ns);
         return sender_.leave(frame, launch);
     }
 

@@ -26,6 +26,17 @@ bool Sender::bind(int index) noexcept {
     return ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
 }
 
+void Sender::await(std::int64_t time_ns) noexcept {
+    constexpr std::int64_t cold_after = 30'000, ahead = 8'000, least = 4'000;
+    static constexpr std::array<std::uint8_t, header_bytes - 1> runt{};
+    auto now = can::monotonic_ns();
+    if (time_ns - now > least && time_ns - last_ns_.load(std::memory_order_relaxed) > cold_after) {
+        for (; now < time_ns - ahead; now = can::monotonic_ns()) pause_processor();
+        (void)!::send(socket_.get(), runt.data(), runt.size(), MSG_DONTWAIT);
+    }
+    while (can::monotonic_ns() < time_ns) pause_processor();
+}
+
 Sent Sender::drop(Sent why) noexcept {
     (why == Sent::late ? late : dropped).fetch_add(1, std::memory_order_relaxed);
     if (why == Sent::refused) errors.fetch_add(1, std::memory_order_relaxed);
@@ -63,6 +74,7 @@ Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) no
         if (error == ENETDOWN || error == ENXIO || error == ENODEV) return Sent::down;
         return error == EMSGSIZE ? Sent::refused : Sent::full;
     }
+    if (now != 0) last_ns_.store(now, std::memory_order_relaxed);
     sent.fetch_add(1, std::memory_order_relaxed);
     sent_bytes.fetch_add(frame.size(), std::memory_order_relaxed);
     if (launch.at_ns != 0) launch_error_ns.store(now - launch.at_ns, std::memory_order_relaxed);

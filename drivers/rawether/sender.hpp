@@ -22,6 +22,11 @@ public:
 
     /// The frame leaves now, if it is not late; stamped, if it wants to be. Any thread; several at a time. [realtime]
     Sent leave(std::span<const std::uint8_t> frame, const Launch&) noexcept;
+    /// Looks at the clock until then. [realtime]
+    ///
+    /// After a pause what the kernel needs to send is no longer in the caches, and a frame leaves some microseconds late, more or less. So a few
+    /// microseconds before its time the kernel is given what it refuses behind most of that way: 13 bytes, less than an Ethernet header.
+    void await(std::int64_t time_ns) noexcept;
     /// A frame that this cannot send for another reason than those leave() finds. [realtime]
     Sent drop(Sent why) noexcept;
     /// Forgets an error that the kernel kept from when the interface was down. [setup] keeper
@@ -37,6 +42,7 @@ private:
 
     RealTime& clock_;
     can::Descriptor socket_;
+    std::atomic<std::int64_t> last_ns_{0};  ///< when something was sent
     bool transmit_stamps_ = false;
 };
 

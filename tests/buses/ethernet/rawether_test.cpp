@@ -172,6 +172,27 @@ TEST_F(Raw, a_frame_leaves_at_its_time_and_is_stamped_then) {
     }
 }
 
+TEST_F(Raw, what_warms_the_way_is_on_no_wire) {
+    for (const bool pacer : {false, true}) {
+        auto there = b({.promiscuous = true});
+        auto here = a({.types = {type}, .spin_ns = 10 * ms, .pacer = pacer});
+        for (std::uint8_t mark = 1; mark < 9; ++mark) {
+            EXPECT_EQ(here->send(frame(broadcast, *here, type, {mark}), {.at_ns = can::monotonic_ns() + ms}, 0), Sent::queued);
+            for (bool ours = false; !ours;) {  // the kernel may have something to say on a new interface
+                ASSERT_TRUE(there->wait(can::monotonic_ns() + 5000 * ms));
+                const auto arrival = there->receive(0);
+                ASSERT_TRUE(arrival);
+                const auto bytes = arrival->bytes;
+                EXPECT_FALSE(std::all_of(bytes.begin(), bytes.begin() + 12, [](std::uint8_t byte) { return byte == 0; }));
+                ours = bytes[12] == type >> 8 && bytes[13] == (type & 0xff);
+                EXPECT_TRUE(!ours || bytes[14] == mark);
+            }
+        }
+        EXPECT_EQ(here->statistics().sent, 8U);
+        EXPECT_EQ(here->statistics().errors + here->statistics().dropped, 0U);
+    }
+}
+
 TEST_F(Raw, the_pacer_sends_in_order_of_the_times) {
     auto there = b(), here = a({.types = {type}, .pacer = true});
     const auto now = can::monotonic_ns();
