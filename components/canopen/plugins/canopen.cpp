@@ -107,11 +107,15 @@ public:
         auto        opened = SharedLink::open(config_.link, options, problem);
         if (!opened) throw std::runtime_error(problem);
         const auto& description = opened->description();
-        if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate && description.bit_rate != hal::can::unlimited)
-            throw std::runtime_error(config_.link + " runs at " + std::to_string(description.bit_rate) + " bit/s, the configuration says " +
-                                     std::to_string(config_.bit_rate) +
-                                     "; change one of them: bitrate = " + std::to_string(description.bit_rate) +
-                                     ", or ip link set … type can bitrate " + std::to_string(config_.bit_rate));
+        if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate && description.bit_rate != hal::can::unlimited) {
+            const std::string wanted = std::to_string(config_.bit_rate), is = std::to_string(description.bit_rate);
+            const std::string interface = config_.link.starts_with("can:") ? config_.link.substr(4, config_.link.find('?') - 4) : "";
+            throw std::runtime_error(config_.link + " runs at " + is + " bit/s, the configuration says " + wanted +
+                                     "; change one of them: bitrate = " + is + " in [bus], or " +
+                                     (interface.empty() ? "bitrate=" + wanted + " in the address"
+                                                        : "sudo ip link set " + interface + " down && sudo ip link set " + interface +
+                                                              " up type can bitrate " + wanted));
+        }
         if (follower_) follower_->start();
         link_ = std::move(opened);
         period_ = 0;
@@ -211,7 +215,7 @@ private:
                                                    static_cast<unsigned>(slave_), static_cast<unsigned>(own_id_)});
             if (!reading.good()) throw std::invalid_argument(first_error(reading));
             if (reading.config.nodes.size() == 1 && reading.config.nodes[0].pdos.empty())
-                throw std::invalid_argument("no object is named: inputs=24831 outputs=24675");
+                throw std::invalid_argument("no object is named; write inputs=24831 outputs=24675");
             if (const std::string& text = bit_rate_.get(); !text.empty()) {
                 const auto bits = config::rate(text);
                 if (!bits) throw std::invalid_argument("bitrate=" + text + ": '" + text + "' is no bit rate; write 1M, 500k or 125000");
@@ -300,14 +304,20 @@ private:
             reporter_->node(s);
             return;
         }
-        const bool failed = (s.step == Step::waiting || s.step == Step::failed) && s.result != BootResult::none && !booted(s.result);
-        if (failed && !pins.is_faulty) {
+        const bool given_up = s.step == Step::waiting || s.step == Step::failed;
+        const bool failed = given_up && s.result != BootResult::none && !booted(s.result);
+        if (given_up && s.cause == Cause::not_started && !pins.is_faulty) {
+            pins.is_faulty = true;
+            raise(w.not_started.c_str(), not_a_number);
+            reporter_->node(s);
+        } else if (failed && !pins.is_faulty) {
             const NodeSetup& setup = config_.nodes[place].setup;
             // One that is not there yet may still be powered up.
             const bool absent = s.result == BootResult::no_answer && (s.cause == Cause::silent || s.cause == Cause::unsent);
             if (absent && (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) return;
             pins.is_faulty = true;
-            raise(w.boot[static_cast<std::size_t>((static_cast<unsigned>(s.result) - 'A') & 15)].c_str(), not_a_number);
+            const std::string& why = s.cause == Cause::doubled ? w.doubled : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
+            raise(why.c_str(), not_a_number);
             reporter_->node(s);
         } else if (s.step == Step::running && pins.is_faulty) {
             reporter_->node(s);

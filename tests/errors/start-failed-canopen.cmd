@@ -1,0 +1,1 @@
+hal sim start-failed-canopen.hal --for 1ms
