@@ -138,7 +138,7 @@ void ros_header(Schema& schema, Writer& writer, std::string_view frame) {
 }
 
 void joint_state(Schema& schema, Writer& writer, const std::vector<std::string>& names) {
-    if (names.empty()) refuse("a JointState needs the names of its joints: joints=shoulder,elbow");
+    if (names.empty()) refuse("ros=sensor_msgs/JointState needs the names of its joints: joints=shoulder,elbow");
     if (names.size() > 256) refuse("joints: more than 256 joints; make two topics of them");
     writer.number(static_cast<std::uint32_t>(names.size()));
     for (const std::string& n : names) {

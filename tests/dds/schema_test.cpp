@@ -122,7 +122,7 @@ TEST(Schema, says_what_is_wrong_with_a_message_of_ros) {
         } catch (const std::invalid_argument& e) { return e.what(); }
         return "accepted";
     };
-    EXPECT_EQ("a JointState needs the names of its joints: joints=shoulder,elbow", refused("sensor_msgs/JointState", {}));
+    EXPECT_EQ("ros=sensor_msgs/JointState needs the names of its joints: joints=shoulder,elbow", refused("sensor_msgs/JointState", {}));
     EXPECT_EQ("joints: there are two joints 'a'", refused("sensor_msgs/JointState", {"a", "b", "a"}));
     EXPECT_EQ("joints: 'a b': 'a b' cannot be a pin's name; letters, digits, - _ and . can", refused("sensor_msgs/JointState", {"a b"}));
     EXPECT_EQ("joints: more than 256 joints; make two topics of them",
