@@ -46,7 +46,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::size_t pdos = 0;
     for (const config::Node& n : reading.config.nodes) {
         pdos += n.pdos.size();
-        for (const config::Pdo& p : n.pdos) require(p.bits() <= 64 && p.cob != 0, "a PDO fits into a frame and has an identifier");
+        for (const config::Pdo& p : n.pdos) require((p.multiplexed() || p.bits() <= 64) && p.cob != 0, "a PDO fits into a frame and has an identifier");
     }
     require(problems_of(reading.config.setup()).empty(), "a master can be made of it");
     const OwnNode own = own_node(reading.config);

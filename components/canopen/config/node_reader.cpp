@@ -466,7 +466,7 @@ void NodeReader::objects_of(const Word& list, Pdo& pdo) {
     for (const Word& word : list_of(list)) {
         Object out;
         if (object(word, pdo, out)) pdo.objects.push_back(std::move(out));
-        if (pdo.objects.size() > 64) return;
+        if (pdo.objects.size() > 64 && !pdo.multiplexed()) return;
     }
 }
 

@@ -210,6 +210,8 @@ void check_whole(const MasterConfig& config, Report& report) {
         const Node* node;
         const Pdo*  pdo;
     };
+    constexpr std::size_t              most_multiplexed = 48 * 254;  // rows of 1FD0h to 1FFFh
+    std::size_t                        multiplexed = 0;
     std::multimap<std::uint32_t, User> users;
     unsigned                           sent = 0, received = 0, safety = 0;
     const auto                         called = [](const User& u) {
@@ -219,6 +221,7 @@ void check_whole(const MasterConfig& config, Report& report) {
     for (const Node& n : config.nodes)
         for (const Pdo& p : n.pdos) {
             const std::uint32_t cob = p.cob & (cob_extended | 0x1fffffff);
+            if (p.multiplexed() && !p.to_node) multiplexed += p.objects.size();
             if (p.safety) ++safety;
             else if (!p.to_node) ++received;
             else sent += !users.contains(cob);
@@ -245,6 +248,11 @@ void check_whole(const MasterConfig& config, Report& report) {
         if (count > 512)
             report.error(Topic::node, config.at, "the nodes have " + std::to_string(count) + " PDOs in one direction; a master has 512",
                          "use a second bus, with a configuration of its own");
+    if (multiplexed > most_multiplexed)
+        report.error(Topic::node, config.at,
+                     "the nodes tell " + std::to_string(multiplexed) + " objects by multiplexed PDOs; a master has room for " +
+                         std::to_string(most_multiplexed),
+                     "use a second bus, with a configuration of its own");
     if (safety > Srdos::most)
         report.error(Topic::node, config.at, "the nodes have " + std::to_string(safety) + " SRDOs; a bus has room for 64");
     if (!std::any_of(report.messages.begin(), report.messages.end(), [](const Message& m) { return m.severity == Severity::error; }))

@@ -359,6 +359,9 @@ TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
               "arm:6:22: a multiplexed PDO is sent when an object changes; write transmission = event, or leave it out");
     EXPECT_EQ(said(node + "tpdo2 = mpdo read-inputs-1\ntpdo1 = read-inputs-1\n"),
               "arm:5:9: object 'read-inputs-1' is in two PDOs, and one of them is a multiplexed one; leave it in one of the two");
+    std::string many = "mpdo 0x2000:1 u8";
+    for (int n = 2; n <= 100; ++n) many += ", 0x2000:" + std::to_string(n) + " u8";
+    EXPECT_EQ(good(node + "tpdo2 = " + many + "\n").nodes[0].pdos[0].objects.size(), 100U);
     EXPECT_EQ(said(node + "tpdo2 = mpdo read-inputz\n").substr(0, 50), "arm:5:14: the node has no object 'read-inputz'; di");
 }
 
