@@ -126,9 +126,13 @@ class Dcf(Node):
         text = (self.folder / "io.dcf").read_text()
         self.assertTrue("ParameterValue=$NODEID+0x00000180\n" in text, "what is as the EDS has it serves another node, too")
         self.assertTrue("\nNodeID=5\n" in text)
+        self.assertFalse(re.search(r"\[6411sub1\][^[]*ParameterValue", text), "what moves something is no setting")
         done = self.dcf("--check")
         self.assertRegex(done.stdout, r"^node 5: 0 of \d+ settings differ\n$")
         self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.write("moves.dcf", text.replace("[6411sub1]\n", "[6411sub1]\nParameterValue=5\n"))
+        done = self.run_program("can", "dcf", "write", self.bus, "5", "moves.dcf", "--check")
+        self.assertEqual("hal can dcf write: left out: 6411:1 Write analogue output 16-bit, Analogue output 1: it moves the device\n", done.stderr)
         # its replacement knows nothing of it
         self.can("sdo", "write", self.bus, "5", "6207:1", "0", "--type", "u8")
         self.can("pdo", "map", self.bus, "5", "tpdo2", "6401:1", "6401:2", "--transmission", "255", "--inhibit", "0ms")

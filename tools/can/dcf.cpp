@@ -22,11 +22,22 @@ namespace {
 
 constexpr std::size_t most_bytes = 65536;  // of one object; more is a program, not a setting
 
-/// What is a setting, to be kept and put back: not what acts when it is written, and no program.
+/// Set-points and outputs of CiA 401 and 402: what is written there moves something.
+bool moves(std::uint16_t index) {
+    if (index < 0x6000 || index >= 0xa000) return false;
+    const unsigned first_axis = 0x6000 + (index - 0x6000U) % 0x800;
+    constexpr std::uint16_t drive[] = {0x6040, 0x6042, 0x6071, 0x607a, 0x60b0, 0x60b1, 0x60b2, 0x60c1, 0x60fe, 0x60ff};
+    const bool outputs = first_axis >= 0x6410 && first_axis <= 0x6413;
+    const bool lines = first_axis == 0x6200 || first_axis == 0x6220 || first_axis == 0x6300 || first_axis == 0x6320;
+    return outputs || lines || std::find(std::begin(drive), std::end(drive), first_axis) != std::end(drive);
+}
+
+/// What is a setting, to be kept and put back: not what acts when it is written, nothing that moves, and no program.
 bool is_setting(std::uint16_t index, const eds::Entry& entry) {
     constexpr std::uint32_t refused_by_scans = 1;  // ObjFlags
     const bool acts = index == 0x1003 || index == 0x1010 || index == 0x1011 || index == 0x1f82 || (index >= 0x1f50 && index <= 0x1f57);
-    return entry.readable() && entry.writable() && !acts && entry.data_type != 0x000f && (entry.flags & refused_by_scans) == 0;
+    return entry.readable() && entry.writable() && entry.access != eds::Access::rww && !acts && !moves(index) && entry.data_type != 0x000f &&
+           (entry.flags & refused_by_scans) == 0;
 }
 
 enum class Read { value, refused, failed };
@@ -197,6 +208,10 @@ int run_can_dcf_write(const Options& options) {
     for (const eds::Message& message : configuration.messages)
         fail(options, fmt::format("{}:{}: {}{}", options.words[2], message.at.line, message.sentence,
                                   message.help.empty() ? "" : "; " + message.help));
+    std::erase_if(configuration.writes, [&](const eds::Write& write) {
+        if (moves(write.index)) fail(options, fmt::format("left out: {}: it moves the device", names.named(write.index, write.sub).label()));
+        return moves(write.index);
+    });
     if (configuration.writes.empty())
         return fail(options, fmt::format("'{}' has no settings: it has no ParameterValue that could be written; hal can dcf read makes such a file",
                                          options.words[2]));
