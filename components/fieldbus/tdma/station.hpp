@@ -11,6 +11,7 @@
 // `now` is when the cycle was due, on the port's clock; what error() asks for moves it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <vector>
@@ -118,8 +119,9 @@ private:
         const Time limit = setup_.backup_from != 0 ? setup_.backup_from / 2 : setup_.guard;
         return lateness <= limit && lateness >= -limit;
     }
-    /// How far ahead transmit() sends. More than a cycle: the next sync is just a cycle away, and the thread is never quite in step.
-    Time reach() const noexcept { return setup_.lead + setup_.cycle + setup_.cycle / 32; }
+    /// How far ahead transmit() sends. A little more than a cycle: the next sync is just a cycle away, and the thread is never quite in step.
+    /// Not more than that little: a port without a pacer takes a slot just behind the thread when it is due, not a cycle before.
+    Time reach() const noexcept { return setup_.lead + setup_.cycle + std::min<Time>(setup_.cycle / 32, 31'250); }
     Time start_of(std::uint32_t cycle) const noexcept {  // global; numbers wrap
         return start_ + static_cast<Time>(static_cast<std::int32_t>(cycle - number_)) * setup_.cycle;
     }

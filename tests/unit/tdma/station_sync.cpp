@@ -101,6 +101,23 @@ TEST(Station_sends_in_its_slot, and_the_jitter_is_below_that_of_the_stamps) {
     }
 }
 
+TEST(Station_hands_a_frame_over, just_before_its_slot_when_its_thread_is_there_just_before) {
+    for (const Time cycle : {1'000'000, 5'000'000, 20'000'000}) {
+        Bed bed;
+        bed.add(1, master(cycle));
+        StationSetup setup = slave(500'000, cycle);
+        setup.phase = 400'000;
+        Machine& s = bed.add(2, setup, {200e-6, 0});
+        bed.run(400 * cycle);
+        ASSERT_TRUE(s.station.ready()) << cycle;
+        s.port.farthest = 0;
+        s.in_cycle = [](Machine& machine) { machine.station.send(some_frame(2), 0, 0); };
+        bed.run(100 * cycle);
+        EXPECT_GT(s.status().count.sent, 95U);
+        EXPECT_LT(s.port.farthest, 150'000) << cycle << ": a port without a pacer refuses what is not due within 200 us";
+    }
+}
+
 TEST(Station_repeats_a_calibration_round, when_a_request_or_a_reply_is_lost) {
     for (const int lost : {0x10, 0x11}) {
         Bed bed;

@@ -46,6 +46,7 @@ public:
         ethernet::Sent send(std::span<const std::uint8_t> frame, const ethernet::Launch& launch, std::int64_t now) noexcept override {
             if (cut) return ethernet::Sent::down;
             const Time at = launch.at_ns == 0 ? now : launch.at_ns;
+            farthest = std::max(farthest, at - now);
             if (now > at + (launch.guard_ns == 0 ? INT64_MAX / 4 : launch.guard_ns)) return ethernet::Sent::late;
             Frame f{{frame.begin(), frame.end()}, number_, clock_.real(std::max(at, now)) + late, 0};
             if (f.bytes.size() < ethernet::smallest_frame) f.bytes.resize(ethernet::smallest_frame);
@@ -68,6 +69,7 @@ public:
         const Clock& clock() const { return clock_; }
 
         bool cut = false;
+        Time farthest = 0;  // ahead of its thread that a frame was handed over
         Time late = 0;  // how much later than asked its frames leave
 
     private:
