@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """swing_up.py HAL [RUNS [NETLIST]]: halfiles/furuta/swing-up.hal, or another netlist of that rig, from random starts, and again after random pushes.
 
-Each run is a machine of its own on the virtual clock, with the rig's encoders of 2000 counts, its 4 A and its radio or camera. Before the motor
+Each run is a machine of its own on the virtual clock, with the rig's encoders of 2000 counts, its 4 A and its radio, camera or wire. Before the motor
 may move the pendulum is pushed at random (up to 2 m/s: it may turn over), which is the start; later it is pushed once more (0.2 to 1 m/s).
 After each it must be upright, to stay, in less than 5 s, and the base must not leave the table.
 """
@@ -17,9 +17,12 @@ LIMIT, UPRIGHT, STEP = 5.0, 0.15, 0.05  # s, rad, s
 
 
 def script(netlist, start, push):
-    look = f"advance {round(STEP * 1000)}ms\ngetp furuta.pendulum-angle\n" * round((LIMIT + 1) / STEP)
-    edges = "getp pendulum-encoder.quad-errors\n" if "pendulum-encoder" in netlist.read_text() else ""
-    return f"source {netlist}\nsetp furuta.push {start}\n{look}setp furuta.push {push}\n{look}getp furuta.base-down\n{edges}"
+    text = netlist.read_text()
+    rig, angle, base = ("canopen-axis-io.0", "second-position", "canopen.0.rig.base-down") if "canopen_axis_io" in text else (
+        "furuta", "pendulum-angle", "furuta.base-down")
+    look = f"advance {round(STEP * 1000)}ms\ngetp {rig}.{angle}\n" * round((LIMIT + 1) / STEP)
+    edges = "getp pendulum-encoder.quad-errors\n" if "pendulum-encoder" in text else ""
+    return f"source {netlist}\nsetp {rig}.push {start}\n{look}setp {rig}.push {push}\n{look}getp {base}\n{edges}"
 
 
 def time_to_stay(angles):
