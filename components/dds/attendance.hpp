@@ -2,6 +2,10 @@
 // What a component with a topic has while it runs.
 #pragma once
 
+#include <atomic>
+#include <memory>
+#include <string>
+
 #include "dds/arguments.hpp"
 #include "dds/status.hpp"
 
@@ -34,7 +38,25 @@ public:
     /// After begin(). [any]
     Endpoint& endpoint() const noexcept { return *endpoint_; }
 
+    /// What the engine tells of others on the topic; `lacks` is the sentence about a quality that does not fit. Threads of the engine.
+    void met(const Arguments& arguments, Event e, int count, const std::string& words, const std::string& lacks) noexcept {
+        switch (e) {
+        case Event::matched: wrong_type_.store(false, std::memory_order_relaxed); [[fallthrough]];
+        case Event::unmatched: matched_.store(static_cast<std::uint32_t>(count), std::memory_order_relaxed); break;
+        case Event::wrong_type:
+            wrong_type_.store(true, std::memory_order_relaxed);
+            arguments.say(words);
+            break;
+        case Event::wrong_quality: arguments.say(lacks + words); break;
+        default: break;
+        }
+    }
+    std::uint32_t matched() const noexcept { return matched_.load(std::memory_order_relaxed); }  ///< [any]
+    bool          wrong_type() const noexcept { return wrong_type_.load(std::memory_order_relaxed); }  ///< [any]
+
 private:
+    std::atomic<std::uint32_t>   matched_{0};
+    std::atomic<bool>            wrong_type_{false};
     std::shared_ptr<Participant> participant_;
     std::shared_ptr<Beacon>      beacon_;
     std::unique_ptr<Endpoint>    endpoint_;

@@ -48,8 +48,8 @@ public:
         due_.store(cycle.start_ns() + every_ * period_, std::memory_order_release);  // after the sample: who sees this sees it
         sent = sent_.load(std::memory_order_relaxed);
         refused = refused_.load(std::memory_order_relaxed);
-        matched = matched_.load(std::memory_order_relaxed);
-        wrong_type = wrong_type_.load(std::memory_order_relaxed);
+        matched = attendance_.matched();
+        wrong_type = attendance_.wrong_type();
     }
 
 private:
@@ -105,18 +105,7 @@ private:
     }
 
     void on_event(Event e, int count, const std::string& words) noexcept override {
-        switch (e) {
-        case Event::matched: wrong_type_.store(false, std::memory_order_relaxed); [[fallthrough]];
-        case Event::unmatched: matched_.store(static_cast<std::uint32_t>(count), std::memory_order_relaxed); break;
-        case Event::wrong_type:
-            wrong_type_.store(true, std::memory_order_relaxed);
-            arguments_.say(words);
-            break;
-        case Event::wrong_quality:
-            arguments_.say("a subscriber of topic '" + topic_.name + "' asks for more than is offered: " + words);
-            break;
-        default: break;
-        }
+        attendance_.met(arguments_, e, count, words, "a subscriber of topic '" + topic_.name + "' asks for more than is offered: ");
     }
 
     Arguments         arguments_{*this};
@@ -144,8 +133,6 @@ private:
     Outbox                     outbox_{schema_.sample, 64};
     std::atomic<std::int64_t>  due_{0};  // when the next sample is made
     std::atomic<std::uint64_t> sent_{0}, refused_{0};
-    std::atomic<std::uint32_t> matched_{0};
-    std::atomic<bool>          wrong_type_{false};
     // The DDS thread's
     std::int64_t lead_ = 0;  // when it looks first, from the beginning of the cycle
     std::int64_t expected_ = 0, since_ = 0;  // the cycle it is looking for, and since when

@@ -62,9 +62,9 @@ public:
         }
         valid = good;
         state_.store(!have_ ? State::waiting : good ? State::valid : State::stale, std::memory_order_relaxed);
-        matched = matched_.load(std::memory_order_relaxed);
+        matched = attendance_.matched();
         malformed = malformed_.load(std::memory_order_relaxed);
-        wrong_type = wrong_type_.load(std::memory_order_relaxed);
+        wrong_type = attendance_.wrong_type();
         silent = silent_.load(std::memory_order_relaxed);
         flood = flood_.load(std::memory_order_relaxed);
     }
@@ -124,18 +124,7 @@ private:
     }
 
     void on_event(Event e, int count, const std::string& words) noexcept override {
-        switch (e) {
-        case Event::matched: wrong_type_.store(false, std::memory_order_relaxed); [[fallthrough]];
-        case Event::unmatched: matched_.store(static_cast<std::uint32_t>(count), std::memory_order_relaxed); break;
-        case Event::wrong_type:
-            wrong_type_.store(true, std::memory_order_relaxed);
-            arguments_.say(words);
-            break;
-        case Event::wrong_quality:
-            arguments_.say("a publisher of topic '" + topic_.name + "' offers less than is asked for: " + words);
-            break;
-        default: break;
-        }
+        attendance_.met(arguments_, e, count, words, "a publisher of topic '" + topic_.name + "' offers less than is asked for: ");
     }
 
     /// Says what the cycle noticed, and that nothing comes. [the DDS thread]
@@ -145,7 +134,7 @@ private:
             arguments_.say("no sample of topic '" + topic_.name + "' for more than " + limit_words_ + "; its pins are not valid");
         if (s == State::valid && said_ == State::stale) arguments_.say("topic '" + topic_.name + "' is valid again");
         said_ = s;
-        const bool somebody = matched_.load(std::memory_order_relaxed) > 0;
+        const bool somebody = attendance_.matched() > 0;
         if (!somebody || quiet_since_ == 0) quiet_since_ = now;
         const std::int64_t since = std::max(last_.load(std::memory_order_relaxed), quiet_since_);
         const bool         quiet = somebody && now - since > silence_ms_ * 1'000'000;
@@ -197,10 +186,9 @@ private:
     // Between them
     hal::Mailbox<Message>      mailbox_{message_};
     std::atomic<State>         state_{State::waiting};
-    std::atomic<std::uint32_t> matched_{0};
     std::atomic<std::uint64_t> malformed_{0};
     std::atomic<std::int64_t>  last_{0};
-    std::atomic<bool>          wrong_type_{false}, silent_{false}, flood_{false};
+    std::atomic<bool>          silent_{false}, flood_{false};
     // The DDS thread's
     State        said_ = State::waiting;
     std::int64_t quiet_since_ = 0;
