@@ -31,7 +31,8 @@ class ReplayPort final : public Port {
 public:
     ReplayPort(const std::string& file, const Options& options, std::vector<Captured> frames)
         : options_(options), frames_(std::move(frames)) {
-        address_ = options.address != Address{} ? options.address : Address{2, 'H', 'A', 'L', 0, 1};
+        // None that a segment in memory gives: who is in a recording of one must not be taken for this port.
+        address_ = options.address != Address{} ? options.address : Address{2, 'R', 'E', 'P', 'L', 'Y'};
         description_ = {"replay:" + file, "capture", file, true, {}};
     }
     const Address& address() const noexcept override { return address_; }

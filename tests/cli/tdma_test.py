@@ -73,6 +73,13 @@ class Tdma(Case):
         self.assertEqual("hal tdma plan: --json and --svg are two answers; write one of them\n",
                          self.bad("tdma", "plan", "cell.tdma", "--json", "--svg", "cell.svg"))
 
+    def test_a_recording_says_what_is_missing(self):
+        for words, problem in (("", "into which file? write file=seen.pcapng"),
+                               ("file=none/seen.pcapng", "none/seen.pcapng cannot be written: No such file or directory"),
+                               ("file=seen.pcapng link=sim:", "sim:: the name of the segment is missing; write sim:net0")):
+            self.write("record.hal", f"loadrt segment_record {words}\nstart\n")
+            self.assertIn(f"error: 'segment-record.0' (segment_record) cannot start: {problem} [start-failed]\n", self.bad("sim", "record.hal"))
+
     def test_bad_plan(self):
         self.write("cell.tdma", CELL.replace("slot 0 200", "slot 0 110"))
         self.assertEqual("cell.tdma:9:1: error: slot 0 of spare begins at 110 us, before slot 0 of master is over: 60 bytes take 6.72 us at 100 Mbit/s: "
