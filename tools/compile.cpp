@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "base/words.hpp"
 #include "build_plugin.hpp"
 #include "check_realtime.hpp"
 #include "comp/comp.hpp"
@@ -21,8 +22,6 @@ namespace hal::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string counted(std::size_t n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
 /// Fills in what is to be compiled. False after saying on stderr why it cannot be.
 using Prepare = bool (*)(const Options& options, const std::string& path, PluginSource& source);

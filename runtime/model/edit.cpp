@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <iterator>
 
+#include "base/words.hpp"
+
 namespace hal {
 namespace {
-
-std::string quoted(std::string_view name) { return "'" + std::string(name) + "'"; }
 
 template <class T>
 auto owner(std::vector<std::unique_ptr<T>>& all, const T* one) {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "base/words.hpp"
+
 namespace hal {
 namespace {
 
@@ -14,8 +16,6 @@ std::vector<std::string> names(const Index<T>& index) {
     for (const auto& [name, object] : index) all.emplace_back(name);
     return all;
 }
-
-std::string quoted(std::string_view name) { return "'" + std::string(name) + "'"; }
 
 // "inputs of pos (pid): enable, command" for a name that begins with an instance's
 std::string pins_of_instance(const Model& model, std::string_view name) {

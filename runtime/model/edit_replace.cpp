@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <memory>
 
+#include "base/words.hpp"
+
 namespace hal {
 namespace {
-
-std::string quoted(std::string_view name) { return "'" + std::string(name) + "'"; }
 
 /// An object the model keeps (at `kept` of the old row) and its declaration in the new version (at `fresh` of the new row).
 struct Pair {

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <span>
 
+#include "base/words.hpp"
 #include "model/order.hpp"
 #include "session/construct.hpp"
 #include "session/thread_options.hpp"
@@ -15,8 +16,6 @@ namespace {
 using Args = std::span<const Token>;
 
 Word word(const Token& token) { return {token.text, token.span}; }
-
-std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
 
 std::vector<std::string> split_list(const std::string& text) {
     std::vector<std::string> parts;

@@ -5,13 +5,12 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/words.hpp"
 #include "netlist/nodes.hpp"
 #include "shell/files.hpp"
 
 namespace hal {
 namespace {
-
-std::string counted(std::size_t number, const char* noun) { return std::to_string(number) + " " + noun + (number == 1 ? "" : "s"); }
 
 std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes) {
     std::string text;
