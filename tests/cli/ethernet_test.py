@@ -77,6 +77,12 @@ class Segment(Case):
         self.assertIn("there is no option 'slots'; there are bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue, "
                       "and of cane: format, order, slot, priority, learn, to, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
                       node("--link", "cane:lo?slots=3"))
+        with_mac = self.folder / "mac.tdma"
+        with_mac.write_text(tdma.read_text().replace("name x\n", "name x\nmac 02:00:00:00:00:07\n"))
+        refusal = node("--link", "cane:lo", "--tdma", str(with_mac), "--station", "x")
+        if "CAP_NET_RAW" not in refusal:
+            self.assertEqual(f"hal node axis-io: eth:lo has the address 00:00:00:00:00:00, {with_mac} gives x 02:00:00:00:00:07; mend the line 'mac' "
+                             "of its block\n", refusal)
         self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
         self.assertIn("there are axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
         self.assertIn("cannot read 'none.tdma'", node("--link", "cane:lo", "--tdma", "none.tdma"))

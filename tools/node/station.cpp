@@ -18,6 +18,19 @@ namespace hal::tools {
 namespace {
 
 constexpr int priority = 70;
+constexpr tdma::Time spin_ns = 200'000;  // a frame that is due so soon behind the thread needs no pacer
+
+/// Somebody who may be that station has a slot farther behind his thread.
+bool has_far_slot(const tdma::config::Schedule& schedule, const std::string& station) {
+    const auto which = tdma::config::find(schedule, station);
+    for (std::size_t n = 0; n < schedule.stations.size(); ++n) {
+        const auto& s = schedule.stations[n];
+        if (which && n != *which) continue;
+        for (const auto& slot : s.slots)
+            if ((slot.setup.offset - s.phase - s.lead + schedule.cycle) % schedule.cycle > spin_ns * 9 / 10) return true;
+    }
+    return false;
+}
 
 /// "200ppm", "-35.5ppm", or nothing.
 std::optional<double> parts_per_million(std::string_view text) {
@@ -49,8 +62,8 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
 
     ethernet::Options how;
     how.types = {tdma::Station::types.begin(), tdma::Station::types.end()};
-    how.spin_ns = 200'000;
-    how.pacer = !options.tunnel.empty();  // a frame is due within 200 us behind the thread; slot 1 may be anywhere
+    how.spin_ns = spin_ns;
+    how.pacer = by_rtcfg || !options.tunnel.empty() || has_far_slot(reading.schedule, options.station);
     auto opened = ethernet::open(segment, how);
     if (!opened) return opened.problem;
     if (opened.port->description().simulated)
@@ -69,6 +82,9 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
             return fmt::format("{} has no station '{}'; write --station with one of {}", options.tdma, who,
                                tdma::config::names(reading.schedule));
         entry = &reading.schedule.stations[*which];
+        if (entry->mac && *entry->mac != opened.port->address())
+            return fmt::format("{} has the address {}, {} gives {} {}; mend the line 'mac' of its block", segment,
+                               ethernet::to_string(opened.port->address()), options.tdma, entry->name, ethernet::to_string(*entry->mac));
         if (entry->slots.empty())
             return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", entry->name, options.tdma);
         made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which), reading.schedule, segment, std::move(opened.port), *skew,
