@@ -340,14 +340,14 @@ TEST(Open, says_what_is_wrong_and_what_to_type) {
     EXPECT_EQ(open("sim:x?rate=1").problem,
               "sim:x?rate=1: there is no option 'rate'; there are"
               " bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue");
-    EXPECT_EQ(open("slcan:/dev/null?bitrate=300k").problem,
-              "slcan:/dev/null?bitrate=300k: a serial-line adapter cannot be told 300000 bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, "
-              "800k and 1M");
+    EXPECT_EQ(
+        open("slcan:/dev/null?bitrate=300k").problem,
+        "slcan:/dev/null?bitrate=300k: a serial-line adapter cannot be told 300000 bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, "
+        "800k and 1M");
     EXPECT_EQ(open("slcan:/dev/null?datarate=3M").problem,
               "slcan:/dev/null?datarate=3M: a serial-line adapter cannot be told a data rate of 3000000 bit/s; it knows 2M and 5M");
     EXPECT_EQ(open("slcan:/dev/null?own").problem, "slcan:/dev/null?own: the option 'own' means nothing to slcan; take it out");
-    EXPECT_EQ(open("replay:none.log?own=1&fd").problem,
-              "replay:none.log?own=1&fd: the option 'own' means nothing to replay; take it out");
+    EXPECT_EQ(open("replay:none.log?own=1&fd").problem, "replay:none.log?own=1&fd: the option 'own' means nothing to replay; take it out");
     EXPECT_EQ(open("udp:?restart=5").problem, "udp:?restart=5: the option 'restart' means nothing to udp; take it out");
     auto one = open("sim:rates?bitrate=250k");
     ASSERT_TRUE(one);

@@ -216,8 +216,11 @@ TEST_F(Socketcan, error_frames_tell_the_state_of_the_controller_its_counters_and
     const struct {
         std::uint8_t what;
         State state;
-    } steps[] = {{CAN_ERR_CRTL_TX_WARNING, State::warning}, {CAN_ERR_CRTL_RX_PASSIVE, State::passive}, {CAN_ERR_CRTL_RX_WARNING, State::warning},
-                 {CAN_ERR_CRTL_TX_PASSIVE, State::passive}, {CAN_ERR_CRTL_ACTIVE, State::active}};
+    } steps[] = {{CAN_ERR_CRTL_TX_WARNING, State::warning},
+                 {CAN_ERR_CRTL_RX_PASSIVE, State::passive},
+                 {CAN_ERR_CRTL_RX_WARNING, State::warning},
+                 {CAN_ERR_CRTL_TX_PASSIVE, State::passive},
+                 {CAN_ERR_CRTL_ACTIVE, State::active}};
     std::uint8_t count = 90;
     for (const auto& step : steps) {
         controller.tell(CAN_ERR_CRTL, step.what, ++count, 7);

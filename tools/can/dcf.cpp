@@ -36,8 +36,8 @@ bool moves(std::uint16_t index) {
 bool is_setting(std::uint16_t index, const eds::Entry& entry) {
     constexpr std::uint32_t refused_by_scans = 1;  // ObjFlags
     const bool acts = index == 0x1003 || index == 0x1010 || index == 0x1011 || index == 0x1f82 || (index >= 0x1f50 && index <= 0x1f57);
-    return entry.readable() && entry.writable() && entry.access != eds::Access::rww && !acts && !moves(index) && entry.data_type != 0x000f &&
-           (entry.flags & refused_by_scans) == 0;
+    return entry.readable() && entry.writable() && entry.access != eds::Access::rww && !acts && !moves(index) &&
+           entry.data_type != 0x000f && (entry.flags & refused_by_scans) == 0;
 }
 
 enum class Read { value, refused, failed };
@@ -94,7 +94,8 @@ int run_can_dcf_read(const Options& options) {
             ++read;
             // As the description has it where it is that, so that the file serves a node with another id, too.
             const eds::Encoded usual = eds::encode(entry.default_value, entry.data_type, node);
-            entry.parameter_value = usual && usual.bytes == bytes && !bytes.empty() ? entry.default_value : eds::spell(bytes, entry.data_type);
+            entry.parameter_value =
+                usual && usual.bytes == bytes && !bytes.empty() ? entry.default_value : eds::spell(bytes, entry.data_type);
         }
     date(description, options);
     eds::Commissioning& commissioning = description.commissioning.emplace();
@@ -134,7 +135,9 @@ public:
             for (const auto& [at, write] : wanted_)
                 if (differing_.contains(group(*write)) && !verify(*write)) return 1;
         const std::string what = fmt::format("node {}: {} of {} settings {}\n", node_, differences_, wanted_.size(),
-                                             options_.check ? "differ" : differences_ == 0 ? "differed" : "differed and were written");
+                                             options_.check      ? "differ"
+                                             : differences_ == 0 ? "differed"
+                                                                 : "differed and were written");
         if (!print(what)) return 1;
         if (written != 0 && !print(fmt::format("they last until its power goes; to store them: hal can sdo write {} {} 1010:1 0x65766173 "
                                                "--type u32\n",
@@ -209,12 +212,14 @@ int run_can_dcf_write(const Options& options) {
         fail(options, fmt::format("{}:{}: {}{}", options.words[2], message.at.line, message.sentence,
                                   message.help.empty() ? "" : "; " + message.help));
     std::erase_if(configuration.writes, [&](const eds::Write& write) {
-        if (moves(write.index)) fail(options, fmt::format("left out: {}: it moves the device", names.named(write.index, write.sub).label()));
+        if (moves(write.index))
+            fail(options, fmt::format("left out: {}: it moves the device", names.named(write.index, write.sub).label()));
         return moves(write.index);
     });
     if (configuration.writes.empty())
-        return fail(options, fmt::format("'{}' has no settings: it has no ParameterValue that could be written; hal can dcf read makes such a file",
-                                         options.words[2]));
+        return fail(options,
+                    fmt::format("'{}' has no settings: it has no ParameterValue that could be written; hal can dcf read makes such a file",
+                                options.words[2]));
     return Download(options, node, names, std::move(configuration.writes)).run();
 }
 

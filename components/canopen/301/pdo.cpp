@@ -42,7 +42,8 @@ Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, Events& events, 
         }
     }
     bool scans = false;
-    for (unsigned list = scanner_first; list <= scanner_last; ++list) scans = dictionary.handle(static_cast<std::uint16_t>(list), *this) || scans;
+    for (unsigned list = scanner_first; list <= scanner_last; ++list)
+        scans = dictionary.handle(static_cast<std::uint16_t>(list), *this) || scans;
     if (scans) scanned_.reserve(most_scanned);
     index_identifiers();
 }

@@ -42,7 +42,8 @@ public:
     bool send_on_change(unsigned number, bool on = true) noexcept;
     /// Asks the producer of RPDO `number` for it by a remote frame. [realtime]
     bool request(unsigned number) noexcept;
-    /// A multiplexed PDO by TPDO `number`, besides those of the scanner list, which are sent by themselves: to an object of node `destination` (0: all), or of one of ours to whom it concerns. [realtime]
+    /// A multiplexed PDO by TPDO `number`, besides those of the scanner list, which are sent by themselves: to an object of node
+    /// `destination` (0: all), or of one of ours to whom it concerns. [realtime]
     bool send_to(unsigned number, std::uint8_t destination, std::uint16_t index, std::uint8_t sub, std::uint32_t value) noexcept;
     bool send_from(unsigned number, std::uint16_t index, std::uint8_t sub) noexcept;
 

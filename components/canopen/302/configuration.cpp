@@ -30,7 +30,8 @@ std::vector<ObjectWrite> pdo_writes(std::uint16_t communication, unsigned number
     add(mapping, 0, std::uint8_t{0}, "mapping");
     for (std::size_t n = 0; n < wished.mapping.size(); ++n)
         add(mapping, static_cast<std::uint8_t>(n + 1), wished.mapping[n], "entry " + std::to_string(n + 1));
-    add(mapping, 0, multiplexed ? static_cast<std::uint8_t>(wished.multiplex) : static_cast<std::uint8_t>(wished.mapping.size()), "mapping");
+    add(mapping, 0, multiplexed ? static_cast<std::uint8_t>(wished.multiplex) : static_cast<std::uint8_t>(wished.mapping.size()),
+        "mapping");
     add(index, 2, wished.transmission, "transmission type");
     add(index, 3, wished.inhibit_100us, "inhibit time").optional = wished.inhibit_100us == 0;
     add(index, 5, wished.event_ms, "event timer").optional = wished.event_ms == 0;

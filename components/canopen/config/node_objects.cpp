@@ -208,11 +208,13 @@ void NodeReader::finish_objects() {
 
 void NodeReader::leftover() {
     const std::vector<std::string> all{
-        "type", "eds", "device", "axes", "device-type", "vendor", "product", "revision",
-        "serial", "mandatory", "configure", "keep-alive", "start", "start-order", "restore", "save",
-        "boot-time", "retry", "retry-most", "on-failure", "on-loss", "heartbeat", "silence", "guarding",
-        "watch-master", "firmware", "firmware-number", "firmware-id", "firmware-version", "firmware-time", "tpdo1", "rpdo1", "tsrdo1", "rsrdo2",
-        "sdo-timeout", "sdo-retries", "configured", "write OBJECT", "command OBJECT"};
+        "type",         "eds",          "device",          "axes",        "device-type",      "vendor",
+        "product",      "revision",     "serial",          "mandatory",   "configure",        "keep-alive",
+        "start",        "start-order",  "restore",         "save",        "boot-time",        "retry",
+        "retry-most",   "on-failure",   "on-loss",         "heartbeat",   "silence",          "guarding",
+        "watch-master", "firmware",     "firmware-number", "firmware-id", "firmware-version", "firmware-time",
+        "tpdo1",        "rpdo1",        "tsrdo1",          "rsrdo2",      "sdo-timeout",      "sdo-retries",
+        "configured",   "write OBJECT", "command OBJECT"};
     for (Line* line : keys_.rest()) {
         line->used = true;
         const std::string near = did_you_mean(line->key.text, all);

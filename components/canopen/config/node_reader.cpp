@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "../306/concise.hpp"
-#include "../311/xdd.hpp"
 
 namespace hal::canopen::config {
 
@@ -67,46 +66,6 @@ std::optional<std::pair<std::uint16_t, std::uint8_t>> address(std::string_view t
 }
 
 }  // namespace
-
-std::string Descriptions::path(const Word& file) const { return file.text.front() == '/' ? file.text : folder_ + file.text; }
-
-bool Descriptions::read(const Word& file, std::string& bytes, Report& report) {
-    const bool whole = file.text.front() == '/';
-    if (read_(path(file), bytes)) return true;
-    report.error(Topic::value, file.at, "the file '" + file.text + "' cannot be read: " + bytes,
-                 whole ? "" : "a name without / at its beginning is looked for beside this file");
-    return false;
-}
-
-const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report) {
-    if (const auto at = known_.find(file.text); at != known_.end()) return at->second.get();
-    auto&       description = known_[file.text];
-    std::string text;
-    if (!read(file, text, report)) return nullptr;
-    eds::Reading reading = eds::read_description(text);
-    if (!reading.description) {
-        std::string why = "it is no device description";
-        for (const auto& m : reading.messages)
-            if (m.severity == eds::Severity::error) why = "line " + std::to_string(m.at.line) + ": " + m.sentence;
-        report.error(Topic::value, file.at, "the device description '" + file.text + "' cannot be used: " + why,
-                     "hal can eds check " + path(file) + " says more");
-        return nullptr;
-    }
-    if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0)
-        report.note(Topic::value, file.at, "'" + file.text + "' has " + std::to_string(warnings) + (warnings == 1 ? " warning" : " warnings"),
-                    "hal can eds check " + path(file) + " says which; what it says of an object that is used here counts");
-    std::vector<eds::Message> ignored;
-    eds::connect_modules(*reading.description, ignored);
-    description = std::make_unique<eds::DeviceDescription>(std::move(*reading.description));
-    return description.get();
-}
-
-bool Descriptions::bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report) {
-    std::string text;
-    if (!read(file, text, report)) return false;
-    to.assign(text.begin(), text.end());
-    return true;
-}
 
 void NodeReader::read() {
     describe();
@@ -247,13 +206,24 @@ void NodeReader::values_of_dcf() {
     for (const eds::Object& o : eds_->objects)
         for (const eds::Entry& e : o.entries) {
             if (e.download_file.empty()) continue;
-            const bool whole = e.download_file.front() == '/' || slash == file.text.npos;
-            ObjectWrite write{{o.index, e.sub, {}}, e.name.empty() ? o.name : e.name};
-            if (!descriptions_.bytes({whole ? e.download_file : file.text.substr(0, slash + 1) + e.download_file, file.at}, write.data, report_))
+            if (o.index == 0x1f50) {
+                report_.warning(
+                    Topic::value, file.at, "the program '" + e.download_file + "' that '" + file.text + "' names is not downloaded",
+                    "write firmware = " + e.download_file + ", with firmware-id or firmware-version of what the node shall have");
                 continue;
-            if (write.data.empty())
-                report_.warning(Topic::value, file.at, "the file '" + e.download_file + "' for object " + object_label(o.index, e.sub) +
-                                                           " is empty, and is not written");
+            }
+            const bool  whole = e.download_file.front() == '/' || slash == file.text.npos;
+            ObjectWrite write{{o.index, e.sub, {}}, e.name.empty() ? o.name : e.name};
+            std::string why;
+            if (!descriptions_.bytes(whole ? e.download_file : file.text.substr(0, slash + 1) + e.download_file, write.data, why))
+                report_.error(Topic::value, file.at,
+                              "the file '" + e.download_file + "', which '" + file.text + "' names for object " +
+                                  object_label(o.index, e.sub) + ", cannot be read: " + why,
+                              "put it beside that file, or take its line DownloadFile= out");
+            else if (write.data.empty())
+                report_.warning(
+                    Topic::value, file.at,
+                    "the file '" + e.download_file + "' for object " + object_label(o.index, e.sub) + " is empty, and is not written");
             else node_.setup.writes.push_back(std::move(write));
         }
 }
@@ -266,7 +236,8 @@ void NodeReader::write_one(const Line& line) {
     const auto refuse = [&](std::string sentence, std::string help) {
         report_.error(Topic::object, line.key.at, std::move(sentence), std::move(help));
     };
-    if (words.empty() || words.size() > 2) return refuse("what is written is missing", verb + " OBJECT = VALUE, as in: " + verb + " 0x6083 = 1000");
+    if (words.empty() || words.size() > 2)
+        return refuse("what is written is missing", verb + " OBJECT = VALUE, as in: " + verb + " 0x6083 = 1000");
     bool                has_sub = false;
     const auto          place = address(words[0].text, has_sub);
     const Known*        known = place ? catalog_->find(place->first, place->second) : catalog_->find(words[0].text);
@@ -393,9 +364,10 @@ void NodeReader::pdo(const PdoWish& wish) {
 
 bool NodeReader::multiplexable(const Object& o, const Pdo& pdo) {
     if (!o.filler && o.bits <= 32 && o.bits % 8 == 0) return true;
-    report_.error(Topic::object, pdo.at,
-                  o.filler ? std::string("a multiplexed PDO has no gaps") : "object '" + o.pin + "' has " + std::to_string(o.bits) + " bits",
-                  "a multiplexed PDO carries one object of 8, 16, 24 or 32 bits at a time");
+    report_.error(
+        Topic::object, pdo.at,
+        o.filler ? std::string("a multiplexed PDO has no gaps") : "object '" + o.pin + "' has " + std::to_string(o.bits) + " bits",
+        "a multiplexed PDO carries one object of 8, 16, 24 or 32 bits at a time");
     return false;
 }
 
@@ -474,8 +446,17 @@ bool NodeReader::default_objects(const PdoWish& wish, Pdo& pdo) {
     const auto  mapping = static_cast<std::uint16_t>((wish.to_node ? 0x1600U : 0x1A00U) + wish.number - 1);
     const auto  count = catalog_->number(mapping, 0, 0);
     const Place at = wish.objects != nullptr ? wish.objects->value.at : node_.at;
+    const std::string which = (wish.to_node ? "rpdo" : "tpdo") + std::to_string(wish.number);
+    if (count == 0xfe || count == 0xff) {
+        const std::string sentence = which + " of the description is a multiplexed PDO, whose objects it does not tell";
+        const std::string help = "name them: " + which + " = mpdo OBJECT, OBJECT";
+        if (wish.objects != nullptr) report_.error(Topic::object, at, sentence, help);
+        else report_.note(Topic::object, at, sentence + ": it is left as it is", help);
+        return false;
+    }
     if (count == 0 || count > 64) {
-        report_.error(Topic::object, at, "the description has no default objects for this PDO", "name them: OBJECT, OBJECT");
+        report_.error(Topic::object, at, "the description has no default objects for " + which,
+                      "name them: " + which + " = OBJECT, OBJECT");
         return false;
     }
     for (unsigned n = 1; n <= count; ++n) {

@@ -20,6 +20,8 @@ public:
     const eds::DeviceDescription* get(const Word& file, Report& report);
     /// The bytes of a file named beside the configuration; false after saying why.
     bool bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report);
+    /// The same of a file that another one names: false, and why.
+    bool bytes(const std::string& file, std::vector<std::uint8_t>& to, std::string& why);
 
 private:
     std::string path(const Word& file) const;

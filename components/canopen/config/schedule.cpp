@@ -66,7 +66,9 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
                 add(p.cob, 0, p.request, name + " request", p.at, false);
                 out.messages.back().remote = true;
             }
-            const Time  every = p.request != 0 && !event_driven(p) ? p.request : of_sync ? sync * std::max<Time>(p.transmission, 1) : event_period(p, cycle);
+            const Time every = p.request != 0 && !event_driven(p) ? p.request
+                               : of_sync                          ? sync * std::max<Time>(p.transmission, 1)
+                                                                  : event_period(p, cycle);
             add(p.cob, p.bytes(), every, std::move(name), p.at, of_sync);
             out.assumed.back() = !of_sync && p.inhibit_100us == 0 && p.request == 0;
         }

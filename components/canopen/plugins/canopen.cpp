@@ -224,7 +224,8 @@ private:
         } else if (!file_argument_.get().empty()) {
             if (by_index())
                 throw std::invalid_argument("slavenodeid= and config= are both given; the configuration says which nodes there are");
-            for (const auto& [argument, name] : {std::pair{&inputs_, "inputs"}, {&outputs_, "outputs"}, {&eds_, "eds"}, {&bit_rate_, "bitrate"}})
+            for (const auto& [argument, name] :
+                 {std::pair{&inputs_, "inputs"}, {&outputs_, "outputs"}, {&eds_, "eds"}, {&bit_rate_, "bitrate"}})
                 if (!argument->get().empty())
                     throw std::invalid_argument(std::string(name) + "=" + argument->get() +
                                                 ": the configuration says this; take the argument out, or config=");
@@ -246,7 +247,7 @@ private:
             for (const config::Message& m : reading.messages)
                 if (m.severity != config::Severity::note)  // those are for `hal canopen check`
                     texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
-                          m.sentence, m.label, m.help);
+                              m.sentence, m.label, m.help);
             if (!reading.good()) hal::Texts::refuse();
         } else if (texts.offered()) {
             throw std::invalid_argument(

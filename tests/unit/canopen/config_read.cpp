@@ -2,6 +2,7 @@
 // The configuration of a network: what it makes, and what is said of a wrong one.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 
@@ -97,20 +98,38 @@ PDOMapping=1
 )";
 
 /// The same device as a DCF: a value that fits, one that does not, and two tables in files.
-std::string dcf_text() {
-    std::string       text = eds_text;
+std::string dcf_text(const std::string& more = "") {
+    std::string text = eds_text;
     const std::string list = "SupportedObjects=2\n1=0x2000\n2=0x2001\n";
     text.replace(text.find(list), list.size(), "SupportedObjects=6\n1=0x2000\n2=0x2001\n3=0x2002\n4=0x2003\n5=0x2004\n6=0x2005\n");
     text += "[2002]\nParameterName=Ramp\nDataType=0x0006\nAccessType=rw\nDefaultValue=1\nParameterValue=7\n";
     text += "[2003]\nParameterName=Limit\nDataType=0x0006\nAccessType=rw\nParameterValue=70000\n";
     text += "[2004]\nParameterName=Cam\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=cam.bin\n";
     text += "[2005]\nParameterName=Gear\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=empty.bin\n";
+    if (!more.empty()) text += "[2006]\nParameterName=More\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=" + more + "\n";
     return text + "[DeviceComissioning]\nNodeID=5\nBaudrate=1000\n";
 }
 
 bool files(const std::string& path, std::string& bytes) {
     if (path == "machine/drive.eds") return bytes = eds_text, true;
+    if (path == "machine/mpdo.eds") {
+        bytes = eds_text;
+        const std::string count = "DefaultValue=1\n[1A00sub1]";
+        return bytes.replace(bytes.find(count), count.size(), "DefaultValue=0xFE\n[1A00sub1]"), true;
+    }
     if (path == "machine/unit/drive.dcf") return bytes = dcf_text(), true;
+    if (path == "machine/unit/lost.dcf") return bytes = dcf_text("lost.bin"), true;
+    if (path == "machine/unit/program.dcf") {
+        const std::string list = "[ManufacturerObjects]";
+        bytes = dcf_text();
+        bytes.replace(bytes.find("[OptionalObjects]\nSupportedObjects=2\n1=0x1800\n2=0x1A00\n"), 55,
+                      "[OptionalObjects]\nSupportedObjects=3\n1=0x1800\n2=0x1A00\n3=0x1F50\n");
+        bytes.insert(bytes.find(list),
+                     "[1F50]\nParameterName=Program\nObjectType=0x8\nSubNumber=2\n[1F50sub0]\nParameterName=n\nDataType=0x0005\n"
+                     "AccessType=const\nDefaultValue=1\n[1F50sub1]\nParameterName=Program\nObjectType=0x2\nDataType=0x000F\n"
+                     "AccessType=wo\nDownloadFile=new.bin\n");
+        return true;
+    }
     if (path == "machine/unit/cam.bin") return bytes = std::string("\0\1\2", 3), true;
     if (path == "machine/unit/empty.bin") return bytes.clear(), true;
     return bytes = "No such file or directory", false;
@@ -255,14 +274,35 @@ TEST(CanopenConfig, what_a_DCF_says_is_written_with_the_files_it_names) {
     for (const Message& m : r.messages) said.push_back(std::to_string(m.at.line) + ": " + m.sentence);
     EXPECT_EQ(r.messages[0].help,
               "hal can eds check machine/unit/drive.dcf says which; what it says of an object that is used here counts");
-    EXPECT_EQ(said, (std::vector<std::string>{"3: 'unit/drive.dcf' has 1 warning", "3: line 94 of 'unit/drive.dcf': the value of 2003sub0 is not configured: '70000' does not fit into "
-                                              "UNSIGNED16 (0..65535)",
-                                              "3: the file 'empty.bin' for object 0x2005:0 is empty, and is not written"}));
+    EXPECT_EQ(said, (std::vector<std::string>{
+                        "3: 'unit/drive.dcf' has 1 warning",
+                        "3: line 94 of 'unit/drive.dcf': the value of 2003sub0 is not configured: '70000' does not fit into "
+                        "UNSIGNED16 (0..65535)",
+                        "3: the file 'empty.bin' for object 0x2005:0 is empty, and is not written"}));
+}
+
+TEST(CanopenConfig, a_file_that_a_DCF_names_and_that_is_not_there_is_said) {
+    EXPECT_EQ(
+        said("[bus]\n[node 5]\neds = unit/lost.dcf\n"),
+        "arm:3:7: the file 'lost.bin', which 'unit/lost.dcf' names for object 0x2006:0, cannot be read: No such file or directory; put it "
+        "beside that file, or take its line DownloadFile= out");
+}
+
+TEST(CanopenConfig, the_program_that_a_DCF_names_is_the_matter_of_firmware) {
+    const Reading r = read_text("[bus]\n[node 5]\neds = unit/program.dcf\n");
+    EXPECT_TRUE(r.good()) << to_string(r, "arm");
+    EXPECT_EQ(write_of(r.config.nodes[0], 0x1f50, 1), nullptr);
+    const auto about =
+        std::find_if(r.messages.begin(), r.messages.end(), [](const Message& m) { return m.sentence.starts_with("the program"); });
+    ASSERT_NE(about, r.messages.end());
+    EXPECT_EQ(about->sentence + "; " + about->help,
+              "the program 'new.bin' that 'unit/program.dcf' names is not downloaded; write firmware = new.bin, with firmware-id or "
+              "firmware-version of what the node shall have");
 }
 
 TEST(CanopenConfig, a_command_is_written_at_each_boot_and_not_read_back) {
-    const auto c = good(
-        "[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\nwrite 0x2001 u8 = 1\ncommand 0x2002 u16 = 5\nwrite 0x2003 u8 = 2\n");
+    const auto c =
+        good("[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\nwrite 0x2001 u8 = 1\ncommand 0x2002 u16 = 5\nwrite 0x2003 u8 = 2\n");
     std::vector<std::pair<std::uint16_t, bool>> seen;
     for (const auto& w : c.nodes[0].setup.writes)
         if (w.index >= 0x2000) seen.emplace_back(w.index, w.always);
@@ -282,8 +322,8 @@ TEST(CanopenConfig, a_slow_node_has_a_time_out_of_its_own) {
 
 TEST(CanopenConfig, a_configuration_has_a_date_or_a_number_made_of_what_is_written) {
     const auto dated = [](const std::string& key, const std::string& more = "") {
-        const auto         c = good("[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\n" + key + more);
-        const NodeSetup&   s = c.nodes[0].setup;
+        const auto c = good("[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\n" + key + more);
+        const NodeSetup& s = c.nodes[0].setup;
         return std::pair(s.configuration_date, s.configuration_time);
     };
     using Date = std::pair<std::uint32_t, std::uint32_t>;
@@ -300,19 +340,21 @@ TEST(CanopenConfig, a_configuration_has_a_date_or_a_number_made_of_what_is_writt
     EXPECT_NE(dated("configured = by-content\n", "write 0x2001 u8 = 2\n"), dated("configured = by-content\n", "write 0x2001 u8 = 1\n"));
     EXPECT_NE(one, dated("configured = by-content\n", "tpdo1.inhibit = 5ms\n"));
     for (const char* wrong : {"2026-02-30", "2026-03-01 25:00", "2026-03-01 14:30x", "1983-12-31", "yes", "14:30"})
-        EXPECT_EQ(said(std::string("[bus]\n[node 1]\nconfigured = ") + wrong + "\n"),
-                  "arm:3:14: 'configured' cannot be '" + std::string(wrong) + "'; write by-content, a date such as 2026-03-01 14:30, or no");
+        EXPECT_EQ(
+            said(std::string("[bus]\n[node 1]\nconfigured = ") + wrong + "\n"),
+            "arm:3:14: 'configured' cannot be '" + std::string(wrong) + "'; write by-content, a date such as 2026-03-01 14:30, or no");
 }
 
 TEST(CanopenConfig, a_PDO_may_be_asked_for) {
     const std::string node = "[bus]\nsync = cycle\n[node 5 x]\ndevice = cia402\n";
-    const auto c = good(node + "tpdo1 = statusword\ntpdo1.request = 100ms\ntpdo2 = modes-of-operation-display\ntpdo2.request = 1s\n"
+    const auto c = good(node +
+                        "tpdo1 = statusword\ntpdo1.request = 100ms\ntpdo2 = modes-of-operation-display\ntpdo2.request = 1s\n"
                         "tpdo2.transmission = 252\n");
     EXPECT_EQ(find(c.nodes[0], false, 1)->transmission, 253);
     EXPECT_EQ(find(c.nodes[0], false, 1)->request, 100 * millisecond);
     EXPECT_EQ(find(c.nodes[0], false, 2)->transmission, 252);
     const Schedule s = schedule_of(c, millisecond);
-    unsigned       requests = 0, answers = 0;
+    unsigned requests = 0, answers = 0;
     for (const plan::Message& m : s.messages)
         if (m.id == 0x185 && m.period == 100 * millisecond) ++(m.remote ? requests : answers);
     EXPECT_EQ(requests, 1U);
@@ -330,7 +372,7 @@ TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
         "[bus]\nsync = cycle\n[node 3 panel]\ndevice = cia401\ntpdo2 = mpdo read-inputs-1, 0x6401:1\nrpdo2 = mpdo write-outputs-1\n"
         "rpdo2.inhibit = 5ms\ntpdo2.inhibit = 2ms\n");
     const Node& n = c.nodes[0];
-    const Pdo * in = find(n, false, 2), *out = find(n, true, 2);
+    const Pdo *in = find(n, false, 2), *out = find(n, true, 2);
     ASSERT_NE(in, nullptr);
     ASSERT_NE(out, nullptr);
     EXPECT_EQ(in->multiplex, Multiplex::from_source);
@@ -362,6 +404,14 @@ TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
     std::string many = "mpdo 0x2000:1 u8";
     for (int n = 2; n <= 100; ++n) many += ", 0x2000:" + std::to_string(n) + " u8";
     EXPECT_EQ(good(node + "tpdo2 = " + many + "\n").nodes[0].pdos[0].objects.size(), 100U);
+    EXPECT_EQ(
+        said("[bus]\n[node 5]\neds = mpdo.eds\ntpdo1 = default\n"),
+        "arm:4:9: tpdo1 of the description is a multiplexed PDO, whose objects it does not tell; name them: tpdo1 = mpdo OBJECT, OBJECT");
+    const Reading as_it_is = read_text("[bus]\n[node 5]\neds = mpdo.eds\n");
+    EXPECT_TRUE(as_it_is.good());
+    ASSERT_EQ(as_it_is.messages.size(), 1U);
+    EXPECT_EQ(as_it_is.messages[0].sentence,
+              "tpdo1 of the description is a multiplexed PDO, whose objects it does not tell: it is left as it is");
     EXPECT_EQ(said(node + "tpdo2 = mpdo read-inputz\n").substr(0, 50), "arm:5:14: the node has no object 'read-inputz'; di");
 }
 

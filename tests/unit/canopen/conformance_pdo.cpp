@@ -231,7 +231,9 @@ TEST_F(ConformancePdo, Pdo_28_process_input_into_a_receive_pdo) { EXPECT_EQ(firs
 TEST_F(ConformancePdo, Pdo_29_unmappable_object_into_a_receive_pdo) { EXPECT_EQ(first_object(0x1400, 0x2004, 0, 16), Abort::not_mappable); }
 TEST_F(ConformancePdo, Pdo_30_process_input_into_a_transmit_pdo) { EXPECT_EQ(first_object(0x1800, 0x6000, 5, 8), Abort::none); }
 TEST_F(ConformancePdo, Pdo_31_process_output_into_a_transmit_pdo) { EXPECT_EQ(first_object(0x1800, 0x6200, 5, 8), Abort::not_mappable); }
-TEST_F(ConformancePdo, Pdo_32_unmappable_object_into_a_transmit_pdo) { EXPECT_EQ(first_object(0x1800, 0x2004, 0, 16), Abort::not_mappable); }
+TEST_F(ConformancePdo, Pdo_32_unmappable_object_into_a_transmit_pdo) {
+    EXPECT_EQ(first_object(0x1800, 0x2004, 0, 16), Abort::not_mappable);
+}
 TEST_F(ConformancePdo, Pdo_33_dummy_object) {
     open_mapping(0x1400);
     EXPECT_EQ(map(0x1600, 1, map_entry(0x0005, 0, 8)), Abort::none);

@@ -92,7 +92,8 @@ TEST_F(Scanner, Tells_what_is_in_its_list_once_and_then_what_changes) {
     ASSERT_EQ(write(0x1fa0, 3, 0x01'2008'03, 4), Abort::none);
     bus.log.clear();
     run(1);
-    EXPECT_EQ(told(), (Told{{0x2008, 1, 1}, {0x2008, 2, 0x55}, {0x2001, 0, 0xfffe}, {0x2008, 3, 0x66}})) << "a list that is new is told anew";
+    EXPECT_EQ(told(), (Told{{0x2008, 1, 1}, {0x2008, 2, 0x55}, {0x2001, 0, 0xfffe}, {0x2008, 3, 0x66}}))
+        << "a list that is new is told anew";
     nmt(NmtCommand::enter_pre_operational);
     device->dictionary().set<std::uint8_t>(0x2008, 1, 9);
     run(1);

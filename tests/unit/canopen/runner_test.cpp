@@ -20,7 +20,8 @@ const std::string one_axis =
     "[node 2 x]\ndevice = cia402\ntpdo1 = statusword\nrpdo1 = controlword, target-position\n";
 
 struct Wire : RunnerEvents {
-    explicit Wire(const std::string& more = "") : reading(config::read(one_axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
+    explicit Wire(const std::string& more = "")
+        : reading(config::read(one_axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
         EXPECT_TRUE(reading.good());
         node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2});
         runner.open(*link);
