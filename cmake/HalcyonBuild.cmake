@@ -43,7 +43,7 @@ endif()
 
 # halcyon_unity(TARGET [ALONE SOURCE...]): compiles the sources of a target eight at a time: without optimisation most of the time goes into
 # reading the same headers. Two sources of such a target must not give one name to different things, not even in anonymous namespaces;
-# those ALONE do, and are compiled one by one. With optimisation and sanitizers g++ 12 takes longer for eight than for each of them.
+# those ALONE do, and are compiled one by one. Only for sources that nothing optimises: of the others a change compiles one, not eight.
 function(halcyon_unity target)
     cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
     if(HALCYON_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
