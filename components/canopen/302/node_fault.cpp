@@ -38,7 +38,7 @@ void Master::Node::on_beat(bool boot_up) noexcept {
     if (status.operational != operational) status.operational = operational, master_.dirty_ = true;
     if (operational) was_operational_ = true, doubts_ = 0;
     else if (was_operational_ && ++doubts_ == 2) return lose(Cause::left_operational);  // one alone may be late
-    const auto window = 10 * producer_ms_ * millisecond;
+    const Time window = Time{10} * producer_ms_ * millisecond;
     if (guarding() || window == 0 || (status.notes & note_doubled) != 0) return;
     // After a pause the heartbeats of it come all at once.
     const bool paused = now() - master_.polled_ > producer_ms_ * millisecond;
