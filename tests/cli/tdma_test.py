@@ -80,6 +80,13 @@ class Tdma(Case):
             self.write("record.hal", f"loadrt segment_record {words}\nstart\n")
             self.assertIn(f"error: 'segment-record.0' (segment_record) cannot start: {problem} [start-failed]\n", self.bad("sim", "record.hal"))
 
+        self.write("full.hal", "loadrt threads name1=servo period1=1000000\nloadrt segment_record link=sim:net0/recorder file=/dev/full\n"
+                   'loadrt tdma link=sim:net0/master station=master schedule="master:; cycle 1000; slot 0 100"\naddf tdma.0.receive servo\n'
+                   "addf tdma.0.transmit servo\naddf segment-record.0.update servo\nstart\nadvance 2s\ngetp segment-record.0.failed\n")
+        done = self.run_program("sim", "full.hal")
+        self.assertEqual("TRUE\n", done.stdout)
+        self.assertEqual(1, done.stderr.count("segment-record.0: /dev/full cannot be written any more; is the disk full?\n"), done.stderr)
+
     def test_bad_plan(self):
         self.write("cell.tdma", CELL.replace("slot 0 200", "slot 0 110"))
         self.assertEqual("cell.tdma:9:1: error: slot 0 of spare begins at 110 us, before slot 0 of master is over: 60 bytes take 6.72 us at 100 Mbit/s: "
