@@ -38,8 +38,9 @@ const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report
 }
 
 bool Descriptions::bytes(const std::string& file, std::vector<std::uint8_t>& to, std::string& why) {
-    if (std::string text; read_(path({file, {}}), text)) return to.assign(text.begin(), text.end()), true;
-    else return why = text, false;
+    std::string text;
+    if (read_(path({file, {}}), text)) return to.assign(text.begin(), text.end()), true;
+    return why = text, false;
 }
 
 bool Descriptions::bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report) {
