@@ -50,8 +50,9 @@ int run_run(const Options& options) {
     if (options.words.empty() && !options.interactive && !options.classic)
         return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
     if (!options.dds.empty() && options.part.empty())
-        return fail(options, "--dds is about the nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take " +
-                                 options.dds + " themselves");
+        return fail(options,
+                    "--dds is about the nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take " +
+                        options.dds + " themselves");
     if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
     const auto nodes = nodes_asked_for(options);
     if (!nodes) return 1;

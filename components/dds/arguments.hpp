@@ -88,7 +88,8 @@ public:
         if (topic_.get().empty()) throw std::invalid_argument("which topic? write topic=NAME");
         for (const auto& [argument, text] : {std::pair{"topic", &topic_.get()}, std::pair{"type", &type_.get()}})
             if (text->size() > longest_name)
-                throw std::invalid_argument(std::string(argument) + "= has more than " + std::to_string(longest_name) + " letters; make it shorter");
+                throw std::invalid_argument(std::string(argument) + "= has more than " + std::to_string(longest_name) +
+                                            " letters; make it shorter");
         if (!ros_.get().empty() && (!fields_.get().empty() || !type_.get().empty()))
             throw std::invalid_argument("ros= gives the fields and the type; leave fields= and type= out");
         if (ros_.get().empty() && fields_.get().empty())

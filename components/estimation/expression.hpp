@@ -217,7 +217,8 @@ private:
                 };
                 if (const int i = find(ones, 1); i >= 0) {
                     sum();
-                    if (!problem && !take(')')) fail(begin, begin + name.size(), name + " takes one value in brackets", "as in " + name + "(x)");
+                    if (!problem && !take(')'))
+                        fail(begin, begin + name.size(), name + " takes one value in brackets", "as in " + name + "(x)");
                     return push({Kind::one, static_cast<std::uint16_t>(i), 0.0});
                 }
                 if (const int i = find(twos, 5); i >= 0) {

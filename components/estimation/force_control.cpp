@@ -10,8 +10,9 @@ struct ForceControl : hal::Component {
     using Component::Component;
 
     hal::In<bool>          enable{*this, "enable", "FALSE: effort 0, position-out is position-command, all memories empty"};
-    hal::In<std::uint32_t> mode{*this, "mode",
-                                "0 direct: a PID on the force; 1 indirect: an admittance in front of a position loop; 2 impedance; else: as if not enabled"};
+    hal::In<std::uint32_t> mode{
+        *this, "mode",
+        "0 direct: a PID on the force; 1 indirect: an admittance in front of a position loop; 2 impedance; else: as if not enabled"};
     hal::In<double>        command{*this, "force-command", "force wanted on the surroundings", {.unit = "N"}};
     hal::In<double>        force{*this, "force", "force measured on the surroundings", {.unit = "N"}};
     hal::In<double>        position_command{*this, "position-command", "where the path is", {.unit = "m"}};

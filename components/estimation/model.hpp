@@ -103,7 +103,8 @@ private:
         const std::string text(piece(name));
         if (text.empty()) return say(name.begin, name.end, "a name is missing", "names are letters, digits and _"), false;
         if (count >= limit)
-            return say(name.begin, name.end, "there are more than " + std::to_string(limit) + " " + what, "leave out what matters least"), false;
+            return say(name.begin, name.end, "there are more than " + std::to_string(limit) + " " + what, "leave out what matters least"),
+                   false;
         if (index_.contains(text) || text == "pi") return say(name.begin, name.end, "'" + text + "' is there twice", "another name"), false;
         return true;
     }
@@ -127,7 +128,9 @@ private:
         std::vector<Dual> values(variables() + 1);
         for (std::size_t i = 0; i < constants.size(); ++i) values[most_slopes + most_inputs + i].value = constants[i];
         const double v = e(values.data(), 0).value;
-        if (!std::isfinite(v)) say(formula.begin, formula.end, "this is no finite number", "is something divided by 0, or the root of a negative number taken?");
+        if (!std::isfinite(v))
+            say(formula.begin, formula.end, "this is no finite number",
+                "is something divided by 0, or the root of a negative number taken?");
         return v;
     }
     void constant(std::size_t begin, std::size_t sign, std::size_t end) {
@@ -154,7 +157,8 @@ private:
             return say(name.begin, end, "a state has a start, a sigma and a noise",
                        "write state " + std::string(piece(name)) + " = 0 sigma 1 noise 0.1");
         const double start = fixed(trim(sign + 1, sigma)), wide = fixed(trim(sigma + 5, noise)), wanders = fixed(trim(noise + 5, end));
-        if (wide < 0.0 || wanders < 0.0) say(sigma, end, "a sigma or a noise is negative", "0 is what is known exactly, and what does not wander");
+        if (wide < 0.0 || wanders < 0.0)
+            say(sigma, end, "a sigma or a noise is negative", "0 is what is known exactly, and what does not wander");
         index_[std::string(piece(name))] = static_cast<std::uint16_t>(states.size());
         states.push_back({std::string(piece(name)),
                           start,
@@ -187,7 +191,8 @@ private:
     void measure(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
         if (piece(name).empty()) return say(begin, sign, "a name is missing", "names are letters, digits and _");
-        if (measures.size() >= most_measures) return say(name.begin, name.end, "there are more than 12 measurements", "leave out what matters least");
+        if (measures.size() >= most_measures)
+            return say(name.begin, name.end, "there are more than 12 measurements", "leave out what matters least");
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), wrap = keyword(sign + 1, end, "wrap");
         if (sigma == end)
             return say(name.begin, end, "a measurement has a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");

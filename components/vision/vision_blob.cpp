@@ -61,7 +61,9 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
     hal::Param<double> forget{*this, "forget", "a thing that was not seen for so long is gone", {.initial = 1.0, .unit = "s"}};
 
     void detect(const Frame& frame, const Settings& of, Found& result) {
-        if (frame.format != Format::bgr) throw std::runtime_error("things are told by their colours and these frames have none; take a camera of colours, without grey in source=");
+        if (frame.format != Format::bgr)
+            throw std::runtime_error(
+                "things are told by their colours and these frames have none; take a camera of colours, without grey in source=");
         const BlobRules rules{static_cast<int>(std::min(of.threshold, 254u)), static_cast<int>(std::clamp(of.area, 1u, 10'000'000u)),
                               of.distance};
         const auto      seen = find_blobs(frame, ground.in(frame), {of.kinds.data(), static_cast<std::size_t>(kinds)}, rules);

@@ -70,7 +70,9 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     }
 
     void detect(const Frame& frame, const Settings& of, Found& result) {
-        if (frame.format != Format::bgr) throw std::runtime_error("the balls are told by their colours and these frames have none; take a camera of colours, without grey in source=");
+        if (frame.format != Format::bgr)
+            throw std::runtime_error(
+                "the balls are told by their colours and these frames have none; take a camera of colours, without grey in source=");
         PendulumView   view;
         PendulumLimits limits;
         view.focal_u = view.focal_v = focal;

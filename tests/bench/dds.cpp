@@ -71,7 +71,8 @@ void dds(const Options& options, Report& report) {
     if (!std::filesystem::exists(options.programs + "/dds_peer")) return report.note("not measured: this build is without Fast DDS");
     const std::uint64_t cycles = 50;
     const double without = cycle_ns("", cycles);
-    const double with = cycle_ns("loadrt dds_publish names=p topic=bench/cost fields=v:float*64 rate=0 domain=231\naddf p t\n", cycles, {"p.dropped"});
+    const double with =
+        cycle_ns("loadrt dds_publish names=p topic=bench/cost fields=v:float*64 rate=0 domain=231\naddf p t\n", cycles, {"p.dropped"});
     report.row({.what = "publishing in the cycle", .unit = "ns", .ours = with - without, .goal = limit(150)});
 
     const int rounds = options.quick ? 2 : 5;

@@ -211,8 +211,9 @@ TEST_F(V4l2, rate_that_a_camera_does_not_have_is_said_and_counts) {
     camera->close();
     kernel.gives_period = {2, 1};  // a frame in two seconds: it is not silent before three did not come
     ASSERT_TRUE(camera->open(0));
-    EXPECT_EQ(camera->remark(),
-              "/dev/video0 gives 0.5 frames per second, not 30; those that it has at each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    EXPECT_EQ(
+        camera->remark(),
+        "/dev/video0 gives 0.5 frames per second, not 30; those that it has at each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
     EXPECT_DOUBLE_EQ(camera->patience_s(), 7.0);
     camera->close();
     kernel.gives_period = {1001, 30'000};  // 29.97: what is called 30
@@ -246,7 +247,8 @@ TEST_F(V4l2, refusals_say_what_to_do) {
                          "/dev/videoN makes YUYV of it for a v4l2loopback device");
     kernel.formats = {V4L2_PIX_FMT_YUYV};
     kernel.gives_format = V4L2_PIX_FMT_MJPEG;
-    EXPECT_EQ(refusal(), "/dev/video0 gives MJPG and not YUYV at this size; take a smaller one: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    EXPECT_EQ(refusal(),
+              "/dev/video0 gives MJPG and not YUYV at this size; take a smaller one: v4l2-ctl -d /dev/video0 --list-formats-ext");
     kernel.gives_format = 0;
     kernel.gives_width = 640, kernel.gives_height = 480;
     EXPECT_EQ(refusal(), "/dev/video0 has no frames of 16 x 4; write v4l2:/dev/video0?width=640&height=480");
@@ -264,7 +266,8 @@ TEST_F(V4l2, every_call_may_fail_and_nothing_is_left_open) {
             EXPECT_EQ(kernel.open_now, 0);
             return;
         }
-        EXPECT_TRUE(camera->problem().text.starts_with("/dev/video0 ") || camera->problem().text.starts_with("/dev/video0: ")) << nth << camera->problem().text;
+        EXPECT_TRUE(camera->problem().text.starts_with("/dev/video0 ") || camera->problem().text.starts_with("/dev/video0: "))
+            << nth << camera->problem().text;
         EXPECT_EQ(kernel.open_now, 0) << nth;
         EXPECT_EQ(kernel.mapped, 0) << nth;
     }

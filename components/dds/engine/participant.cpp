@@ -273,7 +273,9 @@ public:
         bool             made = false;
         try {
             OrdinaryThread::run([&] { made = e.make(topic); });
-            if (!made) throw std::runtime_error(std::string("Fast DDS made no ") + e.kind() + " of '" + e.topic.name + "'; its own message says why");
+            if (!made)
+                throw std::runtime_error(std::string("Fast DDS made no ") + e.kind() + " of '" + e.topic.name +
+                                         "'; its own message says why");
             endpoints_.push_back(&e);
         } catch (...) {
             e.unmake();
@@ -305,12 +307,15 @@ public:
             for (auto& [name, t] : topics_) t.topic = topic_of(name, t.type);
             OrdinaryThread::run([this] {
                 for (Endpoint* e : endpoints_)
-                    if (!e->make(topics_.at(e->topic.name).topic)) throw std::runtime_error("no " + std::string(e->kind()) + " of '" + e->topic.name + "'");
+                    if (!e->make(topics_.at(e->topic.name).topic))
+                        throw std::runtime_error("no " + std::string(e->kind()) + " of '" + e->topic.name + "'");
             });
             complained_ = false;
             return true;
         } catch (const std::exception& why) {
-            if (!complained_) std::fputs((std::string("dds: it cannot begin anew: ") + why.what() + "; it is tried again every second\n").c_str(), stderr);
+            if (!complained_)
+                std::fputs((std::string("dds: it cannot begin anew: ") + why.what() + "; it is tried again every second\n").c_str(),
+                           stderr);
             complained_ = true;
             unmake();
             return false;
@@ -339,8 +344,8 @@ private:
     void make() {
         OrdinaryThread::run([this] {
             const fd::DomainParticipantQos qos = participant_qos(settings_);
-            participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(static_cast<std::uint32_t>(settings_.domain), qos,
-                                                                                            this, fd::StatusMask::none());
+            participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(static_cast<std::uint32_t>(settings_.domain),
+                                                                                            qos, this, fd::StatusMask::none());
             if (participant_ == nullptr)
                 throw std::runtime_error(settings_.security.empty()
                                              ? "Fast DDS made no participant; its own message says why"
@@ -373,8 +378,8 @@ private:
         if (type.empty()) type.reset(new BytesType(t.type, t.largest));
         static_cast<BytesType*>(type.get())->grow(t.largest);
         if (const auto known = topics_.find(t.name); known != topics_.end() && known->second.type != t.type)
-            throw std::runtime_error("topic '" + t.name + "' has the type " + known->second.type + " in this process already, and here " + t.type +
-                                     "; give both the same fields, or another topic=");
+            throw std::runtime_error("topic '" + t.name + "' has the type " + known->second.type + " in this process already, and here " +
+                                     t.type + "; give both the same fields, or another topic=");
         Used& used = topics_[t.name];
         if (used.users == 0) {
             used.type = t.type;
