@@ -343,9 +343,9 @@ private:
         }
     }
 
-    Reading       out_;
-    StationEntry  ignored_;
-    StationEntry* station_ = nullptr;
+    Reading                              out_;
+    StationEntry                         ignored_;
+    StationEntry*                        station_ = nullptr;
     std::map<std::string, std::uint32_t> given_, given_to_all_;  // keys that are there once: of the block, of the segment; their lines
 };
 

@@ -254,11 +254,11 @@ void Station::take_reply(const Decoded& d, Time arrived, Time now) noexcept {
 void Station::look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
     if (status_.state != State::running || !status_.calibrated || own_schedule_) return;
     const Time tolerance = std::max<Time>(2'000, setup_.guard / 2);  // no frame of another slot begins so near
-    const Time     longer = 2 * (wire(frame.size()) - wire(0));  // stored and forwarded once
-    const Time     into = clock_.global(arrived) - status_.delay - longer - start_;
-    const Time     cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
-    const auto     cycle = number_ + static_cast<std::uint32_t>(cycles);
-    const Time     at = into - cycles * setup_.cycle;
+    const Time longer = 2 * (wire(frame.size()) - wire(0));  // stored and forwarded once
+    const Time into = clock_.global(arrived) - status_.delay - longer - start_;
+    const Time cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
+    const auto cycle = number_ + static_cast<std::uint32_t>(cycles);
+    const Time at = into - cycles * setup_.cycle;
     for (const Slot& s : slots_) {
         const SlotSetup& slot = s.setup();
         if (!s.used_in(cycle) || at < slot.offset - tolerance || at > slot.offset + wire(ethernet::header_bytes + slot.size) + tolerance)
