@@ -86,7 +86,8 @@ def check(hal, name):
 
 
 def main():
-    own_network()  # the examples of DDS and of buses over UDP meet nobody else's; where it cannot be made they are on this machine's loopback
+    if own_network():  # the examples of DDS and of buses over UDP meet nobody else's; where it cannot be made they are on this machine's loopback
+        subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
     arguments = sys.argv[1:]
     hal = program(arguments)
     names = arguments or [line.split()[0] for line in run(hal, "doc").stdout.splitlines() if line.split()[0] != "threads"]
