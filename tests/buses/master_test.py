@@ -35,9 +35,12 @@ echo it moves
 kill -9 $drive
 is TRUE getp canopen.0.x.fault
 is FALSE gets x-active
+is TRUE getp x.fault
 drive
 is TRUE getp canopen.0.x.operational
 "$hal" shell sets x-on FALSE
+"$hal" shell setp x.reset TRUE
+is FALSE getp x.fault
 "$hal" shell sets x-on TRUE
 is TRUE gets x-active
 ip link set vcan0 down

@@ -98,13 +98,17 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
         walk_.want(State::switch_on_disabled, Request::disable);
         enabled_ = false;
         orders_.controlword = command::disable_voltage;
+        told_off_ = true, told_off_at_ = now;
         return;
     }
     const State before = walk_.state(), state = state_of(in_.statusword);
-    if (enabled_ && wanted_ && state != State::operation_enabled) {
+    const bool late = told_off_ && now - told_off_at_ < rules.limits.step;  // it does only now what it was told before this enabling
+    if (enabled_ && wanted_ && state != State::operation_enabled && (in_fault(state) || !late)) {
         fail(in_fault(state) ? Cause::drive_fault : Cause::left, Request::run);
         failure_.state = state, failure_.before = before;
     }
+    if (state != State::operation_enabled) told_off_ = false;
+    else if (!wanted_) told_off_ = true, told_off_at_ = now;
     const bool powered = state == State::operation_enabled || state == State::quick_stop_active;
     if (wanted_) walk_.want(State::operation_enabled, Request::enable);
     else if (powered && command.quick_stop) walk_.want(State::quick_stop_active, Request::quick_stop);

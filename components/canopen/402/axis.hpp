@@ -129,12 +129,13 @@ private:
 
     double position_ = 0.0, velocity_ = 0.0, torque_ = 0.0, commanded_ = 0.0, last_position_ = 0.0;
     double joined_ = 0.0, offset_ = 0.0;  // the command of the last cycle; what it was away from the feedback when joined
-    Time last_ = 0, mode_since_ = 0, joined_at_ = 0;
+    Time last_ = 0, mode_since_ = 0, joined_at_ = 0, told_off_at_ = 0;
     Home home_ = Home::no;
     unsigned home_cycles_ = 0;
     bool wanted_ = false, enabled_ = false, active_ = false, homed_ = false, following_ = false, mode_shown_ = false;
     bool was_enable_ = false, was_reset_ = false, was_home_ = false, was_go_ = false, was_operational_ = false, started_ = false;
     bool target_reached_ = false, jumped_ = false;
+    bool told_off_ = false;  // and not seen off since
 };
 
 }  // namespace hal::canopen::cia402

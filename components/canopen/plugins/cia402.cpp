@@ -202,7 +202,8 @@ The master's side of a servo drive on any bus: the pins of its process data on o
 keeps a copy of the drive's state machine and walks it to where it should be, a transition per cycle.
 
 * `enable` walks to *operation enabled*. When a step is not taken within `step-timeout`, the axis is in fault and `show fault` says which:
-  `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes by the ramp of the drive and switches off.
+  `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes by the ramp of the drive and switches off; TRUE
+  again before it has done so enables it anew.
 * While it is not enabled, the position told to the drive is the measured one, so it does not jump when it is. `position-cmd` should follow
   `position-fb` while `active` is FALSE. What it is away then is refused when it is more than `max-step`, and removed over `blend-time`
   when that is 0.

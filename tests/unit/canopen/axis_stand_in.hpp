@@ -2,6 +2,7 @@
 // A drive that does what the state diagram of CiA 402 says, a transition per cycle, and refuses what a test wants refused.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <string>
 #include <vector>
@@ -100,6 +101,7 @@ struct Pair {
     AxisRules rules;
     Time now = 0;
     std::vector<std::uint16_t> words;  ///< controlwords, without repetition
+    std::size_t delay = 0;             ///< cycles that orders and answers are on their way together
 
     Pair() {
         rules.limits = {500 * millisecond, second};
@@ -112,7 +114,8 @@ struct Pair {
             const AxisOrders& orders = axis.step(drive.out, command, rules, now);
             if (words.empty() || words.back() != orders.controlword) words.push_back(orders.controlword);
             last = orders;
-            drive.step(orders);
+            under_way_.push_back(orders);
+            if (under_way_.size() > delay) drive.step(under_way_.front()), under_way_.pop_front();
         }
     }
     /// Cycles until `ready`, at most 20 000. False: never.
@@ -129,6 +132,9 @@ struct Pair {
     }
     std::string why() const { return text(axis.failure()); }
     AxisOrders last;
+
+private:
+    std::deque<AxisOrders> under_way_;
 };
 
 }  // namespace hal::canopen::cia402::test

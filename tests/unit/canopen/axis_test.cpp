@@ -192,6 +192,34 @@ TEST(Axis, Sees_that_the_drive_left_by_itself_or_failed) {
     EXPECT_TRUE(q.enable()) << q.why();
 }
 
+TEST(Axis, Off_and_on_again_while_the_drive_is_slow_to_obey_is_no_failure) {
+    for (const unsigned off : {1U, 2U, 3U, 5U, 8U, 13U, 21U}) {  // cycles; what the drive says and is told is on its way for five
+        Pair p;
+        p.delay = 5;
+        ASSERT_TRUE(p.enable()) << p.why();
+        p.cycle(20);
+        p.command.enable = false;
+        p.cycle(off);
+        p.command.enable = true;
+        p.cycle(100);
+        EXPECT_TRUE(p.axis.enabled()) << off << ": " << p.why();
+        EXPECT_EQ(State::operation_enabled, p.drive.state) << off;
+        p.drive.state = State::switched_on, p.drive.tell();  // the order from before is not taken for the cause twice
+        p.cycle(10);
+        EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without being told (statusword 0x0233))", p.why()) << off;
+    }
+    Pair q;  // nor for that of a fault
+    q.delay = 5;
+    ASSERT_TRUE(q.enable());
+    q.command.enable = false;
+    q.cycle();
+    q.command.enable = true;
+    q.cycle(2);
+    q.drive.fail(error::over_voltage);
+    q.cycle(10);
+    EXPECT_EQ("run: drive went into fault (statusword 0x0238, error 0x3210: DC link over-voltage)", q.why());
+}
+
 TEST(Axis, Reset_that_does_not_help_is_a_failure) {
     Pair p;
     p.drive.fail(0xffff);
