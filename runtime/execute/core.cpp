@@ -264,7 +264,7 @@ void Core::make_safe() noexcept {
 }
 
 void Core::raise(FaultEvent event) noexcept {
-    if (measure_) event.time_ns = monotonic_ns();
+    event.time_ns = measure_ ? monotonic_ns() : info_.start_ns;
     board_.count(event, id_);
     faults_.push(event);  // when full the newest is lost but counted
 }

@@ -137,7 +137,7 @@ std::vector<FaultRecord> Session::faults() const {
     state_->collect_faults();
     std::vector<FaultRecord> records(state_->fault_log.begin(), state_->fault_log.end());
     const std::int64_t now = now_ns();
-    for (FaultRecord& record : records) record.age_ns = record.age_ns == 0 ? 0 : now - record.age_ns;
+    for (FaultRecord& record : records) record.age_ns = now - record.age_ns;
     return records;
 }
 
