@@ -53,6 +53,12 @@ class Reference(Case):
         self.assertEqual(len(self.names()), len(index.links))
         self.assertIn('<h2 id="pins">', (folder / "sum2.html").read_text())
 
+    def test_defaults_are_the_shortest_number_that_is_read_as_the_same(self):
+        page = self.good("doc", "fir") + self.good("doc", "furuta")
+        self.assertIn("below 0.5 (default 0.1)\n", page)
+        self.assertIn("rad (default 0)\n", page)
+        self.assertNotIn("0000)", page)
+
     @unittest.skipUnless(shutil.which("groff"), "no groff here")
     def test_man_pages_are_read_without_a_warning(self):
         self.assertEqual("", self.good("doc", "--all", "--man", "--output", "man9"))

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
@@ -279,7 +280,9 @@ private:
 class RealArgument {
 public:
     RealArgument(Component&, const char* name, double fallback, const char* doc, ArgumentOptions options = {}) {
-        const std::string text = Argument::ask(name, std::to_string(fallback).c_str(), doc, options);
+        char shortest[32] = {};  // that is read as the same number again
+        std::to_chars(shortest, shortest + sizeof shortest - 1, fallback);
+        const std::string text = Argument::ask(name, shortest, doc, options);
         char* end = nullptr;
         value_ = std::strtod(text.c_str(), &end);
         if (text.empty() || *end != '\0' || !std::isfinite(value_)) throw std::invalid_argument(std::string(name) + "=" + text + " is not a number");
