@@ -55,7 +55,7 @@ class Topics(DdsCase):
         self.says("sub: topic 'arm/state' is valid again\n")
 
     def test_nothing_is_lost_in_reliable_mode(self):
-        self.subscriber(more="timeout_ms=60000")
+        self.subscriber(more="timeout_ms=60000 depth=4000")  # so many may wait here for one that is sent again
         self.stranger("rate=2000", "count=4000", "depth=4000")  # all are kept until they are there
         self.becomes("sub.received", "4000")
         self.becomes("sub.lost", "0")
@@ -91,6 +91,12 @@ class Topics(DdsCase):
         self.becomes("sub.angle", "5")
         self.says("sub: topic 'arm/state' is no flood any more: ")
         self.becomes("sub.flood", "FALSE")
+
+    def test_what_of_a_flood_is_not_looked_at_is_not_lost(self):
+        self.subscriber(more="timeout_ms=60000 flood_limit=500 depth=4000")
+        self.stranger("rate=0", "count=4000", "depth=4000")
+        wait_until(lambda: int(self.value("sub.received", "subscriber"), 0) > 3900, "almost all are shown: the last may not be looked at")
+        self.assertEqual("0", self.value("sub.lost", "subscriber"))
 
     def test_a_clock_that_is_off_does_not_make_samples_old_or_valid(self):
         self.subscriber(more="timeout_ms=1000")

@@ -98,7 +98,7 @@ class Cyclone(DdsCase):
         self.becomes("pub.matched", "1", "ours")
 
     def test_it_writes_a_group_of_pins(self):
-        self.machine("ours", f"{THREAD}loadrt dds_subscribe names=sub topic=state type=test::State {FIELDS} domain={DOMAIN} timeout_ms=60000\naddf sub servo\n")
+        self.machine("ours", f"{THREAD}loadrt dds_subscribe names=sub topic=state type=test::State {FIELDS} domain={DOMAIN} timeout_ms=60000 depth=200\naddf sub servo\n")
         writer = self.writer("state", State)
         self.becomes("sub.matched", "1", "ours")
         wait_until(lambda: writer.get_matched_subscriptions(), "Cyclone has found us")

@@ -82,6 +82,9 @@ private:
             arrivals_ = 0;
         }
         last_.store(s.monotonic_ns, std::memory_order_relaxed);
+        if (s.writer == writer_ && s.sequence > message_.sequence) message_.lost += s.sequence - message_.sequence - 1;
+        writer_ = s.writer;
+        message_.sequence = s.sequence;
         if (arrivals_ > static_cast<std::uint64_t>(flood_limit_) && ++skipped_ % 16 != 0) {
             ++message_.received;
             return;
@@ -93,9 +96,6 @@ private:
                                " bytes here); it is not used: the type is made of other fields, or not final");
             return;
         }
-        if (s.writer == writer_ && s.sequence > message_.sequence) message_.lost += s.sequence - message_.sequence - 1;
-        writer_ = s.writer;
-        message_.sequence = s.sequence;
         ++message_.received;
         message_.monotonic_ns = s.monotonic_ns;
         const std::int64_t transit = s.received_ns - s.source_ns;
@@ -209,7 +209,10 @@ newest, whole.
 
 `valid` says that a sample came within `timeout_ms` by this machine's own steady clock; when it falls, fields with `=VALUE` take this value, the
 others stay, and a fault is raised. It rises again by itself. `age-ms` counts from the publisher's cycle, so it needs clocks that agree; when they do
-not (`clock-differs`) it counts from the arrival. `lost` are gaps in a publisher's numbers.
+not (`clock-differs`) it counts from the arrival.
+
+`lost` are gaps in a publisher's numbers. With `reliable=1` what is missing is sent again, while the publisher has it among its newest `depth` and
+no more than `depth` came after it here: a subscriber that must have every sample, also when its computer stood still, needs a `depth` of so many.
 
 `silent`: there is a publisher and nothing has come for `silence_ms`. `wrong-type`: somebody has the topic with another type. Each is
 said once on standard error. `ros=` as in `dds_publish`; joints are found by name, in any order.
