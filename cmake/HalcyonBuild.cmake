@@ -18,6 +18,7 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
 set(HALCYON_COMPONENT_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/components")
+set(CMAKE_INSTALL_RPATH_USE_LINK_PATH ON)  # a library that is not in the system's folders, OpenCV in /opt for one, is found once installed, too
 
 # No fused multiply-add behind our back: the same netlist gives the same bytes on every machine.
 add_compile_options(-Wall -Wextra -Wpedantic "$<$<COMPILE_LANGUAGE:CXX>:-Wconversion;-Wshadow>" -ffp-contract=off)
@@ -41,22 +42,51 @@ else()
     set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")
 endif()
 
+# Optional packages, a file of each, and for the script `hal` the part of the tree that needs it: a build configures again when one of them
+# was installed or removed since, and forgets the files of one that is gone.
+file(STRINGS "${PROJECT_SOURCE_DIR}/cmake/optional" optional REGEX "/")
+list(TRANSFORM optional REPLACE "^[^ ]+ ([^ ]+).*" "\\1")
+file(GLOB optional CONFIGURE_DEPENDS ${optional})
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/optional")
+get_cmake_property(variables CACHE_VARIABLES)
+list(FILTER variables INCLUDE REGEX "^HALCYON_(OPENCV_.|YAML|EDIT|CMARK)")
+foreach(variable IN LISTS variables)
+    if(IS_ABSOLUTE "${${variable}}" AND NOT EXISTS "${${variable}}")
+        unset(${variable} CACHE)
+    endif()
+endforeach()
+
 # halcyon_unity(TARGET [ALONE SOURCE...]): compiles the sources of a target eight at a time: without optimisation most of the time goes into
 # reading the same headers. Two sources of such a target must not give one name to different things, not even in anonymous namespaces;
-# those ALONE do, and are compiled one by one. Only for sources that nothing optimises: of the others a change compiles one, not eight.
+# those ALONE do, and are compiled one by one, as are those that cmake/alone.awk finds. For sources that nothing optimises; for the others
+# with HALCYON_QUICK only, because then a change compiles eight of them.
 function(halcyon_unity target)
     cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
     if(HALCYON_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
         set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+        get_target_property(sources ${target} SOURCES)
+        list(FILTER sources INCLUDE REGEX "[.]cpp$")
+        list(FILTER sources EXCLUDE REGEX "^[$]<")
+        execute_process(COMMAND awk -f "${PROJECT_SOURCE_DIR}/cmake/alone.awk" ${sources} WORKING_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}"
+                        OUTPUT_VARIABLE found ERROR_QUIET)
+        string(REGEX REPLACE "\n" ";" found "${found}")
+        list(APPEND with_ALONE ${found})
         if(with_ALONE)
             set_source_files_properties(${with_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
         endif()
     endif()
 endfunction()
 
-# The same for what has HALCYON_TOOL_OPTIONS, under a sanitizer only: what users run is compiled source by source.
+# The same for what is optimised.
+function(halcyon_unity_quick)
+    if(HALCYON_QUICK)
+        halcyon_unity(${ARGV})
+    endif()
+endfunction()
+
+# The same for what has HALCYON_TOOL_OPTIONS, which do not optimise it under a sanitizer.
 function(halcyon_unity_tool)
-    if(HALCYON_SANITIZE)
+    if(HALCYON_SANITIZE OR HALCYON_QUICK)
         halcyon_unity(${ARGV})
     endif()
 endfunction()
@@ -90,20 +120,25 @@ if(HALCYON_RTSAN_ARCHIVE)
     target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)
 endif()
 
-# halcyon_folder(NAME DEPENDENCY...): the library halcyon_NAME from all sources in runtime/NAME.
+# halcyon_folder(NAME DEPENDENCY... [ALONE SOURCE...]): the library halcyon_NAME from all sources in runtime/NAME; ALONE as in halcyon_unity().
 function(halcyon_folder name)
+    cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
     file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/${name}/*.cpp")
     if(sources)
         set(scope PUBLIC)
         add_library(halcyon_${name} STATIC ${sources})
+        list(TRANSFORM with_ALONE PREPEND "${PROJECT_SOURCE_DIR}/runtime/${name}/")
+        halcyon_unity_quick(halcyon_${name} ALONE ${with_ALONE})
     else()
         set(scope INTERFACE)
         add_library(halcyon_${name} INTERFACE)
     endif()
     target_include_directories(halcyon_${name} ${scope} "${PROJECT_SOURCE_DIR}/runtime")
-    target_link_libraries(halcyon_${name} ${scope} ${ARGN})
+    target_link_libraries(halcyon_${name} ${scope} ${with_UNPARSED_ARGUMENTS})
 endfunction()
 
+cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_LIBDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_LIBRARIES_FROM_PROGRAMS)
+cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_INCLUDEDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_INCLUDES_FROM_PROGRAMS)
 # The values of runtime/paths.hpp, in the one source that depends on where this build tree lies.
 file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/paths.cpp" @ONLY CONTENT [[
 // SPDX-License-Identifier: MIT
@@ -115,6 +150,8 @@ constinit const std::string_view build_components = "@HALCYON_COMPONENT_OUTPUT_D
 constinit const std::string_view install_components = "@CMAKE_INSTALL_FULL_LIBDIR@/halcyon/components";
 constinit const std::string_view build_python = "@PROJECT_BINARY_DIR@/python";
 constinit const std::string_view install_python = "@CMAKE_INSTALL_FULL_LIBDIR@/halcyon/python";
+constinit const std::string_view libraries_from_programs = "@HALCYON_LIBRARIES_FROM_PROGRAMS@";
+constinit const std::string_view includes_from_programs = "@HALCYON_INCLUDES_FROM_PROGRAMS@";
 constinit const std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk";
 constinit const std::string_view install_includes = "@CMAKE_INSTALL_FULL_INCLUDEDIR@";
 }  // namespace hal::paths

@@ -24,19 +24,24 @@ function(add_hal_component name)
     if(NOT (HALCYON_SANITIZE AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))  # there the sanitizer is in the program only
         target_link_options(${target} PRIVATE "LINKER:-z,defs")
     endif()
-    set_target_properties(${target} PROPERTIES OUTPUT_NAME "${name}" PREFIX "" SUFFIX ".so" LINK_DEPENDS "${map}")
+    set_target_properties(${target} PROPERTIES OUTPUT_NAME "${name}" PREFIX "" SUFFIX ".so" LINK_DEPENDS "${map}"
+        INSTALL_RPATH "$ORIGIN/../..")  # for programs other than hal, which loads the libraries of Halcyon by itself
     if(HALCYON_COMPONENT_OUTPUT_DIRECTORY)
         set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${HALCYON_COMPONENT_OUTPUT_DIRECTORY}")
     endif()
     if(TARGET halcyon_precompiled)  # in this tree: the sdk's header is read once for all components
         target_precompile_headers(${target} REUSE_FROM halcyon_precompiled)
     endif()
-    if(HALCYON_COMPONENT_FOLDER)  # in this tree: the folder below components/ is its group in the reference
+    if(HALCYON_COMPONENT_FOLDER)  # in this tree: the folder below components/ is its group; the summary is for what is not built yet
         list(GET ARGN 0 source)
         cmake_path(ABSOLUTE_PATH source)
+        file(STRINGS "${source}" summary REGEX "^HAL_COMPONENT[(]" LIMIT_COUNT 1)
         cmake_path(RELATIVE_PATH source BASE_DIRECTORY "${HALCYON_COMPONENT_FOLDER}")
         string(REGEX MATCH "^[^/]+" group "${source}")
-        set_property(GLOBAL APPEND_STRING PROPERTY HALCYON_GROUPS "${name} ${group}\n")
+        if(NOT summary MATCHES "^HAL_COMPONENT[(][^\"]*\"[^\"]*\", *\"([^\"]*)\"")
+            set(CMAKE_MATCH_1 "")
+        endif()
+        set_property(GLOBAL APPEND_STRING PROPERTY HALCYON_GROUPS "${name} ${group} ${CMAKE_MATCH_1}\n")
         set_property(GLOBAL APPEND PROPERTY HALCYON_PLUGINS ${target})
     endif()
     set(test "${CMAKE_CURRENT_SOURCE_DIR}")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# What is installed: program, headers of the sdk, and the CMake package. Each component installs itself. The build tree has the same
-# package in the same place, so that -DCMAKE_PREFIX_PATH=BUILD works like an installation.
+# What is installed: headers of the sdk, the CMake package, pages and machines. Programs and components install themselves. The build tree has
+# the same package in the same place, so that -DCMAKE_PREFIX_PATH=BUILD works like an installation. An installation may be moved.
 include(CMakePackageConfigHelpers)
 
 set(HALCYON_PACKAGE_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/Halcyon")
@@ -11,9 +11,18 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cma
 set(HALCYON_PACKAGE_FILES cmake/HalcyonConfig.cmake cmake/HalcyonComponent.cmake cmake/HalcyonTest.cmake cmake/plugin.map)
 install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" DESTINATION "${HALCYON_PACKAGE_DIR}")
 
+add_dependencies(installed halcyon_link halcyon_cia402 halcyon_canopen halcyon_tdma)
+
+# Pages, and the machines to start from, in the order of the tree, so that links between them are right.
+install(FILES LICENSE README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY docs halfiles DESTINATION "${CMAKE_INSTALL_DOCDIR}" USE_SOURCE_PERMISSIONS)
+install(DIRECTORY components drivers runtime tests tools DESTINATION "${CMAKE_INSTALL_DOCDIR}" FILES_MATCHING PATTERN "*.md")
+install(DIRECTORY tests/netlists/semantics DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/netlists")
+
 set(package "${PROJECT_BINARY_DIR}/lib/cmake/Halcyon")
-export(TARGETS halcyon_abi halcyon_sdk halcyon_link halcyon_canopen NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
+export(TARGETS halcyon_abi halcyon_sdk halcyon_link halcyon_cia402 halcyon_canopen NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
 foreach(file IN LISTS HALCYON_PACKAGE_FILES ITEMS "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake")
     cmake_path(GET file FILENAME name)
     configure_file("${file}" "${package}/${name}" COPYONLY)
 endforeach()
+install(FILES tools/wireshark/halcyon.lua DESTINATION "${CMAKE_INSTALL_DATADIR}/halcyon/wireshark")

@@ -2,7 +2,7 @@
 # cmake -DHAL=PROGRAM -DPLUGINS=FOLDER -DTEST=FOLDER -P HalcyonTest.cmake
 # Runs FOLDER/test.hal on the virtual clock; what it prints must be the text of FOLDER/expected.
 set(ENV{HALCYON_PLUGIN_PATH} "${PLUGINS}:$ENV{HALCYON_PLUGIN_PATH}")
-execute_process(COMMAND "${HAL}" sim test.hal WORKING_DIRECTORY "${TEST}" OUTPUT_VARIABLE printed ERROR_VARIABLE said RESULT_VARIABLE status)
+execute_process(COMMAND "${HAL}" sim --quiet test.hal WORKING_DIRECTORY "${TEST}" OUTPUT_VARIABLE printed ERROR_VARIABLE said RESULT_VARIABLE status)
 file(READ "${TEST}/expected" expected)
 if(status EQUAL 0 AND printed STREQUAL expected)
     return()

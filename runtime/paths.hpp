@@ -12,6 +12,8 @@ extern const std::string_view build_components;    ///< folder of the plugins in
 extern const std::string_view install_components;  ///< folder of the plugins once installed
 extern const std::string_view build_python;        ///< folder of the Python module in the build tree
 extern const std::string_view install_python;      ///< folder of the Python module once installed
+extern const std::string_view libraries_from_programs;  ///< from the folder of programs to that of libraries, once installed: `../lib`
+extern const std::string_view includes_from_programs;   ///< the same to that of headers
 extern const std::string_view build_includes;      ///< include path of the sdk in this tree, parts separated by `:`
 extern const std::string_view install_includes;    ///< include path of the sdk once installed
 

@@ -5,10 +5,14 @@
 #include <fmt/core.h>
 #include <getopt.h>
 
-#include "options.hpp"
-#include "say.hpp"
-#include "shell/address.hpp"
-#include "shell/client.hpp"
+#include "cli/output.hpp"
+#include "comp/halcompile.hpp"
+#include "control/client.hpp"
+#include "inspect/play.hpp"
+#include "inspect/record.hpp"
+#include "inspect/shell.hpp"
+#include "machine/address.hpp"
+#include "run/run.hpp"
 
 namespace hal::tools {
 
@@ -17,7 +21,7 @@ namespace {
 constexpr int bad_option = 255;
 
 /// halcmd's letters, which halrun takes too. False: not one of them.
-bool halcmd_letter(int letter, Options& options) {
+bool halcmd_letter(int letter, ExecutionOptions& options) {
     switch (letter) {
     case 'f': options.from_file = true; return true;
     case 'i': options.ini = ::optarg; return true;
@@ -65,7 +69,7 @@ int complete_word() {
 }
 
 int halcmd(int argc, char** argv) {
-    Options options;
+    RemoteShellOptions options;
     options.program = "halcmd";
     options.classic = true;
     for (int letter; (letter = ::getopt(argc, argv, "+RCfi:kqQsvVhe")) != -1;) {
@@ -105,7 +109,7 @@ int end_running(const Options& options) {
 }
 
 int halrun(int argc, char** argv) {
-    Options options;
+    RunOptions options;
     options.program = "halrun";
     options.classic = true;
     for (int letter; (letter = ::getopt(argc, argv, "+IUTfi:kqQsvVhe")) != -1;) {
@@ -132,9 +136,11 @@ int halrun(int argc, char** argv) {
     return run_run(options);
 }
 
-/// halsampler and halstreamer: -c and -n are numbers.
-int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, int (*run)(const Options&)) {
-    Options options;
+/// halsampler and halstreamer: -c and -n are numbers. `take` fills in the letters of one of them.
+template <class O>
+int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, bool (*take)(int letter, std::uint64_t number, O&),
+                        int (*run)(const O&)) {
+    O options;
     options.program = program;
     options.classic = true;
     for (int letter; (letter = ::getopt(argc, argv, letters)) != -1;) {
@@ -144,10 +150,9 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
             return fail(options, fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
         switch (letter) {
         case 'c': options.channel = ::optarg; break;
-        case 'n': options.count = number; break;
-        case 't': options.tag = true; break;
         case 'N': options.name_as_component = ::optarg; break;
-        default: return 1;
+        default:
+            if (!take(letter, number, options)) return 1;
         }
     }
     take_words(options, argc, argv);
@@ -155,10 +160,21 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
     return run(options);
 }
 
-int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", run_record); }
-int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", run_play); }
+bool take_sampler_letter(int letter, std::uint64_t number, RecordOptions& options) {
+    switch (letter) {
+    case 'n': options.count = number; return true;
+    case 't': options.tag = true; return true;
+    default: return false;
+    }
+}
 
-constexpr Classic table[] = {{"halcmd", halcmd}, {"halrun", halrun}, {"halsampler", halsampler}, {"halstreamer", halstreamer}};
+bool take_streamer_letter(int, std::uint64_t, PlayOptions&) { return false; }
+
+int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", take_sampler_letter, run_record); }
+int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", take_streamer_letter, run_play); }
+
+constexpr Classic table[] = {
+    {"halcmd", halcmd}, {"halcompile", halcompile}, {"halrun", halrun}, {"halsampler", halsampler}, {"halstreamer", halstreamer}};
 
 }  // namespace
 

@@ -1,22 +1,60 @@
 // SPDX-License-Identifier: MIT
-// A row per subcommand, and what its options are; those of `hal node` are in declare_node.cpp. No other source includes CLI11.
+// The table of subcommands: a row per command. Its options stand in the command's own header.
 #include "commands.hpp"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fmt/core.h>
+#include <memory>
 #include <optional>
+#include <type_traits>
 #include <unistd.h>
 
-#include "base/diagnostic.hpp"
-#include "base/types.hpp"
-#include "declare_node.hpp"
-#include "options.hpp"
+#include "bus/can/dcf.hpp"
+#include "bus/can/drive.hpp"
+#include "bus/can/dump.hpp"
+#include "bus/can/eds_check.hpp"
+#include "bus/can/flash.hpp"
+#include "bus/can/gateway.hpp"
+#include "bus/can/load.hpp"
+#include "bus/can/lss.hpp"
+#include "bus/can/nodes.hpp"
+#include "bus/can/pdo.hpp"
+#include "bus/can/plan.hpp"
+#include "bus/can/produce.hpp"
+#include "bus/can/read_all.hpp"
+#include "bus/can/record.hpp"
+#include "bus/can/scan.hpp"
+#include "bus/can/sdo_command.hpp"
+#include "bus/can/send.hpp"
+#include "bus/can/sniff.hpp"
+#include "bus/can/tdma.hpp"
+#include "bus/node/kinds.hpp"
+#include "cli/capabilities.hpp"
+#include "cli/option_set.hpp"
+#include "cli/output.hpp"
+#include "comp/compile.hpp"
+#include "comp/new.hpp"
+#include "completion.hpp"
+#include "doc/doc.hpp"
+#include "doc/explain.hpp"
+#include "inspect/doctor.hpp"
+#include "inspect/graph.hpp"
+#include "inspect/play.hpp"
+#include "inspect/record.hpp"
+#include "inspect/shell.hpp"
+#include "inspect/tdma_ping.hpp"
+#include "inspect/tdma_status.hpp"
+#include "inspect/top.hpp"
+#include "machine/source_tree.hpp"
 #include "paths.hpp"
-#include "say.hpp"
+#include "run/check.hpp"
+#include "run/fmt.hpp"
+#include "run/run.hpp"
+#include "run/sim.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal::tools {
 
@@ -26,306 +64,18 @@ struct Subcommand {
     const char* name;     ///< more than one word in a group: "can dump"
     const char* usage;    ///< what may follow the name
     const char* summary;
+    std::unique_ptr<Options> (*make_options)();
     int (*run)(const Options&);  ///< nullptr: in hal-bus
-    void (*declare)(CLI::App&, Options&);
-    bool verbatim = false;  ///< from the first word on everything belongs to the words, `-1` and `--` too
+    bool verbatim;               ///< from the first word on everything belongs to the words, `-1` and `--` too
 };
 
-void words(CLI::App& app, Options& o, const char* name, const char* what, bool required = true) {
-    CLI::Option* option = app.add_option(name, o.words, what);
-    if (required) option->required();
+/// A row. `run` takes the command's own options, O; nullptr: the command is in hal-bus.
+template <class O, auto run>
+constexpr Subcommand command(const char* name, const char* usage, const char* summary, bool verbatim = false) {
+    Subcommand row{name, usage, summary, []() -> std::unique_ptr<Options> { return std::make_unique<O>(); }, nullptr, verbatim};
+    if constexpr (!std::is_null_pointer_v<decltype(run)>) row.run = [](const Options& options) { return run(static_cast<const O&>(options)); };
+    return row;
 }
-
-void named(CLI::App& app, Options& o, const char* what) { app.add_option("-N,--name", o.name, what)->type_name("NAME"); }
-
-void netlists(CLI::App& app, Options& o) {
-    app.add_option("-i,--ini", o.ini, "where [SECTION]KEY is looked up")->type_name("FILE");
-    app.add_flag("-k,--keep-going", o.keep_going, "go on after an error, command by command, as halcmd -k does");
-}
-
-void declare_run(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "netlists (.hal), or an INI file whose [HAL]HALFILE names them", false);
-    app.add_flag("-I,--interactive", o.interactive, "open the shell after loading; leaving it ends the run");
-    for_how_long(app, o, "stop after 10s, 250ms, 2min …; without it: until Ctrl-C");
-    named(app, o, "of this instance, when several run on one machine (default: default)");
-    netlists(app, o);
-    app.add_flag("--no-picture", o.no_picture, "no live picture in the terminal");
-    app.add_option("--node", o.part, "of a netlist for several machines: load the part of this one")->type_name("NAME");
-    app.add_option("--dds", o.dds, "how nodes meet: interfaces=ADDRESS domain=N peers=… (default: on this machine only)")->type_name("SETTINGS");
-}
-
-void declare_sim(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "netlists (.hal), or an INI file whose [HAL]HALFILE names them");
-    for_how_long(app, o, "advance the virtual clock by 10s, 250ms … after loading");
-    app.add_option("--cycles", o.cycles, "advance by so many cycles of the fastest thread after loading")->type_name("N");
-    named(app, o, "of the instance");
-    netlists(app, o);
-    app.add_flag("--report", o.report, "print the timing report on stderr at the end");
-    app.add_option("--node", o.part, "of a netlist for several machines: this one alone; without it all of them together")->type_name("NAME");
-    app.add_option("-e,--execute", o.execute, "execute this command at the end; of several machines: 'NODE: COMMAND'; may be repeated")
-        ->type_name("COMMAND")
-        ->allow_extra_args(false);
-}
-
-void declare_shell(CLI::App& app, Options& o) {
-    named(app, o, "of the instance to talk to; needed when several run");
-    app.add_flag("-f,--file", o.from_file, "the first word is a file of commands; without one: standard input");
-    app.add_option("-e,--execute", o.execute, "execute this command; may be repeated")->type_name("COMMAND")->allow_extra_args(false);
-    app.add_option("-i,--ini", o.ini, "where [SECTION]KEY is looked up, with -f")->type_name("FILE");
-    app.add_flag("-k,--keep-going", o.keep_going, "go on after an error");
-    app.add_flag("-s,--script", o.script, "output for scripts: no titles, one line per item");
-    app.add_flag("--json", o.json, "output as JSON");
-    app.add_flag("--echo", o.echo, "echo each command on stderr");
-    app.add_flag_callback("-q", [&o] { o.loudness = Loudness::errors; }, "print errors only (the default)");
-    app.add_flag_callback("-Q", [&o] { o.loudness = Loudness::nothing; }, "print nothing, not even errors");
-    app.add_flag_callback("-v", [&o] { o.loudness = Loudness::results; }, "print the result of each command");
-    app.prefix_command();
-}
-
-void declare_check(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "netlists, in the order they would be loaded");
-    app.add_option("-i,--ini", o.ini, "where [SECTION]KEY is looked up")->type_name("FILE");
-}
-
-void declare_fmt(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "netlists to format in place; - formats standard input");
-    app.add_flag("--check", o.check, "change nothing; exit code 1 when a file is not formatted");
-}
-
-void declare_graph(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "netlists, in the order they would be loaded");
-    app.add_option("-o,--output", o.output, "a .svg or .dot file; without it DOT goes to standard output")->type_name("FILE");
-    app.add_option("--node", o.part, "of a netlist for several machines: the part of this one")->type_name("NAME");
-    app.add_option("-i,--ini", o.ini, "where [SECTION]KEY is looked up")->type_name("FILE");
-}
-
-void declare_doc(CLI::App& app, Options& o) {
-    words(app, o, "COMPONENT", "as loadrt takes it; without it: all there are", false);
-    app.add_flag("--markdown", o.markdown, "as Markdown");
-    app.add_flag("--json", o.json, "as JSON");
-    app.add_flag("--man", o.man, "as a troff page: hal doc pid --man | man -l -");
-    app.add_flag("--html", o.html, "as a web page");
-    app.add_flag("--all", o.all, "all components, into the folder of --output: web pages with an index, or what is chosen above");
-    app.add_option("-o,--output", o.output, "a folder; each component gets a file")->type_name("DIR");
-}
-
-void declare_new(CLI::App& app, Options& o) {
-    words(app, o, "component NAME", "the name loadrt will know; letters, digits, - and _");
-    app.add_option("--folder", o.folder, "made for it (default: NAME, here)")->type_name("DIR");
-}
-
-void declare_compile(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or .c (LinuxCNC's hal.h)");
-    app.add_option("-o,--output", o.output, "install here; default: ~/.local/share/halcyon/components")->type_name("DIR");
-    app.add_flag("--check-rt", o.check_rt, "run it 1000 cycles with random and extreme values; name what is not real time");
-    app.add_flag("--keep", o.keep, "of a .comp file: leave the C text that was made of it in this folder");
-}
-
-void declare_explain(CLI::App& app, Options& o) {
-    words(app, o, "CODE", "what stands in [brackets] at the end of a message; without it: all", false);
-}
-
-void declare_record(CLI::App& app, Options& o) {
-    words(app, o, "CHANNEL FILE", "the number of the sampler (default 0), then the file to write (default: standard output)", false);
-    app.add_option("-c,--channel", o.channel, "a sampler by its number or by its instance's name")->type_name("CHANNEL");
-    app.add_flag("--csv", o.csv, "comma-separated, with a line of column names first");
-    app.add_option("-n,--count", o.count, "end after so many samples")->type_name("N");
-    app.add_flag("-t,--tag", o.tag, "begin each line with the sample's number");
-    named(app, o, "of the instance to read from");
-}
-
-void declare_play(CLI::App& app, Options& o) {
-    words(app, o, "CHANNEL FILE", "the number of the streamer (default 0), then the file to read (default: standard input)", false);
-    app.add_option("-c,--channel", o.channel, "a streamer by its number or by its instance's name")->type_name("CHANNEL");
-    named(app, o, "of the instance to feed");
-}
-
-void declare_doctor(CLI::App& app, Options& o) {
-    app.add_option("--seconds", o.seconds, "how long each measurement takes (default 2)")->type_name("S")->check(CLI::Range(0.0, 3600.0));
-    app.add_flag("--json", o.json, "as JSON");
-}
-
-void declare_top(CLI::App& app, Options& o) {
-    for_how_long(app, o, "in a terminal: end after 10s …; without it: until Ctrl-C");
-    app.add_flag("--once", o.once, "the table once, as it is when the output is no terminal");
-    app.add_flag("--json", o.json, "once, as JSON");
-    app.add_option("--dds", o.dds, "how to meet others: interfaces=ADDRESS domain=N peers=… (default: on this machine only)")->type_name("SETTINGS");
-}
-
-void declare_completion(CLI::App& app, Options& o) { words(app, o, "SHELL", "bash"); }
-
-constexpr const char* address = "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; options follow: ?bitrate=500k&datarate=2M&listen";
-
-void filtered(CLI::App& app, Options& o) {
-    app.add_option("--filter", o.filters, "only frames with this identifier, or ID/MASK: 181, 180/780, 18FF0000/1FFF0000; may be repeated")
-        ->type_name("ID[/MASK]")->allow_extra_args(false);
-    app.add_option("-n,--count", o.count, "end after so many frames")->type_name("N");
-}
-
-void declare_can_dump(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS", address);
-    filtered(app, o);
-    for_how_long(app, o, "end after 2s, 500ms …; without it: until Ctrl-C");
-    app.add_flag("--json", o.json, "a JSON object per line; the last one holds the statistics");
-}
-
-void declare_can_send(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS FRAME", "where to; then frames as candump writes them: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
-    const auto take = [&o](const std::string& text) {
-        const auto ns = parse_duration_ns(text, false);
-        if (!ns || *ns <= 0) throw CLI::ValidationError("--every", fmt::format("'{}' is not a duration; write 10ms, 1s or 500us", text));
-        o.every_ns = *ns;
-    };
-    app.add_option_function<std::string>("--every", take, "send them again and again, this far apart")->type_name("TIME");
-    for_how_long(app, o, "with --every: end after 2s, 500ms …; without it: until Ctrl-C");
-    app.add_option("-n,--count", o.count, "with --every: end after so many rounds")->type_name("N");
-}
-
-void declare_can_record(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS FILE", "what to listen to; a .log file (candump's form) or a .pcapng file (Wireshark)");
-    filtered(app, o);
-    for_how_long(app, o, "end after 2s, 500ms …; without it: until Ctrl-C");
-}
-
-void declare_can_replay(CLI::App& app, Options& o) {
-    words(app, o, "FILE ADDRESS", "a candump log, pcapng or pcap file; the bus its frames are sent to, at their times");
-    app.add_option("--speed", o.speed, "so many times as fast (default 1)")->type_name("FACTOR");
-}
-
-void declare_can_load(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS", address);
-    for_how_long(app, o, "measure for 5s, 500ms … (default 2s)");
-}
-
-void declare_can_nmt(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS COMMAND NODE", "the bus; start, stop, preop, reset or reset-comm; a node 1-127 (or 0x..), or all");
-}
-
-void declare_can_scan(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS", address);
-    for_how_long(app, o, "listen for 2s, 500ms … (default 1s); as long as the slowest heartbeat finds stopped nodes too");
-    app.add_flag("--json", o.json, "as JSON");
-}
-
-/// An option that takes a duration.
-void duration(CLI::App& app, const char* name, std::int64_t& to, const char* what) {
-    const auto take = [name, &to](const std::string& text) {
-        const auto ns = parse_duration_ns(text, false);
-        if (!ns || *ns < 0) throw CLI::ValidationError(name, fmt::format("'{}' is not a duration; write 10ms, 1s or 500us", text));
-        to = *ns;
-    };
-    app.add_option_function<std::string>(name, take, what)->type_name("TIME");
-}
-
-void described(CLI::App& app, Options& o, const char* what = "names and types of the node's objects: an EDS, DCF or XDD file") {
-    app.add_option("--eds", o.eds, what)->type_name("FILE");
-}
-
-void answered(CLI::App& app, Options& o) { duration(app, "--timeout", o.timeout_ns, "an answer comes within 1s, 200ms … (default 500ms); then it is asked again"); }
-
-void transferred(CLI::App& app, Options& o) {
-    described(app, o);
-    app.add_option("--type", o.type, "of the value: u8 … u64, i8 … i64, r32, r64, bool, visible_string, octet_string, domain")->type_name("TYPE");
-    app.add_flag("--block", o.block, "by block transfer, where the node knows it");
-    app.add_flag("--segmented", o.segmented, "never by block transfer");
-    answered(app, o);
-}
-
-void declare_can_sdo_read(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE OBJECT", "the bus; a node 1-127; objects: INDEX:SUB in hex (6041, 1018:1) or names of the EDS");
-    transferred(app, o);
-    app.add_option("-o,--output", o.output, "the bytes as they are into this file")->type_name("FILE");
-    app.add_flag("--json", o.json, "as JSON, a line per object");
-}
-
-void declare_can_sdo_write(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE OBJECT VALUE", "the bus; a node 1-127; INDEX:SUB in hex or a name of the EDS; a number, 0x…, text, or hex bytes");
-    transferred(app, o);
-    app.add_option("--from", o.input, "the bytes of this file instead of a value")->type_name("FILE");
-}
-
-void declare_can_dcf_read(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE", "the bus; a node 1-127");
-    described(app, o, "the node's description, EDS, DCF or XDD: which objects it has");
-    app.add_option("-o,--output", o.output, "the DCF; without it: standard output")->type_name("FILE");
-    answered(app, o);
-}
-
-void declare_can_dcf_write(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE FILE", "the bus; a node 1-127; a DCF");
-    app.add_flag("--check", o.check, "only say what differs; exit code 1 if anything does");
-    answered(app, o);
-}
-
-void declare_can_pdo(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE", "the bus; a node 1-127");
-    described(app, o);
-    answered(app, o);
-}
-
-void declare_can_pdo_show(CLI::App& app, Options& o) {
-    declare_can_pdo(app, o);
-    app.add_flag("--json", o.json, "as JSON, a line per PDO");
-}
-
-void declare_can_pdo_switch(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE PDO", "the bus; a node 1-127; rpdo1 … or tpdo1 …");
-    answered(app, o);
-}
-
-void declare_can_pdo_map(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS NODE PDO OBJECT", "the bus; a node 1-127; rpdo1 … or tpdo1 …; what it carries: INDEX:SUB or a name, with /BITS where the length is not known");
-    described(app, o);
-    answered(app, o);
-    app.add_option("--transmission", o.transmission, "type: 0 SYNC after an event, 1-240 every n-th SYNC, 252, 253 on request, 254, 255 on event")
-        ->check(CLI::Range(0, 255))->type_name("N");
-    app.add_option("--id", o.id, "identifier in hex; without it, as it is")->type_name("ID");
-    duration(app, "--inhibit", o.inhibit_ns, "of a TPDO: at least so long between two");
-    duration(app, "--event", o.event_ns, "event timer: a TPDO is sent, an RPDO expected that often");
-}
-
-void declare_can_pdo_watch(CLI::App& app, Options& o) {
-    declare_can_pdo_show(app, o);
-    for_how_long(app, o, "end after 2s, 500ms …; without it: until Ctrl-C");
-    app.add_option("-n,--count", o.count, "end after so many PDOs")->type_name("N");
-}
-
-void declare_can_lss(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS COMMAND", "the bus; scan, switch configuration|waiting, select VENDOR PRODUCT REVISION SERIAL, inquire, node-id N|none, "
-                                     "bit-rate RATE, activate DELAY, store, identify [VENDOR PRODUCT REVISION SERIAL]");
-    duration(app, "--timeout", o.timeout_ns, "an answer comes within 1s, 200ms … (default 1s; of each step of a scan 20ms, twice that with each repetition)");
-}
-
-void declare_can_gateway(CLI::App& app, Options& o) {
-    words(app, o, "ADDRESS", "the buses, as nets 1, 2 …");
-    app.add_option("--socket", o.socket, "a local socket made for it (default: halcyon-canopen-gateway in $XDG_RUNTIME_DIR)")->type_name("PATH");
-    app.add_option("--listen", o.listen, "a TCP port of this machine instead: 127.0.0.1:6000")->type_name("ADDRESS:PORT");
-    app.add_option("--state", o.state, "what `store` keeps, read at the start")->type_name("FILE");
-}
-
-void declare_can_drive(CLI::App& app, Options& o) {
-    app.add_option("--node", o.drive_node, "the drive: 1-127")->type_name("N");
-    app.add_option("--axis", o.drive_axis, "of commands that begin with none: A (the default) to H")->type_name("LETTER");
-    app.add_flag("-k,--keep-going", o.keep_going, "commands from a file or pipe: go on after one that failed");
-    answered(app, o);
-    app.prefix_command();
-}
-
-void declare_canopen_plan(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "the configuration of the network, NAME.canopen");
-    app.add_option("--cycle", o.cycle, "the period of the master's thread, where the SYNC comes with every cycle (default 1ms)")->type_name("TIME");
-    app.add_flag("--json", o.json, "as JSON");
-}
-
-void declare_tdma_plan(CLI::App& app, Options& o) {
-    words(app, o, "FILE", "the schedule of the segment, NAME.tdma or RTnet's tdma.conf");
-    app.add_flag("--json", o.json, "as JSON");
-    app.add_option("--svg", o.output, "a picture of a cycle into this file; -: standard output")->type_name("FILE");
-}
-
-void declare_canopen_check(CLI::App& app, Options& o) { words(app, o, "FILE", "configurations, NAME.canopen"); }
-
-void declare_can_eds_check(CLI::App& app, Options& o) { words(app, o, "FILE", "device descriptions: EDS, DCF, XDD, XDC"); }
 
 // What talks to a bus needs a third of the code, and other libraries: it is in the program hal-bus, which `hal` becomes then.
 // This source is compiled for both.
@@ -336,51 +86,59 @@ void declare_can_eds_check(CLI::App& app, Options& o) { words(app, o, "FILE", "d
 #endif
 
 constexpr Subcommand table[] = {
-    {"run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads", run_run, declare_run},
-    {"sim", "FILE… [--for TIME] [-- ARG…]", "the same on a virtual clock: deterministic, as fast as it goes", run_sim, declare_sim},
-    {"shell", "[COMMAND…]", "talk to a running instance: one command, a file of them, or interactively", run_shell, declare_shell, true},
-    {"check", "FILE…", "everything wrong with netlists that can be known without running them", run_check, declare_check},
-    {"fmt", "FILE…", "format netlists", run_fmt, declare_fmt},
-    {"graph", "FILE… [-o OUT]", "draw netlists", run_graph, declare_graph},
-    {"doc", "[COMPONENT…] [--all --output DIR]", "the manual page of a component", run_doc, declare_doc},
-    {"new", "component NAME [--folder DIR]", "a component of your own to start from: source, CMakeLists.txt, test", run_new, declare_new},
-    {"compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it", run_compile, declare_compile},
-    {"explain", "[CODE]", "what a diagnostic means and what to do", run_explain, declare_explain},
-    {"record", "[CHANNEL] [FILE]", "write what a sampler samples", run_record, declare_record},
-    {"play", "[CHANNEL] [FILE]", "feed a streamer", run_play, declare_play},
-    {"can dump", "ADDRESS [--filter ID[/MASK]] [--for TIME] [--count N] [--json]", "the frames of a CAN bus, and what they mean", ON_BUS(run_can_dump), declare_can_dump},
-    {"can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB", ON_BUS(run_can_send), declare_can_send},
-    {"can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "write what is on a bus to a file", ON_BUS(run_can_record), declare_can_record},
-    {"can replay", "FILE ADDRESS [--speed FACTOR]", "send what was recorded, at its times", ON_BUS(run_can_replay), declare_can_replay},
-    {"can load", "ADDRESS [--for TIME]", "which identifiers fill the bus", ON_BUS(run_can_load), declare_can_load},
-    {"can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take", ON_BUS(run_can_nmt), declare_can_nmt},
-    {"can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity", ON_BUS(run_can_scan), declare_can_scan},
-    {"can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node", ON_BUS(run_can_sdo_read), declare_can_sdo_read},
-    {"can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node", ON_BUS(run_can_sdo_write), declare_can_sdo_write},
-    {"can dcf read", "ADDRESS NODE --eds FILE [-o FILE]", "the settings of a node into a DCF", ON_BUS(run_can_dcf_read), declare_can_dcf_read},
-    {"can dcf write", "ADDRESS NODE FILE [--check]", "the settings of a DCF into a node: what differs, verified", ON_BUS(run_can_dcf_write), declare_can_dcf_write},
-    {"can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry", ON_BUS(run_can_pdo_show), declare_can_pdo_show},
-    {"can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301", ON_BUS(run_can_pdo_map), declare_can_pdo_map},
-    {"can pdo enable", "ADDRESS NODE PDO", "switch a PDO on", ON_BUS(run_can_pdo_enable), declare_can_pdo_switch},
-    {"can pdo disable", "ADDRESS NODE PDO", "switch a PDO off", ON_BUS(run_can_pdo_disable), declare_can_pdo_switch},
-    {"can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass", ON_BUS(run_can_pdo_watch), declare_can_pdo_watch},
-    {"can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify", ON_BUS(run_can_lss), declare_can_lss},
-    {"can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE]", "a CiA 309-3 gateway: programs command the network by lines of text", ON_BUS(run_can_gateway), declare_can_gateway},
-    {"can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "a drive by hand: on, off, go, speed, stop, home, … or a shell of them", ON_BUS(run_can_drive), declare_can_drive, true},
-    {"can eds check", "FILE…", "what is wrong with a device description, and what it holds", ON_BUS(run_can_eds_check), declare_can_eds_check},
-    {"canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes", ON_BUS(run_canopen_check), declare_canopen_check},
-    {"canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times", ON_BUS(run_canopen_plan), declare_canopen_plan},
-    {"tdma plan", "FILE [--json | --svg FILE]", "the slots of an Ethernet segment as a timeline, its load and the latency from input to output", ON_BUS(run_tdma_plan), declare_tdma_plan},
-    {"node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes", ON_BUS(run_node_drive), declare_node_drive},
-    {"node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401", ON_BUS(run_node_io), declare_node_io},
-    {"node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "a simulated axis whose loop is closed over the bus", ON_BUS(run_node_axis_io), declare_node_axis_io},
-    {"node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "a simulated safety I/O node of EN 50325-5, for trying out", ON_BUS(run_node_safe_io), declare_node},
-    {"node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor", ON_BUS(run_node_jr3), declare_node_jr3},
-    {"node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus", ON_BUS(run_node_bootloader), declare_node_bootloader},
-    {"node faults", "", "what simulated devices can do wrong on purpose", ON_BUS(run_node_faults), declare_node_faults},
-    {"top", "", "all instances on this machine and the network, their threads and faults", run_top, declare_top},
-    {"doctor", "", "what on this machine spoils real time", run_doctor, declare_doctor},
-    {"completion", "SHELL", "print a completion script: source <(hal completion bash)", run_completion, declare_completion},
+    command<RunOptions, run_run>("run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads"),
+    command<SimOptions, run_sim>("sim", "FILE… [--for TIME] [-- ARG…]", "the same on a virtual clock: deterministic, as fast as it goes"),
+    command<RemoteShellOptions, run_shell>("shell", "[COMMAND…]", "talk to a running instance: one command, a file of them, or interactively", true),
+    command<CheckOptions, run_check>("check", "FILE… [--assume NAME]", "everything wrong with netlists that can be known without running them"),
+    command<FmtOptions, run_fmt>("fmt", "FILE…", "format netlists"),
+    command<GraphOptions, run_graph>("graph", "FILE… [-o OUT]", "draw netlists"),
+    command<DocOptions, run_doc>("doc", "[COMPONENT…] [--all --output DIR]", "the manual page of a component"),
+    command<NewOptions, run_new>("new", "component NAME [--folder DIR]", "a component of your own to start from: source, CMakeLists.txt, test"),
+    command<CompileOptions, run_compile>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
+    command<ExplainOptions, run_explain>("explain", "[CODE]", "what a diagnostic means and what to do"),
+    command<RecordOptions, run_record>("record", "[CHANNEL] [FILE]", "write what a sampler samples"),
+    command<PlayOptions, run_play>("play", "[CHANNEL] [FILE]", "feed a streamer"),
+    command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "the frames of a CAN bus, and what they mean"),
+    command<SendOptions, ON_BUS(run_can_send)>("can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),
+    command<CanRecordOptions, ON_BUS(run_can_record)>("can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "write what is on a bus to a file"),
+    command<CanReplayOptions, ON_BUS(run_can_replay)>("can replay", "FILE ADDRESS [--speed FACTOR]", "send what was recorded, at its times"),
+    command<BusLoadOptions, ON_BUS(run_can_load)>("can load", "ADDRESS [--for TIME]", "which identifiers fill the bus"),
+    command<NodesOptions, ON_BUS(run_can_nodes)>("can nodes", "ADDRESS [--for TIME] [--json]", "who is alive, by listening: state, heartbeat age, newest emergencies"),
+    command<SniffOptions, ON_BUS(run_can_sniff)>("can sniff", "ADDRESS [--filter ID[/MASK]] [--for TIME]", "a line per identifier, changed bytes marked"),
+    command<GenerateOptions, ON_BUS(run_can_generate)>("can generate", "ADDRESS [--every TIME] [--id ID[-ID]] [--count N]", "send random or counting frames"),
+    command<ProduceOptions, ON_BUS(run_can_produce)>("can produce", "ADDRESS heartbeat NODE|sync|guarding NODE [--every TIME]", "send a heartbeat, SYNC or guarding requests periodically"),
+    command<FlashOptions, ON_BUS(run_can_flash)>("can flash", "ADDRESS NODE IMAGE [--program N]", "another program for a node: stop, erase, download, start"),
+    command<NmtOptions, ON_BUS(run_can_nmt)>("can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take"),
+    command<ScanOptions, ON_BUS(run_can_scan)>("can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity"),
+    command<SdoReadOptions, ON_BUS(run_can_sdo_read)>("can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node"),
+    command<SdoWriteOptions, ON_BUS(run_can_sdo_write)>("can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node"),
+    command<ReadAllOptions, ON_BUS(run_can_read_all)>("can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]", "every object of a node that its EDS lists, read-only ones too"),
+    command<DcfReadOptions, ON_BUS(run_can_dcf_read)>("can dcf read", "ADDRESS NODE --eds FILE [-o FILE]", "the settings of a node into a DCF"),
+    command<DcfWriteOptions, ON_BUS(run_can_dcf_write)>("can dcf write", "ADDRESS NODE FILE [--check]", "the settings of a DCF into a node: what differs, verified"),
+    command<PdoShowOptions, ON_BUS(run_can_pdo_show)>("can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry"),
+    command<PdoMapOptions, ON_BUS(run_can_pdo_map)>("can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301"),
+    command<PdoSwitchOptions, ON_BUS(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO", "switch a PDO on"),
+    command<PdoSwitchOptions, ON_BUS(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO", "switch a PDO off"),
+    command<PdoWatchOptions, ON_BUS(run_can_pdo_watch)>("can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass"),
+    command<LssOptions, ON_BUS(run_can_lss)>("can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify"),
+    command<GatewayOptions, ON_BUS(run_can_gateway)>("can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE] | --connect HOST:PORT|PATH [COMMAND…]", "a CiA 309-3 gateway, commanded by lines of text; or its client"),
+    command<DriveOptions, ON_BUS(run_can_drive)>("can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "a drive by hand: on, off, go, speed, stop, home, … or a shell of them", true),
+    command<EdsCheckOptions, ON_BUS(run_can_eds_check)>("can eds check", "FILE…", "what is wrong with a device description, and what it holds"),
+    command<CanopenCheckOptions, ON_BUS(run_canopen_check)>("canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes"),
+    command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>("canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times"),
+    command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "the slots of an Ethernet segment as a timeline, its load and the latency from input to output"),
+    command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "the stations of a segment as a running machine hears them"),
+    command<TdmaPingOptions, run_tdma_ping>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "whether a station of a segment answers, and how long that takes"),
+    command<DriveNodeOptions, ON_BUS(run_node_drive)>("node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes"),
+    command<IoNodeOptions, ON_BUS(run_node_io)>("node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401"),
+    command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>("node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "a simulated axis whose loop is closed over the bus"),
+    command<NodeOptions, ON_BUS(run_node_safe_io)>("node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "a simulated safety I/O node of EN 50325-5, for trying out"),
+    command<Jr3NodeOptions, ON_BUS(run_node_jr3)>("node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor"),
+    command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>("node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus"),
+    command<Options, ON_BUS(run_node_faults)>("node faults", "", "what simulated devices can do wrong on purpose"),
+    command<TopOptions, run_top>("top", "", "all instances on this machine and the network, their threads and faults"),
+    command<DoctorOptions, run_doctor>("doctor", "", "what on this machine spoils real time"),
+    command<CompletionOptions, run_completion>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };
 
 /// Commands of two and more words have a first word in common.
@@ -390,9 +148,9 @@ struct Group {
 };
 
 constexpr Group groups[] = {
-    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nmt, sdo, dcf, pdo, lss, drive, gateway; eds check"},
+    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
     {"canopen", "checks and plans a CANopen network"},
-    {"tdma", "plans the time slots of an Ethernet segment"},
+    {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; what they can do wrong: faults"},
 };
 
@@ -440,38 +198,10 @@ std::string help_of(const Group& group) {
     return text + fmt::format("\nhal help {} COMMAND says more.\n", group.name);
 }
 
-std::unique_ptr<CLI::App> app_of(const Subcommand& row, Options& options) {
-    auto app = std::make_unique<CLI::App>(row.summary, fmt::format("hal {}", row.name));
-    row.declare(*app, options);
-    app->set_help_flag("-h,--help", "print this");
-    app->allow_extras();  // worded here, not by the library
-    return app;
-}
-
 std::string help_of(const Subcommand& row) {
-    Options options;
-    const auto app = app_of(row, options);
-    std::string text = fmt::format("hal {}: {}\n\nusage: hal {} {}\n", row.name, row.summary, row.name, row.usage);
-    for (const CLI::Option* option : app->get_options())
-        if (option->get_positional()) text += fmt::format("\n  {:24} {}", option->get_name(true), option->get_description());
-    text += "\n";
-    for (const CLI::Option* option : app->get_options([](const CLI::Option* o) { return o->nonpositional(); })) {
-        const std::string value = option->get_expected_min() > 0 && !option->get_type_name().empty() ? " " + option->get_type_name() : "";
-        std::string names;
-        for (const std::string& name : option->get_snames()) names += (names.empty() ? "-" : ", -") + name;
-        for (const std::string& name : option->get_lnames()) names += (names.empty() ? "--" : ", --") + name;
-        text += fmt::format("  {:24} {}\n", names + value, option->get_description());
-    }
-    return text;
-}
-
-std::vector<std::string> option_names(const CLI::App& app) {
-    std::vector<std::string> names;
-    for (const CLI::Option* option : app.get_options()) {
-        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-        for (const std::string& name : option->get_snames()) names.push_back("-" + name);
-    }
-    return names;
+    const auto options = row.make_options();
+    const OptionSet set(*options, row.name, row.summary);
+    return fmt::format("hal {}: {}\n\nusage: hal {} {}\n", row.name, row.summary, row.name, row.usage) + set.help();
 }
 
 int no_such_command(const std::vector<std::string>& typed) {
@@ -500,42 +230,39 @@ int help(const std::vector<std::string>& about) {
     if (about.empty()) return print(overview()) ? 0 : 1;
     if (const Found found = find(about); found.row) return print(help_of(*found.row)) ? 0 : 1;
     if (const Group* group = find_group(about.front()); group && about.size() == 1) return print(help_of(*group)) ? 0 : 1;
+    // The common beginning of some commands: can sdo, can eds.
+    std::string start, text;
+    for (const std::string& word : about) start += word + " ";
+    for (const Subcommand& row : table)
+        if (std::string_view(row.name).starts_with(start)) text += fmt::format("  {:16} {}\n", row.name, row.summary);
+    if (!text.empty()) return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nhal help {}COMMAND says more.\n", start, text, start)) ? 0 : 1;
     return no_such_command(about);
 }
 
 /// Reads `arguments` into `options`. Returns an exit code when that is the end of it.
 std::optional<int> read(const Subcommand& row, std::vector<std::string> arguments, Options& options) {
-    const auto app = app_of(row, options);
-    std::vector<std::string> behind;
+    OptionSet set(options, row.name, row.summary);
     if (const auto dashes = std::find(arguments.begin(), arguments.end(), "--"); !row.verbatim && dashes != arguments.end()) {
         options.arguments.assign(dashes + 1, arguments.end());
         arguments.erase(dashes, arguments.end());
     }
-    try {
-        std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
-        app->parse(std::move(arguments));
-    } catch (const CLI::CallForHelp&) {
-        return print(help_of(row)) ? 0 : 1;
-    } catch (const CLI::RequiredError&) {
-        return fail(options, fmt::format("something is missing; type: hal {} {}", row.name, row.usage));
-    } catch (const CLI::ParseError& error) {
-        std::string what = error.what();
-        constexpr std::string_view unread = "Could not convert: ";  // --speed = fast
-        if (const auto equals = what.find(" = "); what.starts_with(unread) && equals != std::string::npos)
-            what = fmt::format("{}: '{}' is no number", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3));
-        std::replace(what.begin(), what.end(), '\n', ' ');
-        return fail(options, fmt::format("{}; see: hal help {}", what, row.name));
+    const OptionSet::Reading reading = set.read(std::move(arguments));
+    switch (reading.outcome) {
+    case OptionSet::Outcome::good: break;
+    case OptionSet::Outcome::help: return print(help_of(row)) ? 0 : 1;
+    case OptionSet::Outcome::missing: return fail(options, fmt::format("something is missing; type: hal {} {}", row.name, row.usage));
+    case OptionSet::Outcome::bad: return fail(options, fmt::format("{}; see: hal help {}", reading.problem, row.name));
     }
-    const std::vector<std::string> extra = app->remaining();
+    const std::vector<std::string>& extra = reading.extra;
     if (row.verbatim) {
         if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' && !(extra.front() == "--")) {
-            const std::string hint = did_you_mean(extra.front(), option_names(*app));
+            const std::string hint = did_you_mean(extra.front(), set.names());
             return fail(options, fmt::format("there is no option '{}'; {}", extra.front(),
                                              hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
         }
         options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"), extra.end());
     } else if (!extra.empty()) {
-        const std::string hint = did_you_mean(extra.front(), option_names(*app));
+        const std::string hint = did_you_mean(extra.front(), set.names());
         const bool option = extra.front().starts_with('-');
         return fail(options, fmt::format("{} '{}'; {}", option ? "there is no option" : "nothing is expected at", extra.front(),
                                          option && !hint.empty() ? hint : fmt::format("see: hal help {}", row.name)));
@@ -545,9 +272,12 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
 
 /// Does not return, unless there is no such program.
 int become_bus_program(char** argv) {
+    pass_on_capabilities();
     const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hal-bus");
     ::execv(program.c_str(), argv);
-    return fail(Options{}, fmt::format("cannot start {}: {}; it belongs beside hal: build or install Halcyon again", program.string(), std::strerror(errno)));
+    if (errno == ENOENT && build_on_demand("bus")) ::execv(program.c_str(), argv);
+    return fail(Options{}, fmt::format("cannot start {}: {}; it belongs beside hal: type ./hal build bus in the source tree, or install Halcyon again",
+                                       program.string(), std::strerror(errno)));
 }
 
 }  // namespace
@@ -561,21 +291,21 @@ int run_command_line(int argc, char** argv) {
     if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
     if (!row) return no_such_command(all);
     if (!row->run) return become_bus_program(argv);
-    Options options;
-    options.program = fmt::format("hal {}", row->name);
-    if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, options)) return *end;
-    return row->run(options);
+    const auto options = row->make_options();
+    options->program = fmt::format("hal {}", row->name);
+    if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, *options)) return *end;
+    return row->run(*options);
 }
 
 std::vector<Completion> completions() {
     std::vector<Completion> all;
     for (const Subcommand& row : table) {
-        Options options;
+        const auto options = row.make_options();
         const std::string name = row.name;
         const auto space = name.find(' ');
         if (all.empty() || all.back().name != name.substr(0, space)) all.push_back({name.substr(0, space), {}, {}});
         if (space != name.npos) all.back().words.push_back(name.substr(space + 1, name.find(' ', space + 1) - space - 1));
-        for (std::string& option : option_names(*app_of(row, options)))
+        for (std::string& option : OptionSet(*options, row.name, row.summary).names())
             if (auto& known = all.back().options; std::find(known.begin(), known.end(), option) == known.end()) known.push_back(std::move(option));
     }
     return all;

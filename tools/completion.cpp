@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // `hal completion bash`: a completion script, made from the table of subcommands.
+#include "completion.hpp"
+
 #include <fmt/core.h>
 
+#include "cli/output.hpp"
 #include "commands.hpp"
-#include "options.hpp"
-#include "say.hpp"
 
 namespace hal::tools {
 
@@ -41,7 +42,7 @@ void replace(std::string& text, std::string_view what, std::string_view by) { te
 
 }  // namespace
 
-int run_completion(const Options& options) {
+int run_completion(const CompletionOptions& options) {
     if (options.words != std::vector<std::string>{"bash"}) return fail(options, "only bash is known; type: hal completion bash");
     std::string commands = "help", cases, groups;
     for (const Completion& completion : completions()) {

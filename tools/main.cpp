@@ -1,15 +1,41 @@
 // SPDX-License-Identifier: MIT
-// The program `hal`; under the names halcmd, halrun, halsampler and halstreamer it behaves as LinuxCNC hands expect.
+// The program `hal`; under the names halcmd, halcompile, halrun, halsampler and halstreamer it behaves as LinuxCNC hands expect.
 #include <csignal>
+#include <cstdio>
+#include <cstdlib>
 #include <string_view>
+#include <sys/auxv.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 #include "classic.hpp"
+#include "cli/standard_streams.hpp"
 #include "commands.hpp"
 
+namespace {
+
+/// Started by loadusr, this program ends with the machine. The spawner asked the kernel for that, but the kernel forgets it when it starts a
+/// program with file capabilities.
+void end_with_machine() {
+    const char* const machine = std::getenv("HALCYON_PARENT");
+    const long pid = machine ? std::strtol(machine, nullptr, 10) : 0;
+    if (pid <= 0 || ::getppid() != pid) return;
+    ::prctl(PR_SET_PDEATHSIG, static_cast<unsigned long>(SIGTERM));
+    if (::getppid() != pid) std::raise(SIGTERM);  // it ended meanwhile
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+    hal::tools::open_standard_streams();
     std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves is an error of that write, not the end of a machine
+    // With file capabilities the kernel leaves no core dump and gives /proc/PID to root. Whoever may start this program may load code into
+    // it, so there is nothing in it to keep from him; nobody without the same capabilities can trace it all the same.
+    if (::getauxval(AT_SECURE) != 0) ::prctl(PR_SET_DUMPABLE, 1UL);
+    end_with_machine();
     std::string_view program = argc > 0 ? argv[0] : "hal";
     program.remove_prefix(program.find_last_of('/') + 1);
-    if (const hal::tools::Classic* classic = hal::tools::find_classic(program)) return classic->run(argc, argv);
-    return hal::tools::run_command_line(argc, argv);
+    const hal::tools::Classic* const classic = hal::tools::find_classic(program);
+    const int status = classic ? classic->run(argc, argv) : hal::tools::run_command_line(argc, argv);
+    return status == 0 && (std::ferror(stdout) != 0 || hal::tools::print_failed()) ? 1 : status;
 }

@@ -70,7 +70,7 @@ public:
     hal::Param<std::uint32_t> tune_cycles{*this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
     hal::Param<double>       tune_effort{*this, "tune-effort", "output swings between bias + this and bias - this", {.initial = 0.5}};
 
-    hal::Outs<double> error_i_out{*this, "errorI", debug, "integral of the error"};
+    hal::Outs<double> error_i_out{*this, "errorI", debug, "integral of the error, limited by maxerrorI, before Igain; 0 while not enabled"};
     hal::Outs<double> error_d_out{*this, "errorD", debug, "derivative of the error"};
     hal::Outs<double> command_d_out{*this, "commandD", debug, "first derivative of command"};
     hal::Outs<double> command_dd_out{*this, "commandDD", debug, "second derivative of command"};
@@ -233,13 +233,15 @@ private:
 
 HAL_COMPONENT(Pid, "pid", "Proportional/integral/derivative controller with feed-forward, limits and auto-tuning", R"(
     error     = command - feedback, limited to ±maxerror, reduced by deadband
-    errorI   += error * period, limited to ±maxerrorI, held while it would push further into saturation
+    errorI   += error * period, limited to ±maxerrorI; held while output is limited and error has the sign of what is cut off
     errorD    = slope of command - slope of feedback, limited to ±maxerrorD
     commandD, commandDD, commandDDD = derivatives of command, limited to ±maxcmdD, ±maxcmdDD, ±maxcmdDDD
     output    = bias + error * Pgain + errorI * Igain + errorD * Dgain
               + command * FF0 + commandD * FF1 + commandDD * FF2 + commandDDD * FF3, limited to ±maxoutput
 
-A limit of 0 is no limit. With `error-previous-target` (the default) the error is taken against the target of the
+Here `error` is what is left behind `maxerror` and `deadband`; the pin `error` shows it before both. `errorI` to `feedbackD` are pins with `debug=1`
+only. `errorI` is the integral itself, in units of `error` times seconds and before Igain; it is 0 while `enable` is FALSE and while auto-tuning
+is on. A limit of 0 is no limit. With `error-previous-target` (the default) the error is taken against the target of the
 previous cycle, the one the feedback had time to follow. The slopes are `command-deriv` and `feedback-deriv` when those are
 linked, else differences of this cycle and the one before; `maxerror`, `deadband` and `error-previous-target` do not change
 them, so Dgain damps inside the deadband too. In the cycle in which `index-enable` falls, a slope that is a difference stays as

@@ -2,13 +2,13 @@
 // Load arguments that dds_publish and dds_subscribe have in common.
 #pragma once
 
-#include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "engine.hpp"
 #include "hal/component.hpp"
+#include "hal/message_log.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
 #include "schema.hpp"
@@ -118,11 +118,15 @@ public:
     std::int64_t       depth() const noexcept { return depth_; }
     const std::string& said_topic() const noexcept { return topic_.get(); }
     /// A line on standard error, never in a cycle.
-    void say(const std::string& sentence) const { std::fputs((name + ": " + sentence + "\n").c_str(), stderr); }
+    void say(const std::string& sentence) const { log_.print(sentence); }
+    /// Prints what say() only counted; several times a second. Never in a cycle.
+    void flush_log() const { log_.flush(); }
 
     const std::string name;  ///< of the instance
 
 private:
+    mutable hal::MessageLog log_{name};
+
     static constexpr std::size_t  longest_name = 250;  // 255 in DDS, of which ROS 2 takes some
     static constexpr std::int64_t longest_ms = 86'400'000;
 

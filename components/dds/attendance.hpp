@@ -2,6 +2,8 @@
 // What a component with a topic has while it runs.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <memory>
 #include <string>
@@ -34,6 +36,17 @@ public:
         endpoint_.reset();
         beacon_.reset();
         participant_.reset();
+    }
+    /// A participant by the prefix of its GUIDs: its name, or the prefix. After begin(). Not in a cycle.
+    std::string called(const std::array<std::uint8_t, 16>& guid) const {
+        std::string digits;
+        for (std::size_t n = 0; n < 12; ++n) {
+            constexpr const char* hex = "0123456789abcdef";
+            digits += hex[guid[n] >> 4], digits += hex[guid[n] & 15];
+        }
+        for (const Known& k : participant_->known())
+            if (std::equal(k.prefix.begin(), k.prefix.end(), guid.begin()) && !k.name.empty()) return "'" + k.name + "' (" + digits + ")";
+        return digits;
     }
     /// After begin(). [any]
     Endpoint& endpoint() const noexcept { return *endpoint_; }

@@ -35,7 +35,7 @@ struct FilterBiquad : hal::Component {
     hal::Out<double>        out{*this, "out", "the filtered input", {.finite = true}};
     hal::In<bool>           enable{*this, "enable", "FALSE: out is in", {.initial = true}};
     hal::In<double>         frequency{*this, "frequency", "corner or centre; may change at any time", {.initial = 100.0, .unit = "Hz"}};
-    hal::In<double>         quality{*this, "Q", "bandpass, notch and peak: centre through width", {.initial = 2.0}};
+    hal::In<double>         quality{*this, "Q", "bandpass, notch and peak: centre frequency divided by bandwidth, of each section", {.initial = 2.0}};
     hal::In<double>         gain{*this, "gain", "of a peak, or of a notch at its deepest", {.initial = 0.0}};
     hal::Out<bool>          valid{*this, "valid",
                          "FALSE: frequency is not between 0 and half the thread's rate, or Q or gain make no filter; out is in"};
@@ -87,7 +87,9 @@ private:
 
 HAL_COMPONENT(FilterBiquad, "filter_biquad", "Butterworth low and high pass of any even order, band pass, notch, peak", R"(
 A row of second-order sections. `lowpass` and `highpass` are Butterworth's of the given `order`, 3 dB down at `frequency`; the others are `order`
-equal sections with the centre `frequency` and the quality `Q`. `frequency` may be moved while the filter works, within a cycle: for a resonance
+equal sections with the centre `frequency` and the quality `Q` = `frequency` / bandwidth, each. The bandwidth of one section lies between the
+frequencies at which a band pass or a notch (of `gain` 0) is 3 dB down, and a peak has half of its gain in dB; of two band passes in a row it
+is 0.64 of that. `lowpass` and `highpass` do not use `Q`: their sections have those of Butterworth. `frequency` may be moved while the filter works, within a cycle: for a resonance
 that changes with a speed. The filter starts as if its first input had always been there, so nothing jumps.
 
 LinuxCNC's `biquad` is there too; this one needs no edge to start, has more shapes and does not stop at order 2.

@@ -76,13 +76,42 @@ private:
         give(given, path, 0.0, given != wanted);
     }
 
-    /// m x" + c x' + k x = e, solved by one implicit step (backward Euler): stable for any m, c, k that are not negative.
+    /// The place and the speed of an admittance.
+    struct Motion {
+        double place = 0.0, speed = 0.0;
+    };
+    /// m x" + c x' + k x = e after dt, with e constant during dt: the exact solution, whatever m, c, k >= 0 are.
+    static Motion after(Motion now, double e, double m, double c, double k, double dt) noexcept {
+        if (k > 0.0 && k * dt * dt < 1e-10 * (m + c * dt)) e -= k * now.place, k = 0.0;  // e / k would lose digits
+        if (m <= 0.0) {
+            if (c <= 0.0) return k > 0.0 ? Motion{e / k, (e / k - now.place) / dt} : now;
+            if (k <= 0.0) return {now.place + e / c * dt, e / c};
+            const double rest = e / k, place = rest + (now.place - rest) * std::exp(-k / c * dt);
+            return {place, (e - k * place) / c};
+        }
+        if (k <= 0.0) {
+            if (c <= 0.0) return {now.place + (now.speed + 0.5 * e / m * dt) * dt, now.speed + e / m * dt};
+            const double end = e / c, gone = -std::expm1(-c / m * dt);  // the share of the way to the end speed
+            return {now.place + end * dt + (now.speed - end) * (m / c) * gone, now.speed + (end - now.speed) * gone};
+        }
+        const double rest = e / k, y = now.place - rest, a = 0.5 * c / m, square = k / m, gap = a * a - square;
+        double       even = 0.0, odd = 0.0;  // exp(-a dt) cosh(s dt), exp(-a dt) sinh(s dt) / s, with s = sqrt(gap), imaginary below 0
+        const double s = std::sqrt(std::fabs(gap));
+        if (s * dt < 1e-6) {
+            even = std::exp(-a * dt), odd = even * dt;
+        } else if (gap > 0.0) {
+            const double slow = std::exp(-square / (a + s) * dt), fast = std::exp(-(a + s) * dt);
+            even = 0.5 * (slow + fast), odd = 0.5 * (slow - fast) / s;
+        } else {
+            even = std::exp(-a * dt) * std::cos(s * dt), odd = std::exp(-a * dt) * std::sin(s * dt) / s;
+        }
+        return {rest + y * (even + a * odd) + now.speed * odd, now.speed * (even - a * odd) - square * y * odd};
+    }
+
     void comply(double e, double path, double path_speed, double dt) noexcept {
-        const double m = std::fmax(mass, 0.0), c = std::fmax(damping, 0.0), k = std::fmax(stiffness, 0.0);
-        const double weight = m / dt + c + k * dt;
-        const double speed = weight > 0.0 ? (m / dt * speed_ + e - k * offset_) / weight : 0.0, moved = offset_ + speed * dt;
-        const double kept = within(moved, max_offset);
-        if (std::isfinite(moved)) offset_ = kept, speed_ = kept == moved ? speed : 0.0;
+        const Motion next = after({offset_, speed_}, e, std::fmax(mass, 0.0), std::fmax(damping, 0.0), std::fmax(stiffness, 0.0), dt);
+        const double moved = next.place, kept = within(moved, max_offset);
+        if (std::isfinite(moved) && std::isfinite(next.speed)) offset_ = kept, speed_ = kept == moved ? next.speed : 0.0;
         give(0.0, path + offset_, path_speed + speed_, kept != moved);
     }
 
@@ -112,6 +141,8 @@ private:
 
 HAL_COMPONENT(ForceControl, "force_control", "Force control of one axis: direct, by an admittance, or as an impedance", R"(
 **0, explicit direct.** effort = FF0 command + PID(command - force) - velocity-damping velocity. The fastest; needs an actuator that takes a force.
+The integral adds error × period in every cycle, this one's error included (backward rectangles); the derivative is the difference of this
+error and the last, divided by the period.
 
 **1, explicit indirect.** The error of the force moves the position that an inner loop follows: offset = A(s) (command - force) with the admittance
 
@@ -119,7 +150,8 @@ HAL_COMPONENT(ForceControl, "force_control", "Force control of one axis: direct,
 
 and `position-out` = position-command + offset. Works with any position-controlled drive. With `k` 0 the admittance integrates and no error
 remains; with `k` the error is shared with the spring. It is stable against a wall of stiffness K when the inner loop is fast
-against K / c.
+against K / c. The admittance is solved exactly for an error that is constant during the cycle (zero-order hold): no period makes it
+unstable, and it does not depend on the period how fast it moves.
 
 **2, impedance.** effort = k (path - position) + c (path' - velocity) + command: the axis is a spring about the path; force follows from how far the
 path lies inside the wall, and is as good as that is known. Needs no force sensor.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimation/furuta_identification.hpp"
 #include "hal/component.hpp"
 
 namespace {
@@ -19,6 +20,10 @@ struct FurutaControl : hal::Component {
     hal::In<double> pendulum_angle{*this, "pendulum-angle", "of the pendulum; 0 hangs", {.unit = "rad"}};
     hal::In<double> pendulum_velocity{*this, "pendulum-velocity", "of the pendulum", {.unit = "rad/s"}};
     hal::In<double> pendulum_age{*this, "pendulum-age", "how old the pendulum's values are; they are led on by so much", {.unit = "s"}};
+    hal::In<bool>   identify{*this,
+                           "identify",
+                           "TRUE: the rig's parameters are identified while it moves; FALSE: they are exactly those given below",
+                             {.initial = true}};
     hal::In<double> arm_command{*this, "arm-command", "where the arm is wanted", {.unit = "rad"}};
 
     hal::In<double> gain_arm{*this, "gain-arm", "balance: torque per angle of the arm", {.unit = "N*m/rad"}};
@@ -35,22 +40,30 @@ struct FurutaControl : hal::Component {
     hal::Out<std::uint32_t> phase{*this, "phase", "0 off, 1 swinging up, 2 balancing"};
     hal::Out<bool>          balanced{*this, "balanced", "upright within upright-angle for upright-time"};
     hal::Out<std::uint32_t> catches{*this, "catches", "how often it went from swinging up to balancing"};
+    hal::Out<bool>          homed{
+        *this,
+        "homed",
+        "FALSE: the pendulum swings about another angle than 0, as after a start with a pendulum that did not hang still; no torque",
+                 {.initial = true}};
+    hal::Out<double> zero_offset{
+        *this, "zero-offset", "the angle about which the pendulum swings, as identified", {.unit = "rad", .finite = true}};
+    hal::Out<double> identified_frequency{
+        *this, "identified-frequency", "of small swings with the arm held, as identified", {.unit = "rad/s", .finite = true}};
     hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles in which an angle or a speed was no number; the torque is 0 then"};
 
     hal::Param<double> max_acceleration{*this, "max-acceleration", "swing-up: of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
     hal::Param<double> energy_gain{
         *this, "energy-gain", "swing-up: how many times max-acceleration is asked for when all the energy is missing", {.initial = 20.0}};
     hal::Param<double> energy_target{
-        *this, "energy-target", "swing-up: of energy; above 1, so that it arrives in spite of friction", {.initial = 1.1}};
+        *this, "energy-target", "swing-up: of energy; above 1, so that it arrives in spite of friction", {.initial = 1.15}};
     hal::Param<double> centre_gain{
-        *this, "centre-gain", "swing-up: acceleration per angle of the arm from arm-command", {.initial = 10.0, .unit = "1/s^2"}};
+        *this, "centre-gain", "swing-up: acceleration per angle of the arm from arm-command", {.initial = 15.0, .unit = "1/s^2"}};
     hal::Param<double> centre_damping{
         *this, "centre-damping", "swing-up: acceleration per speed of the arm", {.initial = 0.0, .unit = "1/s"}};
-    hal::Param<double> max_velocity{
-        *this,
-        "max-arm-velocity",
-        "swing-up: an arm that turns faster is braked before anything else; one and a half times as fast ends a balance",
-        {.initial = 5.5, .unit = "rad/s"}};
+    hal::Param<double> max_velocity{*this,
+                                    "max-arm-velocity",
+                                    "swing-up: an arm that turns faster is braked before anything else; a quarter faster ends a balance",
+                                    {.initial = 6.5, .unit = "rad/s"}};
     hal::Param<double> catch_angle{
         *this, "catch-angle", "nearer to upright than this it balances, if that is going to succeed", {.initial = 0.4, .unit = "rad"}};
     hal::Param<double> lose_angle{
@@ -79,6 +92,8 @@ struct FurutaControl : hal::Component {
 
     hal::Function run{*this, "update", &FurutaControl::update, "one step of swing-up or balance"};
 
+    void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
+
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         State        s{arm_angle - arm_command, pendulum_angle, arm_velocity, pendulum_velocity};
@@ -87,14 +102,17 @@ struct FurutaControl : hal::Component {
             bad_inputs = bad_inputs + 1;
             balanced = false;
             upright_s_ = 0.0;
+            identification_.forget_motion();
             return give(0.0, 0.0);
         }
+        learn(s, dt);
         lead(s);
         const double tilt = std::remainder(s.pendulum - std::numbers::pi, 2.0 * std::numbers::pi);
         // seen from the turning arm: what the pendulum would have upright if the arm went on at this speed
         const double spread = s.arm_speed * std::sin(tilt),
-                     kinetic = 0.5 * swing_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
-        const double part = weight_moment > 0.0 ? (kinetic + weight_moment * (1.0 + std::cos(tilt))) / (2.0 * weight_moment) : 0.0;
+                     kinetic = 0.5 * rig_.pendulum_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
+        const double weight = rig_.weight_moment;
+        const double part = weight > 0.0 ? (kinetic + weight * (1.0 + std::cos(tilt))) / (2.0 * weight) : 0.0;
         const double known = std::isfinite(part) ? part : 0.0;
         from_upright = tilt;
         energy = known;
@@ -114,9 +132,41 @@ private:
         double arm, pendulum, arm_speed, pendulum_speed;
     };
 
+    /// The rig as given, or as identified from its motion. A pendulum that turns out to hang elsewhere than at 0 is not driven: every
+    /// torque would be for another angle. Turning `enable` off and on begins anew.
+    void learn(const State& s, double dt) noexcept {
+        const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling, weight_moment, friction};
+        const bool usable = given.arm_inertia > 0.0 && given.pendulum_inertia > 0.0 && given.coupling > 0.0 && given.weight_moment > 0.0;
+        if (!identify || !usable) {
+            rig_ = given;
+            homed = true;
+            identification_ = {};
+            return;
+        }
+        const bool again = enable && !enabled_;
+        enabled_ = enable;
+        if (given != identification_.nominal() || dt != identification_.dt() || (again && !homed)) {
+            identification_.restart(given, dt);
+            homed = true;
+        }
+        identification_.add({arm_angle, s.pendulum, s.arm_speed, s.pendulum_speed, torque}, pendulum_age, now_ == Phase::swing_up);
+        rig_ = identification_.estimate();
+        if (homed && enable && identification_.zero_is_wrong()) {
+            homed = false;
+            if (faults_ != nullptr)
+                faults_->raise(
+                    faults_, this,
+                    "not homed: the pendulum swings about {} rad instead of 0; no torque until it hangs still, its encoder is zeroed, and "
+                    "enable is turned off and on",
+                    identification_.zero_offset());
+        }
+        zero_offset = identification_.zero_offset();
+        identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
+    }
+
     void choose(double tilt, const State& s) noexcept {
-        if (!enable) now_ = Phase::off;
-        else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle || std::fabs(s.arm_speed) >= 1.5 * max_velocity || !gains_valid) {
+        if (!enable || !homed) now_ = Phase::off;
+        else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle || std::fabs(s.arm_speed) >= 1.25 * max_velocity || !gains_valid) {
             const bool can = gains_valid && std::fabs(tilt) < catch_angle && succeeds(tilt, s);
             now_ = can ? Phase::balance : Phase::swing_up;
             if (can) catches = catches + 1;
@@ -141,7 +191,7 @@ private:
             s.arm += dt * (s.arm_speed + 0.5 * dt * rates.arm), tilt += dt * (s.pendulum_speed + 0.5 * dt * rates.pendulum);
             s.arm_speed += dt * rates.arm, s.pendulum_speed += dt * rates.pendulum;
             s.pendulum = tilt + std::numbers::pi;
-            if (!(std::fabs(tilt) < lose_angle && std::fabs(s.arm_speed) < part_of_speed * 1.5 * fastest)) return false;
+            if (!(std::fabs(tilt) < lose_angle && std::fabs(s.arm_speed) < part_of_speed * 1.25 * fastest)) return false;
             if (std::fabs(tilt) < upright_angle && std::fabs(s.pendulum_speed) < 1.0 && std::fabs(s.arm_speed) < fastest) return true;
         }
         return false;
@@ -152,18 +202,20 @@ private:
     double pumped(double part, const State& s) const noexcept {
         const double limit = std::fabs(max_acceleration), sin = std::sin(s.pendulum), cos = std::cos(s.pendulum);
         const double wanted = std::clamp(energy_gain * (energy_target - part), -1.0, 1.0) * limit;
-        const double flow = coupling * cos * s.pendulum_speed + swing_inertia * sin * sin * s.arm_speed;
-        const double sign = part < 0.01 && flow == 0.0 ? 1.0 : std::clamp(flow / (0.1 * coupling), -1.0, 1.0);
+        const double flow = rig_.coupling * cos * s.pendulum_speed + rig_.pendulum_inertia * sin * sin * s.arm_speed;
+        const double sign = part < 0.01 && flow == 0.0 ? 1.0 : std::clamp(flow / (0.1 * rig_.coupling), -1.0, 1.0);
         const double centring = -centre_gain * s.arm - centre_damping * s.arm_speed;
         const bool   fast = std::fabs(s.arm_speed) > max_velocity;
         const double acceleration = fast ? std::copysign(limit, -s.arm_speed) : std::clamp(-wanted * sign + centring, -limit, limit);
         // the torque for this acceleration, from the rig's two equations with a" put in from the second
-        const double K = swing_inertia, c = coupling * cos;
+        const double K = rig_.pendulum_inertia, c = rig_.coupling * cos;
         if (!(K > 0.0)) return 0.0;
-        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - weight_moment * sin;
-        return (arm_inertia + K * sin * sin - c * c / K) * acceleration + c / K * on_pendulum +
-               2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed - coupling * sin * s.pendulum_speed * s.pendulum_speed +
-               friction * std::tanh(s.arm_speed / 0.05);
+        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - rig_.weight_moment * sin;
+        const double drive = (rig_.arm_inertia + K * sin * sin - c * c / K) * acceleration + c / K * on_pendulum +
+                             2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed -
+                             rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed + rig_.friction * std::tanh(s.arm_speed / 0.05);
+        // what the pendulum itself does to the arm in the wanted direction is not braked: that would take energy out of both
+        return !fast && wanted > 0.0 && drive * acceleration < 0.0 ? 0.0 : drive;
     }
 
     struct Rates {
@@ -171,12 +223,12 @@ private:
     };
     /// Accelerations under a torque, without friction: the rig's two equations, solved. Zeros when the parameters make no physical sense.
     Rates under(double drive, const State& s) const noexcept {
-        const double K = swing_inertia, sin = std::sin(s.pendulum), cos = std::cos(s.pendulum), c = coupling * cos;
-        const double J = arm_inertia + K * sin * sin, determinant = J * K - c * c;
+        const double K = rig_.pendulum_inertia, sin = std::sin(s.pendulum), cos = std::cos(s.pendulum), c = rig_.coupling * cos;
+        const double J = rig_.arm_inertia + K * sin * sin, determinant = J * K - c * c;
         if (!(determinant > 0.0)) return {0.0, 0.0};
         const double on_arm =
-            drive - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed + coupling * sin * s.pendulum_speed * s.pendulum_speed;
-        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - weight_moment * sin;
+            drive - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed + rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed;
+        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - rig_.weight_moment * sin;
         return {(K * on_arm - c * on_pendulum) / determinant, (J * on_pendulum - c * on_arm) / determinant};
     }
 
@@ -199,6 +251,12 @@ private:
 
     Phase  now_ = Phase::off;
     double upright_s_ = 0.0;
+    bool   enabled_ = false;
+
+    const hal_faults* faults_ = nullptr;
+
+    hal::estimation::FurutaParameters     rig_;
+    hal::estimation::FurutaIdentification identification_;
 };
 
 }  // namespace
@@ -207,6 +265,14 @@ HAL_COMPONENT(FurutaControl, "furuta_control", "Swings a Furuta pendulum up, cat
 **Swinging up.** The arm is accelerated so that energy flows into the pendulum until it has what it needs upright (K. Åström, K. Furuta, *Swinging
 up a pendulum by energy control*, Automatica 36, 2000), while weak springs hold the arm about `arm-command`. The torque for the
 acceleration comes from the rig's equations (see the manual of furuta), so the parameters are those of the rig.
+
+**Identification.** While the pendulum swings, recursive least squares on both equations of motion find the ratios of the rig's inertias, its
+weight and its friction from the measured motion and the commanded torque (L. Ljung, *System Identification*, 2nd edition, 11.2); energy, torques and
+prediction use them. `identified-frequency` shows the result. So parameters that are 20 % off do not matter. `identify` FALSE uses the parameters as they are.
+
+**Homing.** An incremental encoder counts from where it was switched on. If the pendulum did not hang still then, every angle is wrong, and a swing-up
+spins the arm up. The identification also finds the angle about which the pendulum swings, `zero-offset`. Beyond 0.3 rad `homed` becomes FALSE, a fault
+is raised, and there is no torque. Let the pendulum hang still, zero its encoder, and turn `enable` off and on.
 
 **Catching.** Within `catch-angle` of upright, and when the rig's equations, solved 0.6 s ahead with the torque that there is, say that the balance
 succeeds: what comes too fast, or with the arm too fast, swings on and comes again.

@@ -57,6 +57,8 @@ public:
     }
 
 private:
+    static constexpr std::size_t most_problems = 100;  // one more is kept, so that the host knows of it
+
     static bool space(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
 
     void in_files() {
@@ -73,8 +75,9 @@ private:
             for (const char c : name) word = word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
             if (!word)
                 say(begin, std::max(stop, begin + 1), "'" + name + "' is not a name of a matrix", "write NAME = numbers, as in: A = 0 1");
-            for (const Given& other : found)
-                if (same(other.name, name)) say(begin, stop, "'" + name + "' is there twice", "delete one of them");
+            std::string key = name;
+            for (char& c : key) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+            if (++defined_[key] == 2) say(begin, stop, "duplicate matrix '" + name + "'", "delete all but one of them");
             open(name, begin, stop);
             at += equals + 1;
         }
@@ -156,6 +159,7 @@ private:
         found.push_back(std::move(current_));
     }
     void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+        if (problems.size() > most_problems) return;
         problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
     }
 
@@ -168,6 +172,7 @@ public:
 private:
     std::string_view                 text_;
     Given                            current_;
+    std::map<std::string, unsigned>  defined_;  // by name in lower case: how often
     bool                             open_ = false, diagonal_ = false, lost_ = false;
     std::vector<double>              numbers_;
     std::vector<std::vector<double>> rows_;

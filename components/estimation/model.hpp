@@ -18,6 +18,7 @@ namespace hal::estimation {
 class Model {
 public:
     static constexpr std::size_t most_inputs = 8, most_measures = 12, most_constants = 32;
+    static constexpr std::size_t most_problems = 100;  ///< one more is kept, so that the host knows of it
 
     struct State {
         std::string   name;
@@ -77,6 +78,7 @@ private:
     }
     /// At least a letter wide, if there is one.
     void add(Expression::Problem problem) {
+        if (problems.size() > most_problems) return;
         const auto size = static_cast<std::uint32_t>(text_.size());
         problem.begin = std::min(problem.begin, std::max(size, 1u) - 1);
         problem.end = std::min(std::max(problem.end, problem.begin + 1), size);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <atomic>
 #include <chrono>
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <thread>
 
 #include "hal/component.hpp"
+#include "hal/message_log.hpp"
 
 namespace {
 
@@ -26,6 +26,7 @@ struct Message : hal::Component {
         ended_.store(true);
         if (printer_ && printer_->joinable()) printer_->join();
         printer_.reset();
+        log_.close();
     }
 
     void update(hal::Cycle) noexcept {
@@ -41,13 +42,13 @@ private:
         for (bool last = false; !last;) {
             last = ended_.load();  // looked at before the count, so that what came before the end is still printed
             for (; printed_ != wanted_.load(std::memory_order_relaxed); ++printed_) {
-                std::fputs(line_.c_str(), stderr);
-                std::fflush(stderr);
+                log_.print("", text.get());
             }
+            log_.flush();
             if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
         }
     }
-    const std::string line_ = text.get() + "\n";
+    hal::MessageLog log_{""};
     std::atomic<std::uint32_t> wanted_{0};  // the cycle counts up, the printer follows
     std::uint32_t printed_ = 0;             // the printer only
     std::atomic<bool> ended_{false};
@@ -59,8 +60,9 @@ private:
 
 HAL_COMPONENT(Message, "message", "Shows a message when a bit changes", R"(
 An edge of `trigger` puts the instance's text on the standard error of the process that runs the netlist. The cycle only counts; a thread
-of its own prints, some hundredths of a second later. Before the first cycle `trigger` counts as FALSE. A text that is not given is
-`message`.
+of its own prints, some hundredths of a second later, and at most one line per second: more messages of an instance in that time are
+counted, and the next line ends with their number, as in `(12 times in 1.0 s)`. Before the first cycle `trigger` counts as FALSE. A text
+that is not given is `message`.
 
     loadrt message names=oillow,inverterfail messages="Slideway oil low,Spindle inverter fault"
     addf oillow servo

@@ -19,10 +19,13 @@ struct Sampler : hal::Component {
 
     hal::Function run{*this, "", &Sampler::sample, "puts a record of all pins into the FIFO"};
 
-    void start(const hal_host& host) { columns.publish(host); }
+    void start(const hal_host& host) {
+        columns.keep_times();
+        columns.publish(host);
+    }
 
     /// Producer of the FIFO: writes the record, then head (release). The consumer outside writes tail after copying.
-    void sample(hal::Cycle) noexcept {
+    void sample(hal::Cycle cycle) noexcept {
         hal_stream& fifo = columns.fifo();
         const std::uint64_t head = fifo.head;
         std::uint64_t held = head - __atomic_load_n(&fifo.tail, __ATOMIC_ACQUIRE);
@@ -31,6 +34,7 @@ struct Sampler : hal::Component {
             sample_number = next(number);
             if (held < fifo.depth) {
                 write(columns.record(head), number);
+                columns.time(head) = cycle.start_ns();
                 __atomic_store_n(&fifo.head, head + 1, __ATOMIC_RELEASE);
                 ++held;
             } else {

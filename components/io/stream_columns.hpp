@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/stream_times.h"
 
 namespace stream {
 
@@ -42,6 +43,13 @@ public:
         fifo_.data = values_.data();
     }
 
+    /// The records carry a time each: the producer writes it to time() before it moves the head. In the constructor. [setup]
+    void keep_times() {
+        times_.resize(fifo_.depth);
+        timed_.times = times_.data();
+        fifo_.size = sizeof timed_;
+    }
+
     /// Makes the FIFO known to the programs outside as the instance's own name; a host without streams is all right.
     /// In start(). [setup]
     void publish(const hal_host& host) {
@@ -51,6 +59,7 @@ public:
 
     hal_stream& fifo() noexcept { return fifo_; }
     std::deque<AnyPin>& pins() noexcept { return pins_; }
+    std::int64_t& time(std::uint64_t number) noexcept { return times_[number % fifo_.depth]; }
     /// The record with a running number: a value per column, then the sample number. [realtime]
     hal_value* record(std::uint64_t number) noexcept { return &fifo_.data[number % fifo_.depth * (fifo_.columns + 1)]; }
 
@@ -74,7 +83,9 @@ private:
     std::deque<AnyPin> pins_;
     std::string types_;
     std::vector<hal_value> values_;
-    hal_stream fifo_{};
+    std::vector<std::int64_t> times_;
+    hal_timed_stream timed_{};
+    hal_stream& fifo_ = timed_.stream;
 };
 
 }  // namespace stream

@@ -12,7 +12,7 @@ public:
     /// Another cycle has passed. [realtime]
     void advance(std::int64_t period_ns) noexcept { ns_ += ns_ < (std::int64_t{1} << 62) ? period_ns : 0; }
     void restart() noexcept { ns_ = 0; }
-    /// A time that is not a number is none. [realtime]
+    /// A NaN time counts as 0. [realtime]
     bool reached(double seconds) const noexcept { return !(value() < seconds); }
     double limited(double seconds) const noexcept { return reached(seconds) ? std::fmax(seconds, 0.0) : value(); }
 

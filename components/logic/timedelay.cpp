@@ -33,7 +33,8 @@ private:
 
 HAL_COMPONENT(Timedelay, "timedelay", "Time-delay relay", R"(
 `out` becomes TRUE when `in` has been TRUE for `on-delay` seconds without a break, and FALSE when it has been FALSE for
-`off-delay`. The cycle in which `in` changes counts. A delay that is not a number is none.
+`off-delay`. The cycle in which `in` changes counts, so with the same time `out` follows one cycle before `q` of `ton`, which counts from
+the cycle after the edge. A NaN delay counts as 0.
 
     loadrt timedelay names=pressure-ok
     addf pressure-ok servo

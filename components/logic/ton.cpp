@@ -27,7 +27,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Ton, "ton", "IEC timer: on-delay", R"(
-`q` becomes TRUE when `in` has been TRUE for `pt` seconds, and FALSE with `in`.
+`q` becomes TRUE when `in` has been TRUE for `pt` seconds, and FALSE with `in`. The time counts from the cycle of the rising edge, in which
+`et` is 0; `timedelay` counts that cycle too and is one cycle earlier.
 
     loadrt ton names=spin-up
     addf spin-up servo

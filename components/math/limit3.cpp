@@ -7,6 +7,7 @@
 // exactly 0. So the line through the points (q, p) is the largest speed that still stops on the goal, and braking along it
 // never takes more than a. Below the line `out` speeds up. Where a whole `a` more would lead above it, it brakes by a
 // whole `a`; what this leaves over is made up by the last moves, which lie on the line.
+// That leftover makes one move per stop that neither speeds up nor brakes by a whole `a`; it is avoided where whole ones end there, too.
 // With an input that moves at w the same holds for speed and way relative to it: `out` meets it at w.
 #include "hal/component.hpp"
 
@@ -44,12 +45,30 @@ bool too_fast(double speed, double way, double a) {
     return speed > way || (speed > 0.0 && s * s > 2.0 * a * way);
 }
 
-// The speed after `before`, to go `way` by at most `most` in a cycle.
-double next_speed(double way, double before, double most, double a, double m) {
+// True when after a move of `speed` at most `moves` more, each faster or slower by a whole `a` than the one before, lead to where the last
+// one can end the way: it is of at most `a` and within `a` of the one before. None leads beyond the end or back.
+bool lands(double way, double speed, double a, int moves) {
+    const double slack = 1e-9 * a;
+    way -= speed;
+    if (speed < -slack || way < -slack) return false;
+    if (way <= a + slack && std::abs(way - speed) <= a + slack) return true;
+    return moves > 0 && (lands(way, speed - a, a, moves - 1) || lands(way, speed + a, a, moves - 1));
+}
+
+// The speed after `before`, to go `way` by at most `most` in a cycle; speeds and way are relative to the goal, which may be moving.
+double next_speed(double way, double before, double most, double a, double m, bool moving = false) {
     const double side = std::copysign(1.0, way), limit = side * stopping_speed(way, a, m), on_line = std::min(limit, most);
     const double faster = side * before + a, slower = side * before - a, fastest = std::min(faster, most);
     const double last_moves = a * (fading_way(m) + m + 4.0);  // q(m+2)
-    if (side * way - std::clamp(on_line, slower, faster) <= last_moves) return side * on_line;
+    if (side * way - std::clamp(on_line, slower, faster) <= last_moves) {
+        // With a whole `a` in each cycle, when such moves end there as soon, or meet a moving goal at most two cycles later.
+        const int moves_on_line = static_cast<int>(std::min(8.0, std::ceil(on_line / a - rounding)));
+        if (m == 1.0 && limit < most && on_line > slower && on_line < faster && side * way > a)
+            for (int moves = 0; moves <= moves_on_line + (moving ? 0 : -2); ++moves)
+                for (const double speed : {slower, faster})
+                    if (speed <= most && lands(side * way, speed, a, moves)) return side * speed;
+        return side * on_line;
+    }
     return side * (fastest <= limit * (1.0 + rounding) ? fastest : slower);
 }
 
@@ -113,9 +132,9 @@ private:
         // Once on the input it need not be gentle to what the input does within the limits.
         const double m = arrived_ && std::abs(left - w) <= a ? 1.0 : std::max<double>(smooth_steps, 2.0) - 1.0;
 
-        double wanted = w + next_speed(left - w, speed_ - w, left < w ? v + w : v - w, a, m);
-        if (too_fast(-wanted, -down, a)) wanted = std::max(wanted, stopping_speed(down, a, 1.0));
-        if (too_fast(wanted, up, a)) wanted = std::min(wanted, stopping_speed(up, a, 1.0));
+        double wanted = w + next_speed(left - w, speed_ - w, left < w ? v + w : v - w, a, m, w != 0.0);
+        if (too_fast(-wanted, -down, a)) wanted = std::max(wanted, down < 0.0 ? next_speed(down, speed_, v, a, 1.0) : stopping_speed(down, a, 1.0));
+        if (too_fast(wanted, up, a)) wanted = std::min(wanted, up > 0.0 ? next_speed(up, speed_, v, a, 1.0) : stopping_speed(up, a, 1.0));
         wanted = std::clamp(wanted, -v, v);
         const double possible = std::clamp(wanted, speed_ - a, speed_ + a);
         const double slack = 1e-12 * a + rounding * (std::abs(speed_) + std::abs(w));

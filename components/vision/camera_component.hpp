@@ -54,7 +54,8 @@ public:
               "what is wrong: 0 nothing, 1 absent, 2 refused, 3 unplugged, 4 silent, 5 damaged, 6 huge, 7 black, 8 frozen, 9 not of the "
               "calibration's size, 10 ended"),
           max_age_ms(*this, update_, "max-age-ms", "a result that is older is not valid", {.initial = 200.0, .unit = "ms"}),
-          frozen_frames(*this, update_, "frozen-frames", "equal frames in a row that are a frozen camera; 0: never",
+          frozen_frames(*this, update_, "frozen-frames",
+                        "equal frames in a row that are a frozen camera; 0: never; initially 10 for a camera or a scene, 0 for files",
                         {.initial = worker_.source_frozen_after()}) {}
 
     void start() {

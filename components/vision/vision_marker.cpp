@@ -11,7 +11,7 @@ struct Found {
     bool          found = false;
     std::int32_t  id = -1;
     std::uint32_t count = 0;
-    double        u = 0, v = 0, error_px = 0;
+    double        u = 0, v = 0, error_px = 0, ambiguity = 0;
     Pose          pose;
 };
 
@@ -43,6 +43,7 @@ public:
         found.id = best->id;
         found.pose = best->pose;
         found.error_px = best->error_px;
+        found.ambiguity = best->ambiguity;
         for (const auto& corner : best->corners) found.u += corner[0] / 4, found.v += corner[1] / 4;
     }
     Settings settings() const noexcept { return {wanted, size, max_error}; }
@@ -55,6 +56,7 @@ public:
         roll = f.pose.roll_deg, pitch = f.pose.pitch_deg, yaw = f.pose.yaw_deg;
         u = f.u, v = f.v;
         error = f.error_px;
+        ambiguity = f.ambiguity;
     }
 
     hal::In<std::int32_t> wanted{
@@ -72,7 +74,9 @@ public:
     hal::Out<double>        yaw{*this, "yaw", "turn about the z axis, the third", {.unit = "deg"}};
     hal::Out<double>        u{*this, "u", "where its middle is in the frame, from the left", {.unit = "px"}};
     hal::Out<double>        v{*this, "v", "from the top", {.unit = "px"}};
-    hal::Out<double>        error{*this, "error", "how far its corners are from where this pose has them", {.unit = "px"}};
+    hal::Out<double>        error{*this, "error", "distance of its corners from those of this pose, root mean square", {.unit = "px"}};
+    hal::Out<double>        ambiguity{*this, "ambiguity",
+                               "error of this pose over the last frames divided by that of its mirror image: 0 certain, 1 either may be right"};
 
 private:
     hal::TextArgument dictionary_{*this, "dictionary", "4x4_50", "which markers: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
@@ -97,6 +101,11 @@ For a pose it needs the camera's calibration in a file, `camera=`:
 
 or the YAML that OpenCV's calibration writes. And `size`, the length of a black side. Without a calibration there are `id`, `u` and `v`
 only.
+
+**Ambiguity.** The picture of a small, distant or nearly frontal square fits two poses nearly equally well: the right one and its mirror image
+about the line of sight, with the same place and another tilt (T. Collins and A. Bartoli, 2014). Both are followed from frame to frame, and the
+pins show the one with the smaller error over the last frames (each frame counts 0.8 times as much as the next). `ambiguity` is the ratio of the
+two errors. A controller that uses the tilt compares it with a limit, 0.7 for example; `x`, `y`, `z` and `yaw` do not depend on it much.
 
 The work is done in a thread of its own, of which the newest frame is the only one that counts; `update` copies the last result to the pins.
 What a controller acts on is `valid`: it is TRUE when the newest frame that was looked at shows the marker and is not older than

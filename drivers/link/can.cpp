@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "link/can.hpp"
 
+#include <cstdio>
+
 namespace hal::can {
 
 namespace {
@@ -35,6 +37,30 @@ const char* word(State state) noexcept {
 const char* word(Sent sent) noexcept {
     constexpr const char* words[] = {"queued", "full", "bus off", "down", "refused"};
     return words[static_cast<std::size_t>(sent)];
+}
+
+std::string to_string(const Rejected& r) {
+    char address[18];
+    std::snprintf(address, sizeof address, "%02x:%02x:%02x:%02x:%02x:%02x", static_cast<unsigned>(r.from >> 40 & 0xff),
+                  static_cast<unsigned>(r.from >> 32 & 0xff), static_cast<unsigned>(r.from >> 24 & 0xff),
+                  static_cast<unsigned>(r.from >> 16 & 0xff), static_cast<unsigned>(r.from >> 8 & 0xff), static_cast<unsigned>(r.from & 0xff));
+    const std::string who = address;
+    char command[40];
+    std::snprintf(command, sizeof command, "%s (%03Xh)",
+                  r.id == 0x000 ? "NMT command" : r.id == 0x080 ? "SYNC" : r.id == 0x100 ? "TIME" : "set-point", static_cast<unsigned>(r.id));
+    std::string sentence;
+    switch (r.why) {
+    case Rejected::Why::not_the_master:
+        sentence = std::string("rejected ") + command + " from " + who + ": it is not the master; to allow it: also=" + who + " in the link";
+        break;
+    case Rejected::Why::out_of_slot: sentence = std::string("rejected ") + command + " from " + who + ": not in a slot of that station"; break;
+    case Rejected::Why::stranger: sentence = "rejected frame from " + who + ": the schedule has no station of that address"; break;
+    case Rejected::Why::unsigned_frame: sentence = "rejected frame from " + who + ": not signed (key=)"; break;
+    case Rejected::Why::wrong_tag: sentence = "rejected frame from " + who + ": signed with another key, or changed"; break;
+    case Rejected::Why::replayed: sentence = "rejected frame from " + who + ": replayed, or its clock was set back"; break;
+    }
+    if (r.count > 1) sentence += "; " + std::to_string(r.count) + " frames since the last report";
+    return sentence;
 }
 
 }  // namespace hal::can

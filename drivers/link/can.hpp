@@ -20,6 +20,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace hal::can {
 
@@ -118,7 +119,9 @@ struct Statistics {
     std::uint64_t sent_bytes = 0;     ///< their data
     std::uint64_t received = 0;
     std::uint64_t received_bytes = 0;
-    std::uint64_t lost = 0;       ///< frames of others that did not find room here, as far as can be known
+    std::uint64_t lost = 0;       ///< frames of others that did not find room here, or were lost on the way, as far as can be known
+    std::uint64_t lost_on_wire = 0;  ///< of them: those that left their sender and did not come (where frames have numbers)
+    std::uint64_t rejected = 0;   ///< frames of others that their sender may not send (where the driver knows senders)
     std::uint64_t dropped = 0;    ///< own frames that were not queued or were thrown away
     std::uint64_t errors = 0;     ///< error frames, malformed datagrams or lines
     std::uint64_t bus_offs = 0;
@@ -137,18 +140,47 @@ struct Options {
     bool own_frames = false;      ///< own frames come back when they were on the bus, with `own` set
     bool error_frames = false;    ///< error frames are received
     bool listen_only = false;
+    bool stamps = false;          ///< SocketCAN: the kernel's time of each frame, and a count of those it dropped; each frame costs more
     std::uint32_t restart_ms = 100;  ///< wait after bus off before the link returns by itself; 0: only by restart()
     std::size_t send_capacity = 512;
     std::size_t receive_capacity = 2048;
 };
 
-/// What a link is, in words. Valid as long as the link.
+/// Frames of a sender that it may not send, and that were not passed on.
+struct Rejected {
+    enum class Why : std::uint8_t { not_the_master, stranger, out_of_slot, unsigned_frame, wrong_tag, replayed };
+    Why why = Why::not_the_master;
+    std::uint32_t id = 0;    ///< of the first; where it could be read
+    std::uint64_t from = 0;  ///< address of the sender, 48 bits
+    std::uint32_t count = 0; ///< of this sender since the last report
+};
+/// A sentence for a log. [setup]
+std::string to_string(const Rejected&);
+
+/// What a link is and what it is capable of. Valid as long as the link.
 struct Description {
     std::string address;    ///< as it was opened, completed
     std::string transport;  ///< "SocketCAN", "bus in memory", …
     std::uint32_t bit_rate = 0, data_rate = 0;  ///< 0: not known
     bool fd = false;
-    bool simulated = false;  ///< true: no hardware, time is the runtime's
+    bool simulated = false;       ///< true: no hardware, time is the runtime's
+    bool in_memory = false;       ///< a bus in memory: it takes its bit rate from who opens it first
+    bool has_bit_rate = true;     ///< frames share the time of one bus; false: Ethernet carries them
+    bool has_stamps = false;      ///< Options::stamps gives received frames the time of the kernel or of the bus
+    bool fd_on_request = false;   ///< a device without CAN FD rejects Options::fd: only set it when the user asks for it
+    std::string interface{};      ///< of the kernel, "can0"; empty: none
+    std::string segment{};        ///< address of the Ethernet segment that carries the frames; empty: none
+    std::string file{};           ///< of a capture; empty: none
+};
+
+/// How long values take between this station and another, where that is known beforehand. Cycles are this station's, counted from the one in
+/// which a value is written or read here.
+struct DeliveryTime {
+    std::string station;          ///< the other one
+    std::int64_t there_ns = 0;    ///< from the beginning of the cycle that writes a value to the moment when the other one takes it
+    std::int64_t back_ns = 0;     ///< from the change of an input there, just after it was read, to the cycle that has it
+    std::uint32_t there_cycles = 0, back_cycles = 0;
+    std::uint32_t round_trip = 0; ///< cycles from a value here to an input there that follows it, and back
 };
 
 class Simulation;  // link/simulation.hpp
@@ -183,12 +215,16 @@ public:
     virtual bool set_filters(std::span<const Filter>) = 0;
     /// [setup]
     virtual const Description& description() const noexcept = 0;
+    /// [setup] Returns how long values take to each other station; empty: not known.
+    virtual std::vector<DeliveryTime> delivery_times() const { return {}; }
     /// [setup] Waits until receive() has something to give or the time is over. For threads without a cycle. True: there is something.
     virtual bool wait(std::int64_t at_most_ns) = 0;
     /// [any] A descriptor that polls readable when something may have come, or -1.
     virtual int descriptor() const noexcept { return -1; }
     /// [setup] What can be disturbed on a bus in memory; nullptr on all others.
     virtual Simulation* simulation() noexcept { return nullptr; }
+    /// [realtime] receiver. What was rejected since the last call; at most one sender a second. False: nothing.
+    virtual bool rejected(Rejected&) noexcept { return false; }
 };
 
 /// A link, or why there is none: a sentence with place, cause and what to type.
@@ -201,6 +237,9 @@ struct Opened {
 /// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&key=value`. Keys are those of Options (`bitrate=500000` or `500k`,
 /// `datarate=2M`, `fd`, `listen`, `restart=MS`) and win over them. Drivers: can, sim, udp, slcan, cane, replay.
 Opened open(std::string_view address, const Options& options = {});
+/// [setup] Describes the link that open() would return, as far as the address itself determines it; opens nothing. An unknown driver has an
+/// empty `transport`.
+Description describe(std::string_view address);
 
 #pragma GCC visibility pop
 

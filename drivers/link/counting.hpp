@@ -14,7 +14,7 @@ namespace hal::can {
 class Counting {
 public:
     using Count = std::atomic<std::uint64_t>;
-    Count sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, dropped{0}, errors{0}, bus_offs{0}, restarts{0};
+    Count sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, dropped{0}, errors{0}, bus_offs{0}, restarts{0}, rejected{0};
     std::atomic<std::uint8_t> send_errors{0}, receive_errors{0};
     std::atomic<State> state{State::active};
     std::atomic<std::uint32_t> bit_rate{0}, data_rate{0};  ///< 0: unknown, and no load
@@ -48,7 +48,7 @@ public:
         s.sent = of(sent), s.sent_bytes = of(sent_bytes);
         s.received = of(received), s.received_bytes = of(received_bytes);
         s.lost = of(lost), s.dropped = of(dropped), s.errors = of(errors);
-        s.bus_offs = of(bus_offs), s.restarts = of(restarts);
+        s.bus_offs = of(bus_offs), s.restarts = of(restarts), s.rejected = of(rejected);
         s.queued = static_cast<std::uint32_t>(queued);
         s.load = of(load_);
         return s;

@@ -2,26 +2,8 @@
 #include "link/ethernet.hpp"
 
 #include <algorithm>
-#include <map>
-#include <mutex>
-#include <thread>
 
 namespace hal::ethernet {
-
-namespace {
-
-struct Disciplines {
-    std::mutex mutex;
-    std::map<std::string, std::shared_ptr<DisciplineSeat>, std::less<>> by_address;
-};
-Disciplines& disciplines() {
-    static Disciplines all;
-    return all;
-}
-
-std::string_view without_options(std::string_view address) { return address.substr(0, address.find('?')); }
-
-}  // namespace
 
 const char* word(Sent sent) noexcept {
     constexpr const char* words[] = {"queued", "full", "late", "down", "refused"};
@@ -56,33 +38,5 @@ std::optional<Address> parse_address(std::string_view text) noexcept {
 //   1. user counts itself           2. user reads the discipline        3. user uses it, and counts itself out
 //   4. set() stores what is new     5. set() waits for a count of 0
 // All in one order: who has read the old one in 2 was counted before 4, so 5 waits for its 3.
-void DisciplineSeat::set(Discipline* discipline) noexcept {
-    discipline_.store(discipline);
-    while (users_.load() != 0) std::this_thread::yield();
-}
-
-bool offer_discipline(std::string_view address, Discipline* discipline) {
-    auto& all = disciplines();
-    const std::lock_guard lock(all.mutex);
-    auto& seat = all.by_address[std::string(without_options(address))];
-    if (!seat) seat = std::make_shared<DisciplineSeat>();
-    if (discipline == nullptr || !seat->holds(nullptr)) return false;
-    seat->set(discipline);
-    return true;
-}
-
-void withdraw_discipline(Discipline* discipline) {
-    auto& all = disciplines();
-    const std::lock_guard lock(all.mutex);
-    for (auto& [address, seat] : all.by_address)
-        if (seat->holds(discipline)) seat->set(nullptr);
-}
-
-std::shared_ptr<DisciplineSeat> discipline_of(std::string_view address) {
-    auto& all = disciplines();
-    const std::lock_guard lock(all.mutex);
-    const auto found = all.by_address.find(without_options(address));
-    return found == all.by_address.end() || found->second->holds(nullptr) ? nullptr : found->second;
-}
 
 }  // namespace hal::ethernet

@@ -11,7 +11,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -45,12 +44,23 @@ struct Arrival {
     std::int64_t time_ns = 0;             ///< when it arrived, stamped by the kernel or the segment, on the clock of `now_ns`
 };
 
+/// Completes a frame just before it leaves: its number, a check sequence over it. A frame that waited and was dropped has none.
+class Finisher {
+public:
+    virtual ~Finisher() = default;
+    /// It leaves now; of its own length, before padding. [realtime] any thread
+    virtual void leaves(std::span<std::uint8_t> frame) noexcept = 0;
+    /// The newest leaves() of this frame came to nothing: the system did not take it. [realtime] any thread
+    virtual void stayed(std::span<const std::uint8_t> frame) noexcept = 0;
+};
+
 /// When and how a frame leaves.
 struct Launch {
     std::int64_t at_ns = 0;       ///< not before; 0: at once
     std::int64_t guard_ns = 0;    ///< not when it would leave later than this after `at_ns`: it is dropped and counted as late; 0: whenever
     std::uint16_t stamp_at = 0;   ///< place in the frame where 8 bytes, big endian, receive the time of sending; 0: none
     std::int64_t stamp_add_ns = 0;///< added to that time: from the clock of `now_ns` to the one that the receiver expects
+    Finisher* finisher = nullptr; ///< outlives the port; nullptr: the frame is complete
 
     /// A frame of `length` bytes is one, and holds the stamp. [any]
     bool fits(std::size_t length) const noexcept {
@@ -108,13 +118,15 @@ struct Options {
     std::size_t receive_capacity = 256;  ///< frames
 };
 
-/// What a port is, in words.
+/// What a port is and what it is capable of.
 struct Description {
-    std::string address;    ///< as it was opened
+    std::string address;    ///< as it was opened, without options: equal for all ports that share a line
     std::string transport;  ///< "raw Ethernet", "segment in memory", "capture"
-    std::string interface;
+    std::string interface{};
     bool simulated = false; ///< no hardware, time is the runtime's
     std::string remark{};   ///< what it does not have here, in a sentence; empty: nothing
+    bool in_memory = false; ///< a segment in memory: a user may choose its own address
+    bool paced = false;     ///< Options::pacer gives it a thread that launches frames
 };
 
 class Segment;  // link/segment.hpp
@@ -154,53 +166,13 @@ struct Opened {
 /// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&…`: `speed=100`, `policy=block`, `spin=50us`, `mac=02:00:00:00:00:07`,
 /// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`, `forward=2us`, `noise=1us`. They win over the options given.
 Opened open(std::string_view address, const Options& options = {});
+/// [setup] Describes the port that open() would return, as far as the address itself determines it; opens nothing. An unknown driver has an
+/// empty `transport`.
+Description describe(std::string_view address);
 
 /// "02:00:00:00:00:07", and back; nothing when it is none. [any]
 std::string to_string(const Address&);
 std::optional<Address> parse_address(std::string_view text) noexcept;
-
-/// A discipline (TDMA) that decides when frames may leave on its segment. Other users of the segment hand their frames to it.
-class Discipline {
-public:
-    virtual ~Discipline() = default;
-    /// Queues a frame for slot `slot` (RTnet's slot id; 0 the default one), `priority` 0 first … 31 last. It leaves in the slot's next
-    /// turn; `full`: that turn belongs to frames as urgent already, and the caller keeps this one. [realtime] the thread of the discipline's
-    /// transmit function
-    virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority) noexcept = 0;
-    /// Payload bytes that a frame in this slot may have; 0: there is no such slot. [any]
-    virtual std::size_t room(unsigned slot) const noexcept = 0;
-    /// The station may send: synchronous and calibrated. [any]
-    virtual bool ready() const noexcept = 0;
-    virtual const Address& address() const noexcept = 0;  ///< [any]
-};
-
-/// What a user of a discipline holds: the discipline itself may go, and another one come in its place, while the user is at work.
-class DisciplineSeat {
-public:
-    /// Calls `use` with the discipline, which stays until that returns; false, and nothing done, when there is none. [realtime]
-    template <class Use>
-    bool with(Use use) noexcept {
-        users_.fetch_add(1);
-        Discipline* const now = discipline_.load();
-        if (now != nullptr) use(*now);
-        users_.fetch_sub(1);
-        return now != nullptr;
-    }
-    /// [setup] nullptr: it goes; waits until nobody uses it.
-    void set(Discipline* discipline) noexcept;
-    bool holds(const Discipline* discipline) const noexcept { return discipline_.load() == discipline; }  ///< [any]
-
-private:
-    std::atomic<Discipline*> discipline_{nullptr};  // written by set(), read by users
-    std::atomic<unsigned> users_{0};
-};
-
-/// The disciplines of this process, by the address of their port without options ("eth:enp3s0"). [setup]
-/// False: there is one already. It has to be withdrawn before it is destroyed.
-bool offer_discipline(std::string_view address, Discipline* discipline);
-void withdraw_discipline(Discipline* discipline);
-/// nullptr: there is none now.
-std::shared_ptr<DisciplineSeat> discipline_of(std::string_view address);
 
 #pragma GCC visibility pop
 

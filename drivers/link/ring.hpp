@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <memory>
 
-namespace hal::can {
+namespace hal::link {
 
 /// `head_` counts what was put in, `tail_` what was taken out, both for ever; index = count & mask.
 ///   1. writer stores the item at head      2. writer publishes head + 1 (release)
@@ -59,4 +59,4 @@ private:
     alignas(64) std::atomic<std::size_t> tail_{0};  // written by the reader
 };
 
-}  // namespace hal::can
+}  // namespace hal::link

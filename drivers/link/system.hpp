@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace hal::can {
+namespace hal::link {
 
 class Descriptor {
 public:
@@ -51,4 +51,4 @@ inline bool readable_within(int fd, std::int64_t at_most_ns) noexcept {
 
 inline std::string reason(int error = errno) { return std::strerror(error); }
 
-}  // namespace hal::can
+}  // namespace hal::link

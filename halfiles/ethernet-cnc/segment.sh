@@ -18,9 +18,6 @@ if [ -n "${HAL_BRING_UP:-}" ]; then mount -t tmpfs tmpfs /run; fi
 
 hal=${HAL:-hal}
 command -v "$hal" >/dev/null || { say "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
-folder=$(mktemp -d "${TMPDIR:-/tmp}/hal-$machine.XXXXXX" 2>/dev/null) ||
-    { say "nothing can be written in '${TMPDIR:-/tmp}', where what the processes say would be; set TMPDIR=FOLDER" >&2; exit 1; }
-if [ -n "${HAL_BRING_UP:-}" ]; then export XDG_RUNTIME_DIR=$folder; fi  # the folder of the control sockets may be the real root's
 switch=hal-$machine-switch
 pids=()
 carriers=()
@@ -34,6 +31,28 @@ raise_carriers() {
         case $name in ksoftirqd/*) chrt -p "$pid" | grep -q SCHED_OTHER && chrt -f -p 70 "$pid" && carriers+=("$pid") ;; esac
     done 2>/dev/null
     if [ ${#carriers[@]} -gt 0 ]; then say "ksoftirqd, which carries the frames, has real-time priority until this ends"; fi
+}
+
+# How many CPUs other programs use, in tenths, over half a second.
+busy_tenths() {
+    local before after cpu user nice system idle iowait rest
+    read -r cpu user nice system idle iowait rest </proc/stat
+    before=$((user + nice + system + idle + iowait)) after=$((user + nice + system))
+    sleep 0.5
+    read -r cpu user nice system idle iowait rest </proc/stat
+    local all=$((user + nice + system + idle + iowait - before)) used=$((user + nice + system - after))
+    echo $((all > 0 ? used * cpus * 10 / all : 0))
+}
+cpus=$(nproc)
+
+# A machine whose cycles are late because its computer has other work should not be looked for in its netlist.
+warn_if_busy() {
+    local busy
+    busy=$(busy_tenths)
+    if [ "$busy" -gt $((cpus * 3)) ]; then
+        say "this computer is busy: other programs use $((busy / 10)).$((busy % 10)) of its $cpus CPUs. Cycles will be missed, and the machine" \
+            "may stop; the figures below are those of a busy computer"
+    fi
 }
 
 clean_up() {
@@ -51,8 +70,12 @@ make_segment() {
         say "there are namespaces hal-$machine-… already: another bring-up runs; or remove them: ip -all netns delete" >&2
         exit 1
     fi
+    folder=$(mktemp -d "${TMPDIR:-/tmp}/hal-$machine.XXXXXX" 2>/dev/null) ||
+        { say "nothing can be written in '${TMPDIR:-/tmp}', where what the processes say would be; set TMPDIR=FOLDER" >&2; exit 1; }
+    if [ -n "${HAL_BRING_UP:-}" ]; then export XDG_RUNTIME_DIR=$folder; fi  # the folder of the control sockets may be the real root's
     trap clean_up EXIT
     trap 'exit 130' INT TERM
+    warn_if_busy
     say "a switch, and ${#stations[@]} stations on it: ${stations[*]}"
     ip netns add "$switch" || { say "network namespaces are not to be had here" >&2; exit 77; }
     ip -n "$switch" link add bridge0 type bridge stp_state 0 forward_delay 0 mcast_snooping 0 || exit 77
@@ -68,11 +91,17 @@ make_segment() {
     raise_carriers
 }
 
-# start NAME COMMAND…: in the station's namespace; its output goes to a file.
+# start [--cpu N] NAME COMMAND…: in the station's namespace; its output goes to a file. `hal run` puts its thread on the last CPU: whoever
+# must not wait for it belongs on another, N.
 start() {
+    local place=()
+    if [ "$1" = --cpu ]; then
+        [ "$2" -lt "$cpus" ] && taskset -c "$2" true 2>/dev/null && place=(taskset -c "$2")
+        shift 2
+    fi
     local name=$1
     shift
-    WIRE=wire0 ip netns exec "hal-$machine-$name" "$@" >"$folder/$name.log" 2>&1 &
+    WIRE=wire0 ip netns exec "hal-$machine-$name" "${place[@]}" "$@" >"$folder/$name.log" 2>&1 &
     pids+=($!)
     eval "pid_$name=$!"
 }

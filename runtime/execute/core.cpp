@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <functional>
+
+#include <sched.h>
 
 // The real-time guard: the sanitizer's runtime defines these when the program is built with it.
 extern "C" {
@@ -47,29 +50,43 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
     const Guard guard;
     grid_ns_ = grid_ns;
     info_.start_ns = due_ns;
+    std::int64_t end_ns = woke_ns;
     if (measure_) {
+        due_.store(due_ns, std::memory_order_release);
         busy_since_.store(woke_ns, std::memory_order_release);
         wakeup.add(woke_ns - due_ns);
     }
     take_over();
     if (plan_) {
         import();
-        if (running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed)) run();
-        else if (!safe_) make_safe();
+        if (live()) run();
         if (measure_) store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
-        account(measure_ ? monotonic_ns() - woke_ns : 0);
-        publish();
+        end_ns = account(woke_ns);
+        limiter_.flush(measure_ ? woke_ns : due_ns, [this](const FaultEvent& e) noexcept { faults_.push(e); });
+        output();
         answer();
     }
     ++info_.number;
-    cycles.store(cycles.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    finished_.store(end_ns, std::memory_order_release);
+    cycles.store(cycles.load(std::memory_order_relaxed) + 1, std::memory_order_release);
     busy_since_.store(0, std::memory_order_release);
 }
 
 void Core::service() noexcept {
     take_over();
-    if (!running_.load(std::memory_order_acquire) && !safe_) make_safe();
+    if (int free = nobody; !live() && !safe_ && turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) {
+        make_safe();
+        turn_.store(nobody, std::memory_order_release);
+    }
     if (plan_) answer();
+}
+
+void Core::output() noexcept {
+    int free = nobody;
+    if (!turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) return;
+    if (!live() && !safe_) make_safe();
+    publish(*plan_);
+    turn_.store(nobody, std::memory_order_release);
 }
 
 // After a millisecond of other work neither the instances nor the code are in a near cache, and waiting for memory is
@@ -96,7 +113,9 @@ void Core::warm(std::int64_t until_ns) const noexcept {
 
 void Core::skip(std::uint64_t periods) noexcept {
     info_.number += periods;
-    missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_relaxed);
+    // first the deadline, then the number: missed_by() never counts a period twice
+    due_.store(due_.load(std::memory_order_relaxed) + static_cast<std::int64_t>(periods) * period_ns_, std::memory_order_release);
+    missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_release);
     store(*pins_.missed, static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed)));
 }
 
@@ -109,6 +128,7 @@ void Core::take_over() noexcept {
 }
 
 void Core::take(plan::Plan* plan) noexcept {
+    limiter_.clear([this](const FaultEvent& e) noexcept { faults_.push(e); });  // the reasons may be those of a plugin that is unloaded next
     // All old places are read before any new one is written or rebound: a value may move within one image.
     for (std::size_t i = 0; i < plan->carries.size(); ++i) {
         const plan::Carry& carry = plan->carries[i];
@@ -118,6 +138,7 @@ void Core::take(plan::Plan* plan) noexcept {
     for (const plan::Pointer& pointer : plan->pointers) *pointer.to = pointer.slot;
     for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
     plan_ = plan;
+    shown_.store(plan, std::memory_order_release);
     sampled_ = 0;
     taken_.store(plan->epoch, std::memory_order_release);
 }
@@ -140,8 +161,8 @@ void Core::import() noexcept {
     for (const plan::CellImport& from : plan_->cell_imports) from.to->raw = __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED);
 }
 
-void Core::publish() noexcept {
-    for (plan::Export& to : plan_->exports) {
+void Core::publish(plan::Plan& plan) noexcept {
+    for (plan::Export& to : plan.exports) {
         plan::Channel& channel = *to.channel;
         hal_value* values = channel.buffers[channel.back].get();
         for (std::size_t i = 0; i < to.from.size(); ++i) values[i] = *to.from[i];
@@ -160,15 +181,13 @@ void Core::answer() noexcept {
 
 void Core::run() noexcept {
     safe_ = false;
-    in_function_ = true;
+    in_function_.store(true, std::memory_order_relaxed);
     if (setjmp(recover) == 0) {
         const bool first = !passed_.load(std::memory_order_relaxed);
         passed_.store(true, std::memory_order_release);
         if (first && !plan_->init.empty()) {
             // initf: a cycle of its own, so that the cyclic functions start on a fresh period
-            initialising_ = true;
             run_steps(plan_->init_steps.data(), plan_->init_steps.data() + plan_->init.back().end);
-            initialising_ = false;
         } else if (const auto& functions = plan_->functions; !functions.empty()) {
             const plan::Step* const steps = plan_->steps.data();
             const plan::Row* row = plan_->rows.data();
@@ -184,14 +203,12 @@ void Core::run() noexcept {
                 run_rows(row, steps + function.end, steps + functions.back().end);
             }
         }
-        in_function_ = false;
+        in_function_.store(false, std::memory_order_relaxed);
     } else {
         // An exception left a noexcept function; the terminate handler jumped back here.
-        in_function_ = false;
+        in_function_.store(false, std::memory_order_relaxed);
         raise({HAL_FAULT_EXCEPTION, current_function(), info_.number, info_.start_ns, 0.0, nullptr, nullptr});
-        initialising_ = false;
-        stopped_.store(true, std::memory_order_release);
-        make_safe();
+        stopped_.store(true, std::memory_order_release);  // output() makes the outputs safe
     }
 }
 
@@ -200,6 +217,7 @@ void Core::run_rows(const plan::Row*& row, const plan::Step* first, const plan::
     for (const plan::Step* const steps = plan_->steps.data(); first != last;) {
         while (steps + row->end <= first) ++row;
         const plan::Step* const end = std::min(last, steps + row->end);
+        if (stopped_.load(std::memory_order_relaxed)) [[unlikely]] return;  // declared hung meanwhile
         if (row->run) row->run(first, end, &info_, &current_);
         else run_steps(first, end);
         first = end;
@@ -207,22 +225,19 @@ void Core::run_rows(const plan::Row*& row, const plan::Step* first, const plan::
 }
 
 void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
-    // Small functions cost little more than their call: eight per turn save the jumps, a fifth of the cycle of 1000 gates.
+    // Small functions cost little more than their call: eight per turn save the jumps, a fifth of the cycle of 1000 gates. A function
+    // that returns after its thread was declared hung is the last that runs.
     const auto call = [this](const plan::Step* step) noexcept {
         current_ = step;
         step->step(step->self, &info_);
+        return stopped_.load(std::memory_order_relaxed);
     };
-    for (; last - first >= 8; first += 8) {
-        call(first);
-        call(first + 1);
-        call(first + 2);
-        call(first + 3);
-        call(first + 4);
-        call(first + 5);
-        call(first + 6);
-        call(first + 7);
-    }
-    for (; first != last; ++first) call(first);
+    for (; last - first >= 8; first += 8)
+        if (call(first) || call(first + 1) || call(first + 2) || call(first + 3) || call(first + 4) || call(first + 5) || call(first + 6) ||
+            call(first + 7)) [[unlikely]]
+            return;
+    for (; first != last; ++first)
+        if (call(first)) [[unlikely]] return;
 }
 
 void Core::run_timed(const plan::Function& function, const plan::Step* steps) noexcept {
@@ -238,22 +253,95 @@ void Core::run_timed(const plan::Function& function, const plan::Step* steps) no
     times.total_ns.store(times.total_ns.load(std::memory_order_relaxed) + static_cast<std::uint64_t>(took), std::memory_order_relaxed);
 }
 
-void Core::account(std::int64_t busy_ns) noexcept {
+// Returns the time at the end of the cycle's work.
+std::int64_t Core::account(std::int64_t woke_ns) noexcept {
     store(*pins_.beat, pins_.beat->slot->u32 + 1);
-    if (!measure_) return;
+    if (!measure_) return woke_ns;
+    const std::int64_t now_ns = monotonic_ns(), busy_ns = now_ns - woke_ns;
     busy.add(busy_ns);
     const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
     store(*pins_.time, took);
     const bool more = took > pins_.tmax->slot->s32;
     if (more) store(*pins_.tmax, took);
     store(*pins_.tmax_increased, more);
-    const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
-    const bool in_budget = budget == 0 || busy_ns <= budget;
-    if (!in_budget) {
-        overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-        if (in_budget_) raise({HAL_FAULT_BUDGET, 0, info_.number, info_.start_ns, static_cast<double>(busy_ns), nullptr, nullptr});
+    const std::int64_t budget = budget_ns.load(std::memory_order_relaxed), limit = supervise_ns.load(std::memory_order_relaxed);
+    const bool too_long = busy_ns >= longest_overrun * period_ns_;
+    const bool in_budget = (budget == 0 || busy_ns <= budget) && !too_long;
+    if (!in_budget) overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    const auto event = [&](hal_fault_code code) -> FaultEvent {
+        return {code, slow_function(woke_ns), info_.number, info_.start_ns, static_cast<double>(busy_ns), nullptr, nullptr};
+    };
+    if (limit != 0 && now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
+        if (declare_hung()) raise(event(HAL_FAULT_SILENT_THREAD));  // otherwise the supervisor has reported it
+    } else if (!in_budget && in_budget_ && !hung()) {
+        raise(event(HAL_FAULT_BUDGET));
     }
     in_budget_ = in_budget;  // a row of overruns is one fault
+    return now_ns;
+}
+
+void Core::begin(std::int64_t now_ns) noexcept {
+    due_.store(now_ns, std::memory_order_release);
+    finished_.store(now_ns, std::memory_order_release);
+}
+
+void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
+    const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);
+    const std::int64_t silent_ns = now_ns - std::max({due_ns, finished_ns(), excused_.load(std::memory_order_acquire)});
+    if (limit == 0 || silent_ns <= limit || !declare_hung()) return;
+    raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns), nullptr, nullptr});
+}
+
+bool Core::declare_hung() noexcept {
+    const std::uint64_t next = cycles.load(std::memory_order_acquire) + 1;
+    if (hung_at_.exchange(next, std::memory_order_acq_rel) == next) return false;
+    hangs.fetch_add(1, std::memory_order_relaxed);
+    stopped_.store(true, std::memory_order_release);
+    return true;
+}
+
+// A function writes current_ as an ordinary variable, millions of times a second; here one look at it is enough.
+__attribute__((no_sanitize("thread"))) const plan::Step* Core::where() const noexcept { return current_; }
+
+std::int64_t Core::overdue_since_ns() const noexcept {
+    const std::int64_t busy_since = busy_since_ns();
+    const std::int64_t since = busy_since != 0 ? busy_since : std::max(finished_ns(), due_.load(std::memory_order_acquire) + period_ns_);
+    return std::max(since, excused_.load(std::memory_order_acquire));
+}
+
+void Core::sample() noexcept {
+    const std::int64_t since = busy_since_.load(std::memory_order_acquire);
+    if (since == 0 || !in_function()) return;
+    const plan::Step* const step = where();
+    if (busy_since_.load(std::memory_order_acquire) != since) return;
+    seen_step_.store(step, std::memory_order_relaxed);
+    seen_since_.store(since, std::memory_order_release);
+}
+
+void Core::stand_in(std::int64_t now_ns, bool emergency) noexcept {
+    int free = nobody;
+    const bool mine = turn_.compare_exchange_strong(free, supervisor, std::memory_order_acq_rel);
+    if (plan::Plan* const plan = shown_.load(std::memory_order_acquire)) {
+        for (const plan::Safe& safe : plan->safe) __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
+        store(*pins_.missed, static_cast<std::uint32_t>(missed_by(now_ns)));
+        if (emergency) {
+            hal_cycle info{};
+            info.size = sizeof info;
+            info.period_ns = period_ns_;
+            info.period_s = static_cast<double>(period_ns_) * 1e-9;
+            info.start_ns = now_ns;
+            info.number = cycles.load(std::memory_order_relaxed);
+            for (const plan::Step& step : plan->emergency) step.step(step.self, &info);
+        }
+        if (mine) publish(*plan);
+    }
+    if (mine) turn_.store(nobody, std::memory_order_release);
+}
+
+std::uint64_t Core::missed_by(std::int64_t now_ns) const noexcept {
+    const std::uint64_t counted = missed.load(std::memory_order_acquire);
+    const std::int64_t due = due_.load(std::memory_order_acquire), late = due == 0 ? 0 : (now_ns - due) / period_ns_ - 1;
+    return counted + (late > 0 ? static_cast<std::uint64_t>(late) : 0);
 }
 
 void Core::make_safe() noexcept {
@@ -263,23 +351,53 @@ void Core::make_safe() noexcept {
     for (const plan::Step& step : plan_->emergency) step.step(step.self, &info_);
 }
 
+void Core::make_safe_at_end() noexcept {
+    for (int free = nobody; !turn_.compare_exchange_weak(free, thread, std::memory_order_acq_rel); free = nobody) sched_yield();
+    make_safe();
+    turn_.store(nobody, std::memory_order_release);
+}
+
 void Core::raise(FaultEvent event) noexcept {
     event.time_ns = measure_ ? monotonic_ns() : info_.start_ns;
     board_.count(event, id_);
-    faults_.push(event);  // when full the newest is lost but counted
+    limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });  // when full the newest is lost but counted
 }
 
 void Core::step_clock(std::int64_t ns) noexcept {
-    if (in_function_) timeline_.step(grid_ns_, ns);
+    if (in_function()) timeline_.step(grid_ns_, ns);
 }
 
-std::uint32_t Core::current_function() const noexcept {
-    if (!plan_ || !current_) return 0;
-    const bool init = initialising_;
-    const auto at = static_cast<std::uint32_t>(current_ - (init ? plan_->init_steps.data() : plan_->steps.data()));
-    for (const plan::Function& function : init ? plan_->init : plan_->functions)
-        if (at >= function.begin && at < function.end) return function.id;
-    return 0;
+namespace {
+
+// The function that a step of the plan belongs to; 0: none.
+std::uint32_t function_of(const plan::Plan* plan, const plan::Step* step) noexcept {
+    if (!plan || !step) return 0;
+    const auto among = [step](const std::vector<plan::Step>& steps, const std::vector<plan::Function>& functions) -> std::uint32_t {
+        const std::less<> before;
+        if (before(step, steps.data()) || !before(step, steps.data() + steps.size())) return 0;
+        const auto at = static_cast<std::uint32_t>(step - steps.data());
+        for (const plan::Function& function : functions)
+            if (at >= function.begin && at < function.end) return function.id;
+        return 0;
+    };
+    const std::uint32_t cyclic = among(plan->steps, plan->functions);
+    return cyclic != 0 ? cyclic : among(plan->init_steps, plan->init);
+}
+
+}  // namespace
+
+std::uint32_t Core::current_function() const noexcept { return function_of(plan_, current_); }
+
+std::uint32_t Core::interrupted_function() const noexcept {
+    return in_function() ? function_of(shown_.load(std::memory_order_acquire), where()) : 0;
+}
+
+std::uint32_t Core::hung_function() const noexcept { return busy_since_ns() != 0 ? interrupted_function() : 0; }
+
+// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: there is none.
+std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
+    if (seen_since_.load(std::memory_order_acquire) != woke_ns) return 0;
+    return function_of(plan_, seen_step_.load(std::memory_order_relaxed));
 }
 
 void check_finite(void* self, const hal_cycle* cycle) {

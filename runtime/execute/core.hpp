@@ -51,11 +51,38 @@ public:
     void warm(std::int64_t until_ns) const noexcept;
     /// Periods that passed unserved. [realtime]
     void skip(std::uint64_t periods) noexcept;
+    /// The thread begins: from now on it is expected to finish cycles. [realtime]
+    void begin(std::int64_t now_ns) noexcept;
+    /// The cycle that was due at `due_ns` begins only now: later than the supervision limit is a fault that stops the thread. [realtime]
+    void woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept;
     /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
     void make_safe() noexcept;
+    /// The same at the end of the thread: waits while the supervisor does it. Not in a cycle
+    void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
     /// Moves the grid for all positions after this cycle's; nothing outside a function. [realtime]
     void step_clock(std::int64_t ns) noexcept;
+
+    // --- by the supervisor, in a thread of its own (supervisor.hpp) ----------------------------------------------------
+    /// When the newest cycle ended, CLOCK_MONOTONIC. [any]
+    std::int64_t finished_ns() const noexcept { return finished_.load(std::memory_order_acquire); }
+    /// Since when the cycle that runs, or is due next, has not ended. In the future while it is not due yet. [any]
+    std::int64_t overdue_since_ns() const noexcept;
+    /// Another thread kept the CPU from it until now: its time without a cycle counts from here. Not by the thread itself
+    void excuse(std::int64_t now_ns) noexcept { excused_.store(now_ns, std::memory_order_release); }
+    /// Declared hung, and no cycle has ended since. [any]
+    bool hung() const noexcept { return hung_at_.load(std::memory_order_acquire) == cycles.load(std::memory_order_acquire) + 1; }
+    /// Stops the thread's functions because the cycle that runs or is due does not end. False: that was done already. [any]
+    bool declare_hung() noexcept;
+    /// Notes where the cycle is, so that an overrun can be named.
+    void sample() noexcept;
+    /// In place of a thread that hangs: safe values, with `emergency` the emergency functions, the missed periods, and what other
+    /// threads read of all that.
+    void stand_in(std::int64_t now_ns, bool emergency) noexcept;
+    /// The function that the cycle is in; 0: none.
+    std::uint32_t hung_function() const noexcept;
+    /// Missed periods by the clock: those that the thread has counted, and those that have passed since. [any]
+    std::uint64_t missed_by(std::int64_t now_ns) const noexcept;
 
     // --- by the session ---------------------------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
@@ -88,6 +115,11 @@ public:
     std::uint32_t id() const { return id_; }
     std::int64_t period_ns() const { return period_ns_; }
     std::atomic<std::int64_t> budget_ns{0};
+    /// Longest time without a finished cycle; 0: not supervised. Set before the thread begins.
+    std::atomic<std::int64_t> supervise_ns{0};
+    /// A cycle of so many periods is a fault, whatever the budget.
+    static constexpr std::int64_t longest_overrun = 10;
+    std::atomic<std::uint64_t> hangs{0};                          ///< how often the thread was declared hung
     std::atomic<bool> profile_every{false};
     Histogram wakeup, busy;                                       ///< written by the thread
     std::atomic<std::uint64_t> cycles{0}, missed{0}, overruns{0}; ///< written by the thread
@@ -96,8 +128,9 @@ public:
     /// For crash and terminate handlers: the core whose functions run on this thread, if any.
     static Core* current() noexcept;
     std::uint32_t current_function() const noexcept;
+    std::uint32_t interrupted_function() const noexcept;          ///< the same, seen from another thread
     std::uint64_t cycle_number() const noexcept { return info_.number; }
-    bool in_function() const noexcept { return in_function_; }
+    bool in_function() const noexcept { return in_function_.load(std::memory_order_relaxed); }
     std::jmp_buf recover;                                         ///< where an exception that left a function comes back to
 
 private:
@@ -105,13 +138,17 @@ private:
     void take(plan::Plan* plan) noexcept;
     void drain_writes() noexcept;
     void import() noexcept;
-    void publish() noexcept;
+    static void publish(plan::Plan& plan) noexcept;
+    void output() noexcept;
     void answer() noexcept;
+    bool live() const noexcept { return running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed); }
+    const plan::Step* where() const noexcept;
+    std::uint32_t slow_function(std::int64_t woke_ns) const noexcept;
     void run() noexcept;
     void run_timed(const plan::Function& function, const plan::Step* steps) noexcept;
     void run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
-    void account(std::int64_t busy_ns) noexcept;
+    std::int64_t account(std::int64_t woke_ns) noexcept;
 
     const std::uint32_t id_;
     const std::int64_t period_ns_;
@@ -123,18 +160,32 @@ private:
     std::atomic<plan::Plan*> inbox_{nullptr};         // written by the session, emptied by the thread
     std::atomic<std::uint64_t> taken_{0};             // written by the thread
     std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
-    std::atomic<bool> stopped_{false};                // set by the thread, cleared by the session
+    std::atomic<bool> stopped_{false};                // set by the thread and the supervisor, cleared by the session
     std::atomic<bool> passed_{false};                 // set by the thread
     std::atomic<std::int64_t> busy_since_{0};         // written by the thread
+    std::atomic<std::int64_t> due_{0}, finished_{0};  // of the newest cycle: when it was due and when it ended; written by the thread
+    std::atomic<std::int64_t> excused_{0};            // written by the supervisor
+    std::atomic<std::uint64_t> hung_at_{0};           // cycles + 1 when it was declared hung; written by thread and supervisor
+    // Whose turn it is to make outputs safe and to publish: the thread in each cycle, the supervisor in place of a hung thread.
+    //   1. thread: nobody -> thread      2. make safe if stopped, publish      3. thread -> nobody     (release)
+    //   4. supervisor: stopped := true, nobody -> supervisor (acquire)         5. make safe, publish   6. supervisor -> nobody
+    // When the supervisor is between 4 and 6 the thread does neither and tries again in its next cycle; between 1 and 3 the supervisor
+    // writes safe values without publishing, and the thread, which then is alive, finds itself stopped in its next cycle.
+    enum Turn : int { nobody, thread, supervisor };
+    std::atomic<int> turn_{nobody};
+    std::atomic<std::int64_t> seen_since_{0};         // the cycle (busy_since_) and the step of the newest sample; the supervisor's
+    std::atomic<const plan::Step*> seen_step_{nullptr};
+    std::atomic<plan::Plan*> shown_{nullptr};         // plan_, for the supervisor
     Queue<Write> writes_{most_writes};                // session to thread
     std::uint64_t pushed_ = 0;                        // the session's own
     std::atomic<std::uint64_t> applied_{0};           // written by the thread
     Queue<FaultEvent> faults_{256};                   // thread to session
+    FaultLimiter limiter_;                            // the thread's own
     plan::Plan* plan_ = nullptr;          // the rest is the thread's own
     hal_cycle info_{};
     std::int64_t grid_ns_ = 0;            // position of the cycle that runs
     const plan::Step* volatile current_ = nullptr;
-    bool volatile in_function_ = false, initialising_ = false;
+    std::atomic<bool> in_function_{false};
     bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;

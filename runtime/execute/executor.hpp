@@ -8,27 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "execute/background.hpp"
 #include "execute/core.hpp"
-#include "hal/background.h"
+#include "execute/runner.hpp"
+#include "execute/supervisor.hpp"
+#include "execute/virtual_clock.hpp"
 
 namespace hal {
-
-struct CoreOptions {
-    std::int64_t period_ns = 0;
-    int cpu = -1;             ///< -1: an isolated CPU if there is one, else the last
-    int priority = 0;         ///< SCHED_FIFO priority; 0: not a real-time policy
-    bool deadline = false;    ///< SCHED_DEADLINE with runtime `budget` (or half the period)
-    std::int64_t spin_ns = -1;
-    std::int64_t budget_ns = 0;
-    bool profile_every = false;
-};
-
-/// What a thread got from the system.
-struct Granted {
-    enum class Policy { fifo, deadline, other } policy = Policy::other;
-    int priority = 0, cpu = -1;
-    bool refused = false;     ///< asked for a real-time policy, not allowed
-};
 
 class Executor {
 public:
@@ -39,15 +25,19 @@ public:
 
     /// A new thread, which serves its inbox at once. Returns its core; it lives until remove().
     Core& add(const CoreOptions& options, ThreadPins pins);
-    /// Ends a thread after making its outputs safe. False when it did not end within `timeout_ns` (it is then left alone).
+    /// Ends a thread after making its outputs safe. False when it did not end within `timeout_ns`, or hangs (it is then left alone).
     bool remove(Core& core, std::int64_t timeout_ns);
+    /// Makes the outputs of a thread safe that does not end, and stops its functions.
+    void abandon(Core& core);
+    /// Lets functions run again that a fault stopped. False: the thread hangs.
+    bool reset(Core& core);
 
     void start() { running_.store(true, std::memory_order_release); }
     void stop() { running_.store(false, std::memory_order_release); }
     bool running() const { return running_.load(std::memory_order_acquire); }
 
-    /// Threads that are in the middle of a cycle and do not end it within the time-out. Asked before an edit, so that a
-    /// hanging thread refuses it before any other thread has taken its part.
+    /// Threads that hang, or are in the middle of a cycle and do not end it within the time-out. Asked before an edit, so that
+    /// a hanging thread refuses it before any other thread has taken its part.
     std::vector<Core*> hanging(std::int64_t timeout_ns) const;
     /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the time-out;
     /// their plans have been withdrawn.
@@ -73,39 +63,27 @@ public:
     /// Page faults in the thread's cycles since its 100th.
     std::uint64_t page_faults(const Core& core) const;
     FaultBoard& board() { return board_; }
+    Supervisor& supervisor() { return supervisor_; }
+    const Supervisor& supervisor() const { return supervisor_; }
     const Timeline& timeline() const { return timeline_; }
     hal_clock& clock() { return timeline_.shared; }
-    const hal_background& background() const { return background_.shared; }
+    const hal_background& background() const { return background_.shared(); }
     /// Somebody will make steps: threads watch for them from now on, those that sleep long at once.
     void lead();
 
-    /// Memory locking and the CPU's sleep states, once per process. Returns what was refused: "memory locking", …
-    static std::vector<std::string> prepare_process();
-
-    /// Calls make_safe() of all cores: for crash handlers. async-signal-safe.
-    static void make_all_safe() noexcept;
-
 private:
-    struct Runner;
-    /// Given out as extension "hal.background/1". Work that instances do between two instants of the virtual clock.
-    struct Between {
-        hal_background shared{};  // first: the extension's functions get its address
-        struct Work {
-            void (*work)(void*, std::int64_t);
-            void* self;
-        };
-        std::vector<Work> works;
-    };
-    void call(Runner& runner);       // gets its attention now rather than at its next cycle, where that is possible
+    void call(Runner& runner);       // the virtual clock's is served at once
     Runner& runner(const Core& core) const;
+    void forget(const Runner& leaving);
     const bool virtual_;
     std::atomic<bool> running_{false};
     FaultBoard board_;
+    Supervisor supervisor_{board_};
     Timeline timeline_;
-    Between background_;
+    Background background_;
     std::vector<std::unique_ptr<Runner>> runners_;  // fastest first
-    std::int64_t epoch_ns_ = 0;      // all positions of the grid are epoch + k * period
-    std::int64_t virtual_now_ns_ = 0;
+    VirtualClock clock_{runners_, timeline_, background_, supervisor_};
+    const std::int64_t epoch_ns_;    // all positions of the grid are epoch + k * period
     std::uint32_t next_id_ = 1;
 };
 

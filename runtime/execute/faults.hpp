@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 #include "hal/abi.h"
@@ -18,10 +20,97 @@ struct FaultEvent {
     double value = 0.0;             ///< budget: ns it took; component: its detail
     const char* reason = nullptr;   ///< component faults: a literal of the component
     const void* self = nullptr;     ///< component faults: the instance
+    std::uint64_t repeats = 0;      ///< how many of the same kind were counted, this one included; 0: it is queued by itself
+    std::int64_t last_ns = 0;       ///< when the last of them came
+
+    /// Of the same kind: they differ in time and measured value only. [any]
+    bool same(const FaultEvent& o) const noexcept {
+        return code == o.code && subject == o.subject && reason == o.reason && self == o.self && (!has_code() || value == o.value);
+    }
+    /// Its detail is the number of an error, {x}, and not a measured value. [any]
+    bool has_code() const noexcept {
+        if (reason == nullptr) return false;
+        for (const char* c = reason; *c != '\0'; ++c)
+            if (c[0] == '{' && c[1] == 'x') return true;
+        return false;
+    }
+};
+
+/// Lets a few faults per kind and second pass, then one per second with a count until there is a quiet second, so that a storm of them
+/// neither fills the queue nor buries another fault.
+class FaultLimiter {
+public:
+    static constexpr std::int64_t interval_ns = 1'000'000'000;
+    static constexpr unsigned burst = 4;
+
+    /// Calls `queue(event)` at once, or counts it. [realtime]
+    template <class Queue>
+    void raise(FaultEvent event, Queue&& queue) noexcept {
+        Kind* place = kinds_.data();
+        for (Kind& k : kinds_) {
+            const bool same = k.used && k.first.same(event);
+            if (same && (k.held != 0 || event.time_ns - k.since_ns < interval_ns)) {
+                if (event.time_ns - k.since_ns >= interval_ns) release(k, queue), k.since_ns = event.time_ns;
+                if (k.passed < burst) {
+                    ++k.passed;
+                    return queue(event);
+                }
+                if (k.held++ == 0) ++pending_, k.first = event;
+                k.first.last_ns = event.time_ns;
+                return;
+            }
+            if (same || !k.used) {
+                place = &k;
+                break;
+            }
+            if (k.since_ns < place->since_ns) place = &k;
+        }
+        release(*place, queue);
+        *place = {event, event.time_ns, 0, 1, true};
+        queue(event);
+    }
+    /// Queues what was counted in seconds that are over. At the end of each cycle. [realtime]
+    template <class Queue>
+    void flush(std::int64_t now_ns, Queue&& queue) noexcept {
+        if (pending_ == 0) [[likely]] return;
+        for (Kind& k : kinds_)
+            if (k.held != 0 && now_ns - k.since_ns >= interval_ns) {
+                release(k, queue);
+                k.since_ns = now_ns;
+            }
+    }
+    /// Queues what was counted and forgets all kinds. [realtime]
+    template <class Queue>
+    void clear(Queue&& queue) noexcept {
+        for (Kind& k : kinds_) release(k, queue), k.used = false;
+    }
+
+private:
+    struct Kind {
+        FaultEvent    first{};       // that was counted
+        std::int64_t  since_ns = 0;  // when its second began
+        std::uint64_t held = 0;      // that were counted since
+        unsigned      passed = 0;    // that were queued at once
+        bool          used = false;
+    };
+    template <class Queue>
+    void release(Kind& k, Queue&& queue) noexcept {
+        if (k.held == 0) return;
+        k.first.repeats = k.held;
+        queue(k.first);
+        k.first.repeats = 0;
+        k.held = 0;
+        --pending_;
+    }
+    std::array<Kind, 16> kinds_{};
+    std::size_t          pending_ = 0;  // kinds with some that were counted
 };
 
 /// What is common to all threads; the component `faults` and the session read it.
 struct FaultBoard {
+    FaultBoard() noexcept;
+    FaultBoard(const FaultBoard&) = delete;
+
     hal_faults shared{};                    ///< given out as extension "hal.faults/1"; written with atomic builtins
     /// Any thread that raises one. [realtime]
     void count(const FaultEvent& event, std::uint32_t thread) noexcept {

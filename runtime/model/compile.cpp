@@ -108,8 +108,8 @@ private:
 
     // For a cell made now, before any thread takes part: what the session knows.
     hal_value known_value(const Signal& signal) const {
-        if (const auto at = input_.signal_values->find(const_cast<Signal*>(&signal)); at != input_.signal_values->end()) return at->second;
-        if (const auto at = input_.inherited->find(const_cast<Signal*>(&signal)); at != input_.inherited->end())
+        if (const auto at = input_.signal_values->find(&signal); at != input_.signal_values->end()) return at->second;
+        if (const auto at = input_.inherited->find(&signal); at != input_.inherited->end())
             return *present(*at->second).slot;
         return *signal.slot;
     }

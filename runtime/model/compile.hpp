@@ -20,9 +20,9 @@ struct CompileInput {
     /// Functions left out: those that move between threads, in the first of two swaps.
     const std::unordered_set<const LoadedFunction*>* without = nullptr;
     /// New values of what threads own, and signals that take a pin's value (see Edit).
-    const std::unordered_map<Pin*, hal_value>* pin_values = nullptr;
-    const std::unordered_map<Signal*, hal_value>* signal_values = nullptr;
-    const std::unordered_map<Signal*, Pin*>* inherited = nullptr;
+    const Notes<Pin, hal_value>* pin_values = nullptr;
+    const Notes<Signal, hal_value>* signal_values = nullptr;
+    const Notes<Signal, Pin*>* inherited = nullptr;
     const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;  ///< of pins whose instance was replaced
     std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
     hal_step check_finite = nullptr;

@@ -13,7 +13,8 @@
 #include <unordered_set>
 #include <vector>
 
-#include "base/diagnostic.hpp"
+#include "text/diagnostic.hpp"
+#include "model/absence.hpp"
 #include "model/model.hpp"
 
 namespace hal {
@@ -29,7 +30,9 @@ enum class Arrow { none, to_pin, from_pin, both };
 
 class Edit {
 public:
-    explicit Edit(Model& model) : model_(model) {}
+    explicit Edit(Model& model) : Edit(model, own_) {}
+    /// With absences that outlive the edit.
+    Edit(Model& model, Absences& absences) : model_(model), absences_(absences) {}
     Edit(const Edit&) = delete;
 
     Diagnostics* diagnostics = nullptr;  ///< where problems of the next edits go
@@ -55,8 +58,8 @@ public:
     void take_from_thread(LoadedFunction& function);
 
     // --- names ------------------------------------------------------------------------------------------------------
-    bool alias(Word kind, Word name, Word second);
-    bool unalias(Word kind, Word second);
+    bool alias(Word name, Word second);
+    bool unalias(Word second);
 
     // --- components and instances -----------------------------------------------------------------------------------
     LoadedComponent& add_component(std::string name, Span at);
@@ -66,8 +69,9 @@ public:
                       std::vector<std::unique_ptr<LoadedFunction>> functions);
     /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names that are taken.
     bool add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at);
-    /// Takes pins out that are in no signal.
+    /// Removes pins of a program's component that are in no signal.
     void remove_pins(Instance& instance, const std::vector<Pin*>& pins);
+    void set_process(LoadedComponent& component, std::int64_t process);
     /// The number of the next unnamed instance.
     std::uint32_t take_number(LoadedComponent& component);
     /// Puts a thread's functions into another order.
@@ -89,9 +93,9 @@ public:
     Signal* signal(Word name);
     LoadedFunction* function(Word name);
     Thread* thread(Word name);
-    /// What was to be made and was not, as was said: that its pins, functions or the like are not there either is not said again.
-    void note_absent(std::string name) { absent_.insert(std::move(name)); }
-    bool is_absent(std::string_view name) const;  ///< 'pid.0.output' is with 'pid.0' and with 'pid'
+    /// What could not be made: a missing pin, function or the like of it is not an error again.
+    Absences& absences() { return absences_; }
+    bool is_absent(std::string_view name, Absences::Kind kind) { return absences_.explains(name, kind, model_); }
 
     // --- what the transaction did -----------------------------------------------------------------------------------
     bool structural() const { return structural_; }
@@ -100,6 +104,7 @@ public:
     /// Forgets how to undo; what was removed is handed over to be destroyed after the threads have let go of it.
     struct Removed {
         std::vector<std::unique_ptr<Instance>> instances;
+        std::vector<std::unique_ptr<Pin>> pins;
         std::vector<std::unique_ptr<LoadedFunction>> functions;
         std::vector<std::unique_ptr<LoadedComponent>> components;
         std::vector<std::unique_ptr<Signal>> signals;
@@ -117,9 +122,9 @@ public:
     std::deque<Replaced>& replaced() { return replaced_; }
 
     // New values of what the threads own now; for the compiler (structural) or the write queues (not).
-    std::unordered_map<Pin*, hal_value> pin_values;
-    std::unordered_map<Signal*, hal_value> signal_values;
-    std::unordered_map<Signal*, Pin*> inherited;  ///< a signal that takes the value the pin has
+    Notes<Pin, hal_value> pin_values;
+    Notes<Signal, hal_value> signal_values;
+    Notes<Signal, Pin*> inherited;  ///< a signal that takes the value the pin has
     std::unordered_map<const Pin*, hal_pin*>
         old_memory;  ///< of pins that were replaced: what the threads know until they take the new plan
     /// Where a pin's value is now.
@@ -141,7 +146,8 @@ private:
     void on_undo(std::function<void()> action) { undo_.push_back(std::move(action)); }
 
     Model& model_;
-    std::unordered_set<std::string> absent_;
+    Absences own_;
+    Absences& absences_;
     std::vector<std::function<void()>> undo_;
     Removed removed_;
     std::deque<Replaced> replaced_;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "base/words.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -45,17 +45,9 @@ bool Edit::fail(Code code, Span at, std::string message, std::string label, std:
     return false;
 }
 
-bool Edit::is_absent(std::string_view name) const {
-    if (absent_.empty()) return false;
-    for (std::size_t end = name.size();; end = name.rfind('.', end - 1)) {
-        if (end == std::string_view::npos || end == 0) return false;
-        if (absent_.contains(std::string(name.substr(0, end)))) return true;
-    }
-}
-
 Pin* Edit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
-    if (is_absent(name.text)) return nullptr;
+    if (is_absent(name.text, Absences::Kind::pin)) return nullptr;
     std::string help = pins_of_instance(model_, name.text);
     if (model_.find_signal(name.text))
         help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
@@ -66,7 +58,7 @@ Pin* Edit::pin(Word name) {
 
 Signal* Edit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
-    if (is_absent(name.text)) return nullptr;
+    if (is_absent(name.text, Absences::Kind::signal)) return nullptr;
     const std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
                              : model_.signal.empty()    ? nothing_yet("signal") + "; net makes signals"
                                                         : "";
@@ -76,7 +68,7 @@ Signal* Edit::signal(Word name) {
 
 LoadedFunction* Edit::function(Word name) {
     if (LoadedFunction* const found = model_.find_function(name.text)) return found;
-    if (is_absent(name.text)) return nullptr;
+    if (is_absent(name.text, Absences::Kind::function)) return nullptr;
     std::string help;
     if (const Instance* const instance = model_.find_instance(name.text)) {
         std::vector<std::string> own;
@@ -89,7 +81,7 @@ LoadedFunction* Edit::function(Word name) {
 
 Thread* Edit::thread(Word name) {
     if (Thread* const found = model_.find_thread(name.text)) return found;
-    if (is_absent(name.text)) return nullptr;
+    if (is_absent(name.text, Absences::Kind::thread)) return nullptr;
     const std::string help = model_.threads.empty() ? "make one first: loadrt threads name1=servo-thread period1=1000000"
                                                      : "threads: " + listed(names(model_.thread));
     fail("no-such-thread", name.span, "there is no thread " + quoted(name.text), did_you_mean(name.text, names(model_.thread)), help);
@@ -185,10 +177,11 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
     if (pin.dir == HAL_DIR_OUT && signal.writer)
         return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer", "second output", signal.writer->linked_at,
                       "first output", "a signal has one output pin; join two sources with sum2, or2 or mux2");
-    const auto io = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IO; });
-    if (pin.dir == HAL_DIR_OUT && signal.ios != 0)
+    if (pin.dir == HAL_DIR_OUT && signal.ios != 0) {
+        const auto io = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IO; });
         return refuse("two-writers", "signal " + quoted(signal.name) + " has I/O pins already, so it can have no output", "output",
                       (*io)->linked_at, "I/O pin", "I/O pins share a signal among themselves and with inputs only");
+    }
     if (pin.dir == HAL_DIR_IO && signal.writer)
         return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it can have no I/O pin", "I/O pin",
                       signal.writer->linked_at, "output", "I/O pins share a signal among themselves and with inputs only");
@@ -230,7 +223,8 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
 void Edit::unlink(Pin& pin) {
     Signal* const signal = pin.signal;
     if (!signal) return;
-    const auto at = std::find(signal->pins.begin(), signal->pins.end(), &pin);
+    // a signal with many pins loses them from either end
+    const auto at = signal->pins.back() == &pin ? signal->pins.end() - 1 : std::find(signal->pins.begin(), signal->pins.end(), &pin);
     // it keeps the signal's value, which may be one that this very transaction set or let it inherit
     if (pin.type != HAL_TYPE_PORT) {
         if (const auto set = signal_values.find(signal); set != signal_values.end()) {
@@ -344,15 +338,12 @@ bool Edit::set_signal(Word name, Word value) {
     return true;
 }
 
-bool Edit::alias(Word kind, Word name, Word second) {
-    if (kind.text != "pin" && kind.text != "param" && kind.text != "parameter")
-        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param",
-                    "alias pin NAME ALIAS");
+bool Edit::alias(Word name, Word second) {
     Pin* const target = pin(name);
     if (!target) return false;
     if (!target->alias.empty())
         return fail("alias-taken", name.span, quoted(name.text) + " has the alias " + quoted(target->alias) + " already", "",
-                    "take it off first: unalias " + std::string(kind.text) + " " + target->alias);
+                    std::string("take it off first: unalias ") + (target->dir == HAL_DIR_PARAM ? "param " : "pin ") + target->alias);
     if (model_.find_pin(second.text)) return fail("name-taken", second.span, "there is a pin or alias " + quoted(second.text) + " already");
     if (model_.find_signal(second.text)) return fail("name-taken", second.span, "there is a signal " + quoted(second.text) + " already");
     std::string name_too(second.text);
@@ -365,10 +356,7 @@ bool Edit::alias(Word kind, Word name, Word second) {
     return true;
 }
 
-bool Edit::unalias(Word kind, Word second) {
-    if (kind.text != "pin" && kind.text != "param" && kind.text != "parameter")
-        return fail("wrong-arguments", kind.span, quoted(kind.text) + " is not a kind of name that has aliases", "pin or param",
-                    "unalias pin ALIAS");
+bool Edit::unalias(Word second) {
     Pin* const target = pin(second);
     if (!target) return false;
     if (target->alias.empty()) return fail("no-alias", second.span, quoted(second.text) + " has no alias");

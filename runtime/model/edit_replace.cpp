@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "base/words.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -97,21 +97,13 @@ struct Replacement {
     std::vector<Pin*> gone_pins, new_pins;
     std::vector<LoadedFunction*> gone_functions, new_functions;
 
-    void enter(Pin& pin) const {
-        model.pin.emplace(pin.name, &pin);
-        if (!pin.alias.empty()) model.pin.emplace(pin.alias, &pin);
-    }
-    void leave(const Pin& pin) const {
-        model.pin.erase(pin.name);
-        if (!pin.alias.empty()) model.pin.erase(pin.alias);
-    }
     void exchange_kept_declarations() const {
         for (const InstancePair& pair : instances)
             for (const Pair& pin : pair.pins) swap_declarations(*pair.kept->pins[pin.fresh], *pair.fresh->pins[pin.kept]);
         for (const Pair& pair : functions) swap_declarations(*component.functions[pair.fresh], *other.functions[pair.kept]);
     }
     void run() const {
-        for (const Pin* const pin : gone_pins) leave(*pin);
+        for (const Pin* const pin : gone_pins) model.leave(*pin);
         for (const LoadedFunction* const function : gone_functions) model.function.erase(function->name);
         swap_contents(component, other);
         exchange(component.functions, other.functions, functions);
@@ -121,10 +113,10 @@ struct Replacement {
         }
         exchange_kept_declarations();
         for (LoadedFunction* const function : new_functions) model.function.emplace(function->name, function);
-        for (Pin* const pin : new_pins) enter(*pin);
+        for (Pin* const pin : new_pins) model.enter(*pin);
     }
     void back() const {
-        for (const Pin* const pin : new_pins) leave(*pin);
+        for (const Pin* const pin : new_pins) model.leave(*pin);
         for (const LoadedFunction* const function : new_functions) model.function.erase(function->name);
         exchange_kept_declarations();
         for (const InstancePair& pair : instances) {
@@ -134,7 +126,7 @@ struct Replacement {
         exchange_back(component.functions, other.functions, functions);
         swap_contents(component, other);
         for (LoadedFunction* const function : gone_functions) model.function.emplace(function->name, function);
-        for (Pin* const pin : gone_pins) enter(*pin);
+        for (Pin* const pin : gone_pins) model.enter(*pin);
     }
 };
 

@@ -39,6 +39,16 @@ LoadedComponent* Model::find_component(std::string_view name) const {
     return nullptr;
 }
 
+void Model::enter(Pin& entering) {
+    pin.emplace(entering.name, &entering);
+    if (!entering.alias.empty()) pin.emplace(entering.alias, &entering);
+}
+
+void Model::leave(const Pin& leaving) {
+    pin.erase(leaving.name);
+    if (!leaving.alias.empty()) pin.erase(leaving.alias);
+}
+
 std::vector<const Pin*> Model::sorted_pins() const {
     std::vector<const Pin*> all;
     all.reserve(pin.size());

@@ -12,7 +12,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "base/source.hpp"
+#include "text/source.hpp"
 #include "base/types.hpp"
 #include "plan/plan.hpp"
 
@@ -141,6 +141,13 @@ struct ThreadOptions {
     int priority = 0;                ///< 0: by rate
     std::int64_t spin_ns = -1;       ///< hybrid wait: spin this long before the deadline; -1: the default
     std::int64_t budget_ns = 0;      ///< execution time that counts as a fault; 0: none
+    std::int64_t supervise_ns = -1;  ///< longest time without a finished cycle; 0: not supervised; -1: the default
+
+    /// The limit that takes effect: 10 periods or 100 ms, whichever is longer, when none was given.
+    std::int64_t supervision_limit_ns() const {
+        constexpr std::int64_t least = 100'000'000;
+        return supervise_ns >= 0 ? supervise_ns : period_ns * 10 > least ? period_ns * 10 : least;
+    }
     bool profile_every = false;      ///< time every function in every cycle
 };
 
@@ -160,6 +167,14 @@ struct Thread {
 template <class T>
 using Index = std::unordered_map<std::string_view, T*>;
 
+/// What an edit notes about objects of the model. Who reads the model looks it up by a pointer to const.
+struct AddressHash {
+    using is_transparent = void;
+    std::size_t operator()(const void* object) const noexcept { return std::hash<const void*>{}(object); }
+};
+template <class Object, class Note>
+using Notes = std::unordered_map<Object*, Note, AddressHash, std::equal_to<>>;
+
 struct Model {
     std::vector<std::unique_ptr<LoadedComponent>> components;
     std::vector<std::unique_ptr<Signal>> signals;   ///< unordered: erased by swapping with the last
@@ -177,6 +192,11 @@ struct Model {
     Thread* find_thread(std::string_view name) const;
     Instance* find_instance(std::string_view name) const;
     LoadedComponent* find_component(std::string_view name) const;  ///< `-` and `_` are the same here
+
+    /// Enters a pin into the index by its name and alias.
+    void enter(Pin& pin);
+    /// Removes a pin from the index.
+    void leave(const Pin& pin);
 
     std::vector<const Pin*> sorted_pins() const;             ///< by name; aliases not repeated
     std::vector<const Signal*> sorted_signals() const;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "base/diagnostic.hpp"
+#include "text/diagnostic.hpp"
 #include "model/model.hpp"
 
 namespace hal {

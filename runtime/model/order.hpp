@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "base/diagnostic.hpp"
+#include "text/diagnostic.hpp"
 #include "model/model.hpp"
 
 namespace hal {

@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
+#include "hal/read_file.hpp"
 #include "netlist/line.hpp"
 #include "netlist/netlist.hpp"
 
@@ -17,30 +12,6 @@ namespace {
 constexpr std::size_t largest_file = std::size_t{1} << 30;  // spans count bytes in 32 bits
 constexpr int deepest_include = 16, most_includes = 1000;
 
-/// The whole file, or why not.
-std::optional<std::string> read_whole(const std::string& path, std::string& reason) {
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (file < 0) {
-        reason = std::strerror(errno);
-        return std::nullopt;
-    }
-    std::string text;
-    struct stat status{};
-    if (::fstat(file, &status) == 0 && S_ISREG(status.st_mode))
-        text.reserve(std::min(static_cast<std::size_t>(status.st_size), largest_file) + 1);
-    char part[65536];
-    ssize_t got = 0;
-    while ((got = ::read(file, part, sizeof part)) != 0) {
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) reason = std::strerror(errno);
-        else if (text.size() + static_cast<std::size_t>(got) > largest_file) reason = "it is larger than 1 GB";
-        if (!reason.empty()) break;
-        text.append(part, static_cast<std::size_t>(got));
-    }
-    ::close(file);
-    return reason.empty() ? std::optional(std::move(text)) : std::nullopt;
-}
-
 std::string_view trimmed(std::string_view text) {
     while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
     while (!text.empty() && (is_blank(text.back()) || text.back() == '\r')) text.remove_suffix(1);
@@ -50,10 +21,9 @@ std::string_view trimmed(std::string_view text) {
 }  // namespace
 
 std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked, Diagnostics& diagnostics) {
-    std::string reason;
-    std::optional<std::string> text = read_whole(path, reason);
-    if (text) return sources.add(path, std::move(*text));
-    diagnostics.error("unreadable-file", asked, "cannot read '" + path + "': " + reason);
+    std::string text;
+    if (read_regular_file(path, largest_file, text)) return sources.add(path, std::move(text));
+    diagnostics.error("unreadable-file", asked, "cannot read '" + path + "': " + text);
     return std::nullopt;
 }
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "base/diagnostic.hpp"
-#include "base/source.hpp"
+#include "text/diagnostic.hpp"
+#include "text/source.hpp"
 
 namespace hal {
 

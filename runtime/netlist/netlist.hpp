@@ -10,8 +10,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "base/diagnostic.hpp"
-#include "base/source.hpp"
+#include "text/diagnostic.hpp"
+#include "text/source.hpp"
 
 namespace hal {
 
@@ -29,7 +29,7 @@ struct Command {
     Span span;  ///< from the first to the last token
 };
 
-/// Reads a whole file (a pipe, too) into `sources`. What goes wrong is one error at `asked`, the place that named the file.
+/// Reads a whole file into `sources`. What goes wrong is one error at `asked`, the place that named the file.
 std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked, Diagnostics& diagnostics);
 
 /// An INI file as LinuxCNC reads it: `[SECTION]`, `KEY = value`, `#` and `;` comments on lines of their own, `\` joins
@@ -46,13 +46,13 @@ public:
     std::vector<std::string> names() const;
     bool empty() const { return entries_.empty(); }
 
-private:
-    friend class IniReader;
     struct Entry {
         std::string section, key, value;
     };
+    const std::vector<Entry>& entries() const { return entries_; }
     void add(std::string_view section, std::string_view key, std::string_view value);
 
+private:
     std::vector<Entry> entries_;
     std::unordered_map<std::string, std::size_t> first_;  ///< "[SECTION]KEY" and "[]KEY" to the first entry
 };
@@ -75,6 +75,16 @@ std::vector<Command> parse(const Sources& sources, std::uint32_t source, const E
 /// the last one running fastest. What stands between quotes is left alone, and so is all of print, echo, help, loadusr,
 /// source and save. A faulty command gives none, and an error.
 std::vector<Command> expand(const Command& command, Diagnostics& diagnostics);
+
+/// A command of words that were separated before: one-shot commands of a command line. Nothing in them is substituted and no quote is
+/// special. `text` becomes the words on one line, quoted where that shows their boundaries; the spans point into it, as source `source`.
+Command command_of(const std::vector<std::string>& words, std::uint32_t source, std::string& text);
+
+/// The word as it has to be written in a netlist to arrive as one word: `config=a b` is `config="a b"`.
+std::string written(std::string_view word);
+
+/// The word without the pair of quotes that encloses it.
+std::string_view without_quotes(std::string_view word);
 
 /// True for `=>`, `<=` and `<=>`.
 bool is_arrow(std::string_view word);

@@ -8,7 +8,6 @@
 namespace hal {
 namespace {
 
-constexpr std::string_view usage = "node NAME... [rate=TIME] [deadline=TIME]";
 constexpr std::size_t longest_name = 32;
 constexpr std::size_t most_nodes = 100;
 constexpr std::int64_t shortest_ns = 100'000, longest_ns = 60'000'000'000;
@@ -31,7 +30,7 @@ bool read_option(const Token& token, std::size_t equals, Line& line, Diagnostics
     const std::string key = token.text.substr(0, equals), value = token.text.substr(equals + 1);
     if (key != "rate" && key != "deadline") {
         diagnostics.error("unknown-argument", token.span, "node has no option '" + key + "'", did_you_mean(key, {"rate", "deadline"}),
-                          std::string(usage));
+                          to_string(node_usage));
         return false;
     }
     const auto ns = parse_duration_ns(value, false);
@@ -59,7 +58,7 @@ bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
         }
     }
     if (line.names.empty() && good) {
-        diagnostics.error("wrong-arguments", command.name.span, "node takes at least 1 argument, not 0", "", std::string(usage));
+        diagnostics.error("wrong-arguments", command.name.span, "node takes at least 1 argument, not 0", "", to_string(node_usage));
         return false;
     }
     const bool all = std::any_of(line.names.begin(), line.names.end(), [](const Token* t) { return t->text == "all"; });

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "netlist/netlist.hpp"
+#include "netlist/usage.hpp"
 
 namespace hal {
 
@@ -24,6 +25,8 @@ struct NodeLine {
     /// Not said: ten sendings, at least 100 ms: a machine that is not real time may be late for so long.
     std::int64_t deadline() const { return deadline_ns != 0 ? deadline_ns : rate() < 10'000'000 ? 100'000'000 : 10 * rate(); }
 };
+
+inline constexpr Usage node_usage{"node", "NAME... [rate=TIME] [deadline=TIME]"};
 
 bool is_node_line(const Command& command);
 

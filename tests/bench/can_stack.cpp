@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "canopen/device.hpp"
-#include "canopen/network.hpp"
+#include "canopen/master/network.hpp"
+#include "canopen/protocol/device.hpp"
 
 using namespace hal::canopen;
 namespace can = hal::can;
@@ -75,16 +75,20 @@ public:
     /// Waits, and hands over what has come.
     template <class Take>
     bool take(Time at_most, Take&& each) {
-        if (!opened_.link->wait(at_most)) return false;
-        const Time t = now();
-        for (std::size_t count; (count = opened_.link->receive(room_, t)) > 0;)
-            for (std::size_t n = 0; n < count; ++n) each(room_[n], t);
+        if (!opened_.link->wait(at_most)) return last_ = now(), false;
+        for (std::size_t count = room_.size(); count == room_.size();) {
+            count = opened_.link->receive(room_, can::unclocked);
+            if (count != 0) last_ = room_[0].time_ns;  // the driver has read the clock
+            for (std::size_t n = 0; n < count; ++n) each(room_[n], last_);
+        }
         return true;
     }
+    Time last() const { return last_; }  ///< when the last frames came
 
 private:
     can::Opened opened_;
     std::array<Frame, 64> room_;
+    Time last_ = now();
 };
 
 [[noreturn]] void slave(const char* address) {
@@ -93,7 +97,7 @@ private:
     Port port(address, {{0x080, 0x7ff, false}, {0x200U + node, 0x7ff, false}, {0x600U + node, 0x7ff, false}, {0x000, 0x7ff, false}});
     device.start(now());
     for (;;) {
-        const Time t = now();
+        const Time t = port.last();
         device.poll(t);
         port.send(device.out(), t);
         // What the bus had no room for goes soon, whatever comes.
@@ -112,7 +116,7 @@ struct Master {
     void run(SdoRequest& r) {
         remote.sdo().submit(r);
         while (!r.done()) {
-            const Time t = now();
+            const Time t = port.last();
             network.poll(t);
             port.send(out, t);
             if (!r.done()) port.take(second, [&](const Frame& f, Time at) { network.handle(f, at); });

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "bench.hpp"
-#include "canopen/302/master.hpp"
-#include "canopen/device.hpp"
+#include "canopen/master/boot/nmt_master.hpp"
+#include "canopen/protocol/device.hpp"
 #include "process.hpp"
 #include "sample.hpp"
 

@@ -154,17 +154,17 @@ Result watch_it(const Options& options, ethernet::Port& port, int axes, int cycl
     while (port.receive(0)) {}
     const double beats = asked_hex(options, "servo.threadbeat"), missed = asked_hex(options, "servo.missed"),
                  edges = asked(options, "getp", "updown.0.count");
-    const auto end = can::monotonic_ns() + (options.quick ? 700'000'000 : 2'000'000'000);
+    const auto end = link::monotonic_ns() + (options.quick ? 700'000'000 : 2'000'000'000);
     std::vector<double> busy;
     std::uint64_t frames = 0;
     std::int64_t first = 0, newest = 0;
-    while (can::monotonic_ns() < end) {
+    while (link::monotonic_ns() < end) {
         busy.push_back(asked(options, "getp", "servo.time") / 1000);
         while (const auto arrival = port.receive(0)) {
             if (first == 0) first = arrival->time_ns;
             newest = arrival->time_ns, ++frames;
         }
-        sleep_until(can::monotonic_ns() + 30'000'000);
+        sleep_until(link::monotonic_ns() + 30'000'000);
     }
     const double turns = asked_hex(options, "servo.threadbeat") - beats, rises = asked(options, "getp", "updown.0.count") - edges;
     result.missed = (asked_hex(options, "servo.missed") - missed) / std::max(1.0, turns);
@@ -188,11 +188,11 @@ Result machine(const Options& options, const TemporaryFolder& folder, int axes, 
     if (!opened) throw std::runtime_error(opened.problem);
     Result result;
     for (const Stopwatch watch; watch.ms() < (boot_s + boot_s_per_axis * axes) * 1e3 && here.alive() && there.alive() && !result.booted;) {
-        sleep_until(can::monotonic_ns() + 300'000'000);
+        sleep_until(link::monotonic_ns() + 300'000'000);
         result.booted = asked_hex(options, "canopen.0.nodes-operational") == axes + 1;
     }
     if (!result.booted) return result;
-    sleep_until(can::monotonic_ns() + 500'000'000);
+    sleep_until(link::monotonic_ns() + 500'000'000);
     // The best of some windows, as every bad one is the machine's.
     for (int window = 0; window < 3; ++window) {
         const Result seen = watch_it(options, *opened.port, axes, cycle_us);
@@ -206,7 +206,7 @@ double bare_loop(const Options& options, int frames_in, std::size_t bytes) {
     std::vector<double> us;
     std::atomic<bool> done{false};
     const auto bound = [](const char* interface) {
-        can::Descriptor socket(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK, 0x2390));  // 0x9023 on the wire
+        link::Descriptor socket(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK, 0x2390));  // 0x9023 on the wire
         sockaddr_ll place{};
         place.sll_family = AF_PACKET;
         place.sll_protocol = 0x2390;
@@ -214,14 +214,14 @@ double bare_loop(const Options& options, int frames_in, std::size_t bytes) {
         if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0) throw std::runtime_error("no raw socket");
         return socket;
     };
-    const can::Descriptor here = bound("bench0"), there = bound("bench1");
+    const link::Descriptor here = bound("bench0"), there = bound("bench1");
     const auto frame_of = [](std::size_t length) {
         std::vector<std::uint8_t> f(length);
         std::fill_n(f.begin(), 6, std::uint8_t{0xff});
         f[6] = 2, f[12] = 0x90, f[13] = 0x23;
         return f;
     };
-    const auto begin = can::monotonic_ns() + 20'000'000;
+    const auto begin = link::monotonic_ns() + 20'000'000;
     std::thread answer([&] {
         run_real_time(options.cpu > 0 ? options.cpu - 1 : 0, [&] {
             const auto f = frame_of(60);
@@ -237,10 +237,10 @@ double bare_loop(const Options& options, int frames_in, std::size_t bytes) {
         auto due = begin;
         for (int cycle = 0; cycle < (options.quick ? 500 : 2000); ++cycle, due += 1'000'000) {
             wait_until(due, 50'000);
-            const auto from = can::monotonic_ns();
+            const auto from = link::monotonic_ns();
             while (::recv(here.get(), room.data(), room.size(), 0) > 0) {}
             (void)!::send(here.get(), f.data(), f.size(), 0);
-            us.push_back(static_cast<double>(can::monotonic_ns() - from) / 1000);
+            us.push_back(static_cast<double>(link::monotonic_ns() - from) / 1000);
         }
     });
     done = true;

@@ -85,9 +85,9 @@ private:
         CompileInput input;
         input.epoch = 1'000'000;
         const std::unordered_set<const LoadedFunction*> none;
-        const std::unordered_map<Pin*, hal_value> pins;
-        const std::unordered_map<Signal*, hal_value> signals;
-        const std::unordered_map<Signal*, Pin*> inherited;
+        const Notes<Pin, hal_value> pins;
+        const Notes<Signal, hal_value> signals;
+        const Notes<Signal, Pin*> inherited;
         const std::unordered_map<const Pin*, hal_pin*> replaced;
         input.without = &none;
         input.pin_values = &pins;

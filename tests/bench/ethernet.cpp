@@ -58,12 +58,12 @@ public:
         if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0) throw std::runtime_error("no raw socket");
     }
     void send(Bytes& f) {
-        if (stamps_) put_time(f, can::clock_ns(CLOCK_REALTIME));
+        if (stamps_) put_time(f, link::clock_ns(CLOCK_REALTIME));
         (void)!::send(socket_.get(), f.data(), f.size(), 0);
     }
     /// Whether a frame came by then, and how long it took, by the kernel's stamp.
     bool receive(std::int64_t until, double& one_way_us) {
-        if (wait_ == Wait::hybrid && until - spin_ns > can::monotonic_ns()) sleep_until(until - spin_ns);
+        if (wait_ == Wait::hybrid && until - spin_ns > link::monotonic_ns()) sleep_until(until - spin_ns);
         std::uint8_t bytes[2048];
         for (;;) {
             if (!stamps_) {
@@ -79,14 +79,14 @@ public:
                     return true;
                 }
             }
-            if (can::monotonic_ns() >= until) return false;
+            if (link::monotonic_ns() >= until) return false;
         }
     }
 
 private:
     const Wait wait_;
     const bool stamps_;
-    can::Descriptor socket_;
+    link::Descriptor socket_;
 };
 
 class Ours {
@@ -97,7 +97,7 @@ public:
         auto opened = ethernet::open("eth:" + interface, {.types = {type}, .policy = policy, .spin_ns = spin_ns});
         if (!opened) throw std::runtime_error(opened.problem);
         port_ = std::move(opened.port);
-        for (int i = 0; i < 1000 && !port_->statistics().up; ++i) sleep_until(can::monotonic_ns() + period_ns);
+        for (int i = 0; i < 1000 && !port_->statistics().up; ++i) sleep_until(link::monotonic_ns() + period_ns);
     }
     void send(Bytes& f) { port_->send(f, {.stamp_at = static_cast<std::uint16_t>(stamps_ ? 22 : 0)}, 0); }
     bool receive(std::int64_t until, double& one_way_us) {
@@ -126,13 +126,13 @@ Exchange exchange(const std::string& a, const std::string& b, int cpu_a, int cpu
     result.round_trips.reserve(static_cast<std::size_t>(count)), result.one_ways.reserve(static_cast<std::size_t>(count));
     End here(a, wait, paced), there(b, wait, paced);
     std::atomic<bool> done{false};
-    const auto start = can::monotonic_ns() + 20 * period_ns;
+    const auto start = link::monotonic_ns() + 20 * period_ns;
     constexpr std::int64_t patience_ns = 50'000;  // of the end that expects a frame at its time
     std::thread echo([&] {
         run_real_time(cpu_b, [&] {
             double one_way = 0;
             for (std::int64_t due = start; !done.load(std::memory_order_relaxed);) {
-                const auto now = can::monotonic_ns();
+                const auto now = link::monotonic_ns();
                 if (paced)
                     while (due + patience_ns <= now) due += period_ns;
                 if (!there.receive(paced ? due + patience_ns : now + 10 * period_ns, one_way)) continue;
@@ -149,13 +149,13 @@ Exchange exchange(const std::string& a, const std::string& b, int cpu_a, int cpu
             Bytes f = broadcast_frame();
             if (paced) {
                 const auto due = start + i * period_ns;
-                if (due - can::monotonic_ns() > spin_ns) sleep_until(due - spin_ns);
-                while (can::monotonic_ns() < due) {}
+                if (due - link::monotonic_ns() > spin_ns) sleep_until(due - spin_ns);
+                while (link::monotonic_ns() < due) {}
             }
-            const auto sent = can::monotonic_ns();
+            const auto sent = link::monotonic_ns();
             here.send(f);
             const bool came = here.receive(sent + (paced ? spin_ns : 100 * period_ns), ignored);
-            if (came) result.round_trips.push_back(static_cast<double>(can::monotonic_ns() - sent) / 1000);
+            if (came) result.round_trips.push_back(static_cast<double>(link::monotonic_ns() - sent) / 1000);
             else ++result.missed;
         }
     });
@@ -187,11 +187,11 @@ Rounds pacer(const std::string& interface, int cpu, int rounds, int count) {
     if (!opened) throw std::runtime_error(opened.problem);
     for (int round = 0; round < rounds; ++round) {
         std::vector<double> late;
-        auto due = can::monotonic_ns() + 5 * period_ns;
+        auto due = link::monotonic_ns() + 5 * period_ns;
         for (int i = 0; i < count; ++i, due += period_ns) {
             sleep_until(due - period_ns / 2);
             const Bytes f = broadcast_frame();
-            opened.port->send(f, {.at_ns = due, .stamp_at = 22}, can::monotonic_ns());
+            opened.port->send(f, {.at_ns = due, .stamp_at = 22}, link::monotonic_ns());
             sleep_until(due + period_ns / 4);
             late.push_back(static_cast<double>(opened.port->statistics().launch_error_ns) / 1000);
         }

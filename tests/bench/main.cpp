@@ -38,14 +38,14 @@ constexpr Section sections[] = {
     {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
     {"vision", "markers in frames of 640 x 480: error and time", vision, true},
     {"dds", "64 pins from process to process, against a bare Fast DDS writer", dds},
-    {"size", "of the program; with --full its build from cold", size},
+    {"size", "of the program; with --full from a fresh clone to first motion, complete build, second start", size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };
 
 int usage(const char* problem, const char* word) {
     if (*problem) fmt::print(stderr, "hal-bench: {}'{}'\n", problem, word);
     fmt::print(stderr, "hal-bench [--quick] [--full] [SECTION...]   prints figures, asserts nothing\n"
-                       "  --quick  shorter runs\n  --full   also what takes minutes: a cold build, a million edits\n");
+                       "  --quick  shorter runs\n  --full   also what takes minutes: builds of a fresh clone, a million edits\n");
     for (const Section& section : sections) fmt::print(stderr, "  {:13}{}\n", section.name, section.what);
     return *problem ? 2 : 0;
 }

@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include "bench.hpp"
-#include "base/text.hpp"
+#include "text/glyphs.hpp"
 
 namespace hal::bench {
 namespace {

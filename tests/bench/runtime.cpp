@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <stdexcept>
 
+#include "commands/table.hpp"
 #include "machine.hpp"
 #include "sample.hpp"
 
@@ -29,10 +30,11 @@ Applied Runtime::apply(std::string text) {
     const auto commands = parse(session.sources, source, Environment{&session.ini, {}}, diagnostics);
     cost.parse = parsing.ms();
     const Stopwatch applying;
-    for (const Command& command : commands) session.apply(command, diagnostics);
+    Transaction transaction = session.begin();
+    for (const Command& command : commands) apply_edit(transaction, command, diagnostics);
     cost.apply = applying.ms();
     const Stopwatch committing;
-    const bool good = session.commit(diagnostics);
+    const bool good = transaction.commit(diagnostics);
     cost.commit = committing.ms();
     cost.cpu = cpu.ms();
     if (!good) throw std::runtime_error(diagnostics.all().empty() ? "an edit was refused" : render(diagnostics.all().front(), session.sources));

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "session/session.hpp"
+#include "machine/session.hpp"
 
 namespace hal::bench {
 

@@ -45,8 +45,8 @@ void sleep_until(std::int64_t time) {
 }
 
 void wait_until(std::int64_t time, std::int64_t spin_ns) {
-    if (time - can::monotonic_ns() > spin_ns) sleep_until(time - spin_ns);
-    while (can::monotonic_ns() < time) {}
+    if (time - link::monotonic_ns() > spin_ns) sleep_until(time - spin_ns);
+    while (link::monotonic_ns() < time) {}
 }
 
 double trimmed_rms(std::vector<double>& samples) {

@@ -17,13 +17,13 @@
 
 #include "drivers/link/ethernet.hpp"
 #include "drivers/link/system.hpp"
-#include "fieldbus/tdma/station.hpp"
+#include "fieldbus/tdma/station/station.hpp"
 #include "hal/discipline.hpp"
 #include "machine.hpp"
 #include "process.hpp"
 #include "sample.hpp"
 #include "segment.hpp"
-#include "tools/node/skewed_port.hpp"
+#include "tools/bus/node/skewed_port.hpp"
 
 namespace hal::bench {
 namespace {
@@ -46,7 +46,7 @@ Frame data_frame(const ethernet::Address& from) {
 class Participant {
 public:
     Participant(const std::string& interface, const StationSetup& setup, int cpu, double ppm, bool paced)
-        : clock_(can::monotonic_ns(), ppm, 0.0), spin_(std::min<std::int64_t>(150'000, setup.cycle * 2 / 5)), station_(setup) {
+        : clock_(link::monotonic_ns(), ppm, 0.0), spin_(std::min<std::int64_t>(150'000, setup.cycle * 2 / 5)), station_(setup) {
         ethernet::Options how{.types = {tdma::Station::types.begin(), tdma::Station::types.end()},
                               .spin_ns = std::max(spin_, setup.cycle / 3)};
         // Its sync must not wait for the thread, which looks at the clock on the same CPU.
@@ -72,10 +72,10 @@ private:
     void run() {
         const Frame frame = data_frame(station_.address());
         const auto cycle = station_.setup().cycle;
-        auto due = clock_.local(can::monotonic_ns()) + cycle;
+        auto due = clock_.local(link::monotonic_ns()) + cycle;
         while (!done_.load(std::memory_order_relaxed)) {
             wait_until(clock_.from_local(due), spin_);
-            for (const auto now = clock_.local(can::monotonic_ns()); due < now - cycle / 2;) due += cycle;
+            for (const auto now = clock_.local(link::monotonic_ns()); due < now - cycle / 2;) due += cycle;
             station_.receive(due);
             if (station_.ready() && !station_.setup().slots.empty()) station_.send(frame, tdma::default_slot, 0);
             station_.transmit(due);
@@ -102,10 +102,10 @@ std::unique_ptr<ethernet::Port> observer(const std::string& interface, std::uint
 
 template <class Condition>
 bool within(double most_s, Condition condition) {
-    const auto end = can::monotonic_ns() + static_cast<std::int64_t>(most_s * 1e9);
+    const auto end = link::monotonic_ns() + static_cast<std::int64_t>(most_s * 1e9);
     while (!condition()) {
-        if (can::monotonic_ns() > end) return false;
-        sleep_until(can::monotonic_ns() + 10'000'000);
+        if (link::monotonic_ns() > end) return false;
+        sleep_until(link::monotonic_ns() + 10'000'000);
     }
     return true;
 }
@@ -127,7 +127,7 @@ std::vector<double> phases(ethernet::Port& port, std::int64_t cycle, std::size_t
 
 /// What a program without TDMA would do: the same frame at the same times, on the same clock as the observer's.
 std::vector<double> bare_loop(const std::string& interface, ethernet::Port& port, std::int64_t cycle, int cpu, std::size_t count) {
-    const can::Descriptor socket(::socket(AF_PACKET, SOCK_RAW, 0));
+    const link::Descriptor socket(::socket(AF_PACKET, SOCK_RAW, 0));
     sockaddr_ll place{};
     place.sll_family = AF_PACKET;
     place.sll_ifindex = static_cast<int>(if_nametoindex(interface.c_str()));
@@ -139,10 +139,10 @@ std::vector<double> bare_loop(const std::string& interface, ethernet::Port& port
         run_real_time(cpu, [&] {
             const Frame frame = data_frame({2, 0, 0, 0, 0, 1});
             const auto spin = std::min<std::int64_t>(150'000, cycle * 2 / 5);
-            for (auto due = can::monotonic_ns() + cycle; !done.load(std::memory_order_relaxed); due += cycle) {
+            for (auto due = link::monotonic_ns() + cycle; !done.load(std::memory_order_relaxed); due += cycle) {
                 wait_until(due, spin);
                 (void)!::send(socket.get(), frame.data(), frame.size(), 0);
-                while (due + cycle < can::monotonic_ns()) due += cycle;
+                while (due + cycle < link::monotonic_ns()) due += cycle;
             }
         });
     });
@@ -166,10 +166,10 @@ void jitter(const std::vector<std::string>& lines, std::int64_t cycle, const Opt
             Participant first(lines[0], master, last, 0.0, true), second(lines[1], slave, other, skew, false);
             if (!within(15, [&] { return second.ready(); }))
                 return report.note(fmt::format("cycle of {} us: the station did not come so far as to send", cycle / 1000));
-            sleep_until(can::monotonic_ns() + std::max<std::int64_t>(300'000'000, 1000 * cycle));  // until the clock's drift is known
-            const auto began = can::monotonic_ns();
+            sleep_until(link::monotonic_ns() + std::max<std::int64_t>(300'000'000, 1000 * cycle));  // until the clock's drift is known
+            const auto began = link::monotonic_ns();
             std::vector<double> us = phases(*looking, cycle, count, 20);
-            expected += static_cast<std::size_t>((can::monotonic_ns() - began) / cycle), missed += us.size();
+            expected += static_cast<std::size_t>((link::monotonic_ns() - began) / cycle), missed += us.size();
             if (us.size() > 100) ours.push_back(trimmed_rms(us));
         }
         std::vector<double> us = bare_loop(lines[1], *looking, cycle, other, count);
@@ -196,12 +196,12 @@ void loss(const std::vector<std::string>& lines, const Options& options, Report&
         const auto looking = observer(lines[2], tdma::rtmac_type);
         Participant first(lines[0], clock, last, 0.0, true), second(lines[1], backup, other, skew, false);
         if (!within(15, [&] { return second.ready(); })) continue;
-        sleep_until(can::monotonic_ns() + 200'000'000);
+        sleep_until(link::monotonic_ns() + 200'000'000);
         const auto from = first.address();
         while (looking->receive(0)) {}
-        sleep_until(can::monotonic_ns() + 20'000'000);
+        sleep_until(link::monotonic_ns() + 20'000'000);
         first.end();
-        sleep_until(can::monotonic_ns() + 50'000'000);
+        sleep_until(link::monotonic_ns() + 50'000'000);
         std::optional<std::uint32_t> before;
         std::int64_t at = 0;
         bool found = false;

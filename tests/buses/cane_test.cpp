@@ -4,8 +4,9 @@
 
 #include <random>
 
-#include "cane/format.hpp"
-#include "cane/stations.hpp"
+#include "can/cane/cane_format.hpp"
+#include "can/cane/cane_stations.hpp"
+#include "discipline/discipline.hpp"
 #include "link/can.hpp"
 #include "link/segment.hpp"
 
@@ -302,9 +303,10 @@ struct Slots final : ethernet::Discipline {
     std::vector<std::pair<Bytes, unsigned>> queue;
     std::size_t most = 2;
     bool is_ready = true;
-    ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority) noexcept override {
+    ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority, ethernet::Finisher* finisher) noexcept override {
         if (queue.size() == most) return ethernet::Sent::full;
         queue.emplace_back(Bytes(frame.begin(), frame.end()), priority);
+        if (finisher != nullptr) finisher->leaves(queue.back().first);
         return ethernet::Sent::queued;
     }
     std::size_t room(unsigned slot) const noexcept override { return slot == 2 ? 60 : 0; }
@@ -314,9 +316,12 @@ struct Slots final : ethernet::Discipline {
 
 TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     Slots slots;
-    ASSERT_TRUE(ethernet::offer_discipline("sim:slots/x", &slots));
+    const auto line = ethernet::open("sim:slots/x");
+    ASSERT_TRUE(ethernet::offer_discipline(*line.port, &slots, {{2, {{.station = "y", .there_ns = 7}}}}));
     EXPECT_NE(can::open("cane:sim:slots/x?slot=3").problem, "");
     auto x = opened("cane:sim:slots/x?slot=2");
+    ASSERT_EQ(x->delivery_times().size(), 1U);
+    EXPECT_EQ(x->delivery_times().front().there_ns, 7);
     for (std::uint8_t n = 1; n <= 20; ++n) x->send(message(0x200U + n, {n, 0, 0, 0, 0, 0, 0, 0}), 0);
     x->send(message(0x605, {0x40}), 0);
     x->flush(0);
@@ -348,7 +353,8 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     ethernet::withdraw_discipline(&slots);  // unloaded while the link is in use
     x->receive(f, 4'000'000);
     EXPECT_EQ(x->state(), State::down);
-    ASSERT_TRUE(ethernet::offer_discipline("sim:slots/x", &slots));
+    EXPECT_TRUE(x->delivery_times().empty());
+    ASSERT_TRUE(ethernet::offer_discipline(*line.port, &slots));
     x->receive(f, 5'000'000);
     EXPECT_EQ(x->state(), State::active);
     ethernet::withdraw_discipline(&slots);
@@ -356,7 +362,8 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
 
 TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {
     Slots slots;
-    ASSERT_TRUE(ethernet::offer_discipline("sim:slots/late", &slots));
+    const auto line = ethernet::open("sim:slots/late");
+    ASSERT_TRUE(ethernet::offer_discipline(*line.port, &slots));
     for (const char* format : {"packed", "single"}) {
         auto x = opened(std::string("cane:sim:slots/late?slot=2&format=") + format);
         slots.most = 0;  // the last cycle's frames wait in the slot
@@ -385,6 +392,18 @@ TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {
         slots.queue.clear();
     }
     ethernet::withdraw_discipline(&slots);
+}
+
+TEST(CaneDescribe, names_the_segment_without_opening_it) {
+    EXPECT_EQ(can::describe("cane:enp3s0?slot=2&key=/nowhere").segment, "eth:enp3s0");
+    EXPECT_EQ(can::describe("cane:enp3s0?slot=2").address, "cane:enp3s0?slot=2");
+    EXPECT_TRUE(can::describe("cane:sim:bus0").in_memory);
+    EXPECT_FALSE(can::describe("cane:sim:bus0").has_bit_rate);
+    EXPECT_TRUE(can::describe("sim:bus0").has_bit_rate);
+    EXPECT_EQ(can::describe("can:can0?bitrate=500k").interface, "can0");
+    EXPECT_EQ(can::describe("replay:a.log").file, "a.log");
+    EXPECT_TRUE(can::describe("slcan:/dev/ttyACM0").fd_on_request);
+    EXPECT_TRUE(can::describe("tok:en").transport.empty());
 }
 
 TEST(CaneOpen, says_what_is_wrong_and_what_to_type) {

@@ -30,7 +30,7 @@ drive
 "$hal" run axis.hal slow.hal >machine.said 2>&1 & machine=$!
 is TRUE getp canopen.0.x.operational
 is TRUE gets x-active
-grep -q "operation enabled" drive.said
+until grep -q "operation enabled" drive.said; do sleep 0.1; done
 until "$hal" shell gets x-position | grep -Eq '^-?[1-9]'; do sleep 0.1; done
 echo it moves
 kill -9 $drive

@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 
 try:
@@ -65,22 +66,22 @@ def udp(program):
 
 def serial_line(program):
     if shutil.which("socat") is None:
-        print("socat is missing, slcan is left out; type: sudo apt install socat")
-        return []
-    ends = [f"/tmp/halcyon-slcan-{os.getpid()}-{side}" for side in "ab"]
-    relay = subprocess.Popen(["socat", f"pty,raw,echo=0,link={ends[0]}", f"pty,raw,echo=0,link={ends[1]}"])
-    try:
-        while not all(os.path.exists(e) for e in ends):
-            time.sleep(0.05)
-        with can.Bus(ends[0], interface="slcan", sleep_after_open=0.1) as bus:
-            return exchange(bus, program, f"slcan:{ends[1]}", FRAMES)
-    finally:
-        relay.kill()
-        relay.wait()
+        raise OSError("socat is missing; type: sudo apt install socat")
+    with tempfile.TemporaryDirectory() as folder:
+        ends = [f"{folder}/{side}" for side in "ab"]
+        relay = subprocess.Popen(["socat", f"pty,raw,echo=0,link={ends[0]}", f"pty,raw,echo=0,link={ends[1]}"])
+        try:
+            while not all(os.path.exists(e) for e in ends):
+                time.sleep(0.05)
+            with can.Bus(ends[0], interface="slcan", sleep_after_open=0.1) as bus:
+                return exchange(bus, program, f"slcan:{ends[1]}", FRAMES)
+        finally:
+            relay.kill()
+            relay.wait()
 
 
 def main():
-    program, wrong = sys.argv[1], []
+    program, wrong, ran = sys.argv[1], [], 0
     for name, part in (("udp", udp), ("slcan", serial_line)):
         try:
             found = part(program)
@@ -89,7 +90,8 @@ def main():
             continue
         print(f"{name}: {'; '.join(found) or 'all frames came back'}")
         wrong += found
-    return 1 if wrong else 0
+        ran += 1
+    return 1 if wrong else 0 if ran else 77
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "discipline/discipline.hpp"
 #include "link/segment.hpp"
 
 #include <gtest/gtest.h>
@@ -395,26 +396,35 @@ TEST(Ethernet, addresses_are_written_and_read) {
         EXPECT_FALSE(parse_address(wrong)) << wrong;
 }
 
-TEST(Ethernet, a_discipline_is_found_by_the_address_of_its_port) {
+TEST(Ethernet, discipline_is_found_through_any_port_of_its_line) {
     struct Quiet : Discipline {
-        Sent send(std::span<const std::uint8_t>, unsigned, unsigned) noexcept override { return Sent::queued; }
+        Sent send(std::span<const std::uint8_t>, unsigned, unsigned, Finisher*) noexcept override { return Sent::queued; }
         std::size_t room(unsigned) const noexcept override { return 46; }
         bool ready() const noexcept override { return true; }
         const Address& address() const noexcept override { return broadcast; }
     } one, two;
-    EXPECT_TRUE(offer_discipline("eth:if0?policy=block", &one));
-    EXPECT_FALSE(offer_discipline("eth:if0", &two));
-    const auto seat = discipline_of("eth:if0");
+    const auto first = open("sim:disciplined/a?speed=1000"), second = open("sim:disciplined/a"), other = open("sim:disciplined/b");
+    EXPECT_TRUE(offer_discipline(*first.port, &one));
+    EXPECT_FALSE(offer_discipline(*second.port, &two));
+    const auto seat = discipline_of(*second.port);
     ASSERT_NE(seat, nullptr);
     EXPECT_TRUE(seat->holds(&one));
-    EXPECT_EQ(discipline_of("eth:if0?spin=50us"), seat);
-    EXPECT_EQ(discipline_of("eth:if1"), nullptr);
+    EXPECT_EQ(discipline_of(*first.port), seat);
+    EXPECT_EQ(discipline_of(*other.port), nullptr);
     withdraw_discipline(&one);
-    EXPECT_EQ(discipline_of("eth:if0"), nullptr);
+    EXPECT_EQ(discipline_of(*first.port), nullptr);
     EXPECT_FALSE(seat->with([](Discipline&) { FAIL(); }));
-    EXPECT_TRUE(offer_discipline("eth:if0", &two));
+    EXPECT_TRUE(offer_discipline(*second.port, &two));
     EXPECT_TRUE(seat->holds(&two));  // who had the first has the second now
     withdraw_discipline(&two);
+}
+
+TEST(Ethernet, address_is_described_without_opening_it) {
+    EXPECT_TRUE(describe("sim:net0/a").in_memory);
+    EXPECT_FALSE(describe("sim:net0").paced);
+    EXPECT_EQ(describe("eth:enp3s0?pacer").address, "eth:enp3s0");
+    EXPECT_TRUE(describe("eth:enp3s0").paced);
+    EXPECT_TRUE(describe("tok:en").transport.empty());
 }
 
 }  // namespace

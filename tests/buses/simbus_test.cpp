@@ -339,7 +339,7 @@ TEST(Open, says_what_is_wrong_and_what_to_type) {
     EXPECT_EQ(open("sim:x?bitrate=fast").problem, "sim:x?bitrate=fast: bitrate is 'fast'; write bits per second, as in 500000, 500k or 1M");
     EXPECT_EQ(open("sim:x?rate=1").problem,
               "sim:x?rate=1: there is no option 'rate'; there are"
-              " bitrate, datarate, fd, listen, own, errors, restart, sendqueue, receivequeue");
+              " bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue");
     EXPECT_EQ(
         open("slcan:/dev/null?bitrate=300k").problem,
         "slcan:/dev/null?bitrate=300k: a serial-line adapter cannot be told 300000 bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, "

@@ -25,7 +25,7 @@ protected:
         if (if_nametoindex("vcan0") == 0) GTEST_SKIP() << "no interface vcan0; socketcan_test.py runs this in user-mode-linux";
     }
     static std::unique_ptr<Link> link(const std::string& address) {
-        auto opened = open(address);
+        auto opened = open(address, {.stamps = true});
         EXPECT_TRUE(opened) << opened.problem;
         return std::move(opened.link);
     }
@@ -51,7 +51,7 @@ TEST_F(Socketcan, frames_of_every_kind_cross_with_the_time_of_arrival) {
     Frame fd(0x12345, std::vector<std::uint8_t>(64, 0x5a));
     fd.bit_rate_switch = true;
     const Frame frames[] = {{0x7ff, {1, 2, 3, 4, 5, 6, 7, 8}}, Frame::request(0x701, 1), {0x1abcdef0, {}}, fd};
-    const auto before = monotonic_ns();
+    const auto before = link::monotonic_ns();
     for (const auto& f : frames) EXPECT_EQ(a->send(f, unclocked), Sent::queued);
     a->flush(unclocked);
     for (const auto& f : frames) {
@@ -59,7 +59,7 @@ TEST_F(Socketcan, frames_of_every_kind_cross_with_the_time_of_arrival) {
         ASSERT_TRUE(next(*b, got));
         EXPECT_TRUE(got.same(f));
         EXPECT_GT(got.time_ns, before - 1'000'000);
-        EXPECT_LT(got.time_ns, monotonic_ns() + 1'000'000);
+        EXPECT_LT(got.time_ns, link::monotonic_ns() + 1'000'000);
     }
     EXPECT_EQ(b->statistics().received, 4U);
     EXPECT_EQ(a->statistics().sent, 4U);
@@ -124,7 +124,7 @@ TEST_F(Socketcan, waiting_takes_what_comes_one_by_one_and_in_bursts_and_keeps_th
         while (got < sent) {
             ASSERT_TRUE(b->wait(2'000'000'000));
             const auto before = got;
-            take(burst % 2 == 0 ? unclocked : monotonic_ns());
+            take(burst % 2 == 0 ? unclocked : link::monotonic_ns());
             ASSERT_GT(got, before) << "there was something to receive, said wait()";
         }
     }
@@ -134,13 +134,13 @@ TEST_F(Socketcan, waiting_takes_what_comes_one_by_one_and_in_bursts_and_keeps_th
 TEST_F(Socketcan, waiting_ends_when_nothing_comes) {
     auto a = link("can:vcan0"), b = link("can:vcan0");
     for (const std::int64_t at_most : {0, 1'000'000, 20'000'000, 70'000'000}) {
-        const auto began = monotonic_ns();
+        const auto began = link::monotonic_ns();
         EXPECT_FALSE(b->wait(at_most));
-        EXPECT_GE(monotonic_ns() - began, at_most);
+        EXPECT_GE(link::monotonic_ns() - began, at_most);
         Frame f;
-        EXPECT_FALSE(b->receive(f, monotonic_ns()));
+        EXPECT_FALSE(b->receive(f, link::monotonic_ns()));
     }
-    const auto before = monotonic_ns();  // a cycle that found nothing, then waited, is told in the same cycle
+    const auto before = link::monotonic_ns();  // a cycle that found nothing, then waited, is told in the same cycle
     Frame f;
     EXPECT_FALSE(b->receive(f, before));
     a->send({0x7, {}}, unclocked), a->flush(unclocked);
@@ -207,7 +207,7 @@ struct Controller {
         f.data[1] = what, f.data[6] = send_errors, f.data[7] = receive_errors;
         ASSERT_EQ(::write(socket.get(), &f, sizeof f), static_cast<ssize_t>(sizeof f));
     }
-    Descriptor socket;
+    link::Descriptor socket;
 };
 
 TEST_F(Socketcan, error_frames_tell_the_state_of_the_controller_its_counters_and_what_it_lost) {

@@ -1,73 +1,105 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""includes.py ROOT: fails when a source includes what its folder may not reach; says file:line and the rule."""
+"""includes.py ROOT: fails when a source includes what its folder may not reach (file:line and the rule), when a folder has no row, and when
+folders include each other in a circle, and when code outside drivers/ tests the prefix of an address."""
 import re
 import sys
 from pathlib import Path
 
-# A folder may include the folders in its row and whatever those may include.
+# A folder may include the folders in its row and whatever those may include. A folder below a row belongs to that row.
 ROWS = {
     "runtime/abi": [],
     "runtime/sdk": ["runtime/abi"],
-    "runtime/base": ["runtime/abi", "runtime/sdk"],  # the lock-free queue is the sdk's, for components and runtime alike
+    "runtime/text": ["runtime/abi", "runtime/sdk"],
+    "runtime/base": ["runtime/text"],
     "runtime/netlist": ["runtime/base"],
     "runtime/plan": ["runtime/abi"],
     "runtime/model": ["runtime/base", "runtime/plan"],
     "runtime/execute": ["runtime/plan", "runtime/base"],
-    "runtime/session": ["runtime/execute", "runtime/model", "runtime/netlist"],
-    "runtime/shell": ["runtime/session"],
-    "tools": ["runtime/shell", "components/canopen", "components/fieldbus"],  # hal can: device descriptions; hal node: stations
+    "runtime/machine": ["runtime/execute", "runtime/model", "runtime/netlist"],
+    "runtime/commands": ["runtime/machine"],
+    "runtime/control": ["runtime/commands"],
+    "runtime/cells": ["runtime/control"],
+    "tools": ["tools/inspect", "tools/comp", "tools/bus"],  # the table of subcommands
+    "tools/cli": ["runtime/control"],
+    "tools/run": ["tools/cli", "runtime/cells"],
+    "tools/inspect": ["tools/run", "drivers/link"],  # record: its files
+    "tools/doc": ["tools/cli"],
+    "tools/comp": ["tools/doc"],
+    "tools/bus": ["tools/cli", "components/canopen/master", "components/canopen/device",
+                  "components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel"],  # hal can, hal node, hal tdma
+    "tools/python": ["runtime/control"],
     "drivers/link": [],
-    "drivers": ["drivers/link"],
+    "drivers/discipline": ["drivers/link"],
+    "drivers/capture": ["drivers/link"],
+    "drivers/netlink": ["drivers/link"],
+    "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink"],
+    "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk"],
+    "components/logic": ["components"],
+    "components/math": ["components"],
+    "components/control": ["components"],
+    "components/motion": ["components"],
+    "components/io": ["components"],
+    "components/safety": ["components"],
+    "components/sim": ["components"],
+    "components/estimation": ["components"],
+    "components/vision": ["components"],
+    "components/dds": ["components"],
     "components": ["runtime/sdk"],
-    "components/canopen": ["runtime/sdk", "drivers/link", "components/sim"],  # sim: the plants behind simulated devices
-    "components/fieldbus": ["runtime/sdk", "drivers/link"],
-    "components/ethercat": ["runtime/sdk", "drivers/link"],
+    "components/cia402": ["runtime/sdk"],
+    "components/canopen/protocol": ["runtime/sdk", "drivers/link", "components/cia402"],  # cia402: the error codes
+    "components/canopen/eds": ["components/canopen/protocol"],
+    "components/canopen/master": ["components/canopen/eds"],
+    "components/canopen/device": ["components/canopen/eds", "components/sim"],  # sim: the plants behind simulated devices
+    "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
+    "components/fieldbus/segment": ["runtime/sdk", "drivers/link"],
+    "components/fieldbus/tdma/wire": ["runtime/sdk", "drivers/link"],
+    "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],
+    "components/fieldbus/tdma/config": ["components/fieldbus/tdma/station"],
+    "components/fieldbus/tdma/rtcfg": ["components/fieldbus/tdma/config"],
+    "components/fieldbus/tdma/tunnel": ["components/fieldbus/tdma/config"],
+    "components/fieldbus/tdma/plugins": ["components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel"],
 }
 
 # The bans that carry the design, in words.
 BANS = {
     ("runtime/execute", "runtime/model"): "execute never includes model: real-time code cannot reach a name or a string",
+    ("components/canopen/master", "components/canopen/device"): "master and device never include each other",
+    ("components/canopen/device", "components/canopen/master"): "master and device never include each other",
     ("components", None): "components include only the sdk (bus components also drivers/link)",
-    (None, "runtime/session"): "only shell, tools and tests include session",
+    (None, "runtime/machine"): "only commands, control, cells, tools and tests include machine",
 }
 
 # Libraries that only some folders may include.
 LIBRARIES = {
-    r"Eigen/|unsupported/Eigen": ["components/estimation", "components/kinematics", "components/forcetorque"],
-    r"opencv2/": ["components/vision"],
+    r"Eigen/|unsupported/Eigen": ["components/estimation"],
+    r"opencv2/|yaml-cpp/": ["components/vision"],
     r"fastdds/|fastrtps/|fastcdr/": ["components/dds"],
-    r"CLI/": ["tools"],
-    r"editline/|histedit": ["tools"],
+    r"CLI/": ["tools/cli"],
+    r"editline/|histedit": ["tools/cli"],
     r"fmt/": ["runtime", "tools"],
     r"pugixml": ["components/canopen"],
-    r"nlohmann/": ["runtime/session", "runtime/shell", "tools"],
+    r"nlohmann/": ["runtime/machine", "runtime/commands", "runtime/control", "tools"],
 }
 
 INCLUDE_ROOTS = ["runtime", "runtime/abi", "runtime/sdk", "drivers", "components", "tools", "."]  # as the compiler searches
-SINGLE = {"paths.hpp": ["runtime/session", "runtime/shell", "tools"]}  # headers that belong to no folder
+SINGLE = {"paths.hpp": ["runtime/machine", "runtime/commands", "runtime/control", "tools", "tools/inspect", "tools/comp"]}  # headers that belong to no folder
+# Which transport an address names is the drivers' matter: others ask describe().
+ADDRESS_PREFIX = re.compile(r'(?:\b(?:starts_with|r?find|compare)\(\s*|[=!]=\s*|\b\w+ = )"(?:can|sim|udp|slcan|cane|replay|eth):"')
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
 
 def folder_of(path):
-    """The longest row or component group that holds `path` (relative to the root), or None."""
-    parts = path.parts
-    if parts[0] == "components":
-        return "/".join(parts[:2]) if len(parts) > 2 else "components"
-    for length in (2, 1):
-        if "/".join(parts[:length]) in ROWS:
-            return "/".join(parts[:length])
+    """The longest row that holds `path` (relative to the root), or None. Only a file directly in components/ belongs to its row."""
+    for parent in path.parents:
+        if parent.as_posix() in ROWS and (parent.as_posix() != "components" or path.parent == parent):
+            return parent.as_posix()
     return None
-
-
-def row(folder):
-    """What `folder` itself names; a group of components without a row of its own has that of all components."""
-    return ROWS[folder] if folder in ROWS else ROWS[folder.split("/")[0]]
 
 
 def reach(folder):
     found = {folder}
-    for other in row(folder):
+    for other in ROWS[folder]:
         found |= reach(other)
     return found
 
@@ -82,10 +114,11 @@ def resolve(root, source, name):
 
 
 def rule(folder, target):
+    plain = "components" if ROWS[folder] == ["components"] else None
     for (source, banned), words in BANS.items():
-        if (source is None or folder.split("/")[0] == source or folder == source) and banned in (None, target):
+        if source in (None, folder, plain) and banned in (None, target):
             return words
-    allowed = ", ".join(sorted(row(folder))) or "nothing"
+    allowed = ", ".join(sorted(ROWS[folder])) or "nothing"
     return f"{folder} may include {allowed}"
 
 
@@ -108,18 +141,46 @@ def problem(root, source, kind, name):
     return f'includes "{name}" of {target or found.parent}: {rule(folder, target)}'
 
 
+def circles(graph):
+    """The sets of folders that reach each other, each as a sorted list."""
+    def reached(start):
+        found, new = set(), [start]
+        while new:
+            for other in graph.get(new.pop(), {}):
+                if other not in found:
+                    found.add(other)
+                    new.append(other)
+        return found
+
+    reaches = {folder: reached(folder) for folder in graph}
+    return sorted({tuple(sorted(o for o in seen if folder in reaches.get(o, ()))) for folder, seen in reaches.items() if folder in seen})
+
+
 def main(root):
-    count, errors = 0, []
+    count, errors, graph = 0, [], {}
     for top in ("runtime", "components", "drivers", "tools"):
         for source in sorted((root / top).rglob("*")):
-            if source.suffix not in (".c", ".h", ".cpp", ".hpp") or folder_of(source.relative_to(root)) is None:
+            if source.suffix not in (".c", ".h", ".cpp", ".hpp"):
+                continue
+            path = source.relative_to(root)
+            if folder_of(path) is None:
+                if path.parent.as_posix() not in ("runtime", "components"):
+                    errors.append(f"{path}: {path.parent} has no row in includes.py: what may it include?")
                 continue
             count += 1
             for number, line in enumerate(source.read_text(errors="replace").splitlines(), 1):
+                if not path.as_posix().startswith("drivers/") and ADDRESS_PREFIX.search(line):
+                    errors.append(f"{path}:{number}: tests the prefix of an address; ask can::describe() or ethernet::describe() instead")
                 match = INCLUDE.match(line)
                 wrong = match and problem(root, source, match[1], match[2])
                 if wrong:
-                    errors.append(f"{source.relative_to(root)}:{number}: {wrong}")
+                    errors.append(f"{path}:{number}: {wrong}")
+                target = match and match[1] == '"' and resolve(root, source, match[2])
+                if target and target.parent != path.parent:
+                    graph.setdefault(path.parent, {}).setdefault(target.parent, f'{path}:{number}: includes "{match[2]}"')
+    for circle in circles(graph):
+        errors.append(f"folders that include each other: {', '.join(f.as_posix() for f in circle)}")
+        errors += [f"    {where}" for folder in circle for other, where in graph[folder].items() if other in circle]
     print("\n".join(errors) if errors else f"{count} files include only what they may")
     return 1 if errors else 0
 

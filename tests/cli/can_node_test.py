@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """hal can sdo, pdo and lss: a simulated node on udp: is asked and set up by hand."""
+import csv
 import json
 import os
 import random
@@ -112,6 +113,37 @@ class Sdo(Node):
         self.assertEqual("hal can sdo write: --block and --segmented exclude each other\n", self.bad_can(*sdo, "1", "--block", "--segmented"))
         self.assertEqual("hal can sdo read: 'node.log' is no device description; hal can eds check node.log says why\n",
                          self.bad_can("sdo", "read", self.bus, "5", "1000", "--eds", "node.log"))
+
+
+
+class ReadAll(Node):
+    def test_every_object_also_read_only_ones_and_what_refuses(self):
+        eds = (self.folder / "io.eds").read_text()
+        self.write("more.eds", eds.replace("ParameterName=Serial number", "ParameterName=Serial, number") + "\n[2FF0]\nParameterName=Absent\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\nPDOMapping=0\n"
+                   .replace("Absent", "Not in the device"))
+        listed = re.sub(r"(?s)(\[ManufacturerObjects\]\s*\nSupportedObjects=)(\d+)", lambda m: f"{m[1]}{int(m[2]) + 1}\n{int(m[2]) + 1}=0x2FF0",
+                        (self.folder / "more.eds").read_text())
+        self.write("more.eds", listed)
+        done = self.run_program("can", "read-all", self.bus, "5", "--eds", "more.eds")
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertIn("1018:4 Identity object, Serial, number = 0x00000001 (1)\n", done.stdout)
+        self.assertIn("1000:0 Device type = ", done.stdout)
+        self.assertIn("2FF0:0 Not in the device: refused: object does not exist in the object dictionary (0x06020000)\n", done.stdout)
+        self.assertRegex(done.stderr, r"^\d+ objects of node 5 read, 1 refused, \d+ write-only\n$")
+        self.assertRegex(self.can("read-all", self.bus, "5", "--eds", "more.eds", "-o", "all.csv"), r"^all\.csv: \d+ objects of node 5 read, 1 refused")
+        with open(self.folder / "all.csv", newline="") as file:
+            rows = {(row["index"], row["sub"]): row for row in csv.DictReader(file)}
+        self.assertEqual(("Identity object, Serial, number", "u32", "ro", "1", "01000000", ""),
+                         tuple(rows["0x1018", "4"][key] for key in ("name", "type", "access", "value", "data", "reason")))
+        self.assertEqual(("", "", "object does not exist in the object dictionary (0x06020000)"),
+                         tuple(rows["0x2FF0", "0"][key] for key in ("value", "data", "reason")))
+        lines = [json.loads(line) for line in self.run_program("can", "read-all", self.bus, "5", "--eds", "more.eds", "--json").stdout.splitlines()]
+        self.assertEqual(len(rows), len(lines))
+
+    def test_wrong_words(self):
+        self.assertEqual("hal can read-all: missing --eds FILE: the description lists the objects of the node\n",
+                         self.bad_can("read-all", self.bus, "5"))
+        self.assertIn("hal can read-all: node 9 did not answer within ", self.bad_can("read-all", self.bus, "9", "--eds", "io.eds", "--timeout", "50ms"))
 
 
 class Dcf(Node):
@@ -249,6 +281,79 @@ class Lss(Node):
         self.assertEqual("hal can lss: there is no command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
         self.assertEqual("hal can lss: select takes other words; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
         self.assertEqual("hal can lss: 'x' is no vendor id; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
+
+
+class Watch(Node):
+    def test_nodes_with_their_state_age_and_emergencies(self):
+        listener = self.begin("nodes", "--json", "--for", "3s")
+        sent = self.run_program("can", "send", self.bus, "707#00", "087#3081110000000000", "707#7F", "--every", "100ms", "--count", 2)
+        self.assertEqual(0, sent.returncode, sent.stderr)
+        found = json.loads(listener.communicate(timeout=2 * PATIENCE)[0])
+        seven = next(n for n in found if n["node"] == 7)
+        self.assertEqual(("pre-operational", 2, 2), (seven["state"], seven["boot_ups"], seven["emergencies"]))
+        self.assertEqual((0x8130, "life guard or heartbeat error", 0x11), tuple(seven["newest"][0][key] for key in ("code", "text", "error_register")))
+        self.assertGreater(seven["age"], 0)
+
+    def test_nodes_of_a_capture_as_a_table(self):
+        (self.folder / "seen.log").write_text("".join(f"({t:.6f}) can0 {frame}\n" for t, frame in (
+            (10.0, "705#05"), (10.1, "705#05"), (10.2, "705#05"), (10.3, "086#0000000000000000"), (11.2, "080#"))))
+        text = self.good_on("nodes", "replay:seen.log")
+        self.assertEqual("node  state                 heard  boot-ups  emergencies\n"
+                         "   5  operational          1.00 s         0  0; SILENT: its heartbeats came every 0.10 s\n"
+                         "   6  no heartbeat              -         0  1\n"
+                         "                                               no error any more, 0.9 s ago\n", text)
+
+    def test_changed_bytes_are_marked(self):
+        (self.folder / "seen.log").write_text("(1.000000) can0 181#0102\n(1.010000) can0 181#0103\n(1.020000) can0 182#AA\n")
+        self.assertEqual("      id    frames      period  data, what changed marked\n     181         2     10.0 ms  01 03*\n"
+                         "     182         1           -  AA\n", self.good_on("sniff", "replay:seen.log"))
+
+    def test_what_is_produced_and_generated(self):
+        for words, lines in ((("produce", self.bus, "heartbeat", 9), ["709#05"] * 3), (("produce", self.bus, "guarding", 9), ["709#R1"] * 3),
+                             (("produce", self.bus, "sync", "--counter", 2), ["080#01", "080#02", "080#01"]),
+                             (("generate", self.bus, "--id", "100-101", "--counting", "--length", 2), ["100#0000", "101#0100", "100#0200"])):
+            with self.subTest(words[0] + str(words[2])):
+                (self.folder / "seen.log").unlink(missing_ok=True)
+                listener = self.begin("record", "seen.log", "--count", 3, "--filter", lines[0].split("#")[0] + ("/7FE" if words[0] == "generate" else "/7FF"))
+                self.assertEqual(0, self.run_program("can", *words, "--every", "10ms", "--count", 3).returncode)
+                listener.communicate(timeout=2 * PATIENCE)
+                self.assertEqual(lines, [line.split()[2] for line in (self.folder / "seen.log").read_text().splitlines()])
+        self.assertEqual("hal can produce: unknown 'synk'; did you mean 'sync'?\n", self.bad("can", "produce", self.bus, "synk"))
+        self.assertIn("invalid --id '800'", self.bad("can", "generate", self.bus, "--id", "800"))
+
+    def begin(self, command, *words):
+        """Starts a listener and waits until it listens."""
+        process = subprocess.Popen(["hal", "can", command, self.bus, *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(Case.end, self, process)
+        self.assertIn("listening on", process.stderr.readline())
+        return process
+
+    def good_on(self, *words):
+        done = self.run_program("can", *words)
+        self.assertEqual(0, done.returncode, done.stderr)
+        return done.stdout
+
+
+class Flash(Node):
+    def test_another_program_for_a_node(self):
+        (self.folder / "new.bin").write_bytes(subprocess.run(["hal", "node", "bootloader", "--make-image", "2.1"], executable=str(HAL), env=self.environment,
+                                                             stdout=subprocess.PIPE, check=True).stdout)
+        node = subprocess.Popen(["hal", "node", "bootloader", "--link", self.bus, "--id", "6"], executable=str(HAL), cwd=self.folder, env=self.environment,
+                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        self.addCleanup(Case.end, self, node)
+        node.stdout.readline()
+        text = self.good("can", "flash", self.bus, 6, "new.bin")
+        self.assertRegex(text, r"^node 6: stopping the program\nnode 6: erasing the flash\nnode 6: downloading \d+ bytes\nnode 6: starting the program\n"
+                               r"node 6: runs, software identification 0x[0-9A-F]{8}\n$")
+        (self.folder / "bad.bin").write_bytes(b"not a program at all, and long enough")
+        self.assertEqual("hal can flash: node 6, 1F50:1: data cannot be transferred or stored to the application (0x08000020); the device does not take "
+                         "this image, and may have no usable program now: is it made for this device?\n", self.bad("can", "flash", self.bus, 6, "bad.bin"))
+        self.assertIn("runs, software identification", self.good("can", "flash", self.bus, 6, "new.bin"))
+
+    def test_a_node_without_one_and_wrong_files(self):
+        self.assertIn("hal can flash: node 5 has no program control 1F51:1", self.bad("can", "flash", self.bus, 5, "/proc/version"))
+        self.assertEqual("hal can flash: cannot read 'none.bin': No such file or directory\n", self.bad("can", "flash", self.bus, 5, "none.bin"))
 
 
 if __name__ == "__main__":

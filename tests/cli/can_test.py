@@ -4,9 +4,11 @@ import json
 import os
 import pty
 import random
+import re
 import select
 import subprocess
 import threading
+import time
 import unittest
 
 from harness import HAL, PATIENCE, Case
@@ -110,9 +112,47 @@ class Dump(Can):
         self.assertEqual("hal can dump: 'sim:arm' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to "
                          "one that they do: hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and "
                          "here udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))
-        self.assertEqual("hal can dump: nothing is expected at 'more'; see: hal help can dump\n", self.bad_can("dump", "replay:c.log", "more"))
+        self.assertIn("hal can dump: 'more' is no address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
+        self.assertEqual("hal can dump: --time: unknown form 'utc'; use relative, delta or absolute\n",
+                         self.bad_can("dump", "replay:c.log", "--time", "utc"))
         self.assertEqual("hal: there is no command 'can dmp'; did you mean 'can dump'?\n", self.bad_can("dmp"))
         self.assertEqual("hal: there is no command 'can qqqqqqqq'; type: hal help can\n", self.bad_can("qqqqqqqq"))
+
+    def test_times_relative_delta_and_absolute(self):
+        self.write("c.log", CAPTURE)
+        times = {form: [line.split()[0] for line in self.run_program("can", "dump", "replay:c.log", "-n", "3", "--time", form).stdout.splitlines()]
+                 for form in ("relative", "delta", "absolute")}
+        self.assertEqual({"relative": ["0.000000", "0.001000", "0.002000"], "delta": ["0.000000", "0.001000", "0.001000"],
+                          "absolute": ["1000.000000", "1000.001000", "1000.002000"]}, times)
+        filtered = self.run_program("can", "dump", "replay:c.log", "--filter", "702", "--time", "absolute").stdout.splitlines()
+        self.assertEqual(["1000.006000", "1000.014000"], [line.split()[0] for line in filtered])
+        frames = [json.loads(line) for line in self.run_program("can", "dump", "replay:c.log", "--json", "--time", "absolute").stdout.splitlines()]
+        self.assertEqual(1000.006, frames[6]["time"])
+
+    def test_absolute_time_of_a_live_bus_is_the_time_of_day(self):
+        before = time.time()
+        dump = self.listener("dump", self.bus, "-n", 1, "--time", "absolute")
+        self.good("can", "send", self.bus, "123#00")
+        self.assertTrue(before <= float(self.result(dump)[0].split()[0]) <= time.time())
+
+    def test_several_buses_in_one_dump(self):
+        other = self.bus[:-1] + str((int(self.bus[-1]) + 1) % 10)
+        dump = self.listener("dump", self.bus, other, "-n", 4, "--json")
+        for bus, frame in ((self.bus, "101#01"), (other, "102#02"), (self.bus, "103#03"), (other, "104#04")):
+            self.good("can", "send", bus, frame)
+        *frames, first, second = [json.loads(line) for line in self.result(dump)[0].splitlines()]
+        here, there = self.bus[len("udp:"):], other[len("udp:"):]
+        self.assertEqual([(here, 0x101), (there, 0x102), (here, 0x103), (there, 0x104)], [(f["bus"], f["id"]) for f in frames])
+        self.assertEqual([(here, 2), (there, 2)], [(s["statistics"]["bus"], s["statistics"]["frames"]) for s in (first, second)])
+
+    def test_several_captures_with_a_column_of_their_names(self):
+        self.write("c.log", CAPTURE)
+        self.write("second.log", CAPTURE)
+        done = self.run_program("can", "dump", "replay:c.log", "replay:second.log?bitrate=500k")
+        rows = [line.split()[1] for line in done.stdout.splitlines()]
+        self.assertEqual((20, 20), (rows.count("c.log"), rows.count("second.log")))
+        self.assertIn("listening on replay:c.log (capture), replay:second.log (capture, 500000 bit/s); Ctrl-C ends it\n", done.stderr)
+        self.assertRegex(done.stderr, r"\nc\.log: 20 frames in .*\nsecond\.log: 20 frames in ")
 
 
 class Send(Can):
@@ -318,6 +358,20 @@ class Plan(Case):
                          "  tpdo1 185, 6 bytes, with every SYNC\n"
                          "    u32   out elbow.statusword  6041 Statusword\n"
                          "    s32   out elbow.position-actual-value  6064 Position actual value\n", self.good("canopen", "check", "arm.canopen"))
+
+    def test_check_finds_what_a_run_would_refuse(self):
+        """Names that every node has as pins of its own: as the running component lists them."""
+        arm = "[bus]\nlink = sim:own\n[node 5 elbow]\ndevice = cia402\nrpdo1 = controlword, target-position\n"
+        self.write("arm.canopen", arm)
+        self.write("pins.hal", "loadrt canopen config=arm.canopen\nshow pin canopen.0.elbow\n")
+        names = set(re.findall(r"canopen\.0\.elbow\.(\S+)", self.good("sim", "pins.hal"))) - {"controlword", "target-position"}
+        self.assertGreaterEqual(len(names), 12)
+        for name in sorted(names):
+            self.write("arm.canopen", arm + f"controlword.name = {name}\n")
+            self.assertIn(f"arm.canopen:5:9: error: every node has a pin '{name}' of its own [canopen-object]", self.bad("canopen", "check", "arm.canopen"))
+        self.write("arm.canopen", arm + "tpdo1 = statusword, target-position\n")
+        self.assertIn("  tpdo1 185, 6 bytes, when changed\n    u32   out elbow.statusword  6041 Statusword\n"
+                      "    s32   out elbow.target-position-feedback  607A Target position\n", self.good("canopen", "check", "arm.canopen"))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,50 @@ class Halcmd(Case):
         self.assertEqual("-4\n", self.halcmd("getp", "adder.in0").stdout)
         self.assertEqual(1, self.halcmd("getp", "nothing").returncode)
 
+    def test_arguments_keep_their_boundaries(self):
+        failed = self.halcmd("loadusr", "-w", "sh", "-c", "exit 7")
+        self.assertEqual(1, failed.returncode)
+        self.assertIn("exit status 7", failed.stderr)
+        given = ["a  b", '"q"', "it's", "[A]B", "$HOME", "#x", "{x,y}", "[0..2]", "", "a=b c", "tab\there", "two\nlines", "=>", "\\"]
+        script = "import sys; print(sys.argv[1:])"
+        for name, first in (("halcmd", ()), ("hal", ("shell",))):
+            done = self.run_program(*first, "loadusr", "-w", "python3", "-c", script, *given, name=name)
+            self.assertEqual((f"{given!r}\n", "", 0), (done.stdout, done.stderr, done.returncode))
+        for name in ("two words.hal", "[A]B.hal", '"quoted".hal', "#.hal", "$HOME.hal"):
+            self.assertEqual("", self.halcmd("save", "comp", name).stderr)
+            self.assertIn("loadrt sum2", (self.folder / name).read_text())
+        for name in ("my file.hal", '"q".hal', "#x"):
+            self.write(name, "print hello\n")
+            self.assertIn("HALCMD MSG: hello", self.halcmd("source", name).stderr)
+        self.assertEqual("2\n", self.halcmd("getp adder.in0").stdout)  # one word with blanks: a line
+        self.assertIn("'' is not a", self.halcmd("setp", "adder.in0", "").stderr)
+
+    def test_names_of_files_have_quotes_in_a_netlist(self):
+        self.write("my file.hal", "print hello\n")
+        path = self.write("a.hal", "source \"my file.hal\"\nsource 'my file.hal'\nsave comp \"two words.hal\"\n")
+        done = self.halcmd("-f", path)
+        self.assertEqual((0, 2), (done.returncode, done.stderr.count("HALCMD MSG: hello")))
+        self.assertIn("loadrt sum2", (self.folder / "two words.hal").read_text())
+
+    def test_an_argument_with_blanks_is_saved_with_quotes(self):
+        self.assertEqual(0, self.halcmd("loadrt", "sum2", "names=x y").returncode)
+        saved = self.halcmd("save", "comp").stdout
+        self.assertIn('loadrt sum2 names="x y"\n', saved)
+        self.assertEqual("0\n", self.good("sim", self.write("again.hal", saved + "getp adder.in0\n")))
+
+    def test_goes_on_after_an_unset_ini_key(self):
+        ini = self.write("x.ini", "[A]\nB = 1\nC = # not a comment\n")
+        path = self.write("y.hal", "print one\nprint [A]NONE\nprint [A]B\nprint [A]C\n")
+        done = self.halcmd("-i", ini, "-kf", path)
+        self.assertEqual(1, done.returncode)
+        said = done.stderr.splitlines()
+        self.assertEqual(f"{path}:1: HALCMD MSG: one", said[0])
+        self.assertIn(f"{path}:2:7: error: there is no '[A]NONE' in the INI file", said[1])
+        self.assertIn(f"{path}:3: HALCMD MSG: 1", said)
+        self.assertIn(f"{path}:4: HALCMD MSG: # not a comment", said)
+        self.assertEqual(1, self.halcmd("-i", ini, "-f", path).returncode)
+        self.assertIn("HALCMD MSG: 1", self.halcmd("-i", ini, "-f", given="print [A]B\n").stderr)
+
     def test_letters_may_be_joined(self):
         path = self.write("s.hal", "getp nothing\ngetp adder.in1\n")
         done = self.halcmd("-kf", path)

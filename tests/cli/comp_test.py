@@ -137,6 +137,67 @@ class Comp(Case):
                    "getp a.out\ngetp b.out\nsetp a.gain 7\nadvance 1 cycles\n")
         self.assertEqual(["2", "5", "7", "4"], self.values(netlist, "a.out", "a.runs"))
 
+    def test_headers_of_helpers(self):
+        self.compiled("helpers", """component helpers; pin in float angle; pin out float forward; pin out float aside; pin out s32 sum; function _; license "MIT";
+include <rtapi_list.h>; include <rtapi_io.h>; include <posemath.h>;
+;;
+struct number { struct rtapi_list_head link; int value; };
+FUNCTION(_) {
+    struct number numbers[] = {{{0, 0}, 1}, {{0, 0}, 20}, {{0, 0}, 300}};
+    struct rtapi_list_head *at, *after;
+    PmEulerZyz zyz;
+    RTAPI_LIST_HEAD(list);
+    for (int i = 0; i < 3; ++i) rtapi_list_add_tail(&numbers[i].link, &list);
+    rtapi_list_for_each_safe(at, after, &list) if (rtapi_list_entry(at, struct number, link)->value == 20) rtapi_list_del(at);
+    sum = 0;
+    rtapi_list_for_each(at, &list) sum += rtapi_list_entry(at, struct number, link)->value;
+    const PmRpy turn = {0, 0, angle};
+    PmPose pose = {{1, 2, 3}, {1, 0, 0, 0}}, back, both;
+    PmCartesian point = {2, 0, 0};
+    pmRpyZyzConvert(&turn, &zyz);
+    pmZyzQuatConvert(&zyz, &pose.rot);
+    pmPoseInv(&pose, &back);
+    pmPosePoseMult(&pose, &back, &both);
+    pmPoseCartMult(&both, &point, &point);
+    pmPoseCartMult(&pose, &point, &point);
+    forward = point.x;
+    aside = point.y;
+}
+""")
+        netlist = "loadrt helpers\nloadrt threads name1=t period1=1000000\naddf helpers.0 t\nsetp helpers.0.angle 1.5707963267948966\nstart\nadvance 1 cycles\n"
+        x, y, total = map(float, self.values(netlist, "helpers.0.forward", "helpers.0.aside", "helpers.0.sum"))
+        self.assertEqual((301, 1, 4), (total, round(x, 9), round(y, 9)))
+
+    def test_header_of_the_go_functions(self):
+        self.compiled("arm", """component arm; pin in float shoulder; pin in float elbow; pin out float ahead; pin out float left; pin out float turned; pin out float back;
+pin out float inverse; pin out float on_plane; function _; license "MIT"; include "gomath.h";
+;;
+FUNCTION(_) {
+    const go_link links[] = {{{.dh = {0, 0, 0, 0}}, GO_LINK_DH, GO_QUANTITY_ANGLE}, {{.dh = {2, 0, 0, 0}}, GO_LINK_DH, GO_QUANTITY_ANGLE},
+                             {{.pp = {{{1, 0, 0}, {1, 0, 0, 0}}}}, GO_LINK_PP, GO_QUANTITY_LENGTH}};
+    go_link set[3];
+    go_pose hand, away;
+    go_rpy angles;
+    if (go_link_joint_set(&links[0], shoulder, &set[0]) || go_link_joint_set(&links[1], elbow, &set[1]) || go_link_joint_set(&links[2], 0.5, &set[2])) return;
+    if (go_link_pose_build(set, 3, &hand) || go_quat_rpy_convert(&hand.rot, &angles) || go_pose_inv(&hand, &away) || go_pose_pose_mult(&hand, &away, &away)) return;
+    ahead = hand.tran.x;
+    left = hand.tran.y;
+    turned = angles.y;
+    back = go_pose_pose_compare(&away, &(go_pose){{0, 0, 0}, {1, 0, 0, 0}});
+    GO_MATRIX_DECLARE(m, m_space, 2, 2);
+    go_matrix_init(m, m_space, 2, 2);
+    m.el[0][0] = 1, m.el[0][1] = 2, m.el[1][0] = 3, m.el[1][1] = 4;
+    if (go_matrix_inv(&m, &m) == GO_RESULT_OK) inverse = m.el[1][0];
+    go_plane plane;
+    go_cart foot;
+    if (go_plane_from_abcd(0, 0, 2, -6, &plane) == GO_RESULT_OK && go_point_plane_proj(&hand.tran, &plane, &foot) == GO_RESULT_OK) on_plane = foot.z;
+}
+""")
+        netlist = ("loadrt arm\nloadrt threads name1=t period1=1000000\naddf arm.0 t\nsetp arm.0.shoulder 1.5707963267948966\n"
+                   "setp arm.0.elbow -0.7853981633974483\nstart\nadvance 1 cycles\n")
+        got = [round(float(v), 6) for v in self.values(netlist, *(f"arm.0.{n}" for n in ("ahead", "left", "turned", "back", "inverse", "on-plane")))]
+        self.assertEqual([0.707107, 2.707107, 0.785398, 1, 1.5, 3], got)
+
     def test_a_port_is_given_by_handle_or_by_pointer(self):
         self.compiled("mouth", 'component mouth;\npin in port bytes;\npin out u32 waiting;\npin out bit same;\nfunction _;\nlicense "MIT";\n;;\n'
                       'static unsigned held(const hal_port_t *port) { return hal_port_readable(port); }\n'

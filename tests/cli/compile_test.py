@@ -75,6 +75,31 @@ class Compile(harness.Case):
         self.assertEqual(done.stderr, "hal compile: lag: function 'lag' calls malloc in a cycle\nhal compile: 'lag.cpp' was not installed\n")
         self.assertEqual(done.stdout, "")
 
+    def test_check_rt_calls_an_exception_an_exception(self):
+        def said(constructor="", body="", start="", stop=""):
+            self.write("bad.cpp", f"""#include <stdexcept>
+#include "hal/component.hpp"
+struct Bad : hal::Component {{
+    explicit Bad(const hal_host* host) : Component(host) {{ {constructor} }}
+    hal::In<double> in{{*this, "in", "input"}};
+    hal::Function run{{*this, "", &Bad::go, "runs"}};
+    void start(const hal_host&) {{ {start} }}
+    void stop() noexcept {{ {stop} }}
+    void go(hal::Cycle) noexcept {{ {body} }}
+}};
+HAL_COMPONENT(Bad, "bad", "Throws")
+""")
+            done = self.compile("bad.cpp", "--check-rt")
+            self.assertEqual(1, done.returncode, done.stdout)
+            return done.stderr
+        throw = 'throw std::runtime_error("no board");'
+        self.assertIn("bad: function 'bad' throws std::runtime_error in a cycle\n", said(body=throw))
+        self.assertIn("bad: function 'bad' throws int in a cycle\n", said(body="try { throw 3; } catch (int) {}"))
+        self.assertIn("bad: function 'bad' aborts in a cycle\n", said(body="__builtin_abort();"))
+        self.assertIn("bad: function 'bad' crashes in a cycle\n", said(body="*static_cast<volatile int*>(nullptr) = 1;"))
+        self.assertIn("bad: start() fails here, so nothing is known of its functions: no board\n", said(start=throw))
+        self.assertIn("bad: its stop() throws std::runtime_error, which nothing catches\n", said(stop=throw))
+
     def test_check_rt_of_a_good_one(self):
         done = self.compile(str(EDGES), "--check-rt", "--", "num_chan=2")
         self.assertEqual((done.returncode, done.stderr), (0, ""))

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, Case, Terminal, wait_until
+from harness import HAL, PATIENCE, Case, Terminal, wait_until
 
 
 class Drive(Case):
@@ -30,6 +30,32 @@ class Drive(Case):
     def drive(self, *words, **how):
         return self.good("can", "drive", self.bus, "--node", 2, *words, **how)
 
+    def begin(self, *words, **how):
+        """Starts hal can drive in the background."""
+        process = subprocess.Popen(["hal", "can", "drive", self.bus, "--node", "2", *map(str, words)], executable=str(HAL), cwd=self.folder,
+                                   env=self.environment, stdin=how.get("stdin", subprocess.DEVNULL), stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, process)
+        return process
+
+    def left_moving(self, *words):
+        """A command that succeeds and leaves the axis in motion says so."""
+        done = self.run_program("can", "drive", self.bus, "--node", 2, *words)
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertEqual(f"hal can drive: A: still moving, and not supervised any more; to stop it: hal can drive {self.bus} --node 2 A stop\n",
+                         done.stderr)
+        return done.stdout
+
+    def position(self):
+        return float(self.drive("A", "position?").split()[-1])
+
+    def moving(self):
+        start = self.position()
+        wait_until(lambda: abs(self.position() - start) > 20, "the axis moves")
+
+    def object(self, name):
+        return self.good("can", "sdo", "read", self.bus, 2, name).split(" = ")[1].split()[0]
+
     def refused(self, *words, **how):
         text = self.bad("can", "drive", self.bus, "--node", 2, *words, **how)
         self.assertTrue(text.startswith("hal can drive: "), text)
@@ -47,7 +73,7 @@ class OneShot(Drive):
         self.assertEqual("A: max-speed 40000\n", self.drive("A", "max-speed?"))
         self.assertRegex(self.drive("A", "go", -5000), r"^A: at -(499|500)\d\n$")
         self.assertRegex(self.drive("A", "go", 6000, "relative"), r"^A: at (99\d|100\d|1010)\n$")
-        self.assertEqual("A: speed 2000\n", self.drive("A", "speed", 2000))
+        self.assertEqual("A: speed 2000\n", self.left_moving("A", "speed", 2000))
         self.assertIn("A: mode pv\n", self.drive("A", "mode?"))
         self.assertEqual("A: state operation enabled\n", self.drive("A", "state?"))
         self.assertRegex(self.drive("A", "stop"), r"^A: stands at ")
@@ -110,13 +136,14 @@ class OneShot(Drive):
         self.addCleanup(self.end, going)
         wait_until(lambda: float(self.drive("A", "position?").split()[-1]) > 50, "the axis moves")
         out, error = self.end(going, signal.SIGINT)
-        self.assertEqual((1, "", "hal can drive: A: interrupted; it was stopped\n"), (going.returncode, out, error))
-        self.assertRegex(self.drive("A", "status"), r"^A: operation enabled, mode pp, .*target reached\n")
+        self.assertEqual((1, ""), (going.returncode, out))
+        self.assertRegex(error, r"^hal can drive: A: stopped and off, at \d+ \(interrupted\)\n$")
+        self.assertRegex(self.drive("A", "status"), r"^A: switch on disabled, mode pp, ")
 
     def test_the_drive_falls_silent(self):
         node = self.node("--motor", "endless:1")
         self.drive("A", "on")
-        self.drive("A", "speed", 100)
+        self.left_moving("A", "speed", 100)
         node.kill()
         node.wait()
         self.assertRegex(self.refused("--timeout", "50ms", "A", "stop"), r"^node 2 did not answer within 0.15 s \(asked for \w{4}:0\)")
@@ -158,7 +185,7 @@ A on
         done = self.run_program("can", "drive", self.bus, "--node", 2, given=script)
         self.assertEqual((1, ""), (done.returncode, done.stdout))
         done = self.run_program("can", "drive", self.bus, "--node", 2, "-k", given=script)
-        self.assertEqual((1, "A: on\n"), (done.returncode, done.stdout))
+        self.assertEqual((1, "A: on\nA: stopped and off, at 0 (end of input)\n"), (done.returncode, done.stdout))
 
     def test_terminal(self):
         self.node()
@@ -173,6 +200,221 @@ A on
         terminal.expect("A: off")
         terminal.send("quit\n")
         self.assertEqual(0, terminal.wait())
+
+
+class EveryEnd(Drive):
+    """However the program ends, the axis it moved does not go on."""
+
+    def test_signals_stop_the_axis(self):
+        self.node("--motor", "endless:1")
+        self.drive("A", "set", "max-speed", 500)
+        for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
+            with self.subTest(number):
+                self.drive("A", "on")
+                going = self.begin("A", "go", 100000, "relative")
+                self.moving()
+                out, error = self.end(going, number)
+                self.assertEqual((1, ""), (going.returncode, out))
+                self.assertRegex(error, r"^hal can drive: A: stopped and off, at \d+ \(interrupted\)\n$")
+                self.assertEqual("A: state switch on disabled\n", self.drive("A", "state?"))
+                self.assertEqual("0x00000000", self.object("1016:1"))
+
+    def test_a_signal_at_an_idle_input_stops_the_axis(self):
+        self.node("--motor", "endless:1")
+        for number in (signal.SIGTERM, signal.SIGINT):
+            with self.subTest(number):
+                session = self.begin(stdin=subprocess.PIPE)
+                session.stdin.write("A on\nA speed 500 nowait\n")
+                session.stdin.flush()
+                self.assertEqual("A: on\n", session.stdout.readline())
+                self.assertEqual("A: speed 500\n", session.stdout.readline())
+                self.moving()
+                session.send_signal(number)  # its input stays open
+                session.wait(PATIENCE)
+                error = self.end(session)[1]
+                self.assertRegex(error, r"^hal can drive: A: stopped and off, at \d+ \(interrupted\)\n$")
+                self.assertEqual("A: state switch on disabled\n", self.drive("A", "state?"))
+
+    def test_the_end_of_the_input_stops_the_axis_and_quit_does_not(self):
+        self.node("--motor", "endless:1")
+        done = self.run_program("can", "drive", self.bus, "--node", 2, given="A on\nA speed 500 nowait\n")
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertRegex(done.stdout, r"^A: on\nA: speed 500\nA: stopped and off, at -?\d+ \(end of input\)\n$")
+        done = self.run_program("can", "drive", self.bus, "--node", 2, given="A on\nA speed 500\nquit\n")
+        self.assertEqual((0, "A: on\nA: speed 500\n"), (done.returncode, done.stdout))
+        self.assertIn("A: still moving, and not supervised any more", done.stderr)
+        self.assertEqual("A: state operation enabled\n", self.drive("A", "state?"))
+
+    def test_a_closed_terminal_stops_the_axis(self):
+        self.node("--motor", "endless:1")
+        terminal = Terminal(self, "can", "drive", self.bus, "--node", 2)
+        terminal.expect("drive> ")
+        terminal.send("A on\n")
+        terminal.expect("A: on")
+        terminal.send("A speed 500\n")
+        terminal.expect("A: speed 500")
+        os.close(terminal.descriptor)
+        terminal.descriptor = os.open("/dev/null", os.O_RDWR)
+        os.waitpid(terminal.process, 0)
+        terminal.status = 1
+        self.assertEqual("A: state switch on disabled\n", self.drive("A", "state?"))
+
+    def test_after_kill_9_the_drive_stops_by_itself(self):
+        for option, state in ((1, "fault"), (3, "switch on disabled"), (0, "switch on disabled")):
+            with self.subTest(option):
+                node = self.node("--motor", "endless:1")
+                self.good("can", "sdo", "write", self.bus, 2, "6007", option, "--type", "i16")
+                session = self.begin("--supervise", "1s", stdin=subprocess.PIPE)
+                session.stdin.write("A on\nA speed 500 nowait\n")
+                session.stdin.flush()
+                self.assertEqual("A: on\n", session.stdout.readline())
+                self.moving()
+                self.assertNotEqual("0x00000000", self.object("1016:1"))
+                session.kill()
+                wait_until(lambda: self.drive("A", "state?") == f"A: state {state}\n", "the drive stops")
+                self.assertEqual("A: no fault\n" , self.drive("A", "reset"))
+                self.assertEqual("0x00000000", self.object("1016:1"))  # the entry left behind was used again, and cleared
+                self.end(node)
+
+    def test_it_is_watched_at_an_idle_prompt(self):
+        """Longer than the drive waits for a heartbeat, and it goes on."""
+        self.node("--motor", "endless:1")
+        terminal = Terminal(self, "can", "drive", self.bus, "--node", 2, "--supervise", "1s")
+        terminal.expect("drive> ")
+        terminal.send("A on\n")
+        terminal.expect("A: on")
+        done = self.run_program("can", "dump", self.bus, "--filter", "700/780", "--count", 25)  # by default ten in a second
+        self.assertRegex(done.stdout, r"heartbeat of node 1[12]\d")
+        self.assertEqual("A: state operation enabled\n", self.drive("A", "state?"))
+        terminal.send("quit\n")
+        self.assertEqual(0, terminal.wait())
+
+    def test_life_guarding_where_there_is_no_heartbeat_consumer(self):
+        self.node("--motor", "endless:1", "--without", "1016")
+        session = self.begin("--supervise", "1s", stdin=subprocess.PIPE)
+        session.stdin.write("A on\nA speed 500 nowait\n")
+        session.stdin.flush()
+        self.assertEqual("A: on\n", session.stdout.readline())
+        self.assertEqual("0x05", self.object("100D"))
+        session.kill()
+        wait_until(lambda: self.drive("A", "state?") == "A: state fault\n", "the drive stops")
+
+    def test_a_drive_that_cannot_watch_is_named(self):
+        self.node("--motor", "endless:1", "--without", "1016", "--without", "100C")
+        done = self.run_program("can", "drive", self.bus, "--node", 2, "A", "on")
+        self.assertEqual((0, "A: on\n"), (done.returncode, done.stdout))
+        self.assertEqual("hal can drive: warning: node 2 does not watch this program (it has no heartbeat consumer, 1016h; it has no life guarding, "
+                         "100Ch and 100Dh): if this program is killed or the bus is cut, the axis keeps moving\n", done.stderr)
+        self.assertEqual("A: on\n", self.drive("--supervise", "off", "A", "on"))
+
+    def test_a_drive_without_a_reaction_is_named(self):
+        self.node("--motor", "endless:1", "--without", "6007")
+        done = self.run_program("can", "drive", self.bus, "--node", 2, "A", "on")
+        self.assertEqual("hal can drive: warning: A: no abort connection option, 6007h: on loss of our heartbeat node 2 leaves operational (1029h:1); "
+                         "whether that stops the motor is in its manual\n", done.stderr)
+
+    def test_every_command_ends_in_time(self):
+        self.node("--motor", "endless:1")
+        self.drive("A", "on")
+        self.assertRegex(self.refused("A", "go", 1e9, "within", "1s"), r"^A: not done within 1 s \(timeout\); the axis was stopped at \d+; for more "
+                         r"time add: within 2s\nhal can drive: A: stopped and off, at \d+ \(after the failure\)\n$")
+        self.drive("A", "on")
+        self.assertRegex(self.refused("--within", "1s", "A", "home", 17), r"^A: not done within 1 s \(timeout\); the axis was stopped at -?\d+; ")
+        self.assertEqual("A: state switch on disabled\n", self.drive("A", "state?"))
+        self.assertEqual("go within what? type: A go within 30s\n", self.refused("A", "go", 5, "within"))
+        self.assertEqual("invalid --supervise '1ms'; write 50ms to 65s, or off\n", self.refused("--supervise", "1ms", "A", "on"))
+
+
+class LetterWords(Drive):
+    """The words of the robot shell: the letter of the axis behind the word."""
+
+    def test_a_session(self):
+        self.node("--axes", 2, "--motor", "endless:1")
+        done = self.run_program("can", "drive", self.bus, "--node", 2, given="""ONA:
+ONB:
+MSA:40000
+MSA?
+MAA: 300000
+MAA?
+PFA?
+PFA:2,1
+PFA?
+VFA:2,1
+AFA: 3 , 2
+AFA?
+PFA:1,1
+VFA:1,1
+GA:1000
+A wait
+APA?
+GA : -500
+A wait
+SPDB:100
+STOPB:
+APB ?
+OFFA:
+OFFB:
+HELP
+""")
+        self.assertEqual("", done.stderr)
+        lines = done.stdout.splitlines()
+        self.assertEqual(["MSA=40000", "MAA=300000", "PFA=1,1", "PFA=2,1", "AFA=3,2"], lines[:5])
+        self.assertRegex("\n".join(lines[5:9]), r"^A: at (99\d|100\d)\nAPA=(99\d|100\d)\nA: at -(49\d|50\d)\nAPB=-?\d+$")
+        self.assertIn("  ONA:             switch the axis on", lines)
+        self.assertIn("  MSA:n   MSA?     maximum speed of moves", lines)
+
+    def test_one_shot_and_prompt(self):
+        self.node()
+        self.assertEqual("", self.drive("ONA:"))
+        done = self.run_program("can", "drive", self.bus, "--node", 2, "GA:", 100)  # done when accepted, so it may still be on its way
+        self.assertEqual((0, ""), (done.returncode, done.stdout), done.stderr)
+        self.assertRegex(self.drive("APA?"), r"^APA=\d+\n$")
+        terminal = Terminal(self, "can", "drive", self.bus, "--node", 2)
+        terminal.expect("drive> ")
+        terminal.send("OFFA:\n")
+        terminal.expect("ok\r\n")
+        terminal.send("quit\n")
+        self.assertEqual(0, terminal.wait())
+
+    def test_wrong_lines(self):
+        self.node()
+        done = self.run_program("can", "drive", self.bus, "--node", 2, "-k", given="""GA:1000
+ON:
+ONI:
+ONA?
+APA:
+ONA: 5
+GA:
+GA:1.5
+GA:1,2
+GA:2147483648
+MSA:-1
+PFA:4096
+PFA:0,1
+PFA:1,
+SPA:100
+XYZA:
+GB:5
+""")
+        self.assertEqual(1, done.returncode)
+        self.assertEqual("""A: is not on (drive is in "switch on disabled"); type: A on
+'ON:' has no axis; write ONA: to ONH:
+'I' is not an axis; write ONA: to ONH:
+ONA cannot be asked; type: ONA:
+APA cannot be set; type: APA?
+nothing is expected behind ONA:
+GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
+GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
+GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
+GA: 2147483648 is out of range; write -2147483648 to 2147483647
+MSA: -1 is out of range; write 0 to 4294967295
+PFA: takes two integers from 1 to 4294967295; type: PFA:4096,360
+PFA: 0 is out of range; write 1 to 4294967295
+PFA: takes two integers from 1 to 4294967295; type: PFA:4096,360
+unknown command 'SPA'; did you mean 'APA' or 'SPDA'?
+unknown command 'XYZA'; type: HELP
+B: node 2 has no such axis: object 6841 is missing
+""", done.stderr.replace("hal can drive: ", ""))
 
 
 class WrongWords(Drive):
@@ -203,7 +445,7 @@ there is no command 'st'; did you mean 'set'?
 A: 1e+12 is 1e+12 of the drive's counts; its positions go from -2147483648 to 2147483647
 type: A go POSITION [relative] [nowait]
 there is no value 'max-sped'; did you mean 'max-speed'?
-max-speed -1 is -1 in the drive's units, which go from 0 to 4.29497e+09
+max-speed -1 is -1 in the drive's units, which go from 0 to 4294967295
 'fast' is no number; type: A set max-speed NUMBER
 '1/0' is no factor; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0
 there is no value 'speed-limit'; type: help

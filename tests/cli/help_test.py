@@ -37,13 +37,19 @@ class BusProgram(Case):
         shutil.copy(HAL, alone)
         done = subprocess.run([alone, "can", "dump", "can:can0"], capture_output=True, text=True,
                               env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")))
-        self.assertEqual((1, f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it belongs beside hal: build or install Halcyon again\n"),
+        self.assertEqual((1, f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it belongs beside hal: type ./hal build bus in the source tree, or install Halcyon again\n"),
                          (done.returncode, done.stderr))
 
 
 class WrongWords(Case):
     def test_unknown_command_gets_a_suggestion(self):
         self.assertEqual("hal: there is no command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
+
+    def test_commands_with_a_common_beginning(self):
+        self.assertEqual("usage: hal can eds COMMAND …\n\n  can eds check    what is wrong with a device description, and what it holds\n\n"
+                         "hal help can eds COMMAND says more.\n", self.good("help", "can", "eds"))
+        for words, last in ((("can", "sdo"), "can sdo write"), (("can", "pdo"), "can pdo watch"), (("can", "dcf"), "can dcf write")):
+            self.assertIn(last, self.good("help", *words))
 
     def test_unknown_command_without_likeness_points_to_help(self):
         self.assertEqual("hal: there is no command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))

@@ -67,7 +67,7 @@ class Devices(Node):
         self.assertEqual(f"io, node 5 on {self.bus} (CAN over UDP multicast): CiA 401, 64 digital inputs, 64 outputs, 12 analogue inputs and 12 outputs; "
                          "Ctrl-C ends it", re.sub(r"on \S+ \([^)]*\)", f"on {self.bus} (CAN over UDP multicast)", first))
         self.assertRegex(rest[0], r"^ +0\.\d{3} s  pre-operational$")
-        self.assertRegex(text, r"\n\d+\.\d s: \d+ frames sent, \d+ received, 0 dropped; [1-9]\d* SDO transfers, 0 aborted; [1-9]\d* PDOs sent\n"
+        self.assertRegex(text, r"\n\d+\.\d s: \d+ frames sent, \d+ received, 0 dropped, 0 lost on the wire, 0 lost here, 0 rejected; [1-9]\d* SDO transfers, 0 aborted; [1-9]\d* PDOs sent\n"
                                r"outputs 0{64}, at their error values\n$")
 
     def test_world_around_it_is_set_now_and_later(self):
@@ -126,7 +126,7 @@ class Devices(Node):
         self.write_object(4, "1f51:1", "u8", "0")
         self.expect(device, "bootloader; flash: no error")
         self.write_object(4, "1f51:1", "u8", "3")
-        self.assertEqual("hal node bootloader: cannot write 'nowhere/flash.bin.new': No such file or directory\n", device.communicate(timeout=60)[1])
+        self.assertEqual("hal node bootloader: cannot write 'nowhere/flash.bin': No such file or directory\n", device.communicate(timeout=60)[1])
         self.assertEqual(1, device.returncode)
 
     def test_faults(self):

@@ -143,6 +143,22 @@ class PythonTest(Case):
             "print(hal.pin_has_writer('adder.out'), hal.pin_has_writer('adder.in0'))\n"
             "try: hal.set_p('adder.nothing', 1)\nexcept hal.error: hal.set_p('adder.in1', 9); print('error', hal.get_value('adder.in1'))\n"))
 
+    def test_what_the_functions_return_and_raise_is_linuxcncs(self):
+        self.machine()
+        self.assertEqual("False True False True False False False\nerror\nerror True\nerror True\nAttributeError True\nFalse\nmade\nb'bf' True\n", self.python(
+            "import hal, os, sys\nsys.stderr = open(os.devnull, 'w')\nc = hal.component('x')\n"
+            "print(hal.new_sig('level', hal.HAL_FLOAT), hal.new_sig('level', hal.HAL_FLOAT), hal.connect('adder.in0', 'level'), hal.connect('nothing', 'level'),\n"
+            "      hal.set_s('level', 1), hal.disconnect('adder.in0'), hal.set_p('adder.in0', '2'))\n"
+            "def fails(call, *kinds):\n try: call()\n except kinds[0] as e: return all(isinstance(e, kind) for kind in kinds)\n"
+            "try: hal.set_p('adder.out', 1)\nexcept RuntimeError as e: print(type(e).__name__)\n"
+            "print('error', fails(lambda: c.newpin('a', hal.HAL_BIT, hal.HAL_RO), hal.error, ValueError))\n"
+            "print('error', fails(lambda: c.newpin('a', 99, hal.HAL_IN), hal.error, ValueError))\n"
+            "c.newpin('a', hal.HAL_BIT, hal.HAL_IN)\nprint('AttributeError', fails(lambda: c.getparam('a'), AttributeError, hal.error))\n"
+            "c.ready()\n"
+            "try: c.newpin('b', hal.HAL_BIT, hal.HAL_IN); print('made too late')\nexcept hal.error as e: print(not str(e).startswith('Invalid argument: '))\n"
+            "c.unready(); c.newpin('b', hal.HAL_BIT, hal.HAL_IN); c.ready(); print('made')\n"
+            "s = hal.stream(c, hal.streamer_base + 6, 3, 'bf')\nprint(s.element_types, fails(lambda: hal.stream(c, hal.streamer_base + 7), OSError, hal.error))\n"))
+
     def test_several_processes_talk_through_signals(self):
         self.machine()
         self.background("import hal, time\nc = hal.component('there')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"

@@ -26,7 +26,7 @@ class Sim(Case):
     """Deterministic: the programs run between two advances of the virtual clock."""
 
     def sim(self, *commands):
-        return self.good("sim", self.write("a.hal", NETLIST + "".join(c + "\n" for c in commands)))
+        return self.good("sim", "--quiet", self.write("a.hal", NETLIST + "".join(c + "\n" for c in commands)))
 
     def test_what_is_played_is_recorded(self):
         self.write("in.txt", "1.5 0\n-2 1\n# a comment\n\n3e3 1\n")
@@ -45,13 +45,24 @@ class Sim(Case):
     def test_csv_names_the_linked_signals(self):
         self.write("in.txt", "0.1 0\n0.2 1\n")
         rows = list(csv.reader(self.sim("loadusr -w hal play in.txt", "start", "advance 2 cycles", "loadusr -w hal record --csv -n 2").splitlines()))
-        self.assertEqual(["y", "flag", "sampler.0.pin.2", "beats", "sampler.0.pin.4", "sampler.0.pin.5"], rows[0])
-        self.assertEqual([0.2, 0.4], [float(row[0]) for row in rows[1:]])
-        self.assertEqual(["0", "1"], [row[1] for row in rows[1:]])
+        self.assertEqual(["time_s", "y", "flag", "sampler.0.pin.2", "beats", "sampler.0.pin.4", "sampler.0.pin.5"], rows[0])
+        self.assertEqual([0.2, 0.4], [float(row[1]) for row in rows[1:]])
+        self.assertEqual(["0", "1"], [row[2] for row in rows[1:]])
+        self.assertAlmostEqual(0.001, float(rows[2][0]) - float(rows[1][0]), 12)
+
+    def test_csv_times_show_a_gap(self):
+        rows = list(csv.reader(self.sim("start", "advance 3 cycles", "stop", "advance 7 cycles", "start", "advance 2 cycles", "loadusr -w hal record --csv -n 5").splitlines()))
+        times = [round(float(row[0]) * 1000) for row in rows[1:]]
+        self.assertEqual([1, 1, 8, 1], [b - a for a, b in zip(times, times[1:])])
+
+    def test_a_recorded_table_is_played(self):
+        self.write("in.csv", "sample,time_s,a,b\n0,0.001,1.5,0\n1,0.002,-2,1\n")
+        rows = list(csv.reader(self.sim("loadusr -w hal play in.csv", "start", "advance 2 cycles", "loadusr -w hal record --csv -n 2").splitlines()))
+        self.assertEqual([3.0, -4.0], [float(row[1]) for row in rows[1:]])
 
     def test_csv_with_sample_numbers(self):
         rows = list(csv.reader(self.sim("start", "advance 2 cycles", "loadusr -w hal record --csv --tag -n 2").splitlines()))
-        self.assertEqual("sample", rows[0][0])
+        self.assertEqual(["sample", "time_s"], rows[0][:2])
         self.assertEqual(["0", "1"], [row[0] for row in rows[1:]])
 
     def test_to_a_file(self):

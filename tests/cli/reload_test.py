@@ -56,6 +56,23 @@ struct Part : hal::Component {
 HAL_COMPONENT(Part, "part", "Owns a file")
 """
 
+# What it remembers: `sum` in both versions, `other` with another type.
+STATE = """#include "hal/state.hpp"
+struct Part : hal::Component {
+    using Component::Component;
+    hal::State<std::int64_t> sum{*this, "sum", "of all steps"};
+    hal::State<OTHER> other{*this, "other", "changes its type", ZERO};
+    hal::Out<std::int64_t> cycles{*this, "cycles", "so far"};
+    hal::Function run{*this, "", &Part::update, "one step"};
+    void update(hal::Cycle) noexcept {
+        sum += STEP;
+        other += 1;
+        cycles = cycles + 1;
+    }
+};
+HAL_COMPONENT(Part, "part", "Remembers")
+"""
+
 OTHER_INTERFACE = """#include "hal/abi.h"
 HAL_EXPORT const hal_component hal_plugin = {.size = sizeof(hal_component), .abi_major = HAL_ABI_MAJOR + 1};
 """
@@ -104,6 +121,8 @@ class Reload(Case):
             "renamed": counter(function="step"),
             "stubborn": counter(members='int no = [] { throw std::runtime_error("not today"); return 0; }();'),
             "unasked": counter(t=('hal::Argument offset{*this, "offset", 0, "added"};', "")),
+            "state1": STATE.replace("STEP", "1").replace("OTHER", "double").replace("ZERO", "0.5"),
+            "state2": STATE.replace("STEP", "1000").replace("OTHER", "std::int32_t").replace("ZERO", "7"),
             "owner1": OWNER.replace("VERSION", "1").replace("REFUSE", "false"),
             "owner2": OWNER.replace("VERSION", "2").replace("REFUSE", "false"),
             "refusing": OWNER.replace("VERSION", "3").replace("REFUSE", "true"),
@@ -236,6 +255,25 @@ class Reload(Case):
         rows = self.good("record", "-n", "5").split()
         self.assertEqual([str(int(rows[0]) + i) for i in range(5)], rows)
         self.assertNotEqual("0", self.value("p.tmax"))
+
+    def test_declared_state_is_carried_over_where_name_and_type_match(self):
+        self.install("state1")
+        path = self.write("m.hal", "loadrt threads name1=servo period1=1000000\nloadrt part names=p\naddf p servo\nstart\nadvance 10 cycles\n"
+                          f"getp p.sum\ngetp p.other\nloadusr -w cp {self.versions['state2']} {self.plugins}/part.so\n"
+                          "reload part\nadvance 3 cycles\ngetp p.sum\ngetp p.other\ngetp p.cycles\n")
+        self.assertEqual("10\n10.5\n3010\n10\n13\n", self.good("sim", path))
+        self.assertIn("is read-only: only its component sets it", self.bad("sim", "-q", self.write("w.hal", "loadrt part names=p\nsetp p.sum 1\n")))
+
+    def test_no_cycle_of_declared_state_is_lost_in_a_running_machine(self):
+        self.install("state1")
+        self.start("run", self.write("m.hal", "newthread servo 1000000\nloadrt part names=p\naddf p servo\nnet c p.cycles\nstart\n"))
+        for _ in range(20):
+            before = int(self.value("p.cycles"))
+            self.install("state1")
+            self.say("reload", "part")
+            wait_until(lambda: int(self.value("p.cycles")) > before + 2, "it runs on")
+        self.say("stop")
+        self.assertEqual(self.value("p.cycles"), self.value("p.sum"))
 
     def test_a_machine_that_reloads_itself_under_the_virtual_clock(self):
         self.install("first")

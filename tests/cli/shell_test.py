@@ -148,7 +148,26 @@ class Scripts(Case):
     def test_a_pipes_lines_are_numbered(self):
         pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input="setp adder.in0 \\\n 10\n\ngetp nothing\n", text=True, capture_output=True)
         self.assertTrue(pipe.stderr.startswith("<stdin>:4:6: error: "), pipe.stderr)
+        self.assertTrue(pipe.stderr.endswith("hal shell: a pipe is read line by line: lines 1 to 3 were carried out before the error in line 4\n"), pipe.stderr)
         self.assertEqual("10", self.value("adder.in0"))
+
+    def test_a_pipe_says_what_became_of_an_open_begin(self):
+        before = self.value("adder.in0")
+        for text, said in (("begin\nsetp adder.in0 7\n", "hal shell: 'begin' in line 1 without 'commit': what was collected had no effect\n"),
+                           ("\nbegin\nsetp adder.in0 7\nquit\n", "hal shell: 'begin' in line 2 without 'commit': what was collected had no effect\n"),
+                           ("begin\nsetp adder.in0 7\nsetp nothing 1\ncommit\n",
+                            "hal shell: a pipe is read line by line: what was collected from line 1 on had no effect\n"),
+                           ("getp adder.in0\nbegin\nsetp adder.in0 7\nfrobnicate\ncommit\n",
+                            "hal shell: a pipe is read line by line: line 1 was carried out before the error in line 4; "
+                            "what was collected from line 2 on had no effect\n")):
+            pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input=text, text=True, capture_output=True)
+            self.assertEqual(1, pipe.returncode, text)
+            self.assertTrue(pipe.stderr.endswith(said), pipe.stderr)
+            self.assertEqual(before, self.value("adder.in0"))
+        self.assertEqual("hal shell: 'begin' without 'commit' had no effect; write all of it into a file, or type: hal shell\n", self.bad("shell", "begin"))
+        pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input="begin\nsetp adder.in0 7\ncommit\nsetp nothing 1\n", text=True, capture_output=True)
+        self.assertTrue(pipe.stderr.endswith("lines 1 to 3 were carried out before the error in line 4\n"), pipe.stderr)
+        self.assertEqual("7", self.value("adder.in0"))
 
     def test_pipe_answers_each_line_at_once(self):
         client = subprocess.Popen([str(HAL), "shell"], env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)

@@ -3,7 +3,7 @@
 import signal
 import unittest
 
-from harness import SERVO, Case, wait_until
+from harness import HAL, SERVO, Case, Terminal, wait_until
 
 
 class Sim(Case):
@@ -13,10 +13,37 @@ class Sim(Case):
 
     def test_for_advances_the_clock(self):
         counter = self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt time\naddf time.0 servo\n")
-        self.assertEqual("", self.good("sim", counter, "--for", "2s"))
+        self.assertEqual("", self.good("sim", "--quiet", counter, "--for", "2s"))
         report = self.run_program("sim", counter, "--for", "2s", "--report")
         self.assertEqual("", report.stdout)
         self.assertRegex(report.stderr, r"(?m)^servo +1 ms +2000 +0 ")
+
+    def test_a_summary_ends_a_run_that_printed_nothing(self):
+        path = self.write("a.hal", SERVO)
+        done = self.run_program("sim", path, "--for", "2s")
+        self.assertEqual((0, ""), (done.returncode, done.stdout))
+        self.assertRegex(done.stderr, r"^simulated 2 s in [\d.]+ \ws, [\d.e+]+ times as fast as real time; servo 2000 cycles; no faults\n$")
+        self.assertEqual("no time simulated: add --for 10s, or advance in the netlist; servo 0 cycles; no faults\n", self.run_program("sim", path).stderr)
+        self.assertEqual("5\n", self.good("sim", path, "--for", "2s", "-e", "gets total"))  # its own output is enough
+        terminal = Terminal(self, "sim", path, "--for", "2s", "-e", "gets total")
+        terminal.expect("5\r\nsimulated 2 s in ")
+        self.assertEqual(0, terminal.wait())
+        terminal = Terminal(self, "sim", "-q", path, "--for", "2s", "-e", "gets total")
+        self.assertEqual((0, "5\r\n"), (terminal.wait(), terminal.seen))
+
+    def test_a_summary_names_the_faults(self):
+        path = self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt test_faulty\naddf test-faulty.0.run servo\n"
+                          "setp test-faulty.0.throws TRUE\n")
+        done = self.run_program("sim", path, "--for", "2s", environment={"HALCYON_PLUGIN_PATH": str(HAL.parent.parent / "tests/plugins")})
+        self.assertEqual(1, done.returncode)
+        self.assertRegex(done.stderr, r"(?m)^simulated 2 s in .*; servo 2000 cycles, stopped by a fault; 1 fault:\n"
+                                      r"  servo: function 'test-faulty.0.run' \(test-faulty\) threw an exception at cycle 0")
+
+    def test_show_prints_values_at_the_end(self):
+        path = self.write("a.hal", SERVO)
+        self.assertEqual("total      5\nadder.in0  2\nadder.in1  3\n", self.good("sim", path, "--for", "1s", "--show", "total,adder.in?"))
+        self.assertEqual("hal sim: --show: there is no pin, parameter or signal 'totl'; did you mean 'total'?\n",
+                         self.bad("sim", "-q", path, "--for", "1s", "--show", "totl"))
 
     def test_cycles_advance_the_clock(self):
         path = self.write("a.hal", SERVO)
@@ -51,7 +78,8 @@ class Sim(Case):
         machine = self.start("sim", path, "--for", "100000000s", "--name", "long", loaded=False)
         wait_until(lambda: self.shell("getp", "servo.threadbeat", instance="long").stdout.strip() not in ("", "0"), "it runs")
         out, err = self.end(machine, signal.SIGINT)
-        self.assertEqual((1, "", ""), (machine.returncode, out, err))
+        self.assertEqual((1, ""), (machine.returncode, out))
+        self.assertRegex(err, r"^simulated \d+ s in .*; no faults\n$")
 
 
 if __name__ == "__main__":

@@ -118,6 +118,9 @@ class Tdma(Segment):
         before = self.number("m", "cycle")
         wait_until(lambda: self.number("m", "cycle") > before + 300, "the master goes on")
         x.send_signal(signal.SIGCONT)
+        # a process without CPU time for longer than its threads' limit runs its functions again after `start`
+        wait_until(lambda: "got no CPU time" in self.shell("show", "fault", instance="test-x").stdout, "the fault of the threads is known")
+        self.good("shell", "--name", "test-x", "start")
         at = self.number("m", "cycle")
         wait_until(lambda: self.pin("x", "running") == "TRUE" and self.number("x", "cycle") >= at, "the station is there again")
         self.master_was_not_disturbed()

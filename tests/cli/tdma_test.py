@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""hal tdma plan: schedules of an Ethernet segment."""
+"""hal tdma: schedules of an Ethernet segment, and who answers on it."""
 import json
 import unittest
 import xml.etree.ElementTree
 
-from harness import ROOT, Case
+from harness import ROOT, SERVO, Case, wait_until
 
 CELL = """master:
 cycle 1000
@@ -44,6 +44,17 @@ x: an input of it becomes an output of it after 4000.00 us at worst, 3 cycles af
   3000.00 - 0.00 + 1000.00 for an input that changed just after it was read = 4000.00 us
 """
 
+# A busy machine must not make it lose its sync.
+SEGMENT = """loadrt threads name1=servo period1=1000000
+loadrt tdma link=sim:cell/master,sim:cell/x station=master,x schedule="master:; cycle 1000; lost 20000; rounds 10; slot 0 100; \
+slave:; name x; slot 0 300; slot 2 500 1/2 60; slave:; name away; slot 0 700"
+addf tdma.0.receive servo
+addf tdma.1.receive servo
+addf tdma.0.transmit servo
+addf tdma.1.transmit servo
+start
+"""
+
 
 class Tdma(Case):
     def test_plan(self):
@@ -72,6 +83,44 @@ class Tdma(Case):
                          self.bad("tdma", "plan", "cell.tdma", "--svg", "none/cell.svg"))
         self.assertEqual("hal tdma plan: --json and --svg are two answers; write one of them\n",
                          self.bad("tdma", "plan", "cell.tdma", "--json", "--svg", "cell.svg"))
+
+    def test_ping(self):
+        self.write("cell.hal", SEGMENT)
+        self.start("run", "--no-picture", "cell.hal")
+        wait_until(lambda: self.value("tdma.1.running") == "TRUE", "x runs")
+        one = r"x {}: \d+\.\d\d us, \d+\.\d\d cycles; \d+\.\d\d us of it at x, 15\.44 us each way\n"
+        text = self.good("tdma", "ping", "x", "-c", "6")
+        self.assertRegex(text, "^" + "".join(one.format(n) for n in range(1, 7)) +
+                         r"6 pings from tdma\.0, 6 answered, 0 lost \(0 %\); min \d+\.\d\d, mean \d+\.\d\d, max \d+\.\d\d us\n$")
+        self.assertRegex(self.good("tdma", "ping", "master", "-c", "1"), r"1 ping from tdma\.1, 1 answered, 0 lost")
+        self.assertEqual("hal tdma ping: there is no other station 'nobody'; tdma.0 knows away, x; tdma.1 knows away, master\n",
+                         self.bad("tdma", "ping", "nobody"))
+        self.assertEqual("hal tdma ping: there is no other station 'x'; tdma.1 knows away, master\n",
+                         self.bad("tdma", "ping", "x", "--from", "tdma.1"))
+        self.assertEqual("hal tdma ping: there is no 'tdma.7' to ask from; there is tdma.0, tdma.1\n",
+                         self.bad("tdma", "ping", "x", "--from", "tdma.7"))
+        done = self.run_program("tdma", "ping", "away", "-c", "1")
+        self.assertEqual((1, "away 1: not sent, its address is not known\n1 ping from tdma.0, 0 answered, 1 lost (100 %)\n",
+                          "hal tdma ping: tdma.0 has not heard away yet and does not know its address; write its mac into the schedule\n"),
+                         (done.returncode, done.stdout, done.stderr))
+        status = self.good("tdma", "status").split("tdma.1: ")[0]
+        self.assertRegex(status, r"(?m)^station +state +since +frames +late +drift  slots$")
+        self.assertRegex(status, r"(?m)^away +unheard +- +0 +0 +-  0: 700 us$")
+        self.assertRegex(status, r"(?m)^x +online +\S+ s +\d+ +0 +[-+]0\.0 ppm  0: 300 us, 2: 500 us in 1 of 2 cycles$")
+
+        # It is heard no more: its thread does nothing.
+        for function in ("receive", "transmit"):
+            self.assertEqual(0, self.shell("delf", f"tdma.1.{function}", "servo").returncode)
+        wait_until(lambda: self.value("tdma.0.x.online") == "FALSE", "x is silent")
+        done = self.run_program("tdma", "ping", "x", "-c", "2")
+        self.assertEqual((1, "x 1: no answer\nx 2: no answer\n2 pings from tdma.0, 0 answered, 2 lost (100 %)\n",
+                          "hal tdma ping: x is not heard either: is it switched on, its cable in?\n"),
+                         (done.returncode, done.stdout, done.stderr))
+
+    def test_ping_without_a_segment(self):
+        self.write("plain.hal", SERVO)
+        self.start("run", "--no-picture", "plain.hal")
+        self.assertEqual("hal tdma ping: instance 'default' has no station of a segment (loadrt tdma)\n", self.bad("tdma", "ping", "x"))
 
     def test_a_recording_says_what_is_missing(self):
         for words, problem in (("", "into which file? write file=seen.pcapng"),

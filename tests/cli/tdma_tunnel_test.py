@@ -57,7 +57,7 @@ print(hashlib.sha256(got[::-1]).hexdigest())
 """
 
 GRANT = ("needs the capability CAP_NET_ADMIN; grant it with: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw,cap_net_admin=ep "
-         "$(readlink -f PROGRAM), where PROGRAM is what you start, as in /usr/local/bin/hal; or make it once: ")
+         f"{HAL.resolve()}; or make it once: ")
 WITHOUT_ADMIN = ("setpriv", "--bounding-set=-net_admin", "--inh-caps=-net_admin")
 
 

@@ -52,6 +52,9 @@ class Network(DdsCase):
         wait_until(lambda: float(self.value("sub.age-ms", "subscriber")) > 7000, "it stands still for longer than it is remembered")
         self.assertEqual("FALSE", self.value("sub.valid", "subscriber"))
         publisher.send_signal(signal.SIGCONT)
+        # a process without CPU time for longer than its threads' limit runs its functions again after `start`
+        wait_until(lambda: "got no CPU time" in self.shell("show", "fault", instance="publisher").stdout, "the fault of the thread is known")
+        self.good("shell", "--name", "publisher", "start")
         self.becomes("sub.valid", "TRUE")
         self.shows("1.5")
         self.becomes("pub.matched", "1", "publisher")

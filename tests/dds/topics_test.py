@@ -61,6 +61,31 @@ class Topics(DdsCase):
         self.becomes("sub.lost", "0")
         self.becomes("sub.seq", "4000")
 
+    def test_a_second_publisher_is_ignored_and_named(self):
+        self.publisher(1.5)
+        self.subscriber(more="timeout_ms=2000")
+        self.becomes("sub.valid", "TRUE")
+        stranger = self.stranger("rate=100", "value=9")
+        self.becomes("sub.second-publisher", "TRUE")
+        self.assertEqual("1.5", self.value("sub.angle", "subscriber"), "the first one has it")
+        self.assertGreater(int(self.value("sub.ignored", "subscriber")), 0)
+        self.says("sub: topic 'arm/state' has a second publisher, ")
+        self.assertRegex(self.words("subscriber"), r"second publisher, (\S+ \()?[0-9a-f]{24}\)?, beside (\S+ \()?[0-9a-f]{24}\)?; its samples are ignored")
+        self.assertRegex(self.shell("show", "fault", instance="subscriber").stdout,
+                         r"a second publisher writes topic 'arm/state' at cycle [\d ]+; its samples are ignored")
+        self.end_stranger(stranger)
+        self.becomes("sub.second-publisher", "FALSE")
+        self.assertEqual(["1.5", "TRUE"], [self.value("sub." + pin, "subscriber") for pin in ("angle", "valid")])
+
+    def test_samples_of_all_publishers_are_taken_when_asked_for(self):
+        self.publisher(1.5)
+        self.subscriber(more="timeout_ms=2000 exclusive=0")
+        self.becomes("sub.valid", "TRUE")
+        self.stranger("rate=200", "value=9")
+        self.becomes("sub.angle", "9")
+        self.says("; the samples of both are taken. To take those of one: exclusive=1")
+        self.assertEqual("0", self.value("sub.ignored", "subscriber"))
+
     def test_another_type_is_named_on_both_sides(self):
         self.publisher()
         self.subscriber("angle:float,ready:bit")

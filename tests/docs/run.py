@@ -11,7 +11,7 @@ In README.md and docs/**/*.md:
                         line for any text. No output lines: anything is accepted. The exit status must be 0 unless the
                         command ends in `# exit 1`.
   `./hal` in a command is the program under test and `build/release` its build tree; such commands run in the repository's
-root. Nothing is skipped but `./hal test` and `./hal bench`, which run this.
+root. Nothing is skipped but `./hal test` and `./hal bench`, which run this, and `./hal build`.
 """
 import os
 import pathlib
@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT / "tests/cli"))
 from own_network import own_network  # noqa: E402
 
 HAL = pathlib.Path(os.environ.get("HAL_BIN", ROOT / "build/release/bin/hal")).resolve()
-NOT_RUN = ("./hal test", "./hal bench")
+NOT_RUN = ("./hal test", "./hal bench", "./hal build")
 FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```", re.M | re.S)
 
 

@@ -3,4 +3,4 @@
 export VERSIONS="${HALCYON_PLUGIN_PATH#*:}" HALCYON_PLUGIN_PATH="$HOME/plugins:${HALCYON_PLUGIN_PATH#*:}"
 mkdir "$HOME/plugins"
 cp "$VERSIONS/test_reload_old.so" "$HOME/plugins/test-reload.so"
-exec hal sim reload-conflict.hal
+exec hal sim --quiet reload-conflict.hal

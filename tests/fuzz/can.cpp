@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <string_view>
 
-#include "drivers/canudp/datagram.hpp"
+#include "drivers/can/slcan/slcan_line.hpp"
+#include "drivers/can/udp/datagram.hpp"
 #include "drivers/link/capture.hpp"
-#include "drivers/slcan/line.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::can;

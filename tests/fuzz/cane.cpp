@@ -2,8 +2,8 @@
 // Frames of type 0x9023, as anybody on the segment can send them: the decoders as it comes, and again with the header made right.
 #include <algorithm>
 
-#include "drivers/cane/format.hpp"
-#include "drivers/cane/stations.hpp"
+#include "drivers/can/cane/cane_format.hpp"
+#include "drivers/can/cane/cane_stations.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::can;

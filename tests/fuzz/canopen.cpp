@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "canopen/device.hpp"
-#include "canopen/network.hpp"
+#include "canopen/master/network.hpp"
+#include "canopen/protocol/device.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::canopen;

@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "components/canopen/config/schedule.hpp"
-#include "components/canopen/master/own_node.hpp"
+#include "components/canopen/master/config/bus_schedule.hpp"
+#include "components/canopen/master/cycle/master_node.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 namespace {

@@ -9,7 +9,7 @@
 
 #include "components/dds/schema.hpp"
 #include "components/dds/words.hpp"
-#include "tools/top.hpp"
+#include "tools/inspect/seen_instance.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "components/canopen/306/concise.hpp"
-#include "components/canopen/311/xdd.hpp"
+#include "components/canopen/eds/concise_dcf.hpp"
+#include "components/canopen/eds/xdd.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 using hal::fuzz::require;

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "canopen/309/gateway.hpp"
-#include "canopen/device.hpp"
+#include "canopen/master/gateway/gateway.hpp"
+#include "canopen/protocol/device.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::canopen;

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "canopen/301/protocol.hpp"
-#include "canopen/404/jr3.hpp"
+#include "canopen/device/sensor/jr3.hpp"
+#include "canopen/protocol/numbers.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::canopen;

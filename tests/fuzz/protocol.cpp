@@ -9,9 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "session/session.hpp"
-#include "shell/protocol.hpp"
-#include "shell/shell.hpp"
+#include "machine/session.hpp"
+#include "control/connection.hpp"
+#include "commands/shell.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 namespace {

@@ -7,13 +7,13 @@
 #include <string_view>
 #include <vector>
 
-#include "components/fieldbus/tdma/frames.hpp"
-#include "components/fieldbus/tdma/plan.hpp"
-#include "components/fieldbus/tdma/rtcfg_client.hpp"
-#include "components/fieldbus/tdma/rtcfg_frames.hpp"
-#include "components/fieldbus/tdma/rtcfg_server.hpp"
-#include "components/fieldbus/tdma/station.hpp"
-#include "components/fieldbus/tdma/tunnel.hpp"
+#include "components/fieldbus/tdma/config/schedule_plan.hpp"
+#include "components/fieldbus/tdma/rtcfg/rtcfg_client.hpp"
+#include "components/fieldbus/tdma/rtcfg/rtcfg_server.hpp"
+#include "components/fieldbus/tdma/station/station.hpp"
+#include "components/fieldbus/tdma/tunnel/tunnel.hpp"
+#include "components/fieldbus/tdma/wire/rtcfg_frames.hpp"
+#include "components/fieldbus/tdma/wire/tdma_frames.hpp"
 #include "tests/fuzz/driver/require.hpp"
 
 namespace {
@@ -29,6 +29,8 @@ void frames(std::span<const std::uint8_t> given) {
     if (d.kind == Kind::request)
         require(decode(encode(d.to, d.from, d.request)).request.reply_offset == d.request.reply_offset, "a request too");
     if (d.kind == Kind::reply) require(decode(encode(d.to, d.from, d.reply)).reply.received == d.reply.received, "a reply too");
+    if (d.kind == Kind::ping) require(decode(encode(d.to, d.from, d.ping)).ping.number == d.ping.number, "a ping too");
+    if (d.kind == Kind::echo) require(decode(encode(d.to, d.from, d.echo)).echo.stamp == d.echo.stamp, "an answer too");
     std::array<std::uint8_t, 1514> out{}, back{};
     if (const std::size_t n = tunnel(frame, out); n != 0) {
         require(untunnel(std::span(out).first(n), back) == frame.size(), "what went into the tunnel comes out");

@@ -9,8 +9,8 @@
 #include <sstream>
 #include <string>
 
-#include "canopen/302/master.hpp"
-#include "canopen/device.hpp"
+#include "canopen/master/boot/nmt_master.hpp"
+#include "canopen/protocol/device.hpp"
 
 using namespace hal::canopen;
 

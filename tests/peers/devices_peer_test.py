@@ -17,7 +17,8 @@ can, canopen = peers.packages()
 
 GROUP, PORT = "239.74.163.79", 43179
 HAL = sys.argv[1]
-FOLDER = tempfile.mkdtemp(prefix="hal-devices-")
+TEMPORARY = tempfile.TemporaryDirectory(prefix="hal-devices-")  # gone at the end of the program
+FOLDER = TEMPORARY.name
 checks = []
 
 

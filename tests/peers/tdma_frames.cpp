@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "fieldbus/tdma/config.hpp"
-#include "fieldbus/tdma/frames.hpp"
-#include "fieldbus/tdma/rtcfg_frames.hpp"
+#include "fieldbus/tdma/config/schedule.hpp"
+#include "fieldbus/tdma/wire/rtcfg_frames.hpp"
+#include "fieldbus/tdma/wire/tdma_frames.hpp"
 #include "link/ethernet_capture.hpp"
 
 namespace {

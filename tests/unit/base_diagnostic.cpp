@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "base/diagnostic.hpp"
+#include "text/diagnostic.hpp"
 
 #include <gtest/gtest.h>
 
-#include "base/text.hpp"
+#include "text/glyphs.hpp"
 
 namespace {
 

@@ -12,7 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include "session/session.hpp"
+#include "commands/table.hpp"
+#include "machine/session.hpp"
 
 namespace hal::test {
 
@@ -34,15 +35,16 @@ public:
     /// One transaction of all lines. True when it took effect; what it said is in `said`.
     bool edit(const std::string& text) {
         Diagnostics diagnostics;
-        apply(text, diagnostics);
-        const bool good = session.commit(diagnostics);
+        Transaction transaction = session.begin();
+        apply(transaction, text, diagnostics);
+        const bool good = transaction.commit(diagnostics);
         said = render(diagnostics, session.sources);
         return good;
     }
     /// Applies without committing.
-    void apply(const std::string& text, Diagnostics& diagnostics) {
+    void apply(Transaction& transaction, const std::string& text, Diagnostics& diagnostics) {
         const auto source = session.sources.add("test.hal", text);
-        for (const Command& command : parse(session.sources, source, {&session.ini, {}}, diagnostics)) session.apply(command, diagnostics);
+        for (const Command& command : parse(session.sources, source, {&session.ini, {}}, diagnostics)) apply_edit(transaction, command, diagnostics);
     }
     /// A transaction that must take effect.
     void must(const std::string& text) { ASSERT_TRUE(edit(text)) << text << "\n" << said; }

@@ -145,7 +145,7 @@ TEST_F(Ini_file, read_source_says_why_a_file_cannot_be_read) {
     1 | source missing.hal
       |        ^^^^^^^^^^^
 
-test.hal:1:8: error: cannot read '/': Is a directory [unreadable-file]
+test.hal:1:8: error: cannot read '/': it is a directory [unreadable-file]
     1 | source missing.hal
       |        ^^^^^^^^^^^
 )");

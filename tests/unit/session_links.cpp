@@ -45,6 +45,12 @@ TEST_F(Links, Linkps_linksp_and_linkpp_link_as_net_does) {
     EXPECT_EQ(machine.session.model().find_signal("a")->pins.size(), 2u);
     ASSERT_NE(machine.session.model().find_pin("y.bit-in")->signal, nullptr);
     EXPECT_EQ(machine.session.model().find_pin("y.bit-in")->signal, machine.session.model().find_pin("x.bit-out")->signal);
+    machine.refused("linkpp x.bit-out y.bit-io", "pin-linked");
+    machine.refused("linkpp y.bit-io x.bit-out", "pin-linked");
+    machine.refused("linkpp x.bit-out y.bit-in", "pin-linked");
+    machine.refused("net a", "wrong-arguments");
+    machine.refused("net a =>", "wrong-arguments");
+    machine.refused("net fresh =>", "wrong-arguments");
     machine.refused("linkps x.bit-io a", "type-mismatch");
     machine.refused("linkps x.bit-io nowhere", "no-such-signal");
 }

@@ -105,8 +105,9 @@ TEST_P(Memory, running_out_at_any_allocation_changes_nothing_or_all) {
         Diagnostics diagnostics;
         bool good = false;
         shortage = {true, n, 0, lasting, 0};
-        for (const Command& command : commands) machine.session.apply(command, diagnostics);
-        if (!diagnostics.failed() || machine.session.in_transaction()) good = machine.session.commit(diagnostics);
+        hal::Transaction transaction = machine.session.begin();
+        for (const Command& command : commands) apply_edit(transaction, command, diagnostics);
+        good = transaction.commit(diagnostics);
         const bool reached = shortage.made > n;
         shortage = {};
         if (good && !reached) break;  // it has worked with every allocation granted

@@ -357,8 +357,9 @@ TEST(Check_only, constructs_and_starts_nothing) {
         Session session(options);
         Diagnostics diagnostics;
         const auto source = session.sources.add("x", "loadrt threads\nloadrt test-life refuse=start " + watch.argument() + "\naddf test-life.0 thread1\n");
-        for (const Command& command : parse(session.sources, source, {}, diagnostics)) session.apply(command, diagnostics);
-        EXPECT_TRUE(session.commit(diagnostics)) << render(diagnostics, session.sources);
+        Transaction transaction = session.begin();
+        for (const Command& command : parse(session.sources, source, {}, diagnostics)) apply_edit(transaction, command, diagnostics);
+        EXPECT_TRUE(transaction.commit(diagnostics)) << render(diagnostics, session.sources);
         EXPECT_EQ(watch.constructed, 1);
         EXPECT_EQ(watch.started, 0);
     }

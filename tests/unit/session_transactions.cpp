@@ -53,21 +53,80 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(A_transaction, reports_all_its_errors_at_once) {
     Machine machine;
-    EXPECT_FALSE(machine.edit("setp nothing 1\nloadrt nowhere\nnewsig a colour\naddf f t\n"));
+    EXPECT_FALSE(machine.edit("setp nothing 1\naddf f t\nloadrt nowhere\nnewsig a colour\n"));
     for (const char* code : {"[no-such-pin]", "[no-such-component]", "[no-such-type]", "[no-such-function]"}) EXPECT_NE(machine.said.find(code), std::string::npos) << code << machine.said;
 }
 
-TEST(A_transaction, is_open_until_commit_or_abort) {
+TEST(A_transaction, is_open_until_commit_or_destruction) {
     Machine machine;
     Diagnostics diagnostics;
     const std::string before = machine.dump();
     EXPECT_FALSE(machine.session.in_transaction());
-    machine.apply("loadrt threads\nloadrt test-counter\nnewsig a bit", diagnostics);
-    EXPECT_TRUE(machine.session.in_transaction());
-    machine.session.abort();
+    {
+        hal::Transaction transaction = machine.session.begin();
+        machine.apply(transaction, "loadrt threads\nloadrt test-counter\nnewsig a bit", diagnostics);
+        EXPECT_TRUE(machine.session.in_transaction());
+        const hal::Transaction moved = std::move(transaction);
+        EXPECT_NE(before, machine.dump());
+    }
     EXPECT_FALSE(machine.session.in_transaction());
     EXPECT_EQ(before, machine.dump());
-    EXPECT_TRUE(machine.session.commit(diagnostics)) << "nothing is open: nothing to do";
+}
+
+TEST(A_transaction, is_the_only_one_and_ends_once) {
+    Machine machine;
+    Diagnostics diagnostics;
+    hal::Transaction transaction = machine.session.begin();
+    EXPECT_THROW(machine.session.begin(), std::logic_error);
+    EXPECT_TRUE(transaction.commit(diagnostics)) << "nothing was edited: nothing to do";
+    EXPECT_THROW(transaction.commit(diagnostics), std::logic_error);
+    transaction.roll_back();
+    EXPECT_FALSE(machine.session.in_transaction());
+    machine.session.begin().roll_back();
+    EXPECT_TRUE(machine.session.begin().commit(diagnostics));
+}
+
+TEST(A_transaction, carries_out_its_actions_only_when_it_has_taken_effect) {
+    Machine machine;
+    int done = 0;
+    const auto act = [&](const std::string& text, bool commit) {
+        Diagnostics diagnostics;
+        hal::Transaction transaction = machine.session.begin();
+        transaction.when_committed([&] {
+            EXPECT_FALSE(machine.session.in_transaction());
+            ++done;
+        });
+        machine.apply(transaction, text, diagnostics);
+        if (commit) transaction.commit(diagnostics);
+    };
+    act("newsig a bit", true);
+    EXPECT_EQ(done, 1);
+    act("newsig b bit", false);
+    act("newsig a bit", true);
+    EXPECT_EQ(done, 1);
+}
+
+TEST(An_open_transaction, shows_the_values_that_its_edits_give) {
+    Machine machine;
+    machine.must("loadrt threads name1=t period1=1000000\nloadrt test-types names=x,y\naddf x t\naddf y t\nsetp x.float-in 1\nnewsig s float\nsets s 3\nnewsig free float\nsets free 4\n");
+    machine.start();
+    machine.cycles(3);
+    const std::string before = machine.dump();
+    {
+        Diagnostics diagnostics;
+        hal::Transaction transaction = machine.session.begin();
+        machine.apply(transaction, "setp x.float-in 7\nsets free 5\nloadrt test-types names=z\nsetp z.float-in 9\nnet n z.float-in y.float-in\nnet s x.float-in", diagnostics);
+        EXPECT_FALSE(diagnostics.failed()) << render(diagnostics, machine.session.sources);
+        EXPECT_EQ(machine.get("free"), "5");
+        EXPECT_EQ(machine.get("z.float-in"), "9");
+        EXPECT_EQ(machine.get("y.float-in"), "9");
+        EXPECT_EQ(machine.get("n"), "9");
+        const std::string seen = machine.get("x.float-in");
+        EXPECT_TRUE(transaction.commit(diagnostics)) << render(diagnostics, machine.session.sources);
+        EXPECT_EQ(machine.get("x.float-in"), seen);
+        EXPECT_EQ(machine.get("y.float-in"), "9");
+    }
+    EXPECT_NE(before, machine.dump());
 }
 
 TEST(Values_of_one_transaction, reach_a_thread_in_one_cycle_even_when_they_are_many) {

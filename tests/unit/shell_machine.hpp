@@ -10,8 +10,8 @@
 
 #include <unistd.h>
 
-#include "session/session.hpp"
-#include "shell/shell.hpp"
+#include "machine/session.hpp"
+#include "commands/shell.hpp"
 
 namespace hal::test {
 

@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "machine.hpp"
-#include "shell/processes.hpp"
+#include "machine/processes.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -107,6 +107,26 @@ TEST(Process, W_gives_up_when_the_program_ends_first) {
     EXPECT_EQ(machine.line("loadusr -W true"), 1);
     EXPECT_TRUE(has(machine.err, "'true' ended before a component 'true' was ready [program-ended]")) << machine.err;
     EXPECT_EQ(machine.says("list comp"), "\n");
+}
+
+TEST(Process, a_reserved_name_is_not_for_a_program_from_before) {
+    ShellMachine machine;
+    machine.must("loadusr sleep 1000\n");
+    std::thread announcer([&] {
+        ASSERT_TRUE(eventually([&] { return running(machine, "panel"); }));
+        usleep(30'000);
+        const std::scoped_lock lock(machine.session.mutex);
+        Processes& processes = machine.shell.processes();
+        const auto older = processes.find("sleep")->pid, newer = processes.find("panel")->pid;
+        EXPECT_NE(processes.announce(older, "panel").find("is reserved for process " + std::to_string(newer)), std::string::npos);
+        EXPECT_EQ(processes.announce(newer, "second", 1), "") << "a component of another name does not give the first away";
+        EXPECT_NE(processes.find("panel"), nullptr);
+        EXPECT_EQ(processes.announce(newer, "panel", 2), "");
+    });
+    usleep(50'000);
+    EXPECT_EQ(machine.line("loadusr -Wn panel sleep 1000"), 0) << machine.err;
+    announcer.join();
+    EXPECT_EQ(machine.says("list comp"), "second panel sleep \n");
 }
 
 TEST(Process, a_program_may_choose_another_name_but_no_taken_one) {

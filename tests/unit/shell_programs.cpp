@@ -2,8 +2,8 @@
 // Programs as components, without a socket: pins, exchange, death and take-over, ports, streams.
 #include <nlohmann/json.hpp>
 
-#include "shell/processes.hpp"
-#include "shell/protocol.hpp"
+#include "machine/processes.hpp"
+#include "control/connection.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -96,7 +96,7 @@ TEST_F(Programs, an_input_is_set_only_while_nothing_writes_it) {
 TEST_F(Programs, what_is_wrong_is_refused_and_changes_nothing) {
     EXPECT_NE(refusal({{"exchange", "p"}, {"read", true}}), "");
     EXPECT_NE(refusal({{"exit", "p"}}), "");
-    EXPECT_NE(refusal({{"component", "s"}, {"pins", Json::array()}}).find("already"), std::string::npos);
+    EXPECT_NE(refusal({{"component", "s"}, {"pins", Json::array()}}).find("in use"), std::string::npos);
     EXPECT_NE(refusal({{"component", "p"}, {"pins", {pin("a", "float", "in"), pin("a", "float", "in")}}}), "");
     EXPECT_EQ(machine.says("list comp"), "sum2 \n") << "not even the component";
     EXPECT_NE(refusal({{"component", "p"}, {"pins", {pin("a", "colour", "in")}}}), "");
@@ -154,6 +154,39 @@ TEST_F(Programs, a_dead_one_takes_its_declared_values_after_its_time) {
     EXPECT_EQ(machine.says("getp p.io"), "9\n") << "not declared: it stays";
     machine.must("unloadusr p\n");
     EXPECT_EQ(machine.says("list comp"), "sum2 \n");
+}
+
+TEST_F(Programs, one_that_declares_a_rate_and_misses_it_does_not_respond) {
+    declare({{"timeout_ms", 0}, {"every_ms", 1}});
+    machine.must("net a p.out => s.in0\n");
+    const auto says = [&](const char* command, const char* what) {
+        for (int i = 0; i < 3000 && machine.says(command).find(what) == std::string::npos; ++i) usleep(10'000);
+        return machine.out.find(what) != std::string::npos;
+    };
+    EXPECT_TRUE(says("show comp p", " not responding since ")) << machine.out;
+    EXPECT_EQ(machine.says("gets a"), "-1\n");
+    ask({{"exchange", "p"}, {"write", {1, 4.5}}, {"alive", false}});
+    EXPECT_EQ(machine.says("gets a"), "-1\n") << "values that a thread of its library sends are no sign of life";
+    ask({{"component", "p"}, {"every_ms", 0}});
+    EXPECT_EQ(machine.says("gets a"), "4.5\n") << "what it wrote meanwhile";
+    EXPECT_NE(machine.says("show comp p").find(" ready\n"), std::string::npos) << machine.out;
+    EXPECT_NE(refusal({{"component", "p"}, {"every_ms", -1}}), "");
+    EXPECT_NE(refusal({{"component", "p"}, {"safe", {9, 1}}}), "");
+    ask({{"component", "p"}, {"safe", {2, 7}}});
+    program.reset();
+    EXPECT_TRUE(says("getp p.io", "7\n"));
+}
+
+TEST_F(Programs, a_hundred_thousand_pins_come_die_and_are_taken_over) {
+    Json pins = Json::array();
+    for (int i = 0; i < 100'000; ++i) pins.push_back(pin(("n" + std::to_string(i)).c_str(), "float", i % 2 ? "in" : "out"));
+    const Json request{{"component", "many"}, {"pins", pins}};
+    EXPECT_EQ(ask(request)["values"].size(), 100'000U);
+    program = std::make_unique<Connection>(machine.shell, 4243);
+    EXPECT_EQ(ask(request)["values"].size(), 100'000U);
+    program = std::make_unique<Connection>(machine.shell, 4244);
+    EXPECT_EQ(ask({{"component", "many"}, {"pins", {pin("n0", "float", "out")}}})["values"].size(), 1U) << "all others go";
+    EXPECT_EQ(ask({{"exit", "many"}})["ok"], true);
 }
 
 TEST_F(Programs, bytes_go_through_a_port) {

@@ -2,7 +2,7 @@
 // The control protocol without a socket: every request has its reply, whatever it is.
 #include <nlohmann/json.hpp>
 
-#include "shell/protocol.hpp"
+#include "control/connection.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -85,7 +85,8 @@ TEST_F(Protocol, set_is_one_transaction_of_pins_and_signals) {
     EXPECT_NE(refusal({{"set", {{"a.in0", nullptr}}}}), "");
     EXPECT_NE(refusal({{"set", {"a.in0"}}}), "");
     machine.line("lock all");
-    EXPECT_NE(refusal({{"set", {{"a.in0", false}}}}).find("[locked]"), std::string::npos);
+    EXPECT_NE(refusal({{"set", {{"s.gain0", 1}}}}).find("[locked]"), std::string::npos);
+    EXPECT_EQ(ask({{"set", {{"a.in0", false}}}})["count"], 1);
 }
 
 TEST_F(Protocol, values_without_a_json_number_are_words) {
@@ -160,8 +161,8 @@ TEST_F(Protocol, a_component_is_there_as_long_as_its_client) {
         other.handle(R"({"component":"panel"})", reply);
         EXPECT_EQ(reply, "{\"id\":null,\"ok\":true}\n");
         EXPECT_EQ(machine.says("list comp"), "panel sum2 and2 \n");
-        EXPECT_NE(refusal({{"component", "panel"}}).find("already"), std::string::npos);
-        EXPECT_NE(refusal({{"component", "and2"}}).find("already"), std::string::npos);
+        EXPECT_NE(refusal({{"component", "panel"}}).find("in use"), std::string::npos);
+        EXPECT_NE(refusal({{"component", "and2"}}).find("in use"), std::string::npos);
         EXPECT_NE(refusal({{"component", "a b"}}), "");
     }
     EXPECT_EQ(machine.says("list comp"), "sum2 and2 \n");
@@ -203,7 +204,7 @@ TEST_F(Protocol, options_hold_for_the_connection) {
 
 TEST_F(Protocol, rubbish_gets_an_error_and_changes_nothing) {
     for (const std::string line : {"", "hello", "{", "[]", "null", "17", "\"run\"", "{\"id\":1", "{\"run\":\"start\"}}", "\xff\xfe\x00\x01", "{}", "{\"id\":3}", "{\"rum\":\"start\"}",
-                                   "{\"run\":\"start\",\"read\":[]}", "{\"run\":\"start\",\"colour\":1}", "{\"run\":5}", "{\"run\":[\"start\"]}", "{\"script\":null}", "{\"read\":\"a\"}",
+                                   "{\"run\":\"start\",\"read\":[]}", "{\"run\":\"start\",\"colour\":1}", "{\"run\":5}", "{\"run\":[\"start\",5]}", "{\"run\":[[\"start\"]]}", "{\"script\":null}", "{\"read\":\"a\"}",
                                    "{\"read\":[1]}", "{\"read\":{}}", "{\"subscribe\":[],\"every_ms\":0}", "{\"subscribe\":[],\"every_ms\":1e300}", "{\"subscribe\":[],\"every_ms\":\"x\"}",
                                    "{\"unsubscribe\":-1}", "{\"complete\":\"x\",\"cursor\":-1}", "{\"stream\":\"sampler.0\",\"take\":-5}", "{\"set\":5}", "{\"\":1}", "{\"run\":\"\xc3\x28\"}"}) {
         const std::string reply = raw(line);
@@ -230,13 +231,26 @@ TEST_F(Protocol, what_may_wait_asks_for_a_thread_first) {
     EXPECT_TRUE(connection.cancels(R"({"cancel":true})"));
     EXPECT_FALSE(connection.cancels(R"({"run":"print \"cancel\""})"));
     EXPECT_FALSE(connection.cancels("\"cancel\" rubbish"));
+    EXPECT_FALSE(connection.cancels(R"({"cancel":false})"));
 }
 
 TEST_F(Protocol, stop_ends_the_instance) {
+    for (const Json& other : {Json(false), Json(nullptr), Json(0)}) {
+        EXPECT_EQ(ask({{"stop", other}})["error"], "stop must be true");
+        EXPECT_EQ(handled, Connection::Handled::done);
+    }
     EXPECT_EQ(ask({{"stop", true}})["ok"], true);
     EXPECT_EQ(handled, Connection::Handled::stop);
     ask({{"run", "status"}});
     EXPECT_EQ(handled, Connection::Handled::done);
+}
+
+TEST_F(Protocol, a_program_without_a_process_id_here_is_no_component) {
+    Connection outside(machine.shell, 0);  // as the kernel reports a process outside of the PID namespace
+    std::string reply;
+    outside.handle(R"({"component":"panel"})", reply);
+    EXPECT_EQ(Json::parse(reply)["ok"], false);
+    EXPECT_EQ(ask({{"list", "comp"}, {"patterns", {"panel"}}})["names"], Json::array());
 }
 
 }  // namespace

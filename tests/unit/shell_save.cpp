@@ -7,7 +7,7 @@ namespace {
 
 constexpr const char* machine_text =
     "loadrt threads name1=fast period1=100000\n"
-    "newthread slow 1000000 budget=500us\n"
+    "newthread slow 1000000 budget=500us supervise=off\n"
     "loadrt stepgen step_type=0\n"
     "loadrt and2 names=a,b\n"
     "loadrt and2 count=2\n"
@@ -39,7 +39,7 @@ TEST_F(Save, each_section_is_as_linuxcnc_writes_it) {
               "loadrt and2 names=a,b\n"
               "loadrt and2 count=2\n"
               "loadrt not names=inverter\n"
-              "newthread slow 1000000 budget=500000ns\n");
+              "newthread slow 1000000 budget=500000ns supervise=off\n");
     EXPECT_EQ(machine.says("save alias"), "# pin aliases\nalias pin a.in0 start\n# param aliases\nalias param stepgen.0.maxvel topspeed\n");
     EXPECT_EQ(machine.says("save sig"), "# signals\nnewsig dir bit  \nnewsig level float\nnewsig s bit  \nnewsig unlinked bit  \n");
     EXPECT_EQ(machine.says("save sigu"), "# signals\nnewsig level float\nnewsig unlinked bit  \n");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which commands form a transaction, when it takes effect, and what the user reads about it.
-#include "shell/commands.hpp"
+#include "commands/table.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -20,8 +20,9 @@ TEST(Script, a_file_with_an_error_changes_nothing_and_tells_all_errors) {
 
 TEST(Script, a_command_that_acts_ends_the_transaction) {
     ShellMachine machine;
-    EXPECT_EQ(machine.file("loadrt and2 names=a\ngetp a.in0\nsetp a.in0 1\ngetp a.in0\nsetp a.in1 wrong\nloadrt not\n"), 1);
+    EXPECT_EQ(machine.file("loadrt and2 names=a\ngetp a.in0\nsetp a.in0 1\ngetp a.in0\nnewthread t 1000000\nstart\nsetp a.in1 wrong\nloadrt not\n"), 1);
     EXPECT_EQ(machine.out, "FALSE\nTRUE\n");
+    EXPECT_TRUE(machine.err.ends_with("1 error; lines 1 to 6 took effect; lines 7 to 8 had no effect\n")) << machine.err;
     EXPECT_NE(machine.session.model().find_component("and2"), nullptr);
     EXPECT_EQ(machine.session.model().find_component("not"), nullptr);
 }
@@ -73,7 +74,8 @@ TEST(Script, an_assignment_is_a_setp) {
     machine.must("loadrt and2 names=a\na.in0 = 1\n");
     EXPECT_EQ(machine.says("getp a.in0"), "TRUE\n");
     machine.line("lock");
-    EXPECT_EQ(machine.line("a.in0 = 0"), 1);
+    EXPECT_EQ(machine.line("a.in0 = 0"), 0) << "pins are free under a lock, as in LinuxCNC";
+    EXPECT_EQ(machine.line("a.tmax = 0"), 1);
     EXPECT_TRUE(has(machine.err, "[locked]")) << machine.err;
 }
 
@@ -139,7 +141,7 @@ TEST(Script, shells_of_one_machine_do_not_share_a_begin) {
 
 TEST(Script, locks_forbid_and_say_how_to_unlock) {
     ShellMachine machine;
-    machine.must("loadrt and2 names=a\nnewthread t 1000000\nlock tune\n");
+    machine.must("loadrt and2 names=a\nloadrt sum2 names=s\nnet free a.in1\nnewthread t 1000000\nlock tune\n");
     for (const char* line : {"loadrt not", "net s a.out", "addf a t", "newthread u 2000000", "loadusr -w true", "unload and2", "alias pin a.in0 x"}) {
         EXPECT_EQ(machine.line(line), 1) << line;
         EXPECT_TRUE(has(machine.err, "[locked]") && has(machine.err, "unlock tune")) << line << "\n" << machine.err;
@@ -147,11 +149,13 @@ TEST(Script, locks_forbid_and_say_how_to_unlock) {
     EXPECT_EQ(machine.line("setp a.in0 1"), 0) << machine.err;
     EXPECT_EQ(machine.line("start"), 0) << machine.err;
     machine.line("lock all");
-    for (const char* line : {"setp a.in0 0", "stop"}) {
+    for (const char* line : {"setp s.gain0 0", "s.gain0 = 0", "setp s.gain[0..1] 0", "stop"}) {
         EXPECT_EQ(machine.line(line), 1) << line;
         EXPECT_TRUE(has(machine.err, "[locked]") && has(machine.err, "unlock all")) << machine.err;
     }
-    EXPECT_EQ(machine.says("getp a.in0"), "TRUE\n");
+    EXPECT_EQ(machine.says("getp s.gain0"), "1\n");
+    for (const char* line : {"setp a.in0 0", "a.in0 = 1", "setp s.in[0..1] 2", "sets free 1"}) EXPECT_EQ(machine.line(line), 0) << line << machine.err;
+    EXPECT_EQ(machine.says("getp s.in1"), "2\n");
     EXPECT_EQ(machine.line("lock sideways"), 1);
     EXPECT_EQ(machine.line("unlock"), 0);
     EXPECT_EQ(machine.line("stop"), 0) << machine.err;
@@ -173,12 +177,54 @@ TEST(Script, quit_stops_reading) {
     EXPECT_TRUE(machine.shell.quit());
 }
 
-TEST(Script, the_table_has_exactly_the_sessions_edits) {
+TEST(Script, every_row_of_the_table_is_found_by_its_name_and_has_a_summary) {
     for (const CommandRow& row : command_table()) {
-        EXPECT_EQ(row.handler == nullptr, Session::edits({{row.name, {}}, {}, {}})) << row.name;
         EXPECT_EQ(find_command(row.name), &row);
         EXPECT_TRUE(*row.summary) << row.name;
+        EXPECT_NE(row.function.act == nullptr, row.function.edit == nullptr) << row.name;
     }
+}
+
+// The usage text of a row is the only one: messages, help, the manual and completion show it or follow from it.
+TEST(Script, the_usage_of_every_row_is_the_one_in_its_error_its_help_the_manual_and_its_completion) {
+    ShellMachine machine;
+    const std::string manual = Shell::manual();
+    for (const CommandRow& row : command_table()) {
+        const std::string usage = to_string(row.usage()), name = row.name;
+        EXPECT_TRUE(has(machine.says("help " + name), usage + "\n  " + row.summary)) << name << machine.out;
+        EXPECT_TRUE(has(manual, "\n    " + usage + "\n")) << name;
+        const auto forms = usage_forms(row.arguments);
+        const auto& words = forms.front();
+        const auto least = static_cast<std::size_t>(std::count_if(words.begin(), words.end(), [](const UsageWord& word) { return !word.optional; }));
+        const bool open = std::any_of(words.begin(), words.end(), [](const UsageWord& word) { return word.repeats; });
+        std::vector<std::string> lines;
+        if (least > 0) lines.push_back(name);
+        if (!open) {
+            lines.push_back(name);
+            for (std::size_t i = 0; i <= words.size(); ++i) lines.back() += " x";
+        }
+        for (const std::string& line : lines) {
+            EXPECT_EQ(machine.line(line), 1) << line;
+            EXPECT_TRUE(has(machine.err, name + " takes ") && has(machine.err, "[wrong-arguments]") && has(machine.err, "= help: " + usage + "\n"))
+                << line << "\n" << machine.err;
+        }
+        for (const auto& form : forms) {  // a choice of words or an option in the usage is what completion offers there
+            const std::string_view first = form.empty() ? "" : form.front().text.substr(0, form.front().text.find('|'));
+            if (first.empty() || first.find_first_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ=") != first.npos) continue;
+            const auto candidates = machine.shell.complete(name + " ", name.size() + 1).candidates;
+            EXPECT_TRUE(std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& one) { return one.text == first; })) << name << " " << first;
+        }
+    }
+}
+
+TEST(Script, a_second_form_of_a_command_is_counted_by_itself) {
+    ShellMachine machine;
+    EXPECT_EQ(machine.line("addf --auto"), 1);
+    EXPECT_TRUE(has(machine.err, "addf takes at least 2 arguments, not 1")) << machine.err;
+    EXPECT_EQ(machine.line("addf f t 1 2"), 1);
+    EXPECT_TRUE(has(machine.err, "addf takes at most 3 arguments, not 4")) << machine.err;
+    machine.must("loadrt and2 names=a,b,c,d\nnewthread t 1000000\n");
+    EXPECT_EQ(machine.line("addf --auto t a b c d"), 0) << machine.err;
 }
 
 TEST(Script, help_knows_every_command) {

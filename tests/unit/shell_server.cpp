@@ -11,9 +11,9 @@
 #include <sys/un.h>
 
 #include "machine.hpp"
-#include "shell/address.hpp"
-#include "shell/client.hpp"
-#include "shell/server.hpp"
+#include "machine/address.hpp"
+#include "control/client.hpp"
+#include "control/server.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -287,18 +287,61 @@ TEST_F(ServerTest, clients_that_come_and_go_leave_nothing) {
     EXPECT_FALSE(machine->session.in_transaction());
 }
 
-TEST_F(ServerTest, too_many_clients_wait_until_one_leaves) {
+TEST_F(ServerTest, an_operator_gets_in_when_all_places_are_taken_by_idle_clients) {
     ServerOptions options;
-    options.max_clients = 2;
+    options.max_clients = 4;
+    options.reserved = 2;
+    options.idle_ms = 300'000;  // nobody counts as idle here: the reserved places alone have to do
     serve(options);
-    auto first = client(), second = client();
-    Wire third(server->path());
-    third.send("{\"id\":1,\"run\":\"getp a.out\"}\n");
-    EXPECT_EQ(first->run("getp a.out").out, "FALSE\n");
-    EXPECT_EQ(server->counts().clients, 2U);
-    second.reset();
-    EXPECT_EQ(Json::parse(third.line())["halcyon"], 1);
-    EXPECT_EQ(Json::parse(third.line())["out"], "FALSE\n");
+    std::vector<std::unique_ptr<Wire>> idle;
+    for (int i = 0; i < 4; ++i) {
+        idle.push_back(std::make_unique<Wire>(server->path()));
+        EXPECT_EQ(Json::parse(idle.back()->line())["halcyon"], 1);
+    }
+    for (int i = 0; i < 5; ++i) EXPECT_EQ(client()->run("getp a.out").out, "FALSE\n");
+    EXPECT_EQ(client()->run("stop").status, 0);
+    EXPECT_EQ(client()->stop().status, 0);
+    EXPECT_EQ(server->counts().reclaimed, 0U);
+}
+
+TEST_F(ServerTest, idle_clients_are_closed_first_and_are_told_why) {
+    ServerOptions options;
+    options.max_clients = 3;
+    options.reserved = 1;
+    options.idle_ms = 20;
+    serve(options);
+    Wire subscriber(server->path()), component(server->path()), idle(server->path());
+    subscriber.send("{\"subscribe\":[\"a.out\"],\"every_ms\":3600000}\n");
+    component.send("{\"component\":\"panel\"}\n");
+    EXPECT_EQ(Json::parse(idle.line())["halcyon"], 1);
+    EXPECT_TRUE(eventually([&] { return server->counts().requests == 2; }));
+    usleep(50'000);
+    auto operator_ = client();
+    const Json event = Json::parse(idle.line());
+    EXPECT_EQ(event["event"], "closed");
+    EXPECT_NE(event["reason"].get<std::string>().find("more than 3 clients are connected, and this one made no request for"), std::string::npos) << event;
+    EXPECT_EQ(idle.line(), "");
+    EXPECT_EQ(operator_->run("getp a.out").out, "FALSE\n");
+    EXPECT_EQ(server->counts().clients, 3U) << "those on which something depends stay";
+    Wire fourth(server->path());
+    EXPECT_TRUE(eventually([&] { return !operator_->look(); })) << "it is idle now";
+    EXPECT_NE(operator_->closed_because().find("more than 3 clients"), std::string::npos) << operator_->closed_because();
+}
+
+TEST_F(ServerTest, a_reserved_place_is_not_kept_by_a_subscription) {
+    ServerOptions options;
+    options.max_clients = 1;
+    options.reserved = 1;
+    options.idle_ms = 20;
+    serve(options);
+    Wire first(server->path());
+    first.send("{\"subscribe\":[\"a.out\"],\"every_ms\":3600000}\n");
+    EXPECT_TRUE(eventually([&] { return server->counts().requests == 1; }));
+    Wire second(server->path());
+    second.send("{\"subscribe\":[\"a.out\"],\"every_ms\":3600000}\n");
+    EXPECT_TRUE(eventually([&] { return server->counts().requests == 2; }));
+    EXPECT_EQ(client()->run("getp a.out").out, "FALSE\n");
+    EXPECT_EQ(server->counts().reclaimed, 1U);
 }
 
 // --- the socket itself -----------------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <limits>
 
-#include "tools/canvas.hpp"
+#include "tools/run/canvas.hpp"
 
 namespace hal::tools {
 namespace {

@@ -4,8 +4,8 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include "tools/editor.hpp"
-#include "tools/talk.hpp"
+#include "tools/cli/editor.hpp"
+#include "tools/cli/prompt_loop.hpp"
 
 namespace hal::tools {
 namespace {
@@ -90,15 +90,6 @@ TEST(CandidateTable, fills_the_width_column_by_column) {
 TEST(CandidateTable, says_how_many_it_leaves_out) {
     std::vector<Candidate> many(250, Candidate{"name", ""});
     EXPECT_NE(candidate_table(many, 80).find("… and 50 more\n"), std::string::npos);
-}
-
-TEST(Joined, one_word_is_a_line_and_words_with_blanks_get_quotes) {
-    EXPECT_EQ(joined({"setp a b"}), "setp a b");
-    EXPECT_EQ(joined({"setp", "a", "-1"}), "setp a -1");
-    EXPECT_EQ(joined({"loadrt", "x", "config=a b"}), "loadrt x config=\"a b\"");
-    EXPECT_EQ(joined({"print", "say \"hi\" now"}), "print 'say \"hi\" now'");
-    EXPECT_EQ(joined({"print", "a#b"}), "print \"a#b\"");
-    EXPECT_EQ(joined({"print", ""}), "print \"\"");
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
-#include "tools/page.hpp"
+#include "tools/doc/page.hpp"
 
 namespace hal::tools {
 namespace {

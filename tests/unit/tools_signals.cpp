@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "tools/signals.hpp"
+#include "tools/cli/signals.hpp"
 
 namespace hal::tools {
 namespace {

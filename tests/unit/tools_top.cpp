@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "top.hpp"
+#include "inspect/seen_instance.hpp"
 
 #include <gtest/gtest.h>
 

@@ -170,6 +170,15 @@ TEST(Camera, is_read_from_what_opencv_writes) {
     EXPECT_EQ(read.camera.distortion[4], 0.003);
 }
 
+TEST(Camera, is_read_from_what_ros_writes) {
+    const auto ros = read_camera("image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+                                 "  data: [600, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n"
+                                 "  cols: 5\n  data: [0.1, 0.02, 0, 0, 0.003]\n");
+    ASSERT_TRUE(ros.problems.empty()) << ros.problems[0].sentence;
+    EXPECT_EQ(ros.camera.fy, 601);
+    EXPECT_EQ(ros.camera.distortion[4], 0.003);
+}
+
 TEST(Camera, that_cannot_be_read_says_where_and_why) {
     const std::string own = "size 640\nfocal x\nzoom 3\n";
     EXPECT_EQ(said(read_camera(own), own),
@@ -181,7 +190,16 @@ TEST(Camera, that_cannot_be_read_says_where_and_why) {
     const auto own_refusal = [](const std::string& lines) { return read_camera("size 640 480\n" + lines).problems.at(0).sentence; };
     EXPECT_EQ(own_refusal("focal 0\n"), "a focal length is not positive");
     EXPECT_EQ(own_refusal("focal 600\ncentre 5000 200\n"), "the centre is far outside of the picture");
-    EXPECT_EQ(own_refusal("focal 600\ndistortion 4000\n"), "this distortion bends the picture beyond use");
+    const auto bent = [&](const std::string& distortion) {
+        const auto read = read_camera("size 640 480\nfocal 600\ndistortion " + distortion + "\n");
+        return read.problems.empty() ? "" : read.problems[0].sentence.substr(0, read.problems[0].sentence.find(" it folds"));
+    };
+    EXPECT_EQ(own_refusal("focal 600\ndistortion 4000\n"),
+              "invalid distortion: beyond 14 px from the centre it folds the picture over itself or stretches it more than four times");
+    EXPECT_EQ(bent("30 -900"), "invalid distortion: beyond 114 px from the centre");
+    EXPECT_EQ(bent("-0.9"), "invalid distortion: beyond 243 px from the centre");
+    EXPECT_EQ(bent("0 0 0.4"), "invalid distortion: beyond 250 px from the centre");
+    for (const char* real : {"-0.35 0.15 0.001 -0.002", "0.12 -0.25 0 0 0.1", "-0.4 0.2", "0.3"}) EXPECT_EQ(bent(real), "") << real;
     EXPECT_EQ(own_refusal("focal 600\nfocal 600\n"), "'focal' is there twice");
     const auto opencv_refusal = [](const std::string& matrix, const std::string& distortion = "") {
         return read_camera("%YAML:1.0\nimage_width: 640\nimage_height: 480\n" + matrix + distortion).problems.at(0).sentence;
@@ -189,8 +207,10 @@ TEST(Camera, that_cannot_be_read_says_where_and_why) {
     const std::string good = "camera_matrix: !!opencv-matrix\n   data: [ 600, 0, 320, 0, 600, 240, 0, 0, 1 ]\n";
     EXPECT_EQ(opencv_refusal(""), "there is no camera_matrix");
     EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   rows: 3\n"), "camera_matrix has no data");
+    EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   data: [ 600, 0, x, 0, 600, 240, 0, 0, 1 ]\n"), "'x' is not a number");
+    EXPECT_TRUE(opencv_refusal("camera_matrix: [ 1, 2\n").starts_with("invalid YAML: "));
     EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   data: [ 600, 0, 320, 7, 600, 240, 0, 0, 1 ]\n"),
-              "camera_matrix is no camera's matrix");
+              "invalid camera_matrix");
     EXPECT_EQ(opencv_refusal(good, "distortion_coefficients: !!opencv-matrix\n   data: [ 0, 0, 0, 0, 0, 0.1, 0.1, 0.1 ]\n"),
               "the distortion has 8 coefficients");
     EXPECT_EQ(read_camera("%YAML:1.0\n" + good).problems.at(0).sentence, "there is no image_width and image_height");

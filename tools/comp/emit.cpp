@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "comp.hpp"
-#include "syntax.hpp"
+#include "comp/comp.hpp"
+#include "comp/syntax.hpp"
 
 namespace hal::comp {
 namespace {
@@ -72,6 +72,7 @@ private:
     void tables();
     void create();
     void start_values();
+    void variable_values();
     void plugin();
     void macros();
     void value_macro(const Item& item);
@@ -141,7 +142,7 @@ void Emitter::tables() {
     add("\n");
 }
 
-void Emitter::start_values() {
+void Emitter::variable_values() {
     for (const Variable& variable : tree_.variables) {
         if (!variable.start.given()) continue;
         from(variable.start.span);
@@ -149,6 +150,10 @@ void Emitter::start_values() {
             add("    for (unsigned i = 0; i < sizeof inst->{0} / sizeof inst->{0}[0]; ++i) inst->{0}[i] = {1};\n", variable.name.c, variable.start.text);
         else add("    inst->{} = {};\n", variable.name.c, variable.start.text);
     }
+    from_here();
+}
+
+void Emitter::start_values() {
     for (const Item& item : tree_.items) {
         if (!item.start.given()) continue;
         from(item.start.span);
@@ -160,8 +165,9 @@ void Emitter::start_values() {
 
 void Emitter::create() {
     std::string stem = spelled(tree_.name).hal;
-    const bool renamed = stem.starts_with("hal-");
-    if (renamed) stem.erase(0, 4);
+    const bool shortened = stem.size() != tree_.name.text.size();  // by what stands at its end: trail_ makes trail.0
+    const bool renamed = stem.starts_with("hal-") || shortened;
+    if (stem.starts_with("hal-")) stem.erase(0, 4);
     add("static bool __comp_make(const hal_host *host, struct __comp_state *inst{}) {{\n    __comp_context context = {{host, {{0}}, 0, 0}};\n    (void)inst;\n",
         own_main() ? ", const char *prefix, long extra_arg" : "");
     if (own_main()) add("    __comp_begin_as(&context, prefix, extra_arg);\n");
@@ -179,6 +185,7 @@ void Emitter::create() {
     if (pins) add("    __comp_prepare(inst, __comp_items, sizeof __comp_items / sizeof __comp_items[0]);\n");
     start_values();
     if (tree_.has("extra_setup")) add("    if (!__comp_called(\"EXTRA_SETUP\", extra_setup(inst, context.prefix, context.number))) return false;\n");
+    variable_values();  // EXTRA_SETUP sees zeros, as in LinuxCNC
     add("    const long personality = inst->_personality;\n    (void)personality;\n");
     if (pins) {
         add("    const long counts[] = {{\n");

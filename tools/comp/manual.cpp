@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/types.hpp"
-#include "syntax.hpp"
+#include "comp/syntax.hpp"
 
 namespace hal::comp {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 
-#include "syntax.hpp"
+#include "comp/syntax.hpp"
 
 namespace hal::comp {
 namespace {

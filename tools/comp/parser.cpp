@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "scanner.hpp"
+#include "comp/scanner.hpp"
 
 #include <algorithm>
 #include <array>

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "syntax.hpp"
+#include "comp/syntax.hpp"
 
 namespace hal::comp {
 

@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "base/diagnostic.hpp"
-#include "base/source.hpp"
 #include "hal/abi.h"
+#include "text/diagnostic.hpp"
+#include "text/source.hpp"
 
 namespace hal::comp {
 

@@ -20,12 +20,14 @@
 
 #include <nlohmann/json.hpp>
 #include <pthread.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 #include <pybind11/pybind11.h>
 #include <csignal>
 
 #include "base/types.hpp"
-#include "shell/address.hpp"
-#include "shell/client.hpp"
+#include "machine/address.hpp"
+#include "control/client.hpp"
 
 namespace py = pybind11;
 using Json = nlohmann::json;
@@ -102,10 +104,12 @@ Json initial(hal_type type) { return type == HAL_TYPE_BIT ? Json(false) : type =
 
 class Component {
 public:
-    Component(std::string name, std::string prefix, Json timeout) : name_(std::move(name)), prefix_(std::move(prefix)), timeout_(std::move(timeout)) {
+    Component(std::string name, std::string prefix, Json timeout, long every_ms, bool ends_when_lost)
+        : name_(std::move(name)), prefix_(std::move(prefix)), timeout_(std::move(timeout)), every_ms_(every_ms), ends_when_lost_(ends_when_lost) {
         {
             const py::gil_scoped_release others_may_run;
             client_ = connected();
+            found();
             good(client_->request(announcement()));
         }
         sigset_t every, before;  // signals are Python's main thread's
@@ -207,6 +211,13 @@ public:
         fetched_ = {};
         if (dirty_ && !left_) exchange(false);
     }
+    /// A sign of life, for a component with a declared rate that accesses no pin.
+    void alive() {
+        const py::gil_scoped_release others_may_run;
+        std::unique_lock lock(mutex_, std::defer_lock);
+        take(lock);
+        if (client_->connected()) client_->request({{"exchange", name_}});
+    }
     /// The next look at an input fetches them anew.
     void look() {
         const py::gil_scoped_release others_may_run;
@@ -244,6 +255,7 @@ private:
     Json announcement() const {
         Json body{{"component", name_}, {"prefix", prefix_}, {"ready", false}};
         if (!timeout_.is_null()) body["timeout_ms"] = timeout_;
+        if (every_ms_ > 0) body["every_ms"] = every_ms_;
         return body;
     }
 
@@ -301,13 +313,13 @@ private:
     void flush_later() {
         std::unique_lock lock(mutex_);
         while (!left_) {
-            if (!client_->connected()) {
-                changed_.wait_for(lock, 200ms);
-                if (!left_) reconnect();
+            if (!client_->look()) {
+                reconnect();
+                if (!client_->connected()) changed_.wait_for(lock, 200ms);
                 continue;
             }
             if (!dirty_) {
-                changed_.wait_for(lock, 200ms);
+                changed_.wait_for(lock, 100ms);
                 continue;
             }
             lock.unlock();
@@ -321,14 +333,46 @@ private:
         }
     }
 
+    void found() {
+        int death_signal = 0;
+        tied_ = prctl(PR_GET_PDEATHSIG, &death_signal) == 0 && death_signal != 0 && getppid() == client_->pid();
+        lost_said_ = false;
+    }
+
+    /// The machine is gone. Ends the program as SIGTERM does, or takes the declared values.
+    void be_lost() {
+        if (std::exchange(lost_said_, true)) return;
+        if (ends_when_lost_ && tied_) return;  // the kernel's SIGTERM, or the machine's, is on its way
+        std::fprintf(stderr, "%s: the machine '%s' (process %lld) is gone; %s\n", name_.c_str(), client_->instance().c_str(),
+                     static_cast<long long>(client_->pid()),
+                     ends_when_lost_ ? "ending" : "pins take their declared values, others keep theirs, until it is back (HALCYON_LOST=end ends the program instead)");
+        if (ends_when_lost_) {
+            kill(getpid(), SIGTERM);
+            return;
+        }
+        for (Item& item : items_) {
+            const auto safe = item.declared.find("safe");
+            if (safe == item.declared.end()) continue;
+            item.value = *safe;
+            item.dirty = item.dirty || item.own();
+        }
+    }
+
     /// The same component in an instance that has been started again, or that has dropped this connection.
     void reconnect() {
+        std::unique_ptr<hal::Client> client;
         try {
-            auto client = connected();
+            client = connected();
+        } catch (const std::exception&) {
+            be_lost();
+            return;
+        }
+        try {
             if (!client->request(announcement()).value("ok", false)) return;
             for (std::size_t i = 0; i < items_.size(); ++i)
                 good(client->request({{"component", name_}, {"prefix", prefixes_[i]}, {"pins", Json::array({items_[i].declared})}}));
             client_ = std::move(client);
+            found();
             for (Item& item : items_) item.dirty = dirty_ = item.own() && item.type.type != HAL_TYPE_PORT;
             for (const Item& item : items_) dirty_ = dirty_ || item.dirty;
             fetched_ = {};
@@ -399,6 +443,9 @@ private:
 
     std::string name_, prefix_;
     Json timeout_;
+    long every_ms_;
+    bool ends_when_lost_;
+    bool tied_ = false, lost_said_ = false;  // the kernel ends this process with the machine; its loss has been reported
     std::mutex mutex_;                 // holds for everything below
     std::condition_variable changed_;
     std::unique_ptr<hal::Client> client_;
@@ -445,8 +492,8 @@ PYBIND11_MODULE(_core, module) {
     py::register_exception<Problem>(module, "error", PyExc_RuntimeError);
     py::class_<Link>(module, "Link").def(py::init<>()).def("request", &Link::request);
     py::class_<Component, std::shared_ptr<Component>>(module, "Component")
-        .def(py::init([](std::string name, std::string prefix, long timeout_ms) {
-            return std::make_shared<Component>(std::move(name), std::move(prefix), timeout_ms < -1 ? Json(nullptr) : Json(timeout_ms));
+        .def(py::init([](std::string name, std::string prefix, long timeout_ms, long every_ms, bool ends_when_lost) {
+            return std::make_shared<Component>(std::move(name), std::move(prefix), timeout_ms < -1 ? Json(nullptr) : Json(timeout_ms), every_ms, ends_when_lost);
         }))
         .def("add", &Component::add)
         .def("ready", &Component::ready)
@@ -465,6 +512,7 @@ PYBIND11_MODULE(_core, module) {
         })
         .def("request", &Component::request)
         .def("look", &Component::look)
+        .def("alive", &Component::alive)
         .def("leave", [](Component& c, bool clean) {
             const py::gil_scoped_release others_may_run;
             c.leave(clean);

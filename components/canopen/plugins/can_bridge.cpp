@@ -51,7 +51,7 @@ struct CanBridge : hal::Component {
 
 private:
     static void open(End& end, const std::string& address) {
-        auto opened = hal::can::open(address);
+        auto opened = hal::can::open(address, {.stamps = true});
         if (!opened) throw std::runtime_error(opened.problem);
         end = {std::move(opened.link)};
     }

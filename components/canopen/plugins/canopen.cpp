@@ -5,20 +5,19 @@
 #include <optional>
 #include <utility>
 
-#include "canopen/config/config.hpp"
-#include "canopen/config/lines.hpp"
-#include "canopen/config/schedule.hpp"
-#include "canopen/master/pins.hpp"
-#include "canopen/master/reporter.hpp"
-#include "canopen/master/runner.hpp"
-#include "canopen/master/safety_pins.hpp"
-#include "canopen/master/shared_link.hpp"
-#include "canopen/master/sync_follower.hpp"
+#include "canopen/master/config/bus_schedule.hpp"
+#include "canopen/master/config/config_lines.hpp"
+#include "canopen/master/config/master_config.hpp"
+#include "canopen/master/cycle/master_reporter.hpp"
+#include "canopen/master/cycle/node_pins.hpp"
+#include "canopen/master/cycle/runner.hpp"
+#include "canopen/master/cycle/safety_pins.hpp"
+#include "canopen/master/cycle/shared_link.hpp"
+#include "canopen/master/cycle/sync_follower.hpp"
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
 #include "hal/way.hpp"
-#include "link/ways.hpp"
 
 namespace {
 
@@ -101,15 +100,17 @@ public:
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         hal::can::Options options;
-        options.bit_rate = config_.link.starts_with("sim:") ? config_.bit_rate : 0;
+        const hal::can::Description bus = hal::can::describe(config_.link);
+        options.bit_rate = bus.in_memory && bus.has_bit_rate ? config_.bit_rate : 0;
         options.send_capacity = 4096;
+        options.stamps = true;  // for a SYNC that is followed, and for frames-lost
         std::string problem;
         auto        opened = SharedLink::open(config_.link, options, problem);
         if (!opened) throw std::runtime_error(problem);
         const auto& description = opened->description();
         if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate && description.bit_rate != hal::can::unlimited) {
             const std::string wanted = std::to_string(config_.bit_rate), is = std::to_string(description.bit_rate);
-            const std::string interface = config_.link.starts_with("can:") ? config_.link.substr(4, config_.link.find('?') - 4) : "";
+            const std::string& interface = description.interface;
             throw std::runtime_error(config_.link + " runs at " + is + " bit/s, the configuration says " + wanted +
                                      "; change one of them: bitrate = " + is + " in [bus], or " +
                                      (interface.empty() ? "bitrate=" + wanted + " in the address"
@@ -123,7 +124,7 @@ public:
         notes_told_.assign(nodes_.size(), 0);
         reporter_->start();
         runner_->open(*link_);
-        tell_ways(description.address);
+        tell_ways();
     }
 
     void stop() noexcept {
@@ -183,11 +184,11 @@ private:
     }
 
     /// How long the values of the pins are on the wire, where its schedule is known: to the station called as the node, or at most. [setup]
-    void tell_ways(const std::string& link) {
-        const std::vector<hal::can::Way> ways = hal::can::ways_of(link);
+    void tell_ways() {
+        const std::vector<hal::can::DeliveryTime> ways = link_->delivery_times();
         if (ways.empty()) return;
-        hal::can::Way most = ways.front();
-        for (const hal::can::Way& w : ways) {
+        hal::can::DeliveryTime most = ways.front();
+        for (const hal::can::DeliveryTime& w : ways) {
             most.there_ns = std::max(most.there_ns, w.there_ns), most.back_ns = std::max(most.back_ns, w.back_ns);
             most.there_cycles = std::max(most.there_cycles, w.there_cycles), most.back_cycles = std::max(most.back_cycles, w.back_cycles);
             most.round_trip = std::max(most.round_trip, w.round_trip);
@@ -350,6 +351,11 @@ private:
     void on_short(std::size_t place, unsigned bytes) noexcept override {
         if (!std::exchange(pdo_words_[place].cut_told, true)) raise(pdo_words_[place].cut.c_str(), bytes);
     }
+    void on_foreign(const Foreign& f) noexcept override {
+        if (f.begins && f.sync) raise("another device produces SYNC, too; nodes act on both", not_a_number);
+        if (f.begins && f.rpdo) raise("another device sends the RPDO {x} of a node of this master; the node obeys both", f.id);
+        reporter_->foreign(f);
+    }
     void on_own_id_taken() noexcept override { raise(own_id_words_.c_str(), not_a_number); }
     void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override { raise(safety_->words(place, fault), not_a_number); }
     void on_bus_state(hal::can::State state) noexcept override {
@@ -359,6 +365,7 @@ private:
             raise("the bus is down: the interface is off or was taken away; it is tried again by itself", not_a_number);
         reporter_->bus(state, runner_->had_bus());
     }
+    void on_rejected(const hal::can::Rejected& what) noexcept override { reporter_->rejected(what); }
     void on_flying() noexcept override { reporter_->flying(runner_->flying()); }
     void on_sync_overrun() noexcept override {
         if (!overran_) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <deque>
 
-#include "canopen/devices/axis_io.hpp"
-#include "canopen/devices/component.hpp"
+#include "canopen/device/component.hpp"
+#include "canopen/device/drive/axis_io.hpp"
 
 namespace {
 

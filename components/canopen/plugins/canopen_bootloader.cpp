@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <cstdio>
 
-#include "canopen/devices/bootloader.hpp"
-#include "canopen/devices/component.hpp"
-#include "canopen/devices/flash_file.hpp"
+#include "canopen/device/bootloader/bootloader.hpp"
+#include "canopen/device/bootloader/flash_file.hpp"
+#include "canopen/device/component.hpp"
 
 namespace {
 

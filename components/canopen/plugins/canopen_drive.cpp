@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 
-#include "canopen/devices/component.hpp"
-#include "canopen/devices/drive.hpp"
+#include "canopen/device/component.hpp"
+#include "canopen/device/drive/drive_program.hpp"
 
 namespace {
 

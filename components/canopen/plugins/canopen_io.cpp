@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "canopen/401/io.hpp"
-#include "canopen/devices/component.hpp"
+#include "canopen/device/component.hpp"
+#include "canopen/device/io/io.hpp"
 
 namespace {
 

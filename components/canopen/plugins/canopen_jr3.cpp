@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 
-#include "canopen/404/jr3.hpp"
-#include "canopen/devices/component.hpp"
+#include "canopen/device/component.hpp"
+#include "canopen/device/sensor/jr3.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "canopen/304/safe_io.hpp"
-#include "canopen/devices/component.hpp"
+#include "canopen/device/component.hpp"
+#include "canopen/device/safety/safe_io.hpp"
 
 namespace {
 

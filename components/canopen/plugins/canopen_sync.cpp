@@ -22,7 +22,8 @@ struct CanopenSync : hal::Component {
     hal::Out<std::uint32_t>  count{*this, "count", "SYNCs sent"};
 
     void start() {
-        if (!link.get().starts_with("sim:")) throw std::runtime_error("link=" + link.get() + " is no bus in memory; write link=sim:NAME");
+        const hal::can::Description bus = hal::can::describe(link.get());
+        if (!bus.in_memory || !bus.has_bit_rate) throw std::runtime_error("link=" + link.get() + " is no bus in memory; write link=sim:NAME");
         auto opened = hal::can::open(link.get());
         if (!opened) throw std::runtime_error(opened.problem);
         link_ = std::move(opened.link);

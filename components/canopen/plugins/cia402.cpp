@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 
-#include "canopen/402/axis.hpp"
+#include "cia402/axis.hpp"
 #include "hal/component.hpp"
 
 namespace {
@@ -151,7 +151,7 @@ struct Cia402 : hal::Component {
 
 private:
     static Time time(double seconds) noexcept {
-        return seconds > 0.0 ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(second)) : 0;
+        return seconds > 0.0 ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(one_second)) : 0;
     }
     static const Sentences& sentences() {
         static const Sentences all;

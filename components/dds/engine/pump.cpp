@@ -83,6 +83,7 @@ private:
         std::unique_lock lock(mutex_);
         for (last_ns_ = awake_ns(); running_;) {
             look_for_standstill();
+            engine_log().flush();
             const auto   now = Clock::now().time_since_epoch();
             std::int64_t next = now.count() + 1'000'000'000;
             for (Entry& e : entries_) {
@@ -97,8 +98,11 @@ private:
     void look_for_standstill() {
         const std::int64_t now = awake_ns(), gone = now - std::exchange(last_ns_, now);
         if (gone > participant_lease_ns) {
-            std::fprintf(stderr, "dds: this process stood still for %.1f s, so others may have forgotten it; it makes itself known anew\n",
-                         static_cast<double>(gone) * 1e-9);
+            char text[128];
+            std::snprintf(text, sizeof text,
+                          "this process stood still for %.1f s, so others may have forgotten it; it makes itself known anew",
+                          static_cast<double>(gone) * 1e-9);
+            engine_log().print(text);
             anew_at_ns_ = now;
         }
         if (now < anew_at_ns_) return;

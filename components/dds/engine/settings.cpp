@@ -146,19 +146,14 @@ void security(DomainParticipantQos& qos, const Settings& s) {
     to.emplace_back("dds.sec.access.builtin.Access-Permissions.permissions", file("permissions.p7s"));
 }
 
-/// What Fast DDS says, a line each, not the same line again and again.
+/// What Fast DDS logs, a line each.
 class Said : public fastdds::dds::LogConsumer {
 public:
     void Consume(const fastdds::dds::Log::Entry& entry) override {
-        if (entry.message == last_) return;
-        last_ = entry.message;
-        std::string line = last_;
+        std::string line = entry.message;
         while (!line.empty() && line.back() == '\n') line.pop_back();
-        std::fputs(("dds: " + line + " (Fast DDS, " + (entry.context.category ? entry.context.category : "?") + ")\n").c_str(), stderr);
+        engine_log().print(line + " (Fast DDS, " + (entry.context.category ? entry.context.category : "?") + ")");
     }
-
-private:
-    std::string last_;
 };
 
 }  // namespace
@@ -172,6 +167,11 @@ void prepare_library() {
         fastdds::dds::Log::SetVerbosity(fastdds::dds::Log::Kind::Error);
         fastdds::dds::Log::RegisterConsumer(std::make_unique<Said>());
     });
+}
+
+hal::MessageLog& engine_log() {
+    static hal::MessageLog& log = *new hal::MessageLog("dds");  // never destroyed: Fast DDS logs until the end of the process
+    return log;
 }
 
 DomainParticipantQos participant_qos(const Settings& s) {

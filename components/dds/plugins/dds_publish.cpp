@@ -65,6 +65,7 @@ private:
         const std::int64_t due = due_.load(std::memory_order_acquire);
         bool               found = false;
         std::int64_t       made = 0;
+        if (now >= flush_at_) flush_at_ = now + 500'000'000, arguments_.flush_log();
         for (std::span<std::uint8_t> bytes; !(bytes = outbox_.front(made)).empty(); outbox_.take()) {
             found = true;
             write(bytes, made);
@@ -135,6 +136,7 @@ private:
     std::atomic<std::uint64_t> sent_{0}, refused_{0};
     // The DDS thread's
     std::int64_t lead_ = 0;  // when it looks first, from the beginning of the cycle
+    std::int64_t flush_at_ = 0;
     std::int64_t expected_ = 0, since_ = 0;  // the cycle it is looking for, and since when
 
     Attendance<Writer> attendance_;

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <mutex>
 
 #include "dds/attendance.hpp"
 #include "dds/field_pins.hpp"
@@ -66,6 +68,13 @@ public:
         malformed = malformed_.load(std::memory_order_relaxed);
         wrong_type = attendance_.wrong_type();
         silent = silent_.load(std::memory_order_relaxed);
+        const std::uint64_t others = others_.load(std::memory_order_relaxed);
+        if (others != others_seen_) others_seen_ = others, second_until_ = now + second;
+        const bool with_other = now < second_until_;
+        if (with_other && !second_writer && exclusive_ && faults_ != nullptr)
+            faults_->raise(faults_, this, second_words_.c_str(), std::numeric_limits<double>::quiet_NaN());
+        second_writer = with_other;
+        ignored = ignored_.load(std::memory_order_relaxed);
         flood = flood_.load(std::memory_order_relaxed);
     }
 
@@ -73,7 +82,25 @@ private:
     enum class State { waiting, valid, stale };
     static constexpr std::int64_t second = 1'000'000'000;
 
+    /// One publisher has the topic: the first, until no sample of it came for half of the timeout, or it is gone.
+    bool is_owners(const Sample& s) noexcept {
+        if (s.writer != owner_) {
+            const bool has_one = owner_at_ != 0 && attendance_.matched() > 1 && s.monotonic_ns - owner_at_ < timeout_ / 2;
+            if (has_one) {
+                const std::lock_guard lock(names_);
+                owner_named_ = owner_, other_named_ = s.writer;
+                other_at_.store(s.monotonic_ns, std::memory_order_relaxed);
+                others_.fetch_add(1, std::memory_order_relaxed);
+                if (exclusive_) return ignored_.fetch_add(1, std::memory_order_relaxed), false;
+            }
+            owner_ = s.writer;
+        }
+        owner_at_ = s.monotonic_ns;
+        return true;
+    }
+
     void on_sample(const Sample& s) noexcept override {
+        if (!is_owners(s)) return;
         ++arrivals_;
         if (s.monotonic_ns - window_ >= second) {
             rate_ = static_cast<double>(arrivals_) * 1e9 / static_cast<double>(std::max<std::int64_t>(s.monotonic_ns - window_, 1));
@@ -134,6 +161,17 @@ private:
             arguments_.say("no sample of topic '" + topic_.name + "' for more than " + limit_words_ + "; its pins are not valid");
         if (s == State::valid && said_ == State::stale) arguments_.say("topic '" + topic_.name + "' is valid again");
         said_ = s;
+        const bool second_one = other_at_.load(std::memory_order_relaxed) > now - second;
+        if (second_one && !said_second_) {
+            std::unique_lock lock(names_);
+            const auto owner = owner_named_, other = other_named_;
+            lock.unlock();
+            arguments_.say("topic '" + topic_.name + "' has a second publisher, " + attendance_.called(other) + ", beside " +
+                           attendance_.called(owner) +
+                           (exclusive_ ? "; its samples are ignored. Stop it, or take the samples of all: exclusive=0"
+                                       : "; the samples of both are taken. To take those of one: exclusive=1"));
+        }
+        said_second_ = second_one;
         const bool somebody = attendance_.matched() > 0;
         if (!somebody || quiet_since_ == 0) quiet_since_ = now;
         const std::int64_t since = std::max(last_.load(std::memory_order_relaxed), quiet_since_);
@@ -143,6 +181,7 @@ private:
                 "topic '" + topic_.name + "' has a publisher and no sample has come for " + std::to_string(silence_ms_) +
                 " ms; is it enabled, does its type's representation fit (XCDR1, or XCDR2 of a final type), does a firewall stop data?");
         silent_.store(quiet, std::memory_order_relaxed);
+        arguments_.flush_log();
         return now + 20'000'000;
     }
 
@@ -151,6 +190,9 @@ private:
         *this, "timeout_ms", 0, "no sample for so long: not valid; 0: deadline_ms, without one 1000", {.min = 0, .max = 86'400'000}};
     hal::Argument silence_ms_{*this, "silence_ms", 3000, "a publisher and no sample for so long: said", {.min = 10, .max = 86'400'000}};
     hal::Argument flood_limit_{*this, "flood_limit", 20'000, "samples per second that are too many", {.min = 1, .max = 100'000'000}};
+    hal::Argument exclusive_argument_{
+        *this, "exclusive", -1, "1: takes the samples of one publisher, a second one is a fault; 0: of all; -1: 1, with ros= 0",
+        {.min = -1, .max = 1}};
     hal::Function take_{*this, "", &DdsSubscribe::take, "shows the newest sample"};
 
     const Schema    schema_ = arguments_.schema();
@@ -168,6 +210,8 @@ private:
     hal::Out<std::uint64_t> malformed{*this, take_, "malformed", "samples that are not of the type"};
     hal::Out<bool>          wrong_type{*this, take_, "wrong-type", "somebody publishes this topic with another type"};
     hal::Out<bool>          silent{*this, take_, "silent", "there is a publisher, and nothing comes"};
+    hal::Out<bool>          second_writer{*this, take_, "second-publisher", "somebody else publishes this topic, too"};
+    hal::Out<std::uint64_t> ignored{*this, take_, "ignored", "samples of a second publisher that were not taken"};
     hal::Out<bool>          flood{*this, take_, "flood", "more comes than flood_limit"};
     hal::Out<bool>          clock_differs{*this, take_, "clock-differs", "the publisher's clock is ahead, or more than 2 s behind"};
 
@@ -175,10 +219,15 @@ private:
     const hal_faults* faults_ = nullptr;
     std::int64_t      timeout_ = 0, seen_ = 0, transit_ = 0;
     bool              have_ = false;
+    std::uint64_t     others_seen_ = 0;
+    std::int64_t      second_until_ = INT64_MIN;
     std::string       limit_words_, stale_words_;
+    const bool        exclusive_ = exclusive_argument_ == 1 || (exclusive_argument_ == -1 && schema_.ros.empty());
+    const std::string second_words_ = "a second publisher writes topic '" + topic_.name + "'; its samples are ignored";
     // The engine's threads', one at a time
     Message                      message_{std::vector<hal_value>(schema_.fields.size())};
-    std::array<std::uint8_t, 16> writer_{};
+    std::array<std::uint8_t, 16> writer_{}, owner_{};
+    std::int64_t                 owner_at_ = 0;
     std::uint64_t                arrivals_ = 0, skipped_ = 0;
     std::int64_t                 window_ = 0;
     double                       rate_ = 0;
@@ -189,8 +238,13 @@ private:
     std::atomic<std::uint64_t> malformed_{0};
     std::atomic<std::int64_t>  last_{0};
     std::atomic<bool>          silent_{false}, flood_{false};
+    std::atomic<std::int64_t>  other_at_{INT64_MIN / 2};
+    std::atomic<std::uint64_t> ignored_{0}, others_{0};
+    std::mutex                 names_;  // of the next two, never of the cycle
+    std::array<std::uint8_t, 16> owner_named_{}, other_named_{};
     // The DDS thread's
     State        said_ = State::waiting;
+    bool         said_second_ = false;
     std::int64_t quiet_since_ = 0;
 
     Attendance<Reader> attendance_;
@@ -213,6 +267,9 @@ not (`clock-differs`) it counts from the arrival.
 
 `lost` are gaps in a publisher's numbers. With `reliable=1` what is missing is sent again, while the publisher has it among its newest `depth` and
 no more than `depth` came after it here: a subscriber that must have every sample, also when its computer stood still, needs a `depth` of so many.
+
+A topic has one publisher: the first that comes, until nothing came of it for half of the timeout. The samples of a second one are not taken,
+`second-publisher` rises, a fault is raised, and its participant is named. `exclusive=0` takes those of all, which is the default with `ros=`.
 
 `silent`: there is a publisher and nothing has come for `silence_ms`. `wrong-type`: somebody has the topic with another type. Each is
 said once on standard error. `ros=` as in `dds_publish`; joints are found by name, in any order.

@@ -37,10 +37,10 @@ Dense exponential(const Dense& a) {
     const Dense step = a * std::ldexp(1.0, -halvings);
     Dense       power = Dense::Identity(a.rows(), a.cols()), sum = power;
     for (int k = 1; k <= 14; ++k) {  // 0.25^15 / 15! is far below the last bit
-        power = power * step / k;
+        power = product(power, step) / k;
         sum += power;
     }
-    for (; halvings > 0; --halvings) sum = (sum * sum).eval();
+    for (; halvings > 0; --halvings) sum = product(sum, sum);
     return sum;
 }
 
@@ -64,8 +64,7 @@ Sampled sample(const Dense& a, const Dense& b, const Dense& q, const Dense& r, d
     both.topRightCorner(all, all) = cost * period;
     both.bottomRightCorner(all, all) = drift * period;
     const Dense grown = exponential(both), forward = grown.bottomRightCorner(all, all);
-    Dense       total = forward.transpose() * grown.topRightCorner(all, all);
-    total = (0.5 * (total + total.transpose())).eval();
+    const Dense total = symmetric(product(forward.transpose(), grown.topRightCorner(all, all)));
     return {forward.topLeftCorner(n, n), forward.topRightCorner(n, m), total.topLeftCorner(n, n), total.bottomRightCorner(m, m),
             total.topRightCorner(n, m)};
 }
@@ -74,8 +73,8 @@ std::optional<Mode> unreachable(const Dense& a, const Dense& b, Time time) {
     const Eigen::Index    n = a.rows();
     const Eigen::VectorXd units = balance(a);
     const Dense           inverse = units.cwiseInverse().asDiagonal();
-    const Dense           scaled = inverse * a * units.asDiagonal();
-    Dense                 inputs = inverse * b;
+    const Dense           scaled = product(inverse, a, units.asDiagonal());
+    Dense                 inputs = product(inverse, b);
     for (Eigen::Index j = 0; j < inputs.cols(); ++j)
         if (const double size = inputs.col(j).norm(); size > 0.0) inputs.col(j) *= std::max(scaled.norm(), 1.0) / size;
     const Eigen::EigenSolver<Dense> modes(scaled, false);
@@ -129,17 +128,16 @@ std::optional<Dense> place_observer(const Dense& a, const Dense& c, const Eigen:
         equations.block(j * n, j * n, n, n) += a.transpose();
         for (Eigen::Index k = 0; k < n; ++k) equations.block(j * n, k * n, n, n) -= wanted(k, j) * Dense::Identity(n, n);
     }
-    const Dense                   right = c.transpose() * weights;
-    const Eigen::FullPivLU<Dense> solver(equations);
-    if (!solver.isInvertible()) return {};
-    const Eigen::VectorXd         stacked = solver.solve(right.reshaped());
-    const Eigen::FullPivLU<Dense> x(stacked.reshaped(n, n));
-    if (!x.isInvertible() || x.rcond() < 1e-13) return {};
-    return Dense((weights * x.inverse()).transpose());
+    const Dense     right = product(c.transpose(), weights);
+    const FullPivot solver(equations);
+    if (!solver.invertible()) return {};
+    const FullPivot x(solver.solve(right.reshaped()).reshaped(n, n));
+    if (!x.invertible() || x.rcond() < 1e-13) return {};
+    return Dense(product(weights, x.inverse()).transpose());
 }
 
 bool positive(const Dense& a, bool semi) {
-    const Eigen::SelfAdjointEigenSolver<Dense> solver(0.5 * (a + a.transpose()), Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<Dense> solver(symmetric(a), Eigen::EigenvaluesOnly);
     const double                               least = solver.eigenvalues().minCoeff(), most = solver.eigenvalues().cwiseAbs().maxCoeff();
     return semi ? least >= -1e-12 * most : least > 1e-14 * most && least > 0.0;
 }

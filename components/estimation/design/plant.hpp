@@ -2,14 +2,13 @@
 // Linear plants outside of the cycle: sampling, and which of their modes can be steered or seen.
 #pragma once
 
-#include <Eigen/Core>
 #include <complex>
 #include <optional>
 #include <string>
 
-namespace hal::estimation {
+#include "estimation/design/dense.hpp"
 
-using Dense = Eigen::MatrixXd;
+namespace hal::estimation {
 
 /// e to the power of a square matrix: scaled to a norm below 1/4, Taylor's series, squared back (N. Higham, *Functions of
 /// Matrices*, 10.3). [setup]

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "estimation/design/riccati.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -18,12 +17,16 @@ struct Doubling {
     /// How many doublings it took; -1: it does not settle.
     int run() {
         for (int k = 1; k <= 80; ++k) {
-            const Eigen::PartialPivLU<Dense> w(Dense::Identity(a.rows(), a.cols()) + g * h);
-            const Dense                      wa = w.solve(a), wg = w.solve(g);
-            const Dense                      more_h = a.transpose() * h * wa, more_g = a * wg * a.transpose();
-            a = (a * wa).eval();
-            g += 0.5 * (more_g + more_g.transpose());
-            h += 0.5 * (more_h + more_h.transpose());
+            const Eigen::Index n = a.rows();
+            Dense              both(n, 2 * n);
+            both.leftCols(n) = a;
+            both.rightCols(n) = g;
+            both = solve(Dense::Identity(n, n) + product(g, h), both);
+            const Dense wa = both.leftCols(n), wg = both.rightCols(n), transposed = a.transpose();
+            const Dense more_h = product(transposed, h, wa), more_g = product(a, wg, transposed);
+            a = product(a, wa);
+            g += symmetric(more_g);
+            h += symmetric(more_h);
             if (!a.allFinite() || !g.allFinite() || !h.allFinite()) return -1;
             if (more_h.norm() <= 1e-16 * h.norm() || h.norm() == 0.0) return k;
         }
@@ -34,15 +37,13 @@ struct Doubling {
 }  // namespace
 
 std::optional<Riccati> discrete_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r, const Dense& n) {
-    const Eigen::PartialPivLU<Dense> over_r(r);
-    const Dense                      across = over_r.solve(n.transpose());  // u = v - R^-1 N'x takes the mixed cost away
-    Doubling                         doubling{a - b * across, b * over_r.solve(b.transpose()), q - n * across};
-    doubling.h = (0.5 * (doubling.h + doubling.h.transpose())).eval();
-    const int doublings = doubling.run();
+    const Dense transposed = b.transpose(), across = solve(r, n.transpose());  // u = v - R^-1 N'x takes the mixed cost away
+    Doubling    doubling{a - product(b, across), product(b, solve(r, transposed)), symmetric(q - product(n, across))};
+    const int   doublings = doubling.run();
     if (doublings < 0) return {};
     Riccati result{doubling.h, {}, doublings};
-    result.gain = (r + b.transpose() * result.x * b).partialPivLu().solve(b.transpose() * result.x * a + n.transpose());
-    if (!result.gain.allFinite() || !(spectral_radius(a - b * result.gain) < 1.0)) return {};
+    result.gain = solve(r + product(transposed, result.x, b), product(transposed, result.x, a) + n.transpose());
+    if (!result.gain.allFinite() || !(spectral_radius(a - product(b, result.gain)) < 1.0)) return {};
     return result;
 }
 
@@ -55,25 +56,24 @@ std::optional<Riccati> discrete_riccati(const Dense& a, const Dense& b, const De
 //     A0 = I + 2s W^-T,   G0 = 2s S^-1 G W^-1,   H0 = 2s W^-1 H S^-1
 std::optional<Riccati> continuous_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r) {
     const Eigen::Index n = a.rows();
-    const Dense        unit = Dense::Identity(n, n), g = b * r.partialPivLu().solve(b.transpose()), h = 0.5 * (q + q.transpose());
+    const Dense        unit = Dense::Identity(n, n), transposed = b.transpose(), g = product(b, solve(r, transposed)), h = symmetric(q);
     const double       size = std::max({a.norm(), std::sqrt(g.norm() * h.norm()), 1e-3});
     for (const double part : {0.3, 1.0, 3.0, 0.05, 10.0}) {  // a shift that is an eigenvalue makes S or W singular: then another
-        const double                  shift = part * size;
-        const Eigen::FullPivLU<Dense> s(a - shift * unit);
+        const double    shift = part * size;
+        const Dense     shifted = a - shift * unit;
+        const FullPivot s(shifted);
         if (s.rcond() < 1e-14) continue;
-        const Dense                   sg = s.solve(g), s_inverse = s.inverse();
-        const Eigen::FullPivLU<Dense> w((a - shift * unit).transpose() + h * sg);
+        const Dense     sg = s.solve(g), s_inverse = s.inverse();
+        const FullPivot w(shifted.transpose() + product(h, sg));
         if (w.rcond() < 1e-14) continue;
         const Dense w_inverse = w.inverse();
-        Doubling    doubling{unit + 2.0 * shift * w_inverse.transpose(), 2.0 * shift * sg * w_inverse,
-                          2.0 * shift * w_inverse * h * s_inverse};
-        doubling.g = (0.5 * (doubling.g + doubling.g.transpose())).eval();
-        doubling.h = (0.5 * (doubling.h + doubling.h.transpose())).eval();
-        const int doublings = doubling.run();
+        Doubling    doubling{unit + 2.0 * shift * w_inverse.transpose(), 2.0 * shift * symmetric(product(sg, w_inverse)),
+                          2.0 * shift * symmetric(product(w_inverse, h, s_inverse))};
+        const int   doublings = doubling.run();
         if (doublings < 0) continue;
-        Riccati result{doubling.h, r.partialPivLu().solve(b.transpose() * doubling.h), doublings};
+        Riccati result{doubling.h, solve(r, product(transposed, doubling.h)), doublings};
         if (!result.gain.allFinite()) continue;
-        const Dense closed = a - b * result.gain;
+        const Dense closed = a - product(b, result.gain);
         if (spectral_radius(exponential(closed / std::max(closed.norm(), 1e-300))) < 1.0) return result;  // |e^z| < 1 where Re z < 0
     }
     return {};

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdio>
 #include <memory>
 #include <stdexcept>
 #include <thread>
@@ -10,6 +9,7 @@
 
 #include "hal/background.hpp"
 #include "hal/component.hpp"
+#include "hal/message_log.hpp"
 #include "hal/naming.hpp"
 #include "hal/queue.hpp"
 #include "link/ethernet_capture.hpp"
@@ -82,7 +82,7 @@ private:
             good = recorder_ && recorder_->write(written_.time_ns + since_1970_, std::span(written_.bytes).first(written_.length)) && good;
         if (any) good = recorder_ && recorder_->flush() && good;
         if (good || broken_.exchange(true)) return;
-        std::fputs((name_ + ": " + file.get() + " cannot be written any more; is the disk full?\n").c_str(), stderr);
+        hal::MessageLog(name_).print(file.get() + " cannot be written any more; is the disk full?");
     }
 
     const std::string         name_ = hal::own_name("segment-record.0");

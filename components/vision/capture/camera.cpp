@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <optional>
+
+#ifdef HALCYON_YAML
+#include <yaml-cpp/yaml.h>
+#endif
 
 namespace hal::vision {
 namespace {
@@ -64,9 +67,31 @@ protected:
                   "in px, and the two alike; often about the width");
         if (c.cx < -c.width || c.cx > 2 * c.width || c.cy < -c.height || c.cy > 2 * c.height)
             wrong(centre_, "the centre is far outside of the picture", "in px, and near to half of the width and of the height");
-        for (const double k : c.distortion)
-            if (std::fabs(k) > 1000.0)
-                return wrong(distortion_, "this distortion bends the picture beyond use", "k1 k2 p1 p2 k3, of the order of 0.1");
+        if (const double radius = usable_px(c); radius >= 0.0)
+            wrong(
+                distortion_,
+                "invalid distortion: beyond " + std::to_string(std::lround(radius)) +
+                    " px from the centre it folds the picture over itself or stretches it more than four times",
+                "k1 k2 p1 p2 k3 for coordinates divided by the focal length, of the order of 0.1; calibrate with views that reach into the "
+                "corners of the picture");
+    }
+
+    /// The distance from the centre, within the picture, at which the lens model stops being usable, px; negative: nowhere. The radial part
+    /// must grow with the radius out to the farthest corner, at most four times as fast, and the tangential part must not turn it back.
+    static double usable_px(const Camera& c) {
+        const auto [k1, k2, p1, p2, k3] = c.distortion;
+        double corner = 0;
+        for (const double x : {-c.cx / c.fx, (c.width - 1 - c.cx) / c.fx})
+            for (const double y : {-c.cy / c.fy, (c.height - 1 - c.cy) / c.fy}) corner = std::max(corner, std::hypot(x, y));
+        const double step = corner / 200, tangential = 6 * std::hypot(p1, p2);
+        double       seen = 0;
+        for (int i = 1; i <= 2000 && seen < corner; ++i) {  // a lens that needs ten times the radius of the corner shows nothing there
+            const double q = step * i * step * i;
+            const double slope = 1 + q * (3 * k1 + q * (5 * k2 + q * 7 * k3)) - tangential * step * i;
+            if (!(slope > 0 && slope < 4)) return seen * c.fx;
+            seen = step * i * (1 + q * (k1 + q * (k2 + q * k3)));
+        }
+        return seen < corner ? seen * c.fx : -1.0;
     }
 
     std::string_view text_;
@@ -144,19 +169,33 @@ private:
     }
 };
 
-/// The part of YAML that cv::FileStorage writes: `name: number`, and matrices as a block with `data: [ ... ]`.
-class OpenCvText : public Text {
+#ifdef HALCYON_YAML
+/// What OpenCV's and ROS's calibration write as YAML.
+class YamlText : public Text {
 public:
     using Text::Text;
     CameraText read() {
+        try {
+            read(YAML::Load(std::string(text_)));
+        } catch (const YAML::Exception& problem) {
+            found_.problems.clear();
+            const std::size_t at = problem.mark.is_null() ? 0 : std::min<std::size_t>(static_cast<std::size_t>(problem.mark.pos), text_.size());
+            say(at, std::min(at + 1, text_.size()), "invalid YAML: " + problem.msg, "OpenCV's calibration writes it");
+        }
+        return finish();
+    }
+
+private:
+    void read(const YAML::Node& file) {
+        if (!file.IsMap()) return missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
         Camera& c = found_.camera;
-        if (const auto w = scalar("image_width")) whole(*w, c.width);
-        if (const auto w = scalar("image_height")) whole(*w, c.height);
+        size(file["image_width"], c.width);
+        size(file["image_height"], c.height);
         if (found_.problems.empty() && (c.width == 0 || c.height == 0)) missing("image_width and image_height", "image_width: 640");
         std::vector<double> k, d;
-        if (matrix("camera_matrix", k, focal_)) {
+        if (matrix(file, "camera_matrix", k, focal_)) {
             if (k.size() == 9 && (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1))
-                say(focal_.begin, focal_.end, "camera_matrix is no camera's matrix", "its rows are fx 0 cx, 0 fy cy, 0 0 1");
+                say(focal_.begin, focal_.end, "invalid camera_matrix", "its rows are fx 0 cx, 0 fy cy, 0 0 1");
             else if (k.size() == 9) c.fx = k[0], c.cx = k[2], c.fy = k[4], c.cy = k[5];
             else
                 say(focal_.begin, focal_.end, "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9",
@@ -165,57 +204,52 @@ public:
         } else if (found_.problems.empty()) {
             missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
         }
-        bool plain = matrix("distortion_coefficients", d, distortion_);
+        bool plain = matrix(file, "distortion_coefficients", d, distortion_);
         if (plain && d.size() > 5 && std::any_of(d.begin() + 5, d.end(), [](double v) { return v != 0; })) {
             say(distortion_.begin, distortion_.end, "the distortion has " + std::to_string(d.size()) + " coefficients",
                 "calibrate with k1 k2 p1 p2 k3 only");
             plain = false;
         }
         for (std::size_t i = 0; plain && i < std::min<std::size_t>(d.size(), 5); ++i) c.distortion[i] = d[i];
-        return finish();
     }
-
-private:
-    /// Behind `name:` at the beginning of a line.
-    std::size_t find(const char* name) const {
-        const std::string key = std::string(name) + ":";
-        for (std::size_t at = 0; (at = text_.find(key, at)) != std::string_view::npos; ++at) {
-            std::size_t begin = at;
-            while (begin > 0 && (text_[begin - 1] == ' ' || text_[begin - 1] == '\t')) --begin;
-            if (begin == 0 || text_[begin - 1] == '\n') return at + key.size();
-        }
-        return std::string_view::npos;
+    /// Where a scalar is in the text; with quotes, where it begins.
+    Word place(const YAML::Node& node) const {
+        const YAML::Mark  mark = node.Mark();
+        const std::size_t at = mark.is_null() ? 0 : std::min<std::size_t>(static_cast<std::size_t>(mark.pos), text_.size());
+        return {at, std::min(at + std::max<std::size_t>(node.IsScalar() ? node.Scalar().size() : 1, 1), text_.size())};
     }
-    std::optional<Word> scalar(const char* name) const {
-        std::size_t at = find(name);
-        if (at == std::string_view::npos) return std::nullopt;
-        while (at < text_.size() && text_[at] == ' ') ++at;
-        const std::size_t end = std::min(text_.find_first_of(" \r\n", at), text_.size());
-        return Word{at, std::max(end, std::min(at + 1, text_.size()))};
+    void size(const YAML::Node& node, int& to) {
+        if (node) whole(place(node), to);
     }
-    bool matrix(const char* name, std::vector<double>& to, Word& place) {
-        const std::size_t at = find(name);
-        if (at == std::string_view::npos) return false;
-        place = {at - std::string_view(name).size() - 1, at - 1};
-        const std::size_t data = text_.find("data:", at), open = text_.find('[', at), close = text_.find(']', at);
-        if (data == std::string_view::npos || open == std::string_view::npos || close == std::string_view::npos || open < data ||
-            close < open) {
-            say(place.begin, place.end, std::string(name) + " has no data", "it is followed by rows:, cols:, dt: and data: [ numbers ]");
+    bool matrix(const YAML::Node& file, const std::string& name, std::vector<double>& to, Word& at) {
+        const YAML::Node node = file[name];
+        if (!node) return false;
+        at.begin = std::min(text_.find(name), text_.size());
+        at.end = std::min(at.begin + name.size(), text_.size());
+        const YAML::Node data = node.IsMap() ? node["data"] : node;
+        if (!data || !data.IsSequence() || data.size() > 64) {
+            say(at.begin, at.end, name + " has no data", "it is followed by rows:, cols:, dt: and data: [ numbers ]");
             return false;
         }
-        const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == ','; };
-        for (std::size_t i = open + 1; i < close;) {
-            while (i < close && blank(text_[i])) ++i;
-            const std::size_t begin = i;
-            while (i < close && !blank(text_[i])) ++i;
+        for (const YAML::Node& element : data) {
             double value = 0;
-            if (i == begin) break;
-            if (to.size() >= 64 || !number({begin, i}, value)) return false;
+            if (!number(place(element), value)) return false;
             to.push_back(value);
         }
         return true;
     }
 };
+#else
+/// This build reads no YAML.
+class YamlText : public Text {
+public:
+    using Text::Text;
+    CameraText read() {
+        say(0, 1, "a calibration in YAML: this build of Halcyon does not read it", "sudo apt-get install libyaml-cpp-dev, then build again; or write size, focal, centre and distortion");
+        return std::move(found_);
+    }
+};
+#endif
 
 }  // namespace
 
@@ -223,7 +257,7 @@ CameraText read_camera(std::string_view text) {
     const std::size_t first = text.find_first_not_of(" \t\r\n");
     const bool        yaml =
         first != std::string_view::npos && (text.substr(first, 5) == "%YAML" || text.find("camera_matrix:") != std::string_view::npos);
-    return yaml ? OpenCvText(text).read() : OwnText(text).read();
+    return yaml ? YamlText(text).read() : OwnText(text).read();
 }
 
 }  // namespace hal::vision

@@ -33,7 +33,7 @@ struct CameraText {
 ///     focal 600 600
 ///     centre 319.5 239.5
 ///     distortion 0 0 0 0 0          # k1 k2 p1 p2 k3; may be left out
-/// or the YAML that OpenCV's calibration sample writes: image_width, image_height, camera_matrix, distortion_coefficients. Bounded:
+/// or the YAML that OpenCV's and ROS's calibration write (yaml-cpp reads it): image_width, image_height, camera_matrix, distortion_coefficients. Bounded:
 /// whatever the text, it ends. [setup]
 CameraText read_camera(std::string_view text);
 

@@ -42,7 +42,11 @@ std::uint64_t hash(const std::vector<std::uint8_t>& bytes) {
 
 Worker::Worker(std::string instance, std::unique_ptr<Source> source, std::function<void(const Frame&)> detect,
                std::function<void(const Status&)> publish)
-    : instance_(std::move(instance)), source_(std::move(source)), detect_(std::move(detect)), publish_(std::move(publish)) {
+    : instance_(std::move(instance)),
+      log_(std::make_unique<hal::MessageLog>(instance_)),
+      source_(std::move(source)),
+      detect_(std::move(detect)),
+      publish_(std::move(publish)) {
     std::fill(std::begin(said_ns_), std::end(said_ns_), long_ago);
 }
 
@@ -52,8 +56,17 @@ void Worker::expect(int width, int height, std::string file) {
     file_ = std::move(file);
 }
 
+void Worker::say_to(const std::function<void(const std::string&)>& say) {
+    log_ = std::make_unique<hal::MessageLog>(instance_, [say](std::string line) {
+        line.pop_back();
+        say(line);
+    });
+}
+
 void Worker::turn(std::int64_t now, bool may_wait) noexcept {
+    now_ = now;
     try {
+        log_->flush(now);
         step(now, may_wait);
     } catch (const std::exception& e) {  // a source that finds no memory is opened anew
         close();
@@ -193,9 +206,6 @@ void Worker::well(std::int64_t now) {
 
 void Worker::publish() { publish_(status_); }
 
-void Worker::say(const std::string& sentence) const {
-    if (say_) say_(instance_ + ": " + sentence);
-    else std::fputs((instance_ + ": " + sentence + "\n").c_str(), stderr);
-}
+void Worker::say(const std::string& sentence) { log_->print(sentence, now_); }
 
 }  // namespace hal::vision

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "hal/message_log.hpp"
 #include "vision/capture/source.hpp"
 
 namespace hal::vision {
@@ -35,7 +36,7 @@ public:
     void          freeze_after(std::uint32_t frames) { frozen_after_ = frames; }
     std::uint32_t source_frozen_after() const { return source_->frozen_after(); }
     /// Where lines go instead of standard error: for tests. [setup]
-    void say_to(std::function<void(const std::string&)> say) { say_ = std::move(say); }
+    void say_to(const std::function<void(const std::string&)>& say);
 
     /// A piece of work at `now_ns`; waits for a frame, at most 0.1 s, if it may. [helper thread]
     void turn(std::int64_t now_ns, bool may_wait) noexcept;
@@ -52,13 +53,13 @@ private:
     void trouble(Problem problem, std::int64_t now_ns);
     void well(std::int64_t now_ns);
     void publish();
-    void say(const std::string& sentence) const;
+    void say(const std::string& sentence);
 
     const std::string                        instance_;
+    std::unique_ptr<hal::MessageLog>         log_;
     const std::unique_ptr<Source>            source_;
     const std::function<void(const Frame&)>  detect_;
     const std::function<void(const Status&)> publish_;
-    std::function<void(const std::string&)>  say_;
     Frame                                    frame_;
     Status                                   status_;
     std::string                              file_, remark_;
@@ -66,6 +67,7 @@ private:
     std::uint32_t                            frozen_after_ = 0, equal_ = 0, dropped_before_ = 0;
     std::uint64_t                            picture_ = 0;  // a hash of the last one
     bool                                     open_ = false, told_ = false, ever_ = false;
+    std::int64_t                             now_ = 0;  // of this turn
     std::int64_t                             try_again_ns_ = INT64_MIN, last_frame_ns_ = 0, since_ns_ = 0;
     std::int64_t                             said_ns_[trouble_count];  // when a line was last said about it
 };

@@ -2,7 +2,10 @@
 #include "vision/detect/marker.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -50,6 +53,63 @@ double noise(const cv::Mat& grey) {
     }
     return count == 0 ? 0.0 : std::sqrt(1.5707963267948966) * static_cast<double>(sum) / (6.0 * static_cast<double>(count));
 }
+
+/// Both poses that fit the picture of a square, and how far its corners then lie from those seen, root mean square.
+struct Candidate {
+    cv::Matx33d rotation;
+    cv::Vec3d   place;
+    double      error_px = 0;
+};
+using Candidates = std::array<Candidate, 2>;
+
+/// The corners of a marker in its own axes and in the picture.
+struct View {
+    std::vector<cv::Point3d> square;
+    std::vector<cv::Point2d> seen;
+};
+
+/// Angle of the turn between two rotations, rad.
+double angle_between(const cv::Matx33d& a, const cv::Matx33d& b) {
+    return std::acos(std::clamp((cv::trace(a.t() * b) - 1.0) / 2.0, -1.0, 1.0));
+}
+
+/// The two candidates of one marker over its last frames. Corner noise differs from frame to frame, so the sums of their errors, of which
+/// older ones count less, tell the pose from its mirror image when one frame cannot. A frame counts by the candidates' shares of its squared
+/// error, so that a single bad frame does not outweigh the others.
+struct Track {
+    std::array<cv::Matx33d, 2> rotation;
+    std::array<double, 2>      shares{};
+    std::size_t                chosen = 0;
+    std::uint64_t              last = 0;  ///< the call of find() that saw the marker
+
+    static constexpr double        floor_px = 0.05;  ///< errors below this are alike
+    static constexpr double        memory = 0.8;  ///< part of the sum that stays from frame to frame
+    static constexpr double        enough = 0.8;  ///< the other candidate is chosen when its sum is below this part of the chosen one's
+    static constexpr std::uint64_t gap = 10;  ///< frames without the marker that end the track
+
+    /// Puts the frame's candidates in the order of the track's, adds their errors and chooses.
+    void add(Candidates& now, std::uint64_t call) {
+        const bool fresh = last == 0 || call - last > gap;
+        if (fresh) shares = {};
+        else if (angle_between(rotation[0], now[1].rotation) + angle_between(rotation[1], now[0].rotation) <
+                 angle_between(rotation[0], now[0].rotation) + angle_between(rotation[1], now[1].rotation))
+            std::swap(now[0], now[1]);
+        for (std::size_t i = 0; i < 2; ++i) {
+            rotation[i] = now[i].rotation;
+            const double square = floor_px * floor_px + now[i].error_px * now[i].error_px;
+            shares[i] = memory * shares[i] +
+                        square / (2 * floor_px * floor_px + now[0].error_px * now[0].error_px + now[1].error_px * now[1].error_px);
+        }
+        if (fresh) chosen = shares[1] < shares[0] ? 1 : 0;
+        else if (shares[1 - chosen] < enough * shares[chosen]) chosen = 1 - chosen;
+        last = call;
+    }
+    /// 0: the other candidate does not fit; 1: it fits as well.
+    double ambiguity() const {
+        const double most = std::max(shares[0], shares[1]);
+        return std::isnormal(most) ? std::sqrt(std::min(shares[0], shares[1]) / most) : 1.0;
+    }
+};
 }  // namespace
 
 struct MarkerDetector::Inside {
@@ -60,9 +120,14 @@ struct MarkerDetector::Inside {
     cv::Mat                                d = cv::Mat::zeros(1, 5, CV_64F);
     Frame                                  grey;
     cv::Mat                                smooth;
+    std::map<int, Track>                   tracks;  ///< by id: at most as many as the dictionary has
+    std::uint64_t                          calls = 0;
 
-    void refine(const cv::Mat& picture, std::vector<cv::Point2f>& corners) const;
-    Pose pose(Marker& marker, double size) const;
+    void       refine(const cv::Mat& picture, std::vector<cv::Point2f>& corners) const;
+    Candidates candidates(const View& view) const;
+    Candidate  judged(const View& view, const cv::Mat& r, const cv::Mat& t) const;
+    Candidate  refined(const View& view, const Candidates& both, std::size_t chosen) const;
+    void       place(Marker& marker, double size, bool alone);
 };
 
 MarkerDetector::MarkerDetector(const std::string& dictionary, std::optional<Camera> camera) : inside_(std::make_unique<Inside>()) {
@@ -98,13 +163,14 @@ std::vector<Marker> MarkerDetector::find(const Frame& frame, int id, double size
     std::vector<int>                      ids;
     cv::aruco::detectMarkers(noisy ? in.smooth : picture, in.dictionary, corners, ids, in.parameters);
     for (auto& four : corners) in.refine(picture, four);
+    ++in.calls;
     std::vector<Marker> found;
     for (std::size_t i = 0; i < ids.size(); ++i) {
         if (id >= 0 && ids[i] != id) continue;
         Marker marker;
         marker.id = ids[i];
         for (std::size_t c = 0; c < 4; ++c) marker.corners[c] = {corners[i][c].x, corners[i][c].y};
-        if (in.camera && size_mm > 0.0) marker.pose = in.pose(marker, size_mm);
+        if (in.camera && size_mm > 0.0) in.place(marker, size_mm, std::count(ids.begin(), ids.end(), marker.id) == 1);
         found.push_back(marker);
     }
     std::sort(found.begin(), found.end(), [](const Marker& a, const Marker& b) { return a.id < b.id; });
@@ -122,30 +188,56 @@ void MarkerDetector::Inside::refine(const cv::Mat& picture, std::vector<cv::Poin
     cv::cornerSubPix(picture, corners, {reach, reach}, {-1, -1}, {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.005});
 }
 
-Pose MarkerDetector::Inside::pose(Marker& marker, double size) const {
-    const double             h = size / 2;
-    std::vector<cv::Point3d> square{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}};
-    std::vector<cv::Point2d> seen;
-    for (const auto& c : marker.corners) seen.emplace_back(c[0], c[1]);
-    // Two planes give nearly the same picture; the one that fits better comes first.
+Candidates MarkerDetector::Inside::candidates(const View& view) const {
     std::vector<cv::Mat> rotations, places;
-    cv::solvePnPGeneric(square, seen, k, d, rotations, places, false, cv::SOLVEPNP_IPPE_SQUARE);
-    if (rotations.empty()) throw std::runtime_error("its corners are those of no square");
-    cv::Mat r = rotations[0], t = places[0];
-    cv::solvePnPRefineLM(square, seen, k, d, r, t);
+    cv::solvePnPGeneric(view.square, view.seen, k, d, rotations, places, false, cv::SOLVEPNP_IPPE_SQUARE);
+    if (rotations.empty()) throw std::runtime_error("invalid marker: its corners are not those of a square");
+    Candidates both;
+    for (std::size_t i = 0; i < 2; ++i)
+        both[i] = judged(view, rotations[std::min(i, rotations.size() - 1)], places[std::min(i, places.size() - 1)]);
+    return both;
+}
+
+Candidate MarkerDetector::Inside::judged(const View& view, const cv::Mat& r, const cv::Mat& t) const {
     std::vector<cv::Point2d> back;
-    cv::projectPoints(square, r, t, k, d, back);
+    cv::projectPoints(view.square, r, t, k, d, back);
     double sum = 0;
-    for (std::size_t i = 0; i < 4; ++i) sum += (back[i] - seen[i]).dot(back[i] - seen[i]);
-    marker.error_px = std::sqrt(sum / 4);
-    cv::Matx33d m;
-    cv::Rodrigues(r, m);
-    Pose pose;
-    pose.x_mm = t.at<double>(0), pose.y_mm = t.at<double>(1), pose.z_mm = t.at<double>(2);
-    pose.roll_deg = degrees(std::atan2(m(2, 1), m(2, 2)));
-    pose.pitch_deg = degrees(std::asin(std::clamp(-m(2, 0), -1.0, 1.0)));
-    pose.yaw_deg = degrees(std::atan2(m(1, 0), m(0, 0)));
-    return pose;
+    for (std::size_t i = 0; i < 4; ++i) sum += (back[i] - view.seen[i]).dot(back[i] - view.seen[i]);
+    Candidate c;
+    cv::Rodrigues(r, c.rotation);
+    c.place = {t.at<double>(0), t.at<double>(1), t.at<double>(2)};
+    c.error_px = std::sqrt(sum / 4);
+    return c;
+}
+
+// Least squares may slide from one candidate into the other: then the pose stays as the closed formula has it.
+Candidate MarkerDetector::Inside::refined(const View& view, const Candidates& both, std::size_t chosen) const {
+    const Candidate& from = both[chosen];
+    cv::Mat          r, t(from.place, true);
+    cv::Rodrigues(from.rotation, r);
+    cv::solvePnPRefineLM(view.square, view.seen, k, d, r, t);
+    const Candidate to = judged(view, r, t);
+    const bool      slid = angle_between(to.rotation, both[1 - chosen].rotation) < angle_between(to.rotation, from.rotation);
+    return slid ? from : to;
+}
+
+// Two markers of one id in a frame cannot be followed: each is then placed by this frame alone.
+void MarkerDetector::Inside::place(Marker& marker, double size, bool alone) {
+    const double h = size / 2;
+    View         view{{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}, {}};
+    for (const auto& c : marker.corners) view.seen.emplace_back(c[0], c[1]);
+    Candidates both = candidates(view);
+    Track      once;
+    Track&     track = alone ? tracks[marker.id] : once;
+    track.add(both, calls);
+    const Candidate of = refined(view, both, track.chosen);
+    const auto&     m = of.rotation;
+    marker.pose.x_mm = of.place[0], marker.pose.y_mm = of.place[1], marker.pose.z_mm = of.place[2];
+    marker.pose.roll_deg = degrees(std::atan2(m(2, 1), m(2, 2)));
+    marker.pose.pitch_deg = degrees(std::asin(std::clamp(-m(2, 0), -1.0, 1.0)));
+    marker.pose.yaw_deg = degrees(std::atan2(m(1, 0), m(0, 0)));
+    marker.error_px = of.error_px;
+    marker.ambiguity = track.ambiguity();
 }
 
 }  // namespace hal::vision

@@ -24,11 +24,13 @@ struct Marker {
     int                                  id = -1;
     std::array<std::array<double, 2>, 4> corners{};  ///< px, from its top left one on in the sense of the clock
     Pose                                 pose;
-    double                               error_px = 0;  ///< how far the corners of the pose lie from those seen, root of the mean square
+    double                               error_px = 0;   ///< distance of the pose's corners from those seen, root mean square
+    double ambiguity = 0;  ///< 0: only this pose fits; 1: its mirror image about the line of sight fits as well
 };
 
 /// Finds markers of one ArUco dictionary (S. Garrido-Jurado et al., 2014) by OpenCV, and their poses as those of planes (T. Collins and
-/// A. Bartoli, 2014), refined by least squares.
+/// A. Bartoli, 2014), refined by least squares. A small or distant square fits two poses nearly equally well: both are followed from frame
+/// to frame, and the one with the smaller error over the last frames is returned.
 class MarkerDetector {
 public:
     /// `dictionary`: "4x4_50" ... "7x7_1000". Throws std::invalid_argument with the list of names. [setup]

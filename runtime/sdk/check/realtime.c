@@ -54,6 +54,36 @@ void free(void *memory) {
     __libc_free(memory);
 }
 
+/* --- exceptions: what a component in C++ throws goes through here ------------------------------------------------------- */
+
+static const char *thrown; /* the type of the last one, as its author wrote it */
+
+static void *of_cxx(const char *name) {
+    static void *library; /* the component brought it: it is behind this program, so RTLD_NEXT does not see it */
+    if (!library) library = dlopen("libstdc++.so.6", RTLD_LAZY | RTLD_NOLOAD);
+    void *const function = library ? dlsym(library, name) : NULL;
+    return function ? function : dlsym(RTLD_NEXT, name);
+}
+void *__cxa_allocate_exception(size_t bytes) {
+    check("throw");
+    const bool before = in_cycle;
+    in_cycle = false; /* the throw is what is reported, not what it calls */
+    void *const memory = ((void *(*)(size_t))of_cxx("__cxa_allocate_exception"))(bytes);
+    in_cycle = before;
+    return memory;
+}
+void __cxa_throw(void *object, void *type, void (*destroy)(void *)) {
+    const bool before = in_cycle;
+    in_cycle = false;
+    const char *const mangled = ((const char **)type)[1]; /* std::type_info: its table of functions, then its name */
+    char *(*const demangle)(const char *, char *, size_t *, int *) = (char *(*)(const char *, char *, size_t *, int *))of_cxx("__cxa_demangle");
+    const char *const name = demangle ? demangle(mangled + (*mangled == '*'), NULL, NULL, NULL) : NULL;
+    thrown = name ? name : mangled;
+    in_cycle = before;
+    ((void (*)(void *, void *, void (*)(void *)))of_cxx("__cxa_throw"))(object, type, destroy);
+    abort();
+}
+
 #define GUARDED(result, name, parameters, arguments)                          \
     result name parameters {                                                  \
         static result(*real) parameters;                                      \
@@ -129,7 +159,7 @@ static struct {
 static int pin_count, function_count, argument_count;
 static char **arguments_given;
 static const hal_component *component;
-static const char *running = "";
+static const char *running = "", *phase = "constructor";
 
 static bool take_pin(const hal_host *host, const hal_pin_decl *decl, hal_pin *memory) {
     (void)host;
@@ -162,7 +192,7 @@ static void *allocate(const hal_host *host, size_t bytes, size_t align) {
 }
 static void take_failure(const hal_host *host, const char *reason) {
     (void)host;
-    printf("refused: %s\n", reason);
+    printf("%s: %s\n", strcmp(phase, "start()") == 0 ? "start fails" : "refused", reason);
 }
 static const void *no_extension(const hal_host *host, const char *id) { return (void)host, (void)id, NULL; }
 
@@ -198,12 +228,22 @@ static int64_t now_ns(void) {
     return now.tv_sec * 1000000000ll + now.tv_nsec;
 }
 
+static void put(const char *text) {
+    if (write(STDOUT_FILENO, text, strlen(text)) < 0) _exit(3);
+}
+
 static void ended(int number) {
-    static const char *const what[] = {" does not come back: it ran for ten seconds\n", " crashes in a cycle\n"};
-    const char *const text = what[number != SIGALRM];
+    const bool cycle = in_cycle;
     in_cycle = false;
-    if (write(STDOUT_FILENO, "function '", 10) < 0 || write(STDOUT_FILENO, running, strlen(running)) < 0 || write(STDOUT_FILENO, "'", 1) < 0 ||
-        write(STDOUT_FILENO, text, strlen(text)) < 0) _exit(3);
+    put(cycle ? "function '" : "outside: its ");
+    put(cycle ? running : phase);
+    put(cycle ? "' " : " ");
+    if (number == SIGALRM) put(cycle ? "does not return: it ran for ten seconds\n" : "does not return within ten seconds\n");
+    else if (number == SIGABRT && thrown) {
+        put("throws ");
+        put(thrown);
+        put(cycle ? " in a cycle\n" : ", which nothing catches\n");
+    } else put(number == SIGABRT ? (cycle ? "aborts in a cycle\n" : "aborts\n") : cycle ? "crashes in a cycle\n" : "crashes\n");
     _exit(2);
 }
 
@@ -226,7 +266,8 @@ static int run_function(int f) {
         if (took > 5 * period_ns) shortest = took, i = cycles; /* once is no accident */
     }
     alarm(0);
-    if (forbidden) printf("function '%s' calls %s in a cycle\n", running, forbidden);
+    if (forbidden && strcmp(forbidden, "throw") == 0) printf("function '%s' throws %s in a cycle\n", running, thrown ? thrown : "an exception");
+    else if (forbidden) printf("function '%s' calls %s in a cycle\n", running, forbidden);
     else if (shortest > period_ns) printf("function '%s' takes %.3g ms, longer than a period of 1 ms\n", running, (double)shortest * 1e-6);
     return forbidden || shortest > period_ns;
 }
@@ -237,14 +278,23 @@ int main(int argc, char **argv) {
     if (!component) return printf("refused: it cannot be opened\n"), 3;
     arguments_given = argv + 2;
     argument_count = argc - 2;
-    for (int number = 0; number < 5; ++number) signal((const int[]){SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGALRM}[number], ended);
+    for (int number = 0; number < 6; ++number) signal((const int[]){SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGALRM, SIGABRT}[number], ended);
     const hal_host host = {sizeof host, NULL, take_pin, take_function, give_argument, allocate, take_failure, no_extension};
     void *const instance = allocate(&host, component->instance_size, component->instance_align);
-    if (!component->create(&host, instance) || !component->start(instance, &host)) return fflush(stdout), 3;
+    alarm(10);
+    if (!component->create(&host, instance)) return fflush(stdout), 3;
+    phase = "start()";
+    if (!component->start(instance, &host)) return fflush(stdout), 3;
+    alarm(0);
+    phase = "thread"; /* one that it started */
     int bad = 0;
     for (int f = 0; f < function_count; ++f) bad += run_function(f);
+    alarm(10);
+    phase = "stop()";
     component->stop(instance);
+    phase = "destructor";
     component->destroy(instance);
+    alarm(0);
     if (!bad) printf("%d function%s ran %d cycles each with random and extreme values\n", function_count, function_count == 1 ? "" : "s", cycles);
     fflush(stdout);
     return bad ? 2 : 0;

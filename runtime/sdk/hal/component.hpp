@@ -432,14 +432,21 @@ bool guarded(const hal_host* host, Action action) noexcept {
     return false;
 }
 
+template <class C>
+void construct(const hal_host* host, void* memory) {
+    new (memory) C(host);  // "no matching function": the component lacks the line: using Component::Component;
+}
+
 template <std::derived_from<Component> C>
 constexpr hal_component component(const char* name, const char* summary, const char* doc = "") {
-    static_assert(std::is_constructible_v<C, const hal_host*>, "the component lacks the line: using Component::Component;");
+    // An error in a member's declaration makes C unconstructible as well; then it is no aggregate, because the constructor is inherited.
+    static_assert(std::is_constructible_v<C, const hal_host*> || !std::is_aggregate_v<C>,
+                  "the component lacks the line: using Component::Component;");
     constexpr Traits traits = traits_of<C>();
     return {
         sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name, summary, doc,
         (traits.singleton ? unsigned{HAL_COMPONENT_SINGLETON} : 0u) | (starts<C>() ? unsigned{HAL_COMPONENT_STARTS} : 0u), traits.default_count, sizeof(C), alignof(C),
-        [](const hal_host* host, void* memory) { return guarded(host, [&] { new (memory) C(host); }); },
+        [](const hal_host* host, void* memory) { return guarded(host, [&] { construct<C>(host, memory); }); },
         [](void* self, const hal_host* host) {
             return guarded(host, [&] {
                 detail::creating = host;

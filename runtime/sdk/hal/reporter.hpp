@@ -1,53 +1,66 @@
 // SPDX-License-Identifier: MIT
-// What happened in a cycle, said in sentences on standard error: numbers out of the cycle, words outside of it.
+// What happened in a cycle, in sentences on standard error: numbers out of the cycle, words outside of it.
 #pragma once
 
+#include <atomic>
 #include <chrono>
-#include <cstdio>
 #include <functional>
 #include <string>
 #include <thread>
 
 #include "hal/background.hpp"
+#include "hal/message_log.hpp"
 #include "hal/queue.hpp"
 
 namespace hal {
 
-/// `Event` must be trivially copyable. One cycle tells, one thread words it; on the virtual clock it is said at the end of the instant, so
-/// that the sentences of several instances come in the same order every time.
+/// `Event` must be trivially copyable. One cycle queues events, one thread words them; on the virtual clock they are printed at the end of
+/// the instant, so that the sentences of several instances come in the same order every time. One line per subject and second is printed.
 template <class Event>
 class Reporter {
 public:
-    using Words = std::function<std::string(const Event&)>;  ///< the sentence; empty: nothing is said
+    using Words = std::function<std::string(const Event&)>;    ///< the sentence; empty: nothing is printed
+    using Subject = std::function<std::string(const Event&)>;  ///< what it is about
 
-    /// Sentences are "INSTANCE: SENTENCE". [setup]
-    Reporter(std::string instance, Words words, std::size_t room = 256)
-        : instance_(std::move(instance)), words_(std::move(words)), events_(room) {}
+    /// Sentences are "INSTANCE: SENTENCE". Without `subject`, sentences that differ only in their numbers are about the same. [setup]
+    Reporter(const std::string& instance, Words words, std::size_t room = 256, Subject subject = {})
+        : words_(std::move(words)), subject_(std::move(subject)), events_(room), log_(instance) {}
     ~Reporter() { stop(); }
 
     void start() { background_.start(); }  // [setup] in the component's start()
-    /// What was told by now is still said. [setup]
+    /// What was queued by now is still printed. [setup]
     void stop() noexcept {
         background_.stop();
-        say();
+        print(now_ns_);
+        log_.close();
     }
-    /// What finds no room is not said. [realtime]
-    void tell(const Event& event) noexcept { events_.push(event); }
+    /// What finds no room in the queue is only counted. [realtime]
+    void tell(const Event& event) noexcept {
+        if (!events_.push(event)) lost_.fetch_add(1, std::memory_order_relaxed);
+    }
 
 private:
-    void say() noexcept {
+    void print(std::int64_t now_ns) noexcept {
+        now_ns_ = now_ns;
         for (Event e; events_.pop(e);)
-            if (const std::string sentence = words_(e); !sentence.empty()) std::fputs((instance_ + ": " + sentence + "\n").c_str(), stderr);
+            if (const std::string sentence = words_(e); !sentence.empty())
+                log_.print(subject_ ? subject_(e) : MessageLog::without_numbers(sentence), sentence, now_ns);
+        if (const auto lost = lost_.exchange(0, std::memory_order_relaxed); lost != 0)
+            log_.print(std::to_string(lost) + (lost == 1 ? " message was" : " messages were") + " lost: the queue for them was full", now_ns);
+        log_.flush(now_ns);
     }
-    void turn(bool may_wait) noexcept {
-        say();
+    void turn(std::int64_t now_ns, bool may_wait) noexcept {
+        print(now_ns);
         if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
 
-    const std::string instance_;
-    const Words       words_;
-    Queue<Event>      events_;
-    Background        background_{[this](std::int64_t, bool may_wait) { turn(may_wait); }};  // the last: it uses the others
+    const Words                words_;
+    const Subject              subject_;
+    Queue<Event>               events_;
+    std::atomic<std::uint64_t> lost_{0};  // written by the cycle
+    std::int64_t               now_ns_ = 0;
+    MessageLog                 log_;
+    Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};  // the last: it uses the others
 };
 
 }  // namespace hal

@@ -2,14 +2,12 @@
 // For components that read a file of the user's: where it is, and what is wrong in it, said as the netlist's own errors are.
 #pragma once
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 
 #include "hal/component.hpp"
+#include "hal/read_file.hpp"
 #include "hal/texts.h"
 
 namespace hal {
@@ -26,15 +24,12 @@ public:
     std::string read(const char* argument, const std::string& file) const {
         constexpr std::size_t most = 65536;
         const std::string path = find(file);
-        errno = 0;
-        std::ifstream stream(path, std::ios::binary);
-        std::string text(most + 1, '\0');
-        stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-        text.resize(static_cast<std::size_t>(stream.gcount()));
-        const std::string problem = text.size() > most               ? "is longer than 64 KiB; is it the right one?"
-                                    : stream.eof() && !stream.bad() ? ""
-                                                                    : std::string("cannot be read: ") + std::strerror(errno);
-        if (!problem.empty()) throw std::invalid_argument(std::string(argument) + "=" + file + ": the file '" + path + "' " + problem);
+        std::string text;
+        if (!read_regular_file(path, 16 * most, text))
+            throw std::invalid_argument(std::string(argument) + "=" + file + ": the file '" + path + "' cannot be read: " + text);
+        if (text.size() > most)
+            throw std::invalid_argument(std::string(argument) + "=" + file + ": the file '" + path +
+                                        "' is longer than 64 KiB; is it the right one?");
         return text;
     }
     /// The text the next messages are about. [setup]

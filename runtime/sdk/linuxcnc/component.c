@@ -298,6 +298,10 @@ int hal_init(const char *name) {
 int hal_ready(int comp) { return comp == component_id ? program_ready(true) : -EINVAL; }
 int hal_unready(int comp) { return comp == component_id ? program_ready(false) : -EINVAL; }
 int hal_exit(int comp) { return comp == component_id ? program_end(), 0 : -EINVAL; }
+int halcyon_every(int comp, unsigned every_ms, unsigned timeout_ms) { return comp == component_id ? program_every(every_ms, timeout_ms) : -EINVAL; }
+int halcyon_alive(int comp) { return comp == component_id ? program_alive(), 0 : -EINVAL; }
+int halcyon_safe(int comp, const char *pin, double value) { return comp == component_id ? program_safe(pin, value) : -EINVAL; }
+bool halcyon_connected(int comp) { return comp == component_id && program_connected(); }
 #else
 int hal_ready(int comp) { return comp == component_id ? 0 : -EINVAL; }
 int hal_unready(int comp) { return comp == component_id ? 0 : -EINVAL; }

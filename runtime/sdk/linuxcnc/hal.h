@@ -127,6 +127,19 @@ void *hal_malloc(long size); /* cleared; lives as long as the component */
 int hal_export_funct(const char *name, hal_funct_t code, void *arg, int uses_fp, int reentrant, int comp);
 int hal_export_functf(hal_funct_t code, void *arg, int uses_fp, int reentrant, int comp, const char *name, ...) HALCYON_NAMED(6);
 
+/* --- programs of Halcyon: nothing of LinuxCNC's. [any] thread of a program; 0, or a negative errno ------------------------- */
+
+#ifdef HALCYON_PROGRAM
+/* Declares that the program calls halcyon_alive() at least every so many milliseconds. When it has not for `timeout_ms` longer, `show
+ * comp` says "not responding" and its outputs take their declared values, until it calls again. 0: no longer. */
+int halcyon_every(int comp, unsigned every_ms, unsigned timeout_ms);
+int halcyon_alive(int comp);
+/* Declares what an output takes when the program is dead or does not respond; without it, it keeps its value. */
+int halcyon_safe(int comp, const char *pin, double value);
+/* Whether the machine is there. While it is not, inputs keep their last values. */
+bool halcyon_connected(int comp);
+#endif
+
 /* --- byte streams: [realtime] ---------------------------------------------------------------------------------------------- */
 
 bool hal_port_read(hal_port_t port, char *to, unsigned count);

@@ -5,7 +5,8 @@
  *
  * Every pin has a value in this process, where the program reads and writes it. A thread of ours exchanges all of them some 400
  * times a second: what changed here is written there, what changed there is stored here, unless the program has changed it in
- * that very moment; then it goes the other way next time. When the machine is gone, the thread looks for it until it is back.
+ * that very moment; then it goes the other way next time. When the machine is gone, HALCYON_LOST=end (which loadusr sets) makes the
+ * program end as by SIGTERM; otherwise the thread looks for the machine until it is back.
  */
 #define _GNU_SOURCE
 #include <locale.h>
@@ -16,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <time.h>
@@ -31,6 +33,8 @@ struct link {
     hal_type type;
     hal_dir dir;
     bool read_only, fresh; /* fresh: written whatever it is */
+    bool safe;             /* has a declared value: */
+    double safe_value;
     char *prefix, *name, *doc;
     uint64_t last, before; /* what both sides had; before the last change from here */
     long long written_ns;
@@ -44,6 +48,11 @@ static bool helping, ending, ready;
 static volatile sig_atomic_t asked_to_end;
 static int connection = -1;
 static char name_of_program[HAL_NAME_LEN + 1];
+static long machine;       /* its process */
+static bool tied, lost_said; /* the kernel ends this process with the machine; its loss has been reported */
+static unsigned every_ms, timeout_ms;
+static bool alive;          /* the program has said so since the last exchange */
+static long long alive_ns;  /* when the machine was last told */
 static char *refused; /* why the host refused, until it is said */
 
 /* --- text ------------------------------------------------------------------------------------------------------------------ */
@@ -95,6 +104,12 @@ static void add_value(hal_type type, hal_value value) {
         case HAL_TYPE_U64: add("%llu", (unsigned long long)value.u64); break;
         case HAL_TYPE_PORT: add("null"); break;
     }
+}
+
+static void add_number(hal_type type, double value) {
+    if (type == HAL_TYPE_FLOAT) add_value(type, (hal_value){.real = value});
+    else if (type == HAL_TYPE_BIT) add(value != 0 ? "true" : "false");
+    else add("%.0f", value);
 }
 
 /* Of a slot, what counts: the rest of the eight bytes may be anything. */
@@ -187,15 +202,43 @@ static bool find_machine(void) {
     const struct timeval patience = {.tv_sec = 10};
     setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     const char *hello = connect(connection, (struct sockaddr *)&address, sizeof address) == 0 ? line() : NULL;
-    if (hello && strncmp(hello, "{\"halcyon\":1,", 13) == 0) return true;
+    if (hello && strncmp(hello, "{\"halcyon\":1,", 13) == 0) {
+        const char *const pid = strstr(hello, "\"pid\":");
+        int death_signal = 0;
+        machine = pid ? strtol(pid + 6, NULL, 10) : 0;
+        tied = prctl(PR_GET_PDEATHSIG, &death_signal) == 0 && death_signal != 0 && getppid() == machine;
+        lost_said = false;
+        return true;
+    }
     disconnect();
     return false;
 }
 
-static bool announce(bool is_ready) {
+/* The machine is gone. */
+static void be_lost(void) {
+    if (lost_said) return;
+    lost_said = true;
+    const char *const wanted = getenv("HALCYON_LOST");
+    const bool end = wanted && strcmp(wanted, "end") == 0;
+    if (end && tied) return; /* the kernel's SIGTERM, or the machine's, is on its way */
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) is gone; %s\n", name_of_program, instance(), machine,
+                    end ? "ending" : "pins keep their values until it is back (HALCYON_LOST=end ends the program instead)");
+    if (end) kill(getpid(), SIGTERM);
+}
+
+/* `whole`: with all that is declared of pins, which are there. */
+static bool announce(bool is_ready, bool whole) {
     add("{\"component\":");
     add_string(name_of_program);
-    add(",\"ready\":%s}", is_ready ? "true" : "false");
+    if (every_ms > 0) add(",\"every_ms\":%u,\"timeout_ms\":%u", every_ms, timeout_ms);
+    bool first = true;
+    for (size_t i = 0; whole && i < link_count; ++i) {
+        if (!links[i].safe) continue;
+        add(first ? ",\"safe\":[%zu," : ",%zu,", i);
+        add_number(links[i].type, links[i].safe_value);
+        first = false;
+    }
+    add(first ? ",\"ready\":%s}" : "],\"ready\":%s}", is_ready ? "true" : "false");
     return ask();
 }
 
@@ -261,8 +304,13 @@ static void exchange(void) {
         one->written_ns = now;
     }
     if (write) add("]");
+    const bool lives = __atomic_exchange_n(&alive, false, __ATOMIC_ACQ_REL);
+    const bool tells = every_ms > 0 && lives && (read || now - alive_ns > every_ms * 250000LL);
+    if (every_ms > 0 && !lives) add(",\"alive\":false");
+    if (tells || (write && lives)) alive_ns = now;
+    else if (lives && !write) __atomic_store_n(&alive, true, __ATOMIC_RELEASE); /* with the next one */
     add(read ? ",\"read\":true}" : "}");
-    if (!read && !write) {
+    if (!read && !write && !tells) {
         request.length = 0;
         return;
     }
@@ -290,11 +338,11 @@ static bool gone(void) {
 }
 
 static void come_back(void) {
-    if (!find_machine()) return;
-    bool good = announce(false);
+    if (!find_machine()) return be_lost();
+    bool good = announce(false, false);
     for (size_t i = 0; good && i < link_count; ++i) good = declare(&links[i]);
     if (good) exchange();
-    if (!good || connection < 0 || !announce(ready)) disconnect();
+    if (!good || connection < 0 || !announce(ready, true)) disconnect();
 }
 
 static void *help(void *unused) {
@@ -412,7 +460,7 @@ int program_begin(const char *name) {
     if (!*name) return -EINVAL;
     strcpy(name_of_program, name);
     const locale_t before = enter();
-    const bool found = find_machine(), good = found && announce(false);
+    const bool found = find_machine(), good = found && announce(false, false);
     depart(before);
     const char *const missing = "%s: no machine '%s' is running (hal run FILE.hal; HALCYON_INSTANCE names another)\n";
     if (!found) rtapi_print_msg(RTAPI_MSG_ERR, missing, name, instance());
@@ -427,7 +475,7 @@ int program_begin(const char *name) {
 int program_ready(bool is_ready) {
     const locale_t before = enter();
     if (is_ready) exchange();
-    const bool good = announce(is_ready);
+    const bool good = announce(is_ready, true);
     ready = is_ready;
     depart(before);
     if (!good) return complain("ready"), -EINVAL;
@@ -453,6 +501,47 @@ void program_end(void) {
     link_count = 0;
     *name_of_program = '\0';
     depart(before);
+}
+
+int program_every(unsigned every, unsigned timeout) {
+    const locale_t before = enter();
+    every_ms = every;
+    timeout_ms = timeout;
+    alive = true;
+    add("{\"component\":");
+    add_string(name_of_program);
+    add(",\"every_ms\":%u,\"timeout_ms\":%u,\"ready\":%s}", every, timeout, ready ? "true" : "false");
+    const bool good = ask();
+    depart(before);
+    return good ? 0 : (complain("halcyon_every"), -EINVAL);
+}
+
+void program_alive(void) { __atomic_store_n(&alive, true, __ATOMIC_RELEASE); }
+
+int program_safe(const char *pin, double value) {
+    const locale_t before = enter();
+    struct link *one = NULL;
+    for (size_t i = 0; i < link_count; ++i) {
+        const size_t prefix = strlen(links[i].prefix);
+        if (strncmp(pin, links[i].prefix, prefix) == 0 && pin[prefix] == '.' && strcmp(pin + prefix + 1, links[i].name) == 0) one = &links[i];
+    }
+    const bool fits = one && one->type != HAL_TYPE_PORT;
+    if (fits) {
+        one->safe = true;
+        one->safe_value = value;
+    }
+    const bool good = fits && announce(ready, true);
+    if (one && !good) one->safe = false;
+    depart(before);
+    if (!fits) rtapi_print_msg(RTAPI_MSG_ERR, "%s: halcyon_safe: there is no pin with a value named '%s'\n", name_of_program, pin);
+    return good ? 0 : (fits ? complain(pin) : false, -EINVAL);
+}
+
+bool program_connected(void) {
+    const locale_t before = enter();
+    const bool there = !gone();
+    depart(before);
+    return there;
 }
 
 /* --- byte streams: each call asks the machine --------------------------------------------------------------------------------- */

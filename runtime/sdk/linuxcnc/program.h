@@ -11,5 +11,9 @@ extern char program_prefix[256]; /* of a .comp file's instance; "": names are wh
 int program_begin(const char *name); /* finds the machine; negative after saying why it is none */
 int program_ready(bool ready);       /* from then on the values are exchanged */
 void program_end(void);
+int program_every(unsigned every_ms, unsigned timeout_ms); /* these four: as halcyon_every() and so on */
+void program_alive(void);
+int program_safe(const char *pin, double value);
+bool program_connected(void);
 
 #endif

@@ -65,17 +65,17 @@ protected:
     static std::string firsts(Port& port, int count) {
         std::string s;
         for (int i = 0; i < count; ++i) {
-            if (!port.wait(can::monotonic_ns() + 5'000'000'000)) {
+            if (!port.wait(link::monotonic_ns() + 5'000'000'000)) {
                 s += '-';
                 break;
             }
-            const auto arrival = port.receive(can::monotonic_ns());
+            const auto arrival = port.receive(link::monotonic_ns());
             s += arrival && arrival->bytes.size() > 14 ? static_cast<char>('0' + arrival->bytes[14]) : '?';
         }
         return s;
     }
     /// Nothing more is there. What a veth pair carries has arrived when send() returns.
-    static bool silent(Port& port) { return !port.receive(can::monotonic_ns()); }
+    static bool silent(Port& port) { return !port.receive(link::monotonic_ns()); }
 
     std::string a_, b_;
 };

@@ -9,8 +9,9 @@
 #include <cstdlib>
 #include <thread>
 
+#include "ethernet/raw/raw_clock.hpp"
+#include "hal/privilege.hpp"
 #include "interfaces.hpp"
-#include "rawether/clock.hpp"
 
 namespace hal::ethernet {
 namespace {
@@ -26,11 +27,11 @@ std::int64_t number_at(std::span<const std::uint8_t> bytes, std::size_t place) {
 
 TEST_F(Raw, a_frame_arrives_whole_with_the_time_of_its_arrival) {
     auto here = a(), there = b();
-    const auto before = can::monotonic_ns();
+    const auto before = link::monotonic_ns();
     EXPECT_EQ(here->send(frame(there->address(), *here, type, {1, 2, 3}), {}, before), Sent::queued);
     ASSERT_TRUE(there->wait(before + 5000 * ms));
     const auto arrival = there->receive(before);
-    const auto after = can::monotonic_ns();
+    const auto after = link::monotonic_ns();
     ASSERT_TRUE(arrival);
     EXPECT_EQ(arrival->bytes.size(), smallest_frame);
     EXPECT_EQ((Bytes{arrival->bytes.begin() + 14, arrival->bytes.begin() + 18}), (Bytes{1, 2, 3, 0}));
@@ -49,7 +50,7 @@ TEST_F(Raw, frames_go_there_and_back_with_every_policy) {
         auto here = a({.types = {type}, .policy = policy}), there = b({.types = {type}, .policy = policy});
         const auto waited = [](Port& port) {  // hybrid sleeps until shortly before the end, whatever comes
             bool there_is = false;
-            for (int i = 0; i < 5000 && !there_is; ++i) there_is = port.wait(can::monotonic_ns() + ms);
+            for (int i = 0; i < 5000 && !there_is; ++i) there_is = port.wait(link::monotonic_ns() + ms);
             return there_is;
         };
         std::thread echo([&] {
@@ -131,7 +132,7 @@ TEST_F(Raw, a_lost_carrier_is_told_and_heals) {
     ASSERT_TRUE(eventually([&] { return !here->statistics().up && !there->statistics().up; }));
     const auto f = frame(broadcast, *here, type, {1});
     EXPECT_EQ(here->send(f, {}, 0), Sent::down);
-    EXPECT_FALSE(there->wait(can::monotonic_ns() + 20 * ms));
+    EXPECT_FALSE(there->wait(link::monotonic_ns() + 20 * ms));
     EXPECT_EQ(here->statistics().dropped, 1U);
     EXPECT_EQ(here->statistics().downs, 1U);
     ASSERT_TRUE(command("ip link set " + b_ + " up"));
@@ -147,7 +148,7 @@ TEST_F(Raw, an_interface_that_is_removed_may_come_back) {
     ASSERT_TRUE(command("ip link del " + a_));
     ASSERT_TRUE(eventually([&] { return !here->statistics().up && !there->statistics().up; }));
     EXPECT_EQ(here->send(frame(broadcast, *here, type, {1}), {}, 0), Sent::down);
-    EXPECT_FALSE(there->wait(can::monotonic_ns() + 10 * ms));
+    EXPECT_FALSE(there->wait(link::monotonic_ns() + 10 * ms));
     make();
     ASSERT_TRUE(eventually([&] { return here->statistics().up && there->statistics().up; }));
     EXPECT_EQ(here->send(frame(broadcast, *here, type, {2}), {}, 0), Sent::queued);
@@ -159,7 +160,7 @@ TEST_F(Raw, a_frame_leaves_at_its_time_and_is_stamped_then) {
     for (const bool pacer : {false, true}) {
         auto there = b();
         auto here = a({.types = {type}, .spin_ns = 10 * ms, .pacer = pacer});
-        const auto at = can::monotonic_ns() + 5 * ms;
+        const auto at = link::monotonic_ns() + 5 * ms;
         const Launch launch{.at_ns = at, .stamp_at = 22, .stamp_add_ns = 1000 * ms};
         EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(20)), launch, 0), Sent::queued);
         ASSERT_TRUE(there->wait(at + 5000 * ms));
@@ -177,9 +178,9 @@ TEST_F(Raw, what_warms_the_way_is_on_no_wire) {
         auto there = b({.promiscuous = true});
         auto here = a({.types = {type}, .spin_ns = 10 * ms, .pacer = pacer});
         for (std::uint8_t mark = 1; mark < 9; ++mark) {
-            EXPECT_EQ(here->send(frame(broadcast, *here, type, {mark}), {.at_ns = can::monotonic_ns() + ms}, 0), Sent::queued);
+            EXPECT_EQ(here->send(frame(broadcast, *here, type, {mark}), {.at_ns = link::monotonic_ns() + ms}, 0), Sent::queued);
             for (bool ours = false; !ours;) {  // the kernel may have something to say on a new interface
-                ASSERT_TRUE(there->wait(can::monotonic_ns() + 5000 * ms));
+                ASSERT_TRUE(there->wait(link::monotonic_ns() + 5000 * ms));
                 const auto arrival = there->receive(0);
                 ASSERT_TRUE(arrival);
                 const auto bytes = arrival->bytes;
@@ -195,7 +196,7 @@ TEST_F(Raw, what_warms_the_way_is_on_no_wire) {
 
 TEST_F(Raw, the_pacer_sends_in_order_of_the_times) {
     auto there = b(), here = a({.types = {type}, .pacer = true});
-    const auto now = can::monotonic_ns();
+    const auto now = link::monotonic_ns();
     const auto send = [&](std::uint8_t mark, std::int64_t at) {
         return here->send(frame(broadcast, *here, type, {mark}), {.at_ns = at}, now);
     };
@@ -210,7 +211,7 @@ TEST_F(Raw, the_pacer_sends_in_order_of_the_times) {
 TEST_F(Raw, what_is_later_than_its_guard_is_dropped_and_counted) {
     auto there = b(), here = a({.types = {type}, .pacer = true});
     auto plain = a({.types = {type}, .spin_ns = ms});
-    const auto now = can::monotonic_ns();
+    const auto now = link::monotonic_ns();
     for (auto* port : {here.get(), plain.get()}) {
         const auto f = frame(broadcast, *port, type, {1});
         EXPECT_EQ(port->send(f, {.at_ns = now - ms, .guard_ns = 1 * us}, now), Sent::late);
@@ -227,7 +228,7 @@ TEST_F(Raw, what_is_later_than_its_guard_is_dropped_and_counted) {
 
 TEST_F(Raw, a_pacer_that_is_full_says_so_and_ends_with_its_port) {
     auto here = a({.types = {type}, .pacer = true, .send_capacity = 4});
-    const auto now = can::monotonic_ns();
+    const auto now = link::monotonic_ns();
     const auto f = frame(broadcast, *here, type, {1});
     for (int i = 0; i < 4; ++i) EXPECT_EQ(here->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::queued);
     EXPECT_EQ(here->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::full);
@@ -238,7 +239,7 @@ TEST_F(Raw, a_pacer_that_is_full_says_so_and_ends_with_its_port) {
 TEST_F(Raw, the_kernel_stamps_what_leaves_when_asked_to) {
     auto there = b();
     auto here = open_or_fail("eth:" + a_ + "?txstamps");
-    const auto before = can::monotonic_ns();
+    const auto before = link::monotonic_ns();
     here->send(frame(broadcast, *here, type, {1}), {}, before);
     ASSERT_TRUE(there->wait(before + 5000 * ms));
     const auto arrival = there->receive(0);
@@ -275,7 +276,7 @@ TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
     if (!command("tc qdisc add dev " + a_ + " root netem loss 20% duplicate 10% delay 1ms 1ms"))
         GTEST_SKIP() << "this kernel has no netem, or `tc` is not there";
     // Ours go past the queueing discipline; these are sent by a socket that does not.
-    const can::Descriptor plain(::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0));
+    const link::Descriptor plain(::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0));
     sockaddr_ll place{};
     place.sll_family = AF_PACKET;
     place.sll_ifindex = static_cast<int>(if_nametoindex(a_.c_str()));
@@ -287,7 +288,7 @@ TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
     }
     std::vector<int> times(count);
     int came = 0, overtaken = 0, newest = -1;
-    for (std::int64_t last = 0; there->wait(can::monotonic_ns() + 200 * ms);) {
+    for (std::int64_t last = 0; there->wait(link::monotonic_ns() + 200 * ms);) {
         const auto arrival = there->receive(0);
         ASSERT_TRUE(arrival);
         const int number = arrival->bytes[14] | arrival->bytes[15] << 8;
@@ -309,7 +310,7 @@ TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
     if (std::getenv("HALCYON_MAY_SET_CLOCK") == nullptr) GTEST_SKIP() << "sets the system's clock: runs in user-mode-linux only";
     auto here = a(), there = b();
     const auto set = [](std::int64_t by) {
-        const auto time = can::clock_ns(CLOCK_REALTIME) + by;
+        const auto time = link::clock_ns(CLOCK_REALTIME) + by;
         const timespec t{time / 1'000'000'000, time % 1'000'000'000};
         ASSERT_EQ(clock_settime(CLOCK_REALTIME, &t), 0);
     };
@@ -321,20 +322,20 @@ TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
     constexpr std::int64_t between = 100'000;  // the two clocks are read one after the other, each by a call of that kernel
     const auto f = frame(broadcast, *here, type, {1});
     for (const std::int64_t step : {0, 3'600'000, -7'200'000, 500, -20}) {
-        const auto first = can::monotonic_ns();
+        const auto first = link::monotonic_ns();
         here->send(f, {}, 0);
         set(step * ms);  // between the arrival and its reading
         const auto one = come();
         ASSERT_TRUE(one);
         EXPECT_GE(one->time_ns, first - between) << step;
-        EXPECT_LE(one->time_ns, can::monotonic_ns() + between) << step;
+        EXPECT_LE(one->time_ns, link::monotonic_ns() + between) << step;
         usleep(50'000);
-        const auto second = can::monotonic_ns();
+        const auto second = link::monotonic_ns();
         here->send(f, {}, 0);
         const auto two = come();
         ASSERT_TRUE(two);
         EXPECT_GE(two->time_ns, second - between) << step;
-        EXPECT_LE(two->time_ns, can::monotonic_ns() + between) << step;
+        EXPECT_LE(two->time_ns, link::monotonic_ns() + between) << step;
     }
 }
 
@@ -354,14 +355,15 @@ TEST_F(Raw, without_the_capability_it_says_how_to_grant_it) {
         syscall(SYS_capset, &header, none);
         problem = open("eth:" + a_).problem;
     }).join();
-    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; grant it with: sudo setcap "
-                       "cap_sys_nice,cap_ipc_lock,cap_net_raw=ep $(readlink -f PROGRAM), where PROGRAM is what you start, as in "
-                       "/usr/local/bin/hal; `hal doctor` shows what it has");
+    const std::string grant = grant_command();
+    EXPECT_TRUE(grant.starts_with("sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep /")) << grant;
+    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant +
+                           "; `hal doctor` shows what it has");
 }
 
 TEST(RawClock, a_stamp_that_does_not_fit_is_of_a_clock_that_was_set) {
     rawether::RealTime clock;
-    const auto now = can::monotonic_ns(), real = can::clock_ns(CLOCK_REALTIME);
+    const auto now = link::monotonic_ns(), real = link::clock_ns(CLOCK_REALTIME);
     EXPECT_NEAR(static_cast<double>(clock.to_monotonic(real, now - ms, now + ms)), static_cast<double>(now), 200'000.0);
     constexpr std::int64_t hour = 3'600'000 * ms;
     EXPECT_EQ(clock.to_monotonic(real + hour, now - ms, now), now);
@@ -371,7 +373,7 @@ TEST(RawClock, a_stamp_that_does_not_fit_is_of_a_clock_that_was_set) {
 
 TEST(RawClock, who_looks_all_the_time_is_told_to_rest_before_the_kernel_makes_him) {
     rawether::SpinBudget bounded(true), unbounded(false);
-    std::int64_t now = can::monotonic_ns(), rested = 0;
+    std::int64_t now = link::monotonic_ns(), rested = 0;
     const auto start = now;
     for (int i = 0; i < 50'000; ++i) {
         EXPECT_TRUE(unbounded.spent(now, now + 50 * us));

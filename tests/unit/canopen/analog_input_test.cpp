@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The analogue-input block of CiA 404: scaling, views of one value in four families, zero, tare, deltas and limits.
-#include "canopen/404/analog_input.hpp"
-#include "canopen/404/jr3.hpp"
+#include "canopen/device/sensor/analog_input.hpp"
+#include "canopen/device/sensor/jr3.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "canopen/402/axis.hpp"
+#include "cia402/axis.hpp"
 
 namespace hal::canopen::cia402::test {
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "bus.hpp"
-#include "canopen/302/master.hpp"
+#include "canopen/master/boot/nmt_master.hpp"
 
 namespace hal::canopen::test {
 

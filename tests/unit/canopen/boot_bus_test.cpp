@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "canopen/302/master.hpp"
-#include "canopen/device.hpp"
+#include "canopen/master/boot/nmt_master.hpp"
+#include "canopen/protocol/device.hpp"
 #include "link/simulation.hpp"
 
 namespace hal::canopen::test {

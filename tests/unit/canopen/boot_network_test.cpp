@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Several nodes: mandatory ones, start order, loss and return, reactions, commands.
 #include "boot_bed.hpp"
-#include "canopen/302/objects.hpp"
+#include "canopen/master/boot/master_objects.hpp"
 
 namespace hal::canopen::test {
 namespace {
@@ -292,7 +292,7 @@ TEST(BootNetwork, Survives_late_answers_and_stale_aborts) {
     b.start();
     EXPECT_TRUE(b.operational(20 * second)) << b.master->sentence();
     EXPECT_GT(b.status(6).sdo_retries, 0U);
-    EXPECT_GT(b.master->network().node(7)->sdo().strangers(), 0U);
+    EXPECT_GT(b.master->network().node(7)->sdo().unexpected_responses(), 0U);
 }
 
 TEST(BootNetwork, Survives_wrong_toggle_bits) {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "canopen/device.hpp"
-#include "canopen/network.hpp"
+#include "canopen/master/network.hpp"
+#include "canopen/protocol/device.hpp"
 
 namespace hal::canopen::test {
 

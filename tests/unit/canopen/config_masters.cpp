@@ -2,7 +2,7 @@
 // What [bus] says of following a SYNC and of several masters.
 #include <gtest/gtest.h>
 
-#include "canopen/config/schedule.hpp"
+#include "canopen/master/config/bus_schedule.hpp"
 
 namespace hal::canopen::config {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <map>
 
-#include "canopen/config/node_reader.hpp"
-#include "canopen/config/schedule.hpp"
+#include "canopen/master/config/bus_schedule.hpp"
+#include "canopen/master/config/node_reader.hpp"
 
 namespace hal::canopen::config {
 namespace {

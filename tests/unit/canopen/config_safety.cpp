@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "canopen/304/description.hpp"
-#include "canopen/config/config.hpp"
-#include "canopen/config/schedule.hpp"
+#include "canopen/master/config/bus_schedule.hpp"
+#include "canopen/master/config/master_config.hpp"
+#include "canopen/protocol/srdo_description.hpp"
 
 namespace hal::canopen::config {
 namespace {

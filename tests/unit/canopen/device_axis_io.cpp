@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "canopen/devices/axis_io.hpp"
+#include "canopen/device/drive/axis_io.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {

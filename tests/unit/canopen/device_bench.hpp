@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "canopen/devices/node.hpp"
-#include "canopen/network.hpp"
+#include "canopen/device/node.hpp"
+#include "canopen/master/network.hpp"
 
 namespace hal::canopen::test {
 

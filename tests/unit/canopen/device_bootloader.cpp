@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
 
-#include "canopen/devices/bootloader.hpp"
-#include "canopen/devices/flash_file.hpp"
+#include "canopen/device/bootloader/bootloader.hpp"
+#include "canopen/device/bootloader/flash_file.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {
@@ -130,7 +130,7 @@ TEST(FlashFile, keeps_the_flash) {
     EXPECT_EQ(read_flash(path, 3, image), "");
     EXPECT_EQ(image, bytes);
     EXPECT_EQ(read_flash(path, 2, image), "'" + path + "' is longer than the flash, which has 2 bytes");
-    EXPECT_EQ(write_flash("/nowhere/flash", bytes), "cannot write '/nowhere/flash.new': No such file or directory");
+    EXPECT_EQ(write_flash("/nowhere/flash", bytes), "cannot write '/nowhere/flash': No such file or directory");
     std::filesystem::remove(path);
     Bootloader empty(BootloaderSettings{.version = 0});
     EXPECT_FALSE(empty.running());

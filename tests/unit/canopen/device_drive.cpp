@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "canopen/devices/drive.hpp"
+#include "canopen/device/drive/drive_program.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {

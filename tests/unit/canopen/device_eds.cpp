@@ -3,12 +3,12 @@
 
 #include <map>
 
-#include "canopen/306/dictionary.hpp"
-#include "canopen/401/io.hpp"
-#include "canopen/404/jr3.hpp"
-#include "canopen/devices/bootloader.hpp"
-#include "canopen/devices/drive.hpp"
-#include "canopen/devices/eds_export.hpp"
+#include "canopen/device/bootloader/bootloader.hpp"
+#include "canopen/device/drive/drive_program.hpp"
+#include "canopen/device/eds_export.hpp"
+#include "canopen/device/io/io.hpp"
+#include "canopen/device/sensor/jr3.hpp"
+#include "canopen/eds/eds_dictionary.hpp"
 
 namespace hal::canopen::test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "canopen/401/io.hpp"
+#include "canopen/device/io/io.hpp"
 #include "device_bench.hpp"
 #include "link/simulation.hpp"
 
@@ -52,7 +52,7 @@ TEST_F(FaultyDevice, answers_late) {
     set("late-sdo:time=150ms");  // later than the client waits
     type();
     bench.run(second);
-    EXPECT_GT(bench.remote().sdo().strangers() + bench.remote().sdo().retries(), 0U);
+    EXPECT_GT(bench.remote().sdo().unexpected_responses() + bench.remote().sdo().retries(), 0U);
 }
 
 TEST_F(FaultyDevice, sends_PDOs_of_wrong_length_or_late) {
@@ -101,7 +101,7 @@ TEST_F(FaultyDevice, sends_stale_aborts_which_the_client_drops) {
     EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 1), example_vendor);
     set("stale-abort");
     EXPECT_EQ(type(), 0xf0191U);
-    EXPECT_EQ(bench.remote().sdo().strangers(), 1U);
+    EXPECT_EQ(bench.remote().sdo().unexpected_responses(), 1U);
     const auto answers = bench.sent(0x585);
     const auto& stale = answers[answers.size() - 2];
     EXPECT_EQ(stale.data[0], 0x80);

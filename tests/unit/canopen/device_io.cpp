@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 
-#include "canopen/401/io.hpp"
+#include "canopen/device/io/io.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-#include "canopen/404/jr3.hpp"
+#include "canopen/device/sensor/jr3.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The safety I/O node as a process has it: configured by hand over SDO, set by name, its state in a line.
-#include "canopen/304/description.hpp"
-#include "canopen/304/safe_io.hpp"
+#include "canopen/device/safety/safe_io.hpp"
+#include "canopen/protocol/srdo_description.hpp"
 #include "device_bench.hpp"
 
 namespace hal::canopen::test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The master's axis and the simulated drive against each other in every mode, with one cycle of delay each way as on a bus.
-#include "canopen/402/axis.hpp"
+#include "cia402/axis.hpp"
 #include "drive_bench.hpp"
 
 namespace hal::canopen::test {

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "bus.hpp"
-#include "canopen/402/drive.hpp"
+#include "canopen/device/drive/drive.hpp"
 
 namespace hal::canopen::test {
 

@@ -2,9 +2,10 @@
 // Codes of errors in words: those of drives are not those of other nodes.
 #include <gtest/gtest.h>
 
-#include "canopen/301/emcy.hpp"
-#include "canopen/402/objects.hpp"
-#include "canopen/master/emergency_words.hpp"
+#include "canopen/master/cycle/emergency_words.hpp"
+#include "canopen/protocol/emcy.hpp"
+#include "cia402/drive_profile.hpp"
+#include "cia402/error_words.hpp"
 
 namespace hal::canopen {
 namespace {

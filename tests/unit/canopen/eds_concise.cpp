@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From a DCF to the writes that configure a node.
-#include "components/canopen/306/concise.hpp"
+#include "components/canopen/eds/concise_dcf.hpp"
 #include "eds_text.hpp"
 
 namespace hal::canopen::eds::test {

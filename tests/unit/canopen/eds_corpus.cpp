@@ -7,8 +7,8 @@
 #include <iostream>
 #include <iterator>
 
-#include "components/canopen/306/concise.hpp"
-#include "components/canopen/311/xdd.hpp"
+#include "components/canopen/eds/concise_dcf.hpp"
+#include "components/canopen/eds/xdd.hpp"
 #include "eds_text.hpp"
 
 namespace hal::canopen::eds::test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A device description becomes the description of an object dictionary.
-#include "components/canopen/306/dictionary.hpp"
+#include "components/canopen/eds/eds_dictionary.hpp"
 #include "eds_text.hpp"
 
 namespace hal::canopen::eds::test {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <string>
 
-#include "components/canopen/306/eds.hpp"
+#include "components/canopen/eds/eds.hpp"
 
 namespace hal::canopen::eds::test {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Device descriptions in XML, read into the same structures.
-#include "components/canopen/311/xdd.hpp"
+#include "components/canopen/eds/xdd.hpp"
 #include "eds_text.hpp"
 
 namespace hal::canopen::eds::test {
@@ -61,6 +61,17 @@ TEST_F(Xdd, Is_read_into_the_same_structures_as_an_eds) {
     EXPECT_EQ(speed.high_limit, "10");
     EXPECT_TRUE(speed.pdo_mapping);
     EXPECT_EQ(*read_eds(write_eds(d)).description, d);  // becomes an EDS
+}
+
+TEST_F(Xdd, A_parameter_without_access_can_be_read_as_the_schema_says) {
+    std::string text = xdd("<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\"/>\n"
+                           "<CANopenObject index=\"2001\" objectType=\"7\" uniqueIDRef=\"P1\" accessType=\"wo\"/>\n");
+    text.replace(text.find(" access=\"readWrite\""), std::string(" access=\"readWrite\"").size(), "");
+    const Reading reading = read_xdd(text);
+    ASSERT_TRUE(reading.description) << complaints(reading);
+    EXPECT_EQ(complaints(reading, Severity::note), "");
+    EXPECT_EQ(reading.description->find(0x2000, 0)->access, Access::ro);
+    EXPECT_EQ(reading.description->find(0x2001, 0)->access, Access::wo);
 }
 
 TEST_F(Xdd, A_configuration_has_node_id_and_values) {

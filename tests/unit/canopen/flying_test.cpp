@@ -4,7 +4,7 @@
 
 #include <deque>
 
-#include "canopen/302/flying.hpp"
+#include "canopen/master/boot/flying_master.hpp"
 
 namespace hal::canopen::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "bus.hpp"
-#include "canopen/309/gateway.hpp"
+#include "canopen/master/gateway/gateway.hpp"
 
 namespace hal::canopen::test {
 namespace {
@@ -80,6 +80,23 @@ TEST_F(Gate, Long_values_go_both_ways_by_segments_and_by_blocks) {
         EXPECT_EQ(ask("[3] 5 r 0x2006 0 d", 60'000), "[3] " + gateway::base64(data));
         data[0] ^= 1;
     }
+}
+TEST_F(Gate, Own_node_answers_without_the_bus) {
+    EXPECT_EQ(ask("[1] 126 r 0x1000 0 u32", 10'000), "[1] ERROR:0x05040000 #SDO protocol timed out");  // no own node yet
+    EXPECT_EQ(ask("[2] set id 126"), "[2] OK");
+    EXPECT_EQ(ask("[3] 126 r 0x1000 0 u32", 0), "[3] 0");
+    EXPECT_EQ(ask("[4] 126 r 0x1001 0 u8", 0), "[4] 0");
+    EXPECT_EQ(ask("[5] 126 r 0x1008 0 vs", 0), "[5] \"Halcyon CiA 309-3 gateway\"");
+    EXPECT_EQ(ask("[5] 126 r 0x2000 1 vs", 0), "[5] \"Halcyon\"");
+    EXPECT_EQ(ask("[5] 126 r 0x2000 3 vs", 0), "[5] \"\"");
+    EXPECT_EQ(ask("[6] 126 r 0x1018 0 u8", 0), "[6] 4");
+    EXPECT_EQ(ask("[7] 126 w 0x1018 1 u32 1", 0), "[7] ERROR:0x06010002 #attempt to write a read-only object");
+    EXPECT_EQ(ask("[8] 126 r 0x1018 9 u32", 0), "[8] ERROR:0x06090011 #sub-index does not exist");
+    EXPECT_EQ(ask("[9] set heartbeat 250"), "[9] OK");
+    EXPECT_EQ(ask("[10] 126 r 0x1017 0 u16", 0), "[10] 250");
+    EXPECT_EQ(ask("[11] 126 w 0x1017 0 u16 0", 0), "[11] OK");
+    EXPECT_EQ(ask("[12] 126 stop", 0), "[12] ERROR:102 #request not processed due to internal state: node 126 is the gateway itself, always operational");
+    EXPECT_EQ(ask("[13] 5 r 0x1000 0 hex").substr(0, 5), "[13] ");
 }
 TEST_F(Gate, Aborts_and_errors_have_their_numbers) {
     EXPECT_EQ(ask("[1] 5 r 0x2fff 0 u8"), "[1] ERROR:0x06020000 #object does not exist in the object dictionary");

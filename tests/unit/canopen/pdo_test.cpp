@@ -117,6 +117,26 @@ TEST_F(Pdo, Type_253_samples_when_asked_unless_bit_30_forbids) {
     send(Frame::request(0x185, 2));
     EXPECT_EQ(count(0x185), 1U);
 }
+TEST_F(Pdo, Event_timer_of_a_cycle_is_over_in_every_cycle_though_cycles_are_moved) {
+    for (const std::uint16_t inhibit : {std::uint16_t{0}, std::uint16_t{10}}) {
+        bus = {};
+        make(with_tpdo(254, inhibit, 1));
+        for (int n = 0; n < 400; ++n) {  // an external clock reference moves them by some microseconds
+            now += millisecond + (n * 7919 % 13 - 6) * microsecond;
+            device->poll(now);
+            bus.exchange(now);
+        }
+        EXPECT_EQ(count(0x185), 400U) << inhibit;
+    }
+    bus = {};
+    make(with_tpdo(254, 0, 4));
+    for (int n = 0; n < 400; ++n) {
+        now += millisecond + (n % 2 == 0 ? 3 : -3) * microsecond;
+        device->poll(now);
+        bus.exchange(now);
+    }
+    EXPECT_EQ(count(0x185), 100U) << "longer ones end with the cycle next to them";
+}
 TEST_F(Pdo, Types_254_and_255_follow_events_within_the_inhibit_time) {
     for (const std::uint8_t type : {std::uint8_t{254}, std::uint8_t{255}}) {
         bus = {};

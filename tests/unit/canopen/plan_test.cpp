@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "canopen/plan/response_time.hpp"
+#include "canopen/master/plan/response_time.hpp"
 
 namespace hal::canopen::plan {
 namespace {

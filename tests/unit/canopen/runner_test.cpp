@@ -6,10 +6,10 @@
 #include <cstring>
 #include <vector>
 
-#include "canopen/config/config.hpp"
-#include "canopen/devices/drive.hpp"
-#include "canopen/devices/node.hpp"
-#include "canopen/master/runner.hpp"
+#include "canopen/device/drive/drive_program.hpp"
+#include "canopen/device/node.hpp"
+#include "canopen/master/config/master_config.hpp"
+#include "canopen/master/cycle/runner.hpp"
 #include "link/simulation.hpp"
 
 namespace hal::canopen::test {
@@ -20,10 +20,10 @@ const std::string one_axis =
     "[node 2 x]\ndevice = cia402\ntpdo1 = statusword\nrpdo1 = controlword, target-position\n";
 
 struct Wire : RunnerEvents {
-    explicit Wire(const std::string& more = "")
-        : reading(config::read(one_axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
+    explicit Wire(const std::string& more = "", bool starts_itself = false, const std::string& axis = one_axis)
+        : reading(config::read(axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
         EXPECT_TRUE(reading.good());
-        node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2});
+        node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2, .start_by_itself = starts_itself});
         runner.open(*link);
         for (Slot& s : runner.slots())
             if (s.to_node && s.object->bits == 32) target = &s;
@@ -48,6 +48,8 @@ struct Wire : RunnerEvents {
         node->turn(now);
         for (Frame f; ear->receive(f, now);) {
             if (f.id == 0x282) ++(f.remote ? asked : answered);
+            if (f.id == 0x080) ++syncs;
+            if (f.id == 0x202) ++rpdos;
             if (f.id != 0x202 || f.length != 6) continue;
             std::int32_t value = 0;
             std::memcpy(&value, f.data.data() + 2, sizeof value);
@@ -65,7 +67,10 @@ struct Wire : RunnerEvents {
     void on_own_id_taken() noexcept override { ++own_id_taken; }
     void on_short(std::size_t place, unsigned bytes) noexcept override { cut.emplace_back(place, bytes); }
 
-    unsigned                                      overruns = 0, own_id_taken = 0, asked = 0, answered = 0;
+    void on_foreign(const Foreign& f) noexcept override { foreign.push_back(f); }
+
+    unsigned                                      overruns = 0, own_id_taken = 0, asked = 0, answered = 0, syncs = 0, rpdos = 0;
+    std::vector<Foreign>                          foreign;
     std::vector<std::pair<std::size_t, unsigned>> cut;
     config::Reading            reading;
     Runner                     runner;
@@ -125,6 +130,70 @@ TEST(Runner, Notices_another_device_with_the_master_s_node_id) {
     w.ear->send({0x77f, {0x05}}, w.now), w.ear->flush(w.now);
     for (int n = 0; n < 3; ++n) w.step();
     EXPECT_EQ(w.own_id_taken, 1U);
+}
+
+/// CiA 302-2. The drive starts by itself, with RPDO 1 and TPDO 1 laid out otherwise.
+TEST(Runner, Sends_and_takes_no_process_data_before_a_node_is_configured) {
+    for (const bool at_boot : {false, true}) {
+        std::string bus = one_axis;
+        if (at_boot) bus.insert(bus.find("[node"), "sync-at-boot = yes\n");
+        Wire w("tpdo1 = statusword, modes-of-operation-display\n", true, bus.substr(0, bus.find("tpdo1")) + bus.substr(bus.find("rpdo1")));
+        for (int n = 0; n < 5000 && w.runner.status(0).step < Step::watching; ++n) {
+            w.step();
+            if (w.runner.status(0).step >= Step::watching) break;
+            ASSERT_EQ(w.rpdos, 0U);
+            if (!at_boot) ASSERT_EQ(w.syncs, 0U);
+        }
+        EXPECT_EQ(w.syncs > 0, at_boot);
+        for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+        for (int n = 0; n < 20; ++n) w.step();
+        EXPECT_TRUE(w.runner.operational(0));
+        EXPECT_GE(w.rpdos, 18U);
+        EXPECT_GE(w.syncs, 18U);
+        EXPECT_TRUE(w.cut.empty()) << "its first PDOs are laid out otherwise, which is no fault";
+
+        // It loses its power and comes back with its own layout.
+        w.node->power(false);
+        for (int n = 0; n < 10; ++n) w.step();
+        w.node->power(true);
+        for (int n = 0; n < 5000 && w.runner.operational(0); ++n) w.step();
+        bool booting = false;
+        for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+            w.step();
+            const Step step = w.runner.status(0).step;
+            if (!booting && step < Step::watching) booting = true, w.rpdos = 0;
+            if (booting && step < Step::watching) ASSERT_LE(w.rpdos, 1U) << "one was on its way";
+        }
+        EXPECT_TRUE(booting);
+        EXPECT_TRUE(w.cut.empty());
+    }
+}
+
+TEST(Runner, Names_what_others_send_in_its_place_once_a_second) {
+    Wire w;
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    EXPECT_TRUE(w.foreign.empty());
+    const auto send = [&](const Frame& f) { w.ear->send(f, w.now + millisecond / 2), w.ear->flush(w.now + millisecond / 2); };
+    for (int n = 0; n < 2500; ++n) send({0x080, {}}), w.step();
+    ASSERT_EQ(w.foreign.size(), 3U);
+    EXPECT_TRUE(w.foreign[0].begins && w.foreign[0].sync);
+    EXPECT_EQ(w.foreign[0].frames, 1U);
+    EXPECT_FALSE(w.foreign[1].begins);
+    EXPECT_NEAR(w.foreign[1].frames, 1000, 2);
+    for (int n = 0; n < 1100; ++n) w.step();
+    w.foreign.clear();
+    send({0x080, {}}), send({0x202, {1, 2, 3, 4, 5, 6}}), send({0x602, {0x40, 0, 0x10, 0, 0, 0, 0, 0}});
+    send({0x000, {0x80, 7}}), send({0x201, {1}}), send({0x182, {1, 2}});
+    for (int n = 0; n < 3; ++n) w.step();
+    ASSERT_EQ(w.foreign.size(), 4U);
+    EXPECT_TRUE(std::all_of(w.foreign.begin(), w.foreign.end(), [](const auto& f) { return f.begins && f.frames == 1; }));
+    std::sort(w.foreign.begin(), w.foreign.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+    EXPECT_EQ(w.foreign[0].id, 0x000);
+    EXPECT_EQ(w.foreign[0].data, (std::array<std::uint8_t, 2>{0x80, 7}));
+    EXPECT_TRUE(w.foreign[1].sync && w.foreign[1].id == 0x080);
+    EXPECT_TRUE(w.foreign[2].rpdo && w.foreign[2].id == 0x202);
+    EXPECT_EQ(w.foreign[3].id, 0x602);
 }
 
 TEST(Runner, Set_points_that_a_dead_wire_kept_back_are_not_sent_when_it_is_back) {

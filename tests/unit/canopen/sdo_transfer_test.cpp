@@ -67,7 +67,7 @@ TEST_P(Sizes, Transfer_goes_both_ways_on_a_good_wire) {
     EXPECT_EQ(up.size, size);
     EXPECT_TRUE(std::equal(data.begin(), data.end(), room.begin()));
     EXPECT_EQ(down.retries + up.retries, 0U);
-    EXPECT_EQ(p.client.strangers(), 0U);
+    EXPECT_EQ(p.client.unexpected_responses(), 0U);
 }
 
 std::string size_name(const testing::TestParamInfo<Sizes::ParamType>& info) {
@@ -127,6 +127,140 @@ INSTANTIATE_TEST_SUITE_P(All, Disturbed,
                                           testing::Values(SdoMode::segmented, SdoMode::block), testing::Bool()),
                          name_of);
 
+/// A client that pauses 300 ms in the middle of every block: nothing is acknowledged before its end, and the size stays.
+TEST(SdoServer, Does_not_acknowledge_in_the_middle_of_a_block_of_a_slow_client_and_keeps_the_size) {
+    Recorder events;
+    Device device(example(), {.node_id = 5, .sdo = {.timeout = 1 * second}}, events);
+    Bus bus;
+    bus.attach(device);
+    Time now = 0;
+    device.start(now);
+    bus.exchange(now);
+    const auto data = bytes(127 * 7 * 3, 5);
+    std::vector<std::pair<unsigned, unsigned>> acknowledged;
+    const auto turn = [&](const Frame* f) {
+        bus.log.clear();
+        if (f != nullptr) bus.inject(*f, now);
+        device.poll(now), bus.exchange(now);
+        for (const auto& one : bus.log)
+            if (one.id == 0x585 && one.data[0] == 0xa2) acknowledged.emplace_back(one.data[1], one.data[2]);
+            else if (one.id == 0x585 && one.data[0] == 0x80) ADD_FAILURE() << "aborted " << load<std::uint32_t>(one.data.data() + 4);
+    };
+    Frame start = make_frame(0x605, 8);
+    start.data = {0xc2, 0x06, 0x20, 0};
+    store(start.data.data() + 4, static_cast<std::uint32_t>(data.size()));
+    turn(&start);
+    for (unsigned segment = 0; segment < data.size() / 7; ++segment) {
+        Frame f = make_frame(0x605, 8);
+        f.data[0] = static_cast<std::uint8_t>(segment % 127 + 1 | (segment + 1 == data.size() / 7 ? 0x80 : 0));
+        std::copy_n(data.begin() + segment * 7, 7, f.data.begin() + 1);
+        turn(&f);
+        if (segment % 127 == 60)
+            for (int n = 0; n < 300; ++n) now += millisecond, turn(nullptr);
+    }
+    EXPECT_EQ(acknowledged, (std::vector<std::pair<unsigned, unsigned>>{{127, 127}, {127, 127}, {127, 127}}));
+    Frame end = make_frame(0x605, 8);
+    end.data[0] = 0xc1;
+    turn(&end);
+    const auto& e = *device.dictionary().find(0x2006, 0);
+    ASSERT_EQ(e.size, data.size());
+    EXPECT_TRUE(std::equal(data.begin(), data.end(), e.data));
+}
+
+TEST(SdoServer, Acknowledges_what_came_of_a_block_after_half_of_its_timeout_and_the_rest_does_not_count) {
+    Recorder events;
+    Device device(example(), {.node_id = 5, .sdo = {.timeout = 1 * second}}, events);
+    Bus bus;
+    bus.attach(device);
+    Time now = 0;
+    device.start(now);
+    bus.exchange(now);
+    const auto data = bytes(70, 6);
+    std::vector<std::vector<std::uint8_t>> answers;
+    const auto turn = [&](const std::vector<std::uint8_t>& f) {
+        bus.log.clear();
+        if (!f.empty()) {
+            Frame frame = make_frame(0x605, 8);
+            std::copy(f.begin(), f.end(), frame.data.begin());
+            bus.inject(frame, now);
+        }
+        device.poll(now), bus.exchange(now);
+        for (const auto& one : bus.log)
+            if (one.id == 0x585) answers.push_back({one.data[0], one.data[1], one.data[2]});
+    };
+    const auto segment = [&](unsigned number, unsigned which, bool last = false) {
+        std::vector<std::uint8_t> f{static_cast<std::uint8_t>(number | (last ? 0x80 : 0))};
+        f.insert(f.end(), data.begin() + which * 7, data.begin() + which * 7 + 7);
+        turn(f);
+    };
+    turn({0xc2, 0x06, 0x20, 0, 70, 0, 0, 0});
+    answers.clear();
+    for (unsigned n = 0; n < 4; ++n) segment(n + 1, n);
+    for (int n = 0; n < 499; ++n) now += millisecond, turn({});
+    EXPECT_TRUE(answers.empty());
+    for (int n = 0; n < 2; ++n) now += millisecond, turn({});
+    EXPECT_EQ(answers, (std::vector<std::vector<std::uint8_t>>{{0xa2, 4, 127}})) << "nothing was lost: the size stays";
+    answers.clear();
+    for (unsigned n = 4; n < 10; ++n) segment(n + 1, n, n == 9);  // the rest of the old block, on its way when the acknowledgement came
+    EXPECT_TRUE(answers.empty());
+    for (unsigned n = 4; n < 10; ++n) segment(n - 3, n, n == 9);
+    EXPECT_EQ(answers, (std::vector<std::vector<std::uint8_t>>{{0xa2, 6, 127}}));
+    turn({0xc1});
+    const auto& e = *device.dictionary().find(0x2006, 0);
+    ASSERT_EQ(e.size, data.size());
+    EXPECT_TRUE(std::equal(data.begin(), data.end(), e.data));
+}
+
+TEST(SdoClient, Aborts_when_a_segment_is_acknowledged_that_was_never_sent) {
+    for (const bool whole : {false, true}) {
+        FrameQueue out(256);
+        SdoClient client(out, {.restarts = 0});
+        client.configure(9);
+        const auto data = bytes(70, 1);
+        SdoRequest r{.index = 0x2006, .mode = SdoMode::block, .data = data};
+        client.submit(r);
+        client.poll(0);
+        client.handle({0x589, {0xa4, 0x06, 0x20, 0, static_cast<std::uint8_t>(whole ? 127 : 5), 0, 0, 0}}, 0);
+        Frame f;
+        while (out.pop(f)) {}
+        EXPECT_EQ(f.data[0] & 0x7f, whole ? 10 : 5);
+        client.handle({0x589, {0xa2, static_cast<std::uint8_t>(whole ? 11 : 6), 20, 0, 0, 0, 0, 0}}, 0);
+        ASSERT_TRUE(out.pop(f));
+        EXPECT_EQ(f.data[0], 0x80);
+        EXPECT_EQ(load<std::uint32_t>(f.data.data() + 4), 0x05040003U);
+        EXPECT_TRUE(r.done());
+        EXPECT_EQ(r.abort, Abort::sequence);
+    }
+}
+
+TEST(SdoClient, Goes_on_behind_what_a_server_acknowledged_in_the_middle_of_a_block) {
+    FrameQueue out(16);  // the block does not leave at once
+    SdoClient client(out, {.restarts = 0});
+    client.configure(9);
+    const auto data = bytes(140, 1);
+    SdoRequest r{.index = 0x2006, .mode = SdoMode::block, .data = data};
+    client.submit(r);
+    client.poll(0);
+    Frame f;
+    ASSERT_TRUE(out.pop(f));
+    client.handle({0x589, {0xa4, 0x06, 0x20, 0, 127, 0, 0, 0}}, 0);
+    unsigned sent = 0;
+    for (; sent < 6 && out.pop(f); ++sent) {}
+    client.handle({0x589, {0xa2, 6, 127, 0, 0, 0, 0, 0}}, 0);
+    std::vector<std::uint8_t> got(data.begin(), data.begin() + 42);
+    bool begun = false, last = false;
+    for (int n = 0; n < 100 && !last; ++n) {
+        client.poll(0);
+        while (out.pop(f) && !last) {
+            begun = begun || (f.data[0] & 0x7f) == 1;
+            if (!begun) continue;  // of the old block
+            got.insert(got.end(), f.data.begin() + 1, f.data.end() - (f.data.size() - 8));
+            last = (f.data[0] & 0x80) != 0;
+        }
+    }
+    EXPECT_EQ(got, data);
+}
+
 TEST(SdoClient, Drops_a_stale_abort_and_asks_again_on_silence) {
     Pair p;
     std::uint8_t room[4];
@@ -137,7 +271,7 @@ TEST(SdoClient, Drops_a_stale_abort_and_asks_again_on_silence) {
     ASSERT_TRUE(p.out.pop(asked));  // never reaches the server: it answers with the abort of an earlier transfer instead
     p.client.handle({0x585, {0x80, 0x06, 0x20, 0, 0x01, 0, 0x04, 0x05}}, p.now);
     EXPECT_FALSE(r.done());
-    EXPECT_EQ(p.client.strangers(), 1U);
+    EXPECT_EQ(p.client.unexpected_responses(), 1U);
     for (int n = 0; n < 200 && !r.done(); ++n) {
         p.now += millisecond;
         p.client.poll(p.now);

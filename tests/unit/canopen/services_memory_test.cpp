@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <new>
 
-#include "canopen/302/master.hpp"
-#include "canopen/402/drive.hpp"
-#include "canopen/device.hpp"
+#include "canopen/device/drive/drive.hpp"
+#include "canopen/master/boot/nmt_master.hpp"
+#include "canopen/protocol/device.hpp"
 
 namespace {
 bool counting = false;

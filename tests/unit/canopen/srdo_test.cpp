@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // SRDOs of EN 50325-5: what is sent, what is believed, and what is not.
-#include "canopen/304/description.hpp"
+#include "canopen/protocol/srdo_description.hpp"
 #include "node.hpp"
 
 namespace hal::canopen::test {

@@ -3,7 +3,8 @@
 #include <iostream>
 #include <string_view>
 
-#include "session/session.hpp"
+#include "commands/table.hpp"
+#include "machine/session.hpp"
 
 int main(int argc, char** argv) {
     if (argc != 4) return 2;
@@ -13,8 +14,9 @@ int main(int argc, char** argv) {
     hal::Session session(options);
     hal::Diagnostics diagnostics;
     const auto source = session.sources.add("netlist", argv[3]);
-    for (const hal::Command& command : hal::parse(session.sources, source, {&session.ini, {}}, diagnostics)) session.apply(command, diagnostics);
-    if (!session.commit(diagnostics)) {
+    hal::Transaction transaction = session.begin();
+    for (const hal::Command& command : hal::parse(session.sources, source, {&session.ini, {}}, diagnostics)) hal::apply_edit(transaction, command, diagnostics);
+    if (!transaction.commit(diagnostics)) {
         std::cerr << hal::render(diagnostics, session.sources);
         return 3;
     }

@@ -2,8 +2,8 @@
 // Frames byte by byte: the golden ones are written from the layouts of the RTmac, TDMA and RTcfg documents.
 #include <gtest/gtest.h>
 
-#include "components/fieldbus/tdma/frames.hpp"
-#include "components/fieldbus/tdma/rtcfg_frames.hpp"
+#include "components/fieldbus/tdma/wire/rtcfg_frames.hpp"
+#include "components/fieldbus/tdma/wire/tdma_frames.hpp"
 
 namespace {
 

@@ -6,8 +6,8 @@
 
 #include <cstdio>
 
-#include "components/fieldbus/tdma/rtcfg_applicant.hpp"
-#include "components/fieldbus/tdma/rtcfg_service.hpp"
+#include "components/fieldbus/tdma/rtcfg/rtcfg_applicant.hpp"
+#include "components/fieldbus/tdma/rtcfg/rtcfg_service.hpp"
 #include "wire.hpp"
 
 namespace tdma_tests {
@@ -36,8 +36,8 @@ struct Newcomer {
     Newcomer(Machine& m, rtcfg::Logical own, std::string file)
         : machine(m), applicant("tdma." + std::to_string(m.port.address()[5]), m.station, own, std::move(file), m) {
         m.station.accompany(&applicant.client(), nullptr);
-        m.in_cycle = [this](Machine&) {
-            applicant.work();
+        m.in_cycle = [this](Machine& at) {
+            applicant.work(at.next);
             configured += applicant.cycle() ? 1 : 0;
         };
     }

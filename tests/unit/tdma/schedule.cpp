@@ -2,7 +2,7 @@
 // Schedules: read, judged, worked out.
 #include <gtest/gtest.h>
 
-#include "components/fieldbus/tdma/plan.hpp"
+#include "components/fieldbus/tdma/config/schedule_plan.hpp"
 
 namespace {
 

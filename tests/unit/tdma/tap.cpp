@@ -11,7 +11,7 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
-#include "components/fieldbus/tdma/tap.hpp"
+#include "components/fieldbus/tdma/tunnel/tap.hpp"
 #include "link/system.hpp"
 #include "wire.hpp"
 
@@ -24,28 +24,28 @@ constexpr std::uint16_t experimental = 0x88b5;  // of IEEE 802: no protocol of t
 /// Why there is no namespace, or nothing.
 std::string enter() {
     if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return "no network namespace may be made here";
-    const hal::can::Descriptor tun(::open("/dev/net/tun", O_RDWR | O_CLOEXEC));
+    const hal::link::Descriptor tun(::open("/dev/net/tun", O_RDWR | O_CLOEXEC));
     return tun ? "" : "there is no /dev/net/tun here";
 }
 
 /// A socket on one interface, for frames as they are.
-hal::can::Descriptor raw(const std::string& name) {
-    hal::can::Descriptor fd(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+hal::link::Descriptor raw(const std::string& name) {
+    hal::link::Descriptor fd(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     sockaddr_ll address{};
     address.sll_family = AF_PACKET;
     address.sll_protocol = htons(experimental);
     address.sll_ifindex = static_cast<int>(if_nametoindex(name.c_str()));
-    EXPECT_EQ(0, ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address)) << name << ": " << hal::can::reason();
+    EXPECT_EQ(0, ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address)) << name << ": " << hal::link::reason();
     return fd;
 }
 
 /// An answer of the kernel about an interface.
 template <class Read>
 auto asked(const std::string& name, unsigned long what, Read read) {
-    const hal::can::Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    const hal::link::Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     ifreq request{};
     name.copy(request.ifr_name, IFNAMSIZ - 1);
-    EXPECT_EQ(0, ioctl(socket.get(), what, &request)) << name << ": " << hal::can::reason();
+    EXPECT_EQ(0, ioctl(socket.get(), what, &request)) << name << ": " << hal::link::reason();
     return read(request);
 }
 

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "components/fieldbus/tdma/tap.hpp"
+#include "components/fieldbus/tdma/tunnel/tap.hpp"
 #include "wire.hpp"
 
 namespace tdma_tests {

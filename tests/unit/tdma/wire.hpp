@@ -11,8 +11,8 @@
 #include <random>
 #include <vector>
 
-#include "components/fieldbus/tdma/bytes.hpp"
-#include "components/fieldbus/tdma/station.hpp"
+#include "components/fieldbus/tdma/station/station.hpp"
+#include "components/fieldbus/tdma/wire/big_endian.hpp"
 
 namespace tdma_tests {
 

@@ -12,6 +12,7 @@ docs/tutorials/python.md tells the rest.
 """
 import atexit
 import enum
+import errno
 import json
 import math
 import os
@@ -23,6 +24,19 @@ from hal import _core
 
 error = _core.error
 error.__module__ = "hal"
+
+
+# What LinuxCNC raises, and what Python's own habits expect, in one.
+class InvalidArgument(error, ValueError):
+    pass
+
+
+class WrongKind(error, AttributeError):
+    pass
+
+
+class StreamError(error, OSError):
+    pass
 
 
 class Type(enum.IntEnum):
@@ -174,15 +188,28 @@ class component:
 
     Beyond LinuxCNC's: `timeout` is how many seconds after this program's death its pins take their declared values (default 1;
     None: never), `safe` what all output pins are declared to take then unless newpin says otherwise (default: they keep their value).
+    `every` declares that the program accesses its pins, or calls alive(), at least every so many seconds: when it has not for `timeout`
+    longer, it counts as not responding, and its outputs take their declared values until it does again.
+    `lost` is what happens when the machine is gone: "end" ends the program as SIGTERM does, "stay" looks for the machine until it is
+    back (default: $HALCYON_LOST, which loadusr sets to end, else stay).
     """
 
-    def __init__(self, name, prefix=None, *, timeout=1.0, safe=None):
-        object.__setattr__(self, "_core", _core.Component(name, prefix if prefix is not None else name, -1 if timeout is None else int(timeout * 1000)))
+    def __init__(self, name, prefix=None, *, timeout=1.0, safe=None, every=None, lost=None):
+        lost = lost or os.environ.get("HALCYON_LOST") or "stay"
+        if lost not in ("end", "stay"):
+            raise ValueError(f"lost is 'end' or 'stay', not {lost!r}")
+        object.__setattr__(self, "_ready", False)
+        object.__setattr__(self, "_core", _core.Component(name, prefix if prefix is not None else name, -1 if timeout is None else int(timeout * 1000),
+                                                          max(1, int(every * 1000)) if every else 0, lost == "end"))
         object.__setattr__(self, "_safe", safe)
         object.__setattr__(self, "_name", name)
         _be_told_to_end()
 
     def _new(self, name, kind, dir, safe, doc, unit):
+        if self._ready:
+            raise error(f"Invalid argument: component {self._name!r} is ready; pins and parameters are made before ready(), or after unready()")
+        if kind not in Type.__members__.values():
+            raise InvalidArgument(f"Invalid argument: {kind!r} is not a HAL type")
         word, number = _TYPES[Type(kind)]
         more = {key: value for key, value in (("doc", doc), ("unit", unit)) if value}
         if safe is None and dir in (Dir.OUT, Dir.IO) and kind != HAL_PORT:
@@ -193,19 +220,25 @@ class component:
 
     def newpin(self, name, type, dir, *, safe=None, doc="", unit=""):
         if dir not in (HAL_IN, HAL_OUT, HAL_IO):
-            raise ValueError("the direction of a pin is HAL_IN, HAL_OUT or HAL_IO")
+            raise InvalidArgument("Invalid argument: the direction of a pin is HAL_IN, HAL_OUT or HAL_IO")
         return self._new(name, type, dir, safe, doc, unit)
 
     def newparam(self, name, type, dir, *, safe=None, doc="", unit=""):
         if dir not in (HAL_RO, HAL_RW):
-            raise ValueError("the direction of a parameter is HAL_RO or HAL_RW")
+            raise InvalidArgument("Invalid argument: the direction of a parameter is HAL_RO or HAL_RW")
         return self._new(name, type, dir, safe, doc, unit)
 
     def ready(self):
         self._core.ready(True)
+        object.__setattr__(self, "_ready", True)
 
     def unready(self):
         self._core.ready(False)
+        object.__setattr__(self, "_ready", False)
+
+    def alive(self):
+        """A sign of life, for a component with `every` that accesses no pin for longer than that."""
+        self._core.alive()
 
     def exit(self):
         self._core.leave(True)
@@ -225,13 +258,13 @@ class component:
     def getpin(self, name):
         item = self.getitem(name)
         if not item.is_pin():
-            raise AttributeError(f"{name!r} is a parameter")
+            raise WrongKind(f"{name!r} is a parameter")
         return item
 
     def getparam(self, name):
         item = self.getitem(name)
         if item.is_pin():
-            raise AttributeError(f"{name!r} is a pin")
+            raise WrongKind(f"{name!r} is a pin")
         return item
 
     def getpins(self):
@@ -293,11 +326,18 @@ class stream:
         else:
             about = self._ask()
             if types is not None and types != about["types"]:
-                raise error(f"stream {self._name} has the types {about['types']}, not {types}")
-        self.element_types, self.maxdepth = about["types"], about["depth"]
+                raise StreamError(f"stream {self._name} has the types {about['types']}, not {types}")
+        self._types, self.maxdepth = about["types"], about["depth"]
+
+    @property
+    def element_types(self):
+        return self._types.encode()
 
     def _ask(self, **what):
-        return _good(self._comp.request(json.dumps({"stream": self._name, **what})))
+        try:
+            return _good(self._comp.request(json.dumps({"stream": self._name, **what})))
+        except error as refusal:
+            raise StreamError(str(refusal)) from None
 
     @property
     def depth(self):
@@ -322,15 +362,15 @@ class stream:
             return None
         number, record = self._waiting.pop()
         self.sampleno = number + 1
-        return tuple(float(value) if letter == "f" else value for letter, value in zip(self.element_types, record))
+        return tuple(float(value) if letter == "f" else value for letter, value in zip(self._types, record))
 
     def write(self, record):
-        row = [bool(value) if letter == "b" else _plain(float(value)) if letter == "f" else int(value) for letter, value in zip(self.element_types, record)]
-        if len(row) != len(self.element_types) or len(record) != len(row):
-            raise ValueError(f"a record has {len(self.element_types)} values")
+        row = [bool(value) if letter == "b" else _plain(float(value)) if letter == "f" else int(value) for letter, value in zip(self._types, record)]
+        if len(row) != len(self._types) or len(record) != len(row):
+            raise ValueError(f"a record has {len(self._types)} values")
         if self._ask(records=[row])["taken"] == 0:
             self.num_overruns += 1
-            raise error(f"stream {self._name} is full")
+            raise StreamError(errno.ENOSPC, f"stream {self._name} is full")
 
 
 # --- functions of the module ------------------------------------------------------------------------------------------------
@@ -348,19 +388,32 @@ def component_is_ready(name):
     return about is not None and about.get("ready", True)
 
 
+def _failed(command, *words):
+    """As LinuxCNC's functions for signals: prints what is wrong and returns True, or returns False when all is well."""
+    try:
+        _run(command, *words)
+    except error as problem:
+        if _msg_level >= MSG_ERR:
+            print(problem, file=sys.stderr)
+        return True
+    return False
+
+
 def new_sig(name, type):
-    _run("newsig", name, _TYPES[Type(type)][0])
-    return True
+    """Makes a signal. False when all went well, as LinuxCNC's; True after printing why not."""
+    if type not in Type.__members__.values():
+        raise InvalidArgument(f"{type!r} is not a HAL type")
+    return _failed("newsig", name, _TYPES[Type(type)][0])
 
 
 def connect(pin, signal):
-    _run("linkps", pin, signal)
-    return True
+    """Links a pin to a signal. False when all went well, as LinuxCNC's; True after printing why not."""
+    return _failed("linkps", pin, signal)
 
 
 def disconnect(pin):
-    _run("unlinkp", pin)
-    return True
+    """Takes a pin off its signal. False when all went well, as LinuxCNC's; True after printing why not."""
+    return _failed("unlinkp", pin)
 
 
 def pin_has_writer(name):
@@ -382,13 +435,15 @@ get_p = get_s = get_value
 
 
 def set_p(name, value):
+    """Sets a pin or parameter. Returns False, as LinuxCNC's does when all went well; raises what is wrong."""
     _run("setp", name, _word(value))
-    return True
+    return False
 
 
 def set_s(name, value):
+    """Sets a signal. Returns False, as LinuxCNC's does when all went well; raises what is wrong."""
     _run("sets", name, _word(value))
-    return True
+    return False
 
 
 sets = set_s

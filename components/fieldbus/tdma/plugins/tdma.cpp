@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <optional>
 
-#include "fieldbus/tdma/config.hpp"
-#include "fieldbus/tdma/plan.hpp"
-#include "fieldbus/tdma/reporter.hpp"
-#include "fieldbus/tdma/rtcfg_applicant.hpp"
-#include "fieldbus/tdma/rtcfg_service.hpp"
-#include "fieldbus/tdma/station.hpp"
-#include "fieldbus/tdma/tap.hpp"
+#include "fieldbus/tdma/config/schedule.hpp"
+#include "fieldbus/tdma/config/schedule_plan.hpp"
+#include "fieldbus/tdma/config/segment_reporter.hpp"
+#include "fieldbus/tdma/plugins/other_pins.hpp"
+#include "fieldbus/tdma/rtcfg/rtcfg_applicant.hpp"
+#include "fieldbus/tdma/rtcfg/rtcfg_service.hpp"
+#include "fieldbus/tdma/station/station.hpp"
+#include "fieldbus/tdma/tunnel/tap.hpp"
 #include "hal/background.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
-#include "link/ways.hpp"
+#include "discipline/discipline.hpp"
 
 namespace {
 
@@ -36,6 +39,14 @@ public:
         join_rtcfg();
         waiting_.emplace(*this, transmit_, "slot-#.waiting", static_cast<std::int64_t>(setup_.slots.size()),
                          "frames that wait for the #th slot of the configuration");
+        if (entry_)
+            for (const config::StationEntry& other : schedule_.stations)
+                if (other.name != entry_->name) others_.emplace_back(*this, receive_, other);
+        if (setup_.asks_master) {  // the only other station that one without a schedule knows
+            config::StationEntry master;
+            master.name = "master";
+            others_.emplace_back(*this, receive_, master);
+        }
         reporter_ = std::make_unique<Reporter>(name_, schedule_, own_ip_ ? config::to_string(*own_ip_) : std::string());
     }
 
@@ -43,9 +54,10 @@ public:
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         ethernet::Options options;
         options.types.assign(Station::types.begin(), Station::types.end());
-        options.pacer = link_.get().starts_with("eth:");
+        const ethernet::Description line = ethernet::describe(link_.get());
+        options.pacer = line.paced;
         const auto wanted = entry_ ? entry_->mac : own_mac_;
-        if (wanted && link_.get().starts_with("sim:")) options.address = *wanted;
+        if (wanted && line.in_memory) options.address = *wanted;
         auto opened = ethernet::open(link_.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
         if (own_mac_ && opened.port->address() != *own_mac_)
@@ -55,11 +67,10 @@ public:
             throw std::runtime_error(link_.get() + " has the address " + ethernet::to_string(opened.port->address()) +
                                      ", the configuration gives " + entry_->name + " " + ethernet::to_string(*entry_->mac) +
                                      "; mend the line 'mac' of its block");
-        OpenedTap         tap = open_tunnel(*opened.port);
-        const std::string key = link_.get().substr(0, link_.get().find('?'));
-        if (!ethernet::offer_discipline(key, station_.get()))
-            throw std::runtime_error(
-                key + " has a station of this process already; give this one a line of its own, as in sim:" + "NAME/STATION");
+        OpenedTap tap = open_tunnel(*opened.port);
+        if (!ethernet::offer_discipline(*opened.port, station_.get(), delivery_times()))
+            throw std::runtime_error(opened.port->description().address +
+                                     " has a station of this process already; give this one a line of its own, as in sim:NAME/STATION");
         const void* nobody = nullptr;
         leads_ = leading_instance.compare_exchange_strong(nobody, this);
         try {
@@ -72,13 +83,12 @@ public:
         port_ = std::move(opened.port);
         tap_ = std::move(tap.tap);
         const std::string& remark = port_->description().remark;
-        if (!remark.empty()) std::fputs((name_ + ": " + remark + "\n").c_str(), stderr);
+        if (!remark.empty()) hal::MessageLog(name_).print(remark);
         beat_.lose();
         told_period_ = was_reset_ = false, had_carrier_ = true;
         words_ = own_words_.get();
         if (service_) service_->begin();
         if (applicant_) applicant_->begin(), background_->start();
-        offer_ways(key);
         reporter_->start();
         station_->accompany(companion(), tunnel_.get());
         station_->attach(*port_);
@@ -87,13 +97,11 @@ public:
 
     void stop() noexcept {
         ethernet::withdraw_discipline(station_.get());
-        for (const std::string& link : ways_offered_) hal::can::withdraw_ways(link);
-        ways_offered_.clear();
         station_->detach();
         if (leads_) leading_instance.store(nullptr);
         leads_ = false;
         if (background_) background_->stop();
-        if (applicant_) applicant_->work();  // what came by now is still written
+        if (applicant_) applicant_->finish();  // what came by now is still written
         reporter_->stop();
         tap_.reset();
         port_.reset();
@@ -114,6 +122,7 @@ public:
                 fault = false;
             }
             was_reset_ = reset;
+            for (std::size_t n = 0; n < others_.size(); ++n) others_[n].ask(*station_, n);
             station_->receive(cycle.start_ns());
             follow(cycle.period_ns());
         }
@@ -127,18 +136,16 @@ public:
     }
 
 private:
-    /// How long values are on their way by our slots, under the addresses of the links that use them. [setup]
-    void offer_ways(const std::string& segment) {
-        const auto which = entry_ ? config::find(schedule_, entry_->name) : std::nullopt;
-        if (!which) return;
-        const std::string link = "cane:" + segment.substr(segment.starts_with("eth:") ? 4 : 0) + "?slot=";
-        for (std::size_t n = 0; n < entry_->slots.size(); ++n) {
-            std::vector<hal::can::Way> ways;
+    /// How long values take by way of this station's slots. [setup]
+    ethernet::SlotTimes delivery_times() const {
+        ethernet::SlotTimes times;
+        const auto          which = entry_ ? config::find(schedule_, entry_->name) : std::nullopt;
+        if (!which) return times;
+        for (std::size_t n = 0; n < entry_->slots.size(); ++n)
             for (const plan::Way& w : plan::ways_of(schedule_, *which, n))
-                ways.push_back({schedule_.stations[w.other].name, w.there, w.back, w.there_cycles, w.back_cycles, w.round_trip});
-            ways_offered_.push_back(link + std::to_string(entry_->slots[n].setup.id));
-            hal::can::offer_ways(ways_offered_.back(), std::move(ways));
-        }
+                times[entry_->slots[n].setup.id].push_back(
+                    {schedule_.stations[w.other].name, w.there, w.back, w.there_cycles, w.back_cycles, w.round_trip});
+        return times;
     }
 
     /// A schedule that RTcfg brought. [realtime]
@@ -209,6 +216,7 @@ private:
             if (!own_ip_ && !own_mac_) return false;
         }
         setup_.configured = false;
+        setup_.asks_master = true;
         setup_.room_for_slots = most_slots;
         return true;
     }
@@ -219,8 +227,8 @@ private:
             rtcfg::Logical own;
             if (own_ip_) own = {true, *own_ip_};
             applicant_ = std::make_unique<rtcfg::Applicant>(name_, *station_, own, stage_2_argument_.get(), static_cast<Events&>(*this));
-            background_ = std::make_unique<hal::Background>([this](std::int64_t, bool may_wait) {
-                applicant_->work();
+            background_ = std::make_unique<hal::Background>([this](std::int64_t now, bool may_wait) {
+                applicant_->work(now);
                 if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(20));
             });
         } else if (entry_ && entry_->role != Role::slave) {
@@ -257,10 +265,8 @@ private:
             open_tap(*tunnel_, {tunnel_argument_.get(), port.address(), ip, parse_prefix(netmask_argument_.get()).value_or(24)}, name_);
         if (!opened.tap) throw std::runtime_error("tunnel: " + opened.problem);
         if (!entry_) return opened;  // it is said when there is a schedule
-        std::fputs((name_ + ": ordinary packets pass by " + opened.tap->name() + ", MTU " + std::to_string(tunnel_->mtu()) +
-                    (entry_->ip ? ", IP " + config::to_string(*entry_->ip) : "") + "\n")
-                       .c_str(),
-                   stderr);
+        hal::MessageLog(name_).print("ordinary packets pass by " + opened.tap->name() + ", MTU " + std::to_string(tunnel_->mtu()) +
+                                     (entry_->ip ? ", IP " + config::to_string(*entry_->ip) : ""));
         return opened;
     }
 
@@ -309,12 +315,23 @@ private:
         if (applicant_) stage_2_bytes = applicant_->file_bytes();
         intruders = s.count.intruders;
         losses = s.count.losses;
+        const Time now = s.global - s.offset;
+        const std::size_t known = station_->roster().size();
+        for (std::size_t n = 0; n < others_.size() && n < station_->pings().size(); ++n)
+            others_[n].show(n < known ? station_->roster()[n] : heard_of_master(s, now), station_->pings()[n], now, station_->setup().cycle);
         if (!tunnel_) return;
         tunnel_open = tunnel_->open();
         tunnel_sent = tunnel_->sent();
         tunnel_received = tunnel_->received();
         tunnel_dropped = tunnel_->dropped();
         tunnel_refused = tunnel_->refused();
+    }
+
+    /// Of a station without a schedule: what the syncs tell.
+    const Heard& heard_of_master(const Status& s, Time now) noexcept {
+        if (heard_.alive != s.master_active) heard_.alive = s.master_active, heard_.since = now;
+        heard_.frames = s.count.syncs;
+        return heard_;
     }
 
     void raise(const std::string& reason, double detail) noexcept {
@@ -332,8 +349,11 @@ private:
             fault = true;
             raise(words_->other_master, not_a_number);
             break;
+        case Event::other_master_gone:
+            if (station_->ready()) fault = false;
+            break;
         case Event::master_there:
-            fault = true;
+            fault = withdrawn_ = true;
             raise(words_->master_there, not_a_number);
             break;
         case Event::other_schedule:
@@ -345,7 +365,7 @@ private:
             raise(words_->out_of_step, static_cast<double>(value) * 1e-3);
             break;
         case Event::withdrew:
-            fault = true;
+            fault = withdrawn_ = true;
             raise(words_->withdrew, not_a_number);
             break;
         case Event::foreign_frame:
@@ -369,7 +389,8 @@ private:
             if (station_->ready()) fault = false;
             break;
         case Event::running:
-            if (station_->status().count.losses + station_->status().count.unanswered == 0) break;
+            if (station_->status().count.losses + station_->status().count.unanswered == 0 && !withdrawn_) break;
+            withdrawn_ = false;
             fault = false;  // it recovered by itself
             break;
         default: break;
@@ -405,7 +426,7 @@ private:
     hal::Function transmit_{*this, "transmit", &Tdma::transmit,
                             "sends what waits for the slots of this cycle, and the master's sync; last in the thread"};
 
-    hal::In<bool>           reset{*this, receive_, "reset", "rising: a master that withdrew begins anew; fault is acknowledged"};
+    hal::In<bool>           reset{*this, receive_, "reset", "rising edge: a master that stepped down begins anew; acknowledges fault"};
     hal::Out<std::int32_t>  state{*this, receive_, "state",
                                  "0 listening, 1 synchronising, 2 calibrating, 3 running, 4 withdrawn, 5 unconfigured"};
     hal::Out<bool>          synchronous{*this, receive_, "synchronous", "the sync is there, or was a few cycles ago", {.safe = false}};
@@ -443,6 +464,8 @@ private:
     hal::Out<std::uint64_t> tunnel_refused{*this, receive_, "tunnel-refused",
                                            "tunnelled frames that are for others, or cut, or of the segment's own types: not acted on"};
 
+    std::deque<OtherPins>                   others_;  // as the setup's `others`, then the master of one without a schedule
+    Heard                                   heard_;   // of that
     config::Schedule                        schedule_;
     std::optional<config::StationEntry>     entry_;
     StationSetup                            setup_;
@@ -457,13 +480,12 @@ private:
     std::unique_ptr<hal::Background>        background_;  // the applicant's helper
     std::unique_ptr<Reporter>               reporter_;
     std::unique_ptr<ethernet::Port>         port_;
-    std::vector<std::string>                ways_offered_;
     std::unique_ptr<Tunnel>                 tunnel_;  // before tap_, which uses it
     std::unique_ptr<Tap>                    tap_;
     hal::DisciplinedClock                   clock_;
     hal::Discipline                         beat_;
     const hal_faults*                       faults_ = nullptr;
-    bool                                    leads_ = false, told_period_ = false, was_reset_ = false, was_beat_ = false;
+    bool                                    leads_ = false, told_period_ = false, was_reset_ = false, was_beat_ = false, withdrawn_ = false;
     bool                                    had_carrier_ = true;
 };
 
@@ -508,14 +530,17 @@ On a machine there is one station, `loadrt tdma link=eth:enp3s0 config=cell.tdma
 with `link = cane:enp3s0?slot=2` sends in slot 2. Where the station is not the master, all threads of the process follow the sync.
 
 When no sync comes for as many cycles as `lost` says, the station is silent, `synchronous` and `running` become false and a fault is
-recorded. It returns by itself when there is a sync again. A master that finds one there when it
-begins, or later a second one with a smaller address, is silent until `reset`.
+recorded. It returns by itself when there is a sync again. A master that finds another when it begins does not send until that one is gone.
+A second master that comes later is named and ignored; only a master that no station follows gives way to it, when its address is smaller.
 
 With `tunnel=hal0` the component makes an interface hal0, through which `ping`, `ssh` and all that speaks IP cross the segment in slot 1 and
 never in a real-time slot. It has the block's `ip`, the port's MAC address and an MTU of the slot's size less 4, and needs CAP_NET_ADMIN.
 
 A station may start without the file: `station=auto` gets its block from the master, whose file has its `mac` or `ip`, and into
 `stage2=FILE` the file that the master has for it (RTcfg).
+
+Pins with a station's name in front show what is heard of that station. Another number in `x.ping` asks station x for an answer: question
+and answer leave in their senders' slots, in room that real-time frames leave. `hal tdma ping x` does so and prints what comes of it.
 
 `hal tdma plan cell.tdma` shows what a schedule comes to; docs/tdma.md is the whole story.
 )")

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// A device whose program is changed over the bus: CiA 302's program download (1F50h), program control (1F51h), software identification
+// (1F56h) and flash status (1F57h). After an update its revision number and software version are those of the new program.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "canopen/device/program.hpp"
+
+namespace hal::canopen {
+
+/// How a program looks that such a device takes: 20 bytes, then the program. All numbers little endian.
+struct ProgramHeader {
+    static constexpr std::size_t size = 20;
+    static constexpr std::uint32_t signature = 0x50434c48;  ///< "HLCP"
+    std::uint32_t product = 0, version = 0, length = 0, crc = 0;  ///< CRC-32 of the bytes behind the header
+};
+/// CRC-32 as in Ethernet and zip; object 1F56h has it of the whole image. [any]
+std::uint32_t crc32(std::span<const std::uint8_t>) noexcept;
+/// An image with `length` bytes of program; version 0x00020001 is 2.1. [any, not real time]
+std::vector<std::uint8_t> program_image(std::uint32_t product, std::uint32_t version, std::size_t length);
+
+struct BootloaderSettings {
+    std::uint32_t product = 0x302, serial = 1;
+    std::uint32_t version = 0x00010000;           ///< of the program it comes with; 0: its flash is empty
+    std::size_t flash = 1 << 20;                  ///< bytes there is room for
+    Time erase = 20 * millisecond;                ///< how long clearing takes
+    std::uint16_t heartbeat_ms = 0;
+    std::optional<std::vector<std::uint8_t>> image{};  ///< content of the flash instead of the program it comes with
+};
+
+/// Error codes in bits 1–7 of 1F57h; bit 0: busy.
+enum class FlashError : std::uint8_t {
+    none = 0, no_program = 1, unknown_format = 2, wrong_data = 3, not_cleared = 4, write_error = 5, address = 6, secured = 7,
+};
+
+class Bootloader final : public Program {
+public:
+    explicit Bootloader(BootloaderSettings);  // [setup]
+
+    /// The program runs; otherwise the bootloader does, which is what takes a new one. [realtime]
+    bool running() const noexcept { return running_; }
+    std::uint32_t version() const noexcept { return running_ || valid() ? header_.version : 0; }
+    FlashError error() const noexcept { return error_; }
+    std::span<const std::uint8_t> flash() const noexcept { return {flash_.data(), used_}; }
+    /// Counts what was changed in the flash: time to keep it in a file. [any]
+    unsigned changes() const noexcept { return changes_; }
+
+    Description description() const override;
+    void attach(Device&) override;
+    void boot(Time now) noexcept override;
+    void step(Time now) noexcept override;
+    std::string summary() const override;
+    void on_reset(bool application) noexcept override;
+    Abort reading(Entry&) noexcept override;
+    Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
+    void written(Entry&) noexcept override;
+
+private:
+    class Flash final : public Stream {
+    public:
+        explicit Flash(Bootloader& device) : device_(device) {}
+        Abort open_read(Entry&, std::uint32_t&) noexcept override { return Abort::write_only; }
+        Abort read(Entry&, std::uint32_t, std::span<std::uint8_t>) noexcept override { return Abort::write_only; }
+        Abort open_write(Entry&, std::uint32_t size) noexcept override;
+        Abort write(Entry&, std::uint32_t offset, std::span<const std::uint8_t>) noexcept override;
+        Abort close(Entry&, bool writing, bool whole) noexcept override;
+
+    private:
+        Bootloader& device_;
+    };
+
+    bool valid() const noexcept { return error_ == FlashError::none && used_ != 0; }
+    void examine() noexcept;
+    void show() noexcept;
+    bool busy() const noexcept { return wants_reset_ || writing_ || erasing_; }
+
+    const BootloaderSettings settings_;
+    std::vector<std::uint8_t> flash_;
+    std::size_t used_ = 0;
+    ProgramHeader header_;
+    std::uint32_t identification_ = 0;
+    FlashError error_ = FlashError::no_program;
+    bool running_ = false, writing_ = false, erasing_ = false, wants_reset_ = false, starts_ = false;
+    bool broken_off_ = false;  // a download was; it may be begun anew
+    Time now_ = 0, erased_at_ = 0;
+    unsigned changes_ = 0;
+    Flash stream_{*this};
+};
+
+}  // namespace hal::canopen

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// A device of CiA 401: terminals on one side, objects 6000h–64FFh on the other.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "canopen/device/program.hpp"
+
+namespace hal::canopen {
+
+struct IoSettings {
+    unsigned digital_inputs = 64, digital_outputs = 64;  ///< 0–64
+    unsigned analog_inputs = 12, analog_outputs = 12;    ///< 0–12
+    std::uint32_t serial = 1;
+    std::uint16_t heartbeat_ms = 0;
+};
+
+/// The objects and default PDOs of such a device. Throws std::invalid_argument when it has more terminals than there can be. [setup]
+Description io_description(const IoSettings&);
+
+class Io final : public Program {
+public:
+    explicit Io(const IoSettings& = {});  // [setup]
+
+    // The terminals, counted from 0; a number that does not exist does nothing. [realtime]
+    void set_input(unsigned n, bool on) noexcept;
+    bool output(unsigned n) const noexcept { return n < settings_.digital_outputs && (terminals_out_[n / 8] >> n % 8 & 1) != 0; }
+    /// -1 to 1 of the range.
+    void set_analog_input(unsigned n, double fraction) noexcept;
+    double analog_output(unsigned n) const noexcept { return n < settings_.analog_outputs ? analog_out_[n] / 32767.0 : 0.0; }
+    /// Outputs took their error values, and nobody wrote one since. [realtime]
+    bool safe() const noexcept { return safe_; }
+
+    Description description() const override { return io_description(settings_); }
+    void attach(Device&) override;
+    void step(Time now) noexcept override { sample(now); }
+    bool set(std::string_view name, double value) override;
+    std::vector<std::string> settable() const override;
+    std::string summary() const override;
+
+    void on_sync(std::uint8_t, Time now) noexcept override { sample(now); }
+    void on_state(NmtState state) noexcept override {
+        if (state == NmtState::stopped) take_error_values();
+    }
+    void on_communication_error(Time) noexcept override { take_error_values(); }
+    void on_reset(bool application) noexcept override;
+    Abort reading(Entry&) noexcept override;
+    void written(Entry&) noexcept override;
+
+private:
+    static constexpr unsigned most_bits = 64, most_analog = 12, bytes = most_bits / 8;
+    using Block = std::array<std::uint8_t, bytes>;
+
+    void sample(Time now) noexcept;
+    void sample_digital(Time now) noexcept;
+    void sample_analog() noexcept;
+    bool interrupts(unsigned n, std::int32_t value) const noexcept;
+    void trigger(std::uint16_t index, std::size_t sub) noexcept;
+    void drive_outputs() noexcept;
+    void take_error_values() noexcept;
+    void lay(std::uint16_t index, void* image, std::size_t each);
+
+    const IoSettings settings_;
+    // What the objects show, and what is at the terminals.
+    alignas(8) Block inputs_{}, outputs_{}, input_polarity_{}, filter_{}, any_change_{}, rising_{}, falling_{}, output_polarity_{},
+        error_mode_{}, error_value_{}, output_mask_{};
+    Block terminals_in_{}, terminals_out_{}, filtered_{};
+    std::array<Time, most_bits> differs_since_{};
+    std::array<std::int16_t, most_analog> analog_in_{}, analog_out_{}, analog_terminals_{};
+    std::array<std::int32_t, most_analog> upper_{}, lower_{}, error_analog_{}, said_{};
+    std::array<std::uint32_t, most_analog> delta_{}, negative_delta_{}, positive_delta_{};
+    std::array<std::uint8_t, most_analog> triggers_{}, analog_error_mode_{};
+    std::uint8_t interrupts_on_ = 1, analog_interrupts_on_ = 0;
+    std::uint16_t filter_ms_ = 10;
+    std::uint32_t interrupted_ = 0;
+    bool safe_ = false;
+};
+
+}  // namespace hal::canopen

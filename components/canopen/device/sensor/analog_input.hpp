@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// The analogue-input function block of CiA 404, for up to 32 channels: sub-index n of each object is channel n.
+//
+//     field value 6100h -> process value 6130h = field · factor + scaling offset + offset -> net value 6140h = process - tare
+//
+// Each value has four objects: 61xxh REAL32, 71xxh INTEGER16, 81xxh INTEGER24, 91xxh INTEGER32. The whole numbers are the real one times
+// ten to the decimal digits (6132h), cut off at the ends of their type; what is written by one is seen by all.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "canopen/protocol/device.hpp"
+
+namespace hal::canopen {
+
+/// What a channel is at power-on.
+struct AnalogChannel {
+    const char* name = "";
+    std::uint16_t sensor_type = 0;  ///< 6110h
+    std::uint32_t unit = 0;         ///< 6131h, as CiA 303-2 has it; 0: not said
+    std::uint8_t digits = 0;        ///< 6132h, 0 to 6
+};
+
+/// Objects 6100h to 6150h and those of the families 71xxh, 81xxh and 91xxh. [setup]
+void add_analog_inputs(Description&, std::span<const AnalogChannel>);
+
+class AnalogInputs final : public Handler {
+public:
+    static constexpr std::uint8_t not_valid = 0x01, too_high = 0x02, too_low = 0x04;  // of 6150h
+
+    /// As many channels as were described. The values lie here from now on. [setup]
+    void attach(Device&, unsigned channels);
+    /// The application was reset: what was said of before is not known any more. [realtime]
+    void reset() noexcept;
+
+    /// A new field value, `counts` as the converter gave it. A channel that is off (6112h = 0), or whose sample is not due (6114h),
+    /// keeps its values. [realtime]
+    void sample(unsigned n, double field, std::int32_t counts, std::uint8_t status, Time now) noexcept;
+    /// The process value is further from where it was when that was last said than its delta (6133h), or passed a limit (6134h,
+    /// 6135h) since. [realtime]
+    bool changed(unsigned n) const noexcept { return channels_[n].changed; }
+    /// It is said now. [realtime]
+    void said(unsigned n) noexcept;
+
+    double field(unsigned n) const noexcept { return channels_[n].field; }
+    double process(unsigned n) const noexcept;
+    double net(unsigned n) const noexcept { return process(n) - double{channels_[n].tare}; }
+
+    Abort reading(Entry&) noexcept override;
+    Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
+    void written(Entry&) noexcept override;
+
+private:
+    struct Channel {
+        float fv1 = 0, pv1 = 0, fv2 = 1, pv2 = 1, offset = 0, factor = 1, scaling_offset = 0, delta = 0, lower = 0, upper = 0, tare = 0;
+        float process = 0, field_shown = 0, net_shown = 0;
+        std::uint32_t period_us = 0;
+        std::uint8_t digits = 0, mode = 1, status = 0;
+        double field = 0, said = 0;
+        std::int32_t counts = 0;
+        std::int8_t zone = 0, said_zone = 0;  // below the lower limit, between, above the upper one
+        bool changed = false, sampled = false;
+        Time last = 0;
+    };
+    float* value(Channel&, std::uint8_t part) noexcept;
+    void show(unsigned n) noexcept;
+
+    std::vector<Channel> channels_;
+};
+
+}  // namespace hal::canopen

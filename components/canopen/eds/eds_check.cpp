@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// Rules between objects, and modules joined to their device.
+#include <algorithm>
+
+#include "eds_reader.hpp"
+
+namespace hal::canopen::eds {
+
+namespace {
+
+constexpr unsigned most_pdo_bits = 64 * 8;  // CAN FD; a classic frame has 64
+
+class Checks {
+public:
+    Checks(const DeviceDescription& d, std::vector<Message>& messages) : d_(d), messages_(messages), node_(d.node_id(1)) {}
+
+    void run() {
+        for (const Object& object : d_.objects) {
+            const bool receive = object.index >= 0x1600 && object.index < 0x1800, send = object.index >= 0x1A00 && object.index < 0x1C00;
+            if (receive || send) mapping(object, receive);
+        }
+        count(0x1400, d_.device.rx_pdos, d_.device.rx_pdos_at, "NrOfRXPDO");
+        count(0x1800, d_.device.tx_pdos, d_.device.tx_pdos_at, "NrOfTXPDO");
+    }
+
+private:
+    void say(Severity severity, Topic topic, const Place& at, std::string sentence, std::string help = "") {
+        messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
+    }
+
+    std::optional<std::uint64_t> value(const Entry& entry) const {
+        const std::string& text = entry.parameter_value.empty() ? entry.default_value : entry.parameter_value;
+        const Encoded      encoded = encode(text, entry.data_type, node_);
+        if (!encoded || encoded.bytes.empty() || encoded.bytes.size() > 8) return {};
+        std::uint64_t out = 0;
+        for (std::size_t i = 0; i < encoded.bytes.size(); ++i) out |= std::uint64_t{encoded.bytes[i]} << (8 * i);
+        return out;
+    }
+
+    void mapping(const Object& object, bool receive) {
+        const Entry* first = object.find(0);
+        const auto   mapped = first != nullptr ? value(*first) : std::nullopt;
+        if (!mapped || *mapped == 0 || *mapped > 64) return;
+        unsigned sum = 0;
+        for (unsigned sub = 1; sub <= *mapped; ++sub) {
+            const Entry* entry = object.find(static_cast<std::uint8_t>(sub));
+            if (entry == nullptr) {
+                say(Severity::warning, Topic::object, object.at,
+                    label(object.index) + " maps " + std::to_string(*mapped) + " objects, yet sub-index " + hex(sub, 1).substr(2) +
+                        " is not described");
+                break;
+            }
+            const auto bits = value(*entry);
+            if (!bits || *bits == 0) continue;
+            sum += one(object, *entry, static_cast<std::uint32_t>(*bits), receive);
+        }
+        if (sum > most_pdo_bits)
+            say(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
+                "no frame has so many");
+        else if (sum > 64)
+            say(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
+                "a CAN frame has 64; only CAN FD frames have more");
+    }
+
+    /// The bits this one takes.
+    unsigned one(const Object& object, const Entry& entry, std::uint32_t word, bool receive) {
+        const auto        index = static_cast<std::uint16_t>(word >> 16);
+        const auto        sub = static_cast<std::uint8_t>(word >> 8);
+        const unsigned    bits = word & 0xFF;
+        const std::string here = label(object.index, entry.sub) + " maps " + (sub == 0 ? label(index) : label(index, sub));
+        const auto        warn = [&](std::string sentence, std::string help = "") {
+            say(Severity::warning, Topic::object, entry.at, here + std::move(sentence), std::move(help));
+        };
+        if (index < 0x20) {  // a dummy
+            const DataType* type = data_type(index);
+            const bool told = std::any_of(d_.dummies.begin(), d_.dummies.end(), [&](const auto& dummy) { return dummy.first == index; });
+            const bool may =
+                std::any_of(d_.dummies.begin(), d_.dummies.end(), [&](const auto& dummy) { return dummy.first == index && dummy.second; });
+            if (type == nullptr || type->bits == 0) warn(", which is no data type with a length");
+            else if (!may && told) warn(", which [DummyUsage] does not allow", "Dummy" + label(index) + "=1 allows it");
+            return bits;
+        }
+        const Entry* target = d_.find(index, sub);
+        if (target == nullptr) {
+            warn(", which is not described");
+            return bits;
+        }
+        const DataType* type = data_type(target->data_type);
+        if (type != nullptr && type->bits != 0 && type->bits != bits)
+            warn(" with " + std::to_string(bits) + " bits; it has " + std::to_string(type->bits),
+                 "write " + hex((word & ~0xFFu) | type->bits, 8));
+        if (!target->pdo_mapping) say(Severity::note, Topic::object, entry.at, here + ", which has no PDOMapping=1");
+        if (receive ? !target->writable() : !target->readable())
+            warn(receive ? ", which is not writable" : ", which is not readable",
+                 "its AccessType is " + std::string(name_of(target->access)));
+        return bits;
+    }
+
+    void count(std::uint16_t base, unsigned said, const Place& at, const char* key) {
+        const auto there =
+            std::count_if(d_.objects.begin(), d_.objects.end(), [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
+        if (said == static_cast<unsigned>(there) || d_.objects.empty()) return;
+        if (said == 0 && d_.file.eds_version.empty()) return;  // a DCF made by hand
+        say(Severity::note, Topic::count, at,
+            "'" + std::string(key) + "' is " + std::to_string(said) + ", " + std::to_string(there) + " are described",
+            "write " + std::string(key) + "=" + std::to_string(there) + " in [DeviceInfo]");
+    }
+
+    const DeviceDescription& d_;
+    std::vector<Message>&    messages_;
+    unsigned                 node_;
+};
+
+}  // namespace
+
+void check_objects(const DeviceDescription& description, std::vector<Message>& messages) { Checks(description, messages).run(); }
+
+void connect_modules(DeviceDescription& d, std::vector<Message>& messages) {
+    const auto object_of = [&](std::uint16_t index, const Object& like) -> Object& {
+        const auto at =
+            std::lower_bound(d.objects.begin(), d.objects.end(), index, [](const Object& o, std::uint16_t i) { return o.index < i; });
+        if (at != d.objects.end() && at->index == index) return *at;
+        Object made;
+        made.index = index;
+        made.name = like.name;
+        made.at = like.at;
+        made.type = ObjectType::array;
+        made.category = index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
+        Entry first;
+        first.name = "Highest sub-index supported";
+        first.data_type = 0x05;
+        first.access = Access::ro;
+        first.default_value = "0";
+        first.at = like.at;
+        made.entries.push_back(first);
+        return *d.objects.insert(at, std::move(made));
+    };
+    for (const unsigned number : d.connected_modules) {
+        const auto module = std::find_if(d.modules.begin(), d.modules.end(), [&](const Module& m) { return m.number == number; });
+        if (module == d.modules.end()) continue;  // said by the reader
+        for (const Object& fixed : module->fixed) {
+            Object& there = object_of(fixed.index, fixed);
+            if (there.entries.size() <= 1 && there.type == ObjectType::array) there = fixed;
+        }
+        for (const SubExtension& extension : module->extensions) {
+            const auto count = parse_number(extension.count);
+            if (!count || count->node_id || count->magnitude == 0 || count->magnitude > 0xFE) {
+                messages.push_back({Severity::warning, Topic::value, extension.object.at,
+                                    "'Count' of module " + std::to_string(number) + " for " + label(extension.object.index) +
+                                        " is not a plain number: '" + extension.count + "'",
+                                    "its sub-indices were not added"});
+                continue;
+            }
+            const Entry&  each = extension.object.entries.at(0);
+            std::uint16_t index = extension.object.index;
+            const auto    next = parse_number(extension.object_extend);
+            for (std::uint64_t i = 0; i < count->magnitude; ++i) {
+                Object* object = &object_of(index, extension.object);
+                // Full: the next object of the row, when the module says that there are more.
+                while (object->entries.back().sub >= 0xFE && next && next->magnitude != 0 && index < 0xFFFF)
+                    object = &object_of(++index, extension.object);
+                if (object->entries.back().sub >= 0xFE) {
+                    messages.push_back({Severity::warning, Topic::count, extension.object.at,
+                                        "object " + label(index) + " has no room for what module " + std::to_string(number) + " adds", ""});
+                    break;
+                }
+                Entry made = each;
+                made.sub = static_cast<std::uint8_t>(object->entries.back().sub + 1);
+                object->entries.push_back(std::move(made));
+                if (Entry* first = object->find(0)) first->default_value = std::to_string(object->entries.back().sub);
+            }
+        }
+    }
+}
+
+}  // namespace hal::canopen::eds

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "eds_reader.hpp"
+
+namespace hal::canopen::eds {
+
+namespace {
+
+bool is_hex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F'); }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+unsigned hex_value(std::string_view text) {
+    unsigned value = 0;
+    for (const char c : text) value = value << 4 | static_cast<unsigned>(is_digit(c) ? c - '0' : (c | 0x20) - 'a' + 10);
+    return value;
+}
+
+}  // namespace
+
+std::string hex(std::uint64_t value, int digits) {
+    std::array<char, 24> text{};
+    std::snprintf(text.data(), text.size(), "0x%0*llX", digits, static_cast<unsigned long long>(value));
+    return text.data();
+}
+
+std::string label(std::uint16_t index) { return hex(index).substr(2); }
+
+std::string label(std::uint16_t index, unsigned sub) { return label(index) + "sub" + hex(sub, 1).substr(2); }
+
+unsigned distance(std::string_view a, std::string_view b) {
+    constexpr std::size_t longest = 32;
+    if (a.size() > longest || b.size() > longest || a.size() > b.size() + 2 || b.size() > a.size() + 2) return 3;
+    const std::string                 x = lower(a), y = lower(b);
+    std::array<unsigned, longest + 1> row{};
+    for (unsigned j = 0; j <= y.size(); ++j) row[j] = j;
+    for (unsigned i = 1; i <= x.size(); ++i) {
+        unsigned diagonal = row[0];
+        row[0] = i;
+        for (unsigned j = 1; j <= y.size(); ++j) {
+            const unsigned above = row[j];
+            row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (x[i - 1] != y[j - 1] ? 1u : 0u)});
+            diagonal = above;
+        }
+    }
+    return std::min(row[y.size()], 3u);
+}
+
+SectionName section_name(std::string_view name) {
+    SectionName out;
+    std::string squeezed;
+    for (const char c : name)
+        if (c != ' ' && c != '\t') squeezed += c;
+    out.odd = squeezed.size() != name.size();
+    std::string_view rest = squeezed;
+    if (rest.size() > 2 && rest[0] == '0' && (rest[1] == 'x' || rest[1] == 'X')) {
+        rest.remove_prefix(2);
+        out.odd = true;
+    }
+    std::size_t digits = 0;
+    while (digits < rest.size() && digits < 4 && is_hex(rest[digits])) ++digits;
+    if (digits < 4) return {};
+    out.index = static_cast<std::uint16_t>(hex_value(rest.substr(0, 4)));
+    rest.remove_prefix(4);
+    using What = SectionName::What;
+    if (rest.empty()) {
+        out.what = What::object;
+    } else if (same_word(rest.substr(0, 3), "sub")) {
+        rest.remove_prefix(3);
+        if (rest.size() > 2 && rest[0] == '0' && (rest[1] == 'x' || rest[1] == 'X')) rest.remove_prefix(2), out.odd = true;
+        if (rest.empty() || rest.size() > 4 || !std::all_of(rest.begin(), rest.end(), is_hex)) return {};
+        out.what = What::sub;
+        out.sub = hex_value(rest);
+    } else if (same_word(rest, "Name")) {
+        out.what = What::names;
+    } else if (same_word(rest, "Value")) {
+        out.what = What::values;
+    } else if (same_word(rest, "Denotation")) {
+        out.what = What::denotations;
+    } else if (same_word(rest, "ObjectLinks")) {
+        out.what = What::links;
+    } else {
+        return {};
+    }
+    return out;
+}
+
+void Keys::cut_comment(IniKey& key) {
+    for (std::size_t i = 1; i < key.value.size(); ++i) {
+        if ((key.value[i] != ';' && key.value[i] != '#') || (key.value[i - 1] != ' ' && key.value[i - 1] != '\t' && key.value[i] != ';'))
+            continue;
+        Place at = key.value_at;
+        at.offset += static_cast<std::uint32_t>(i), at.length -= static_cast<std::uint32_t>(i), at.column += static_cast<std::uint32_t>(i);
+        const std::string value(trimmed(std::string_view(key.value).substr(0, i)));
+        say(Severity::note, Topic::syntax, at, "a comment behind the value of '" + key.name + "' was left out",
+            "give comments a line of their own, with ';'");
+        key.value = value;
+        key.value_at.length = static_cast<std::uint32_t>(value.size());
+        return;
+    }
+}
+
+std::string Keys::text(IniSection& section, std::string_view key) {
+    IniKey* found = section.find(key);
+    if (found == nullptr) return {};
+    found->used = true;
+    return found->value;
+}
+
+std::string Keys::bare(IniSection& section, std::string_view key) {
+    IniKey* found = section.find(key);
+    if (found == nullptr) return {};
+    found->used = true;
+    cut_comment(*found);
+    return found->value;
+}
+
+std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::uint64_t most) {
+    key.used = true;
+    cut_comment(key);
+    const std::string           in = "'" + key.name + "' of [" + section.name + "]";
+    const std::optional<Number> number = parse_number(key.value);
+    if (!number || number->node_id) {
+        // 0007 as in a section's name, 1A00 without 0x
+        const bool bare_hex = !key.value.empty() && key.value.size() <= 8 && std::all_of(key.value.begin(), key.value.end(), is_hex);
+        say(Severity::warning, Topic::value, key.value_at, in + " is no number: '" + key.value.substr(0, 60) + "'",
+            bare_hex ? "write 0x" + key.value : "numbers are 12 or 0x0C");
+        return {};
+    }
+    if (number->spelling == Spelling::octal)
+        say(Severity::warning, Topic::value, key.value_at,
+            in + " begins with 0: read as the octal number it is, " + std::to_string(number->magnitude),
+            "write " + hex(number->magnitude, 1) + ", or leave the 0 out");
+    if (number->spelling == Spelling::decimal_with_zero)
+        say(Severity::warning, Topic::value, key.value_at,
+            in + " begins with 0, yet is no octal number; read as " + std::to_string(number->magnitude), "leave the 0 out");
+    if ((number->negative && number->magnitude != 0) || number->magnitude > most) {
+        say(Severity::warning, Topic::value, key.value_at, in + " is out of range: '" + key.value + "'",
+            "0 to " + std::to_string(most) + " is possible");
+        return {};
+    }
+    return number->magnitude;
+}
+
+std::optional<std::uint64_t> Keys::number(IniSection& section, std::string_view key, std::uint64_t most) {
+    IniKey* found = section.find(key);
+    if (found == nullptr) return {};
+    found->used = true;
+    if (found->value.empty()) return {};
+    return parse(section, *found, most);
+}
+
+bool Keys::flag(IniSection& section, std::string_view key, bool otherwise) {
+    IniKey* found = section.find(key);
+    if (found == nullptr) return otherwise;
+    found->used = true;
+    cut_comment(*found);
+    if (found->value.empty()) return otherwise;
+    const auto number = parse_number(found->value);
+    if (number && !number->node_id && number->magnitude < 2) return number->magnitude == 1;
+    for (const std::string_view word : {"true", "yes", "y", "no", "false", "n"}) {
+        if (!same_word(found->value, word)) continue;
+        const bool yes = word[0] == 't' || word[0] == 'y';
+        say(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value + "'",
+            yes ? "write 1" : "write 0");
+        return yes;
+    }
+    const bool yes = number && number->magnitude != 0;
+    say(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value.substr(0, 60) + "'",
+        yes         ? "taken as 1"
+        : otherwise ? "taken as 1, which it is when nothing is said"
+                    : "taken as 0");
+    return number ? yes : otherwise;
+}
+
+std::map<unsigned, IniKey*> Keys::list(IniSection& section, const char* count_key) {
+    std::map<unsigned, IniKey*> out;
+    for (IniKey& key : section.keys) {
+        if (key.name.empty() || !is_digit(key.name[0])) continue;
+        const auto number = parse_number(key.name);
+        if (!number || number->magnitude > 0xFFFF) continue;
+        const auto [at, fresh] = out.emplace(static_cast<unsigned>(number->magnitude), &key);
+        if (!fresh)
+            say(Severity::warning, Topic::count, key.at, "number " + key.name + " of [" + section.name + "] is given twice",
+                "the first counts");
+        key.used = true;
+    }
+    if (count_key == nullptr) return out;
+    IniKey* count = section.find(count_key);
+    if (count == nullptr) {
+        say(Severity::warning, Topic::missing, section.at, "'" + std::string(count_key) + "' is missing in [" + section.name + "]",
+            "it lists " + std::to_string(out.size()));
+        return out;
+    }
+    count->used = true;
+    std::uint64_t said = out.size();
+    if (!count->value.empty()) {
+        const auto number = parse(section, *count, 0xFFFF);
+        if (!number) return out;
+        said = *number;
+    }
+    if (count->value.empty() || said != out.size())
+        say(Severity::warning, Topic::count, count->value_at,
+            "'" + count->name + "' of [" + section.name + "] is " + (count->value.empty() ? "empty" : std::to_string(said)) +
+                ", the section lists " + std::to_string(out.size()),
+            "write " + count->name + "=" + std::to_string(out.size()));
+    return out;
+}
+
+Extras Keys::rest(IniSection& section, std::initializer_list<std::string_view> known) {
+    section.used = true;
+    Extras out;
+    for (const std::string& comment : section.comments) out.emplace_back("", comment);
+    for (IniKey& key : section.keys) {
+        if (key.used) continue;
+        key.used = true;
+        for (const std::string_view name : known)
+            if (const unsigned apart = distance(name, key.name);
+                apart > 0 && apart <= (name.size() > 5 ? 2u : 1u) && section.find(name) == nullptr) {
+                say(Severity::warning, Topic::missing, key.at, "'" + key.name + "' is no key of [" + section.name + "]",
+                    "did you mean '" + std::string(name) + "'? It was kept as it is");
+                break;
+            }
+        out.emplace_back(key.name, key.value);
+    }
+    return out;
+}
+
+bool compactable(const Object& o) {
+    if (o.compact == 0 || o.entries.size() != o.compact + 1 || o.compact > 0xFE) return false;
+    Entry first;
+    first.name = "NrOfObjects", first.data_type = 0x05, first.access = Access::ro, first.default_value = std::to_string(o.compact);
+    if (o.entries[0] != first) return false;
+    const Entry& one = o.entries[1];
+    for (std::size_t i = 1; i < o.entries.size(); ++i) {
+        Entry same = o.entries[i];
+        if (same.sub != i) return false;
+        same.sub = one.sub, same.name = one.name, same.denotation = one.denotation, same.parameter_value = one.parameter_value;
+        if (same != one || !one.extras.empty() || !one.upload_file.empty() || !one.download_file.empty()) return false;
+    }
+    return one.type == ObjectType::var && one.flags == o.flags && one.data_type == o.data_type;
+}
+
+}  // namespace hal::canopen::eds

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: MIT
+#include "eds_text.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace hal::canopen::eds {
+
+namespace {
+
+constexpr std::size_t most_bytes = 32u << 20;
+constexpr std::size_t most_line = 65536;
+
+char small(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; }
+bool blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\r'; }
+
+void append_utf8(std::string& out, std::uint32_t c) {
+    const auto add = [&](std::uint32_t byte) { out += static_cast<char>(byte); };
+    if (c < 0x80) return add(c);
+    if (c < 0x800) return add(0xC0 | c >> 6), add(0x80 | (c & 0x3F));
+    if (c < 0x10000) return add(0xE0 | c >> 12), add(0x80 | (c >> 6 & 0x3F)), add(0x80 | (c & 0x3F));
+    add(0xF0 | c >> 18), add(0x80 | (c >> 12 & 0x3F)), add(0x80 | (c >> 6 & 0x3F)), add(0x80 | (c & 0x3F));
+}
+
+/// Bytes of the UTF-8 character at `at`; 0 when there is none.
+std::size_t utf8_at(std::string_view text, std::size_t at) {
+    const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+    const auto follows = [&](std::size_t n) {
+        for (std::size_t i = 1; i <= n; ++i)
+            if ((byte(at + i) & 0xC0) != 0x80) return false;
+        return true;
+    };
+    const unsigned first = byte(at), second = byte(at + 1);
+    if (first < 0x80) return 1;
+    if (first >= 0xC2 && first < 0xE0) return follows(1) ? 2 : 0;
+    if (first >= 0xE0 && first < 0xF0) {
+        if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second >= 0xA0)) return 0;
+        return follows(2) ? 3 : 0;
+    }
+    if (first >= 0xF0 && first < 0xF5) {
+        if ((first == 0xF0 && second < 0x90) || (first == 0xF4 && second >= 0x90)) return 0;
+        return follows(3) ? 4 : 0;
+    }
+    return 0;
+}
+
+std::size_t first_bad_utf8(std::string_view text) {
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t n = utf8_at(text, at);
+        if (n == 0) return at;
+        at += n;
+    }
+    return std::string_view::npos;
+}
+
+/// Windows-1252 0x80..0x9F; the five holes are kept as control characters.
+constexpr std::array<std::uint16_t, 32> windows{0x20AC, 0x81,   0x201A, 0x0192, 0x201E, 0x2026, 0x2020, 0x2021, 0x02C6, 0x2030, 0x0160,
+                                                0x2039, 0x0152, 0x8D,   0x017D, 0x8F,   0x90,   0x2018, 0x2019, 0x201C, 0x201D, 0x2022,
+                                                0x2013, 0x2014, 0x02DC, 0x2122, 0x0161, 0x203A, 0x0153, 0x9D,   0x017E, 0x0178};
+
+std::string from_windows(std::string_view bytes) {
+    std::string text;
+    text.reserve(bytes.size() + bytes.size() / 8);
+    for (const char c : bytes) {
+        const auto byte = static_cast<unsigned char>(c);
+        append_utf8(text, byte >= 0x80 && byte < 0xA0 ? windows[byte - 0x80u] : byte);
+    }
+    return text;
+}
+
+std::string from_utf16(std::string_view bytes, bool big, bool& whole) {
+    std::string text;
+    const auto  unit = [&](std::size_t i) {
+        const unsigned a = static_cast<unsigned char>(bytes[i]), b = static_cast<unsigned char>(bytes[i + 1]);
+        return big ? a << 8 | b : b << 8 | a;
+    };
+    whole = bytes.size() % 2 == 0;
+    for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
+        std::uint32_t c = unit(i);
+        if (c >= 0xD800 && c < 0xDC00 && i + 3 < bytes.size() && (unit(i + 2) & 0xFC00u) == 0xDC00u) {
+            c = 0x10000 + ((c & 0x3FF) << 10) + (unit(i + 2) & 0x3FF);
+            i += 2;
+        } else if (c >= 0xD800 && c < 0xE000) {
+            c = 0xFFFD;
+            whole = false;
+        }
+        append_utf8(text, c);
+    }
+    return text;
+}
+
+std::uint32_t line_of(std::string_view text, std::size_t at) {
+    return 1 + static_cast<std::uint32_t>(
+                   std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(std::min(at, text.size())), '\n'));
+}
+
+}  // namespace
+
+std::string_view trimmed(std::string_view text) {
+    while (!text.empty() && (blank(text.front()) || text.front() == '\n')) text.remove_prefix(1);
+    while (!text.empty() && (blank(text.back()) || text.back() == '\n')) text.remove_suffix(1);
+    return text;
+}
+
+std::string lower(std::string_view text) {
+    std::string out(text);
+    std::transform(out.begin(), out.end(), out.begin(), small);
+    return out;
+}
+
+bool same_word(std::string_view a, std::string_view b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return small(x) == small(y); });
+}
+
+std::string to_string(const Message& message) {
+    constexpr std::array<const char*, 3> words{"note", "warning", "error"};
+    std::string                          text;
+    if (message.at.line != 0) text = "line " + std::to_string(message.at.line) + ", column " + std::to_string(message.at.column) + ": ";
+    text += std::string(words[static_cast<std::size_t>(message.severity)]) + ": " + message.sentence;
+    return message.help.empty() ? text : text + "; " + message.help;
+}
+
+bool decode(std::string_view bytes, std::string& text, std::vector<Message>& messages) {
+    const auto say = [&](Severity severity, Topic topic, std::uint32_t line, std::string sentence, std::string help) {
+        messages.push_back({severity, topic, {line, 1, 0, 0}, std::move(sentence), std::move(help)});
+    };
+    const auto refuse = [&](std::string sentence, std::string help) {
+        say(Severity::error, Topic::unreadable, 0, std::move(sentence), std::move(help));
+        return false;
+    };
+    text.clear();
+    if (bytes.size() > most_bytes)
+        return refuse("the file has more than 32 MiB", "no device description is that long; is it the right file?");
+    std::string          plain;
+    const auto           starts = [&](std::string_view mark) { return bytes.substr(0, mark.size()) == mark; };
+    std::vector<Message> later;  // their offsets are those of the translated text
+    if (starts("\xFF\xFE") || starts("\xFE\xFF")) {
+        bool whole = true;
+        plain = from_utf16(bytes.substr(2), starts("\xFE\xFF"), whole);
+        say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text", "most tools want plain ASCII; save it as such");
+        if (!whole) say(Severity::warning, Topic::syntax, 1, "some of its characters are cut in two", "");
+    } else if (bytes.size() >= 4 && bytes[1] == 0 && bytes[3] == 0 && bytes[0] != 0) {
+        bool whole = true;
+        plain = from_utf16(bytes, false, whole);
+        say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text without a byte order mark",
+            "most tools want plain ASCII; save it as such");
+    } else {
+        if (starts("\xEF\xBB\xBF")) {
+            bytes.remove_prefix(3);
+            say(Severity::note, Topic::syntax, 1, "the file begins with a byte order mark",
+                "some tools do not find the first section then");
+        }
+        const std::size_t bad = first_bad_utf8(bytes);
+        if (bad == std::string_view::npos) {
+            plain = bytes;
+        } else {
+            plain = from_windows(bytes);
+            say(Severity::note, Topic::syntax, line_of(bytes, bad), "a character that is not UTF-8; the file was read as Windows-1252",
+                "CiA 306 wants ASCII");
+        }
+    }
+    const auto zeros = static_cast<std::size_t>(std::count(plain.begin(), plain.end(), '\0'));
+    if (zeros > plain.size() / 16 + 4) return refuse("this is no text file", "an EDS is a text of [sections] and Key=Value lines");
+    if (zeros != 0) {
+        say(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')), "a zero byte in the text was left out", "");
+        std::erase(plain, '\0');
+    }
+    text.reserve(plain.size());
+    bool lone = false;
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+        if (plain[i] != '\r') {
+            text += plain[i];
+            continue;
+        }
+        std::size_t next = i;
+        while (next < plain.size() && plain[next] == '\r') ++next;
+        if (next < plain.size() && plain[next] == '\n') {
+            i = next - 1;  // any number of \r before \n: one line end
+        } else {
+            text += '\n';
+            lone = true;
+        }
+    }
+    if (lone) say(Severity::note, Topic::syntax, 1, "lines that end with a carriage return only", "");
+    // The places point to the start of their lines.
+    for (Message& message : messages) {
+        std::size_t at = 0;
+        for (std::uint32_t line = 1; line < message.at.line && at != std::string::npos; ++line) {
+            at = text.find('\n', at);
+            if (at != std::string::npos) ++at;
+        }
+        message.at.offset = static_cast<std::uint32_t>(std::min(at, text.size()));
+    }
+    return true;
+}
+
+IniKey* IniSection::find(std::string_view key) {
+    const auto found = std::find_if(keys.begin(), keys.end(), [&](const IniKey& one) { return same_word(one.name, key); });
+    return found == keys.end() ? nullptr : &*found;
+}
+
+IniSection* Ini::find(std::string_view name) {
+    const auto found = by_name_.find(lower(name));
+    return found == by_name_.end() ? nullptr : &sections_[found->second];
+}
+
+void Ini::parse(std::string_view text, std::vector<Message>& messages) {
+    std::uint32_t                                number = 0;
+    IniSection*                                  section = nullptr;
+    std::unordered_map<std::string, std::size_t> keys;  // of the section being read
+    bool                                         said_outside = false;
+    for (std::size_t start = 0; start < text.size();) {
+        const std::size_t      stop = std::min(text.find('\n', start), text.size());
+        const std::string_view whole = text.substr(start, stop - start), line = trimmed(whole);
+        ++number;
+        const std::size_t line_start = start;
+        start = stop + 1;
+        if (line.empty()) continue;
+
+        const auto place = [&](std::string_view part) {
+            const auto    offset = static_cast<std::size_t>(part.data() - text.data());
+            std::uint32_t column = 1;
+            for (std::size_t i = line_start; i < offset; ++i) column += (text[i] & 0xC0) != 0x80;
+            return Place{number, column, static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(part.size())};
+        };
+        const auto say = [&](Severity severity, std::string_view part, std::string sentence, std::string help = "") {
+            messages.push_back({severity, Topic::syntax, place(part), std::move(sentence), std::move(help)});
+        };
+        const auto keep = [&](std::string comment) { (section != nullptr ? section->comments : preamble_).push_back(std::move(comment)); };
+
+        if (line.size() > most_line) {
+            say(Severity::warning, line.substr(0, 1), "a line of " + std::to_string(line.size()) + " bytes was left out",
+                "255 characters are allowed");
+            continue;
+        }
+        if (line[0] == ';' || line[0] == '#') {
+            if (line[0] == '#' && line.find('=') != std::string_view::npos)
+                say(Severity::note, line.substr(0, 1), "a line that begins with '#' was taken for a comment",
+                    "comments of an EDS begin with ';'");
+            keep(std::string(line));
+            continue;
+        }
+        if (line[0] == '[') {
+            const std::size_t close = line.find(']');
+            std::string_view  name = trimmed(line.substr(1, std::min(close, line.size()) - 1));
+            if (close == std::string_view::npos) {
+                say(Severity::warning, line, "the section's ']' is missing", "write [" + std::string(name) + "]");
+            } else if (const std::string_view rest = trimmed(line.substr(close + 1)); !rest.empty() && rest[0] != ';') {
+                say(rest[0] == '#' ? Severity::note : Severity::warning, rest, "text behind the section's name was left out",
+                    "give comments a line of their own");
+            }
+            keys.clear();
+            const auto [at, fresh] = by_name_.try_emplace(lower(name), sections_.size());
+            if (fresh) {
+                sections_.push_back({std::string(name), place(close == std::string_view::npos ? line : line.substr(0, close + 1)), {}, {}});
+                section = &sections_.back();
+            } else {
+                section = &sections_[at->second];
+                say(Severity::warning, line, "section [" + std::string(name) + "] is here for the second time",
+                    "the first is in line " + std::to_string(section->at.line) + "; what this one says again replaces it");
+                for (std::size_t i = 0; i < section->keys.size(); ++i) keys.emplace(lower(section->keys[i].name), i);
+            }
+            continue;
+        }
+        const std::size_t equal = line.find('=');
+        if (equal == std::string_view::npos || equal == 0) {
+            say(Severity::warning, line, equal == 0 ? "nothing stands before '='" : "neither a [section] nor Key=Value",
+                "the line was kept as a comment; comments begin with ';'");
+            keep("; " + std::string(line));
+            continue;
+        }
+        const std::string_view name = trimmed(line.substr(0, equal)), value = trimmed(line.substr(equal + 1));
+        if (section == nullptr) {
+            if (!said_outside)
+                say(Severity::warning, line, "a key before the first section", "the lines up to the first section were kept as comments");
+            said_outside = true;
+            keep("; " + std::string(line));
+            continue;
+        }
+        IniKey key{std::string(name), std::string(value), place(name), place(value.empty() ? line : value)};
+        const auto [at, fresh] = keys.try_emplace(lower(name), section->keys.size());
+        if (fresh) {
+            section->keys.push_back(std::move(key));
+        } else {
+            IniKey&    old = section->keys[at->second];
+            const bool same = old.value == key.value;
+            say(same ? Severity::note : Severity::warning, name, "key '" + key.name + "' is given twice in [" + section->name + "]",
+                same ? "with the same value"
+                     : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; this one, '" + key.value + "', counts");
+            old = std::move(key);
+        }
+    }
+}
+
+}  // namespace hal::canopen::eds

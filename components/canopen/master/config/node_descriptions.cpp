@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#include "canopen/eds/xdd.hpp"
+#include "node_reader.hpp"
+
+namespace hal::canopen::config {
+
+std::string Descriptions::path(const Word& file) const { return file.text.front() == '/' ? file.text : folder_ + file.text; }
+
+bool Descriptions::read(const Word& file, std::string& bytes, Report& report) {
+    const bool whole = file.text.front() == '/';
+    if (read_(path(file), bytes)) return true;
+    report.error(Topic::value, file.at, "the file '" + file.text + "' cannot be read: " + bytes,
+                 whole ? "" : "a name without / at its beginning is looked for beside this file");
+    return false;
+}
+
+const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report) {
+    if (const auto at = known_.find(file.text); at != known_.end()) return at->second.get();
+    auto&       description = known_[file.text];
+    std::string text;
+    if (!read(file, text, report)) return nullptr;
+    eds::Reading reading = eds::read_description(text);
+    if (!reading.description) {
+        std::string why = "it is no device description";
+        for (const auto& m : reading.messages)
+            if (m.severity == eds::Severity::error) why = "line " + std::to_string(m.at.line) + ": " + m.sentence;
+        report.error(Topic::value, file.at, "the device description '" + file.text + "' cannot be used: " + why,
+                     "hal can eds check " + path(file) + " says more");
+        return nullptr;
+    }
+    if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0)
+        report.note(Topic::value, file.at, "'" + file.text + "' has " + std::to_string(warnings) + (warnings == 1 ? " warning" : " warnings"),
+                    "hal can eds check " + path(file) + " says which; what it says of an object that is used here counts");
+    std::vector<eds::Message> ignored;
+    eds::connect_modules(*reading.description, ignored);
+    description = std::make_unique<eds::DeviceDescription>(std::move(*reading.description));
+    return description.get();
+}
+
+bool Descriptions::bytes(const std::string& file, std::vector<std::uint8_t>& to, std::string& why) {
+    std::string text;
+    if (read_(path({file, {}}), text)) return to.assign(text.begin(), text.end()), true;
+    return why = text, false;
+}
+
+bool Descriptions::bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report) {
+    std::string text;
+    if (!read(file, text, report)) return false;
+    to.assign(text.begin(), text.end());
+    return true;
+}
+
+}  // namespace hal::canopen::config

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// A node's keys to a Node: its description, its settings, its PDOs, its writes.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "canopen/eds/eds.hpp"
+#include "canopen/protocol/srdo_description.hpp"
+#include "config_keys.hpp"
+#include "object_catalog.hpp"
+
+namespace hal::canopen::config {
+
+/// Device descriptions by their path, each read once.
+class Descriptions {
+public:
+    Descriptions(const ReadFile& read, std::string folder) : read_(read), folder_(std::move(folder)) {}
+    /// nullptr after saying why, at the value that names the file.
+    const eds::DeviceDescription* get(const Word& file, Report& report);
+    /// The bytes of a file named beside the configuration; false after saying why.
+    bool bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report);
+    /// The same of a file that another one names: false, and why.
+    bool bytes(const std::string& file, std::vector<std::uint8_t>& to, std::string& why);
+
+private:
+    std::string path(const Word& file) const;
+    bool        read(const Word& file, std::string& bytes, Report& report);
+
+    const ReadFile&                                                read_;
+    std::string                                                    folder_;
+    std::map<std::string, std::unique_ptr<eds::DeviceDescription>> known_;
+};
+
+class NodeReader {
+public:
+    NodeReader(Keys& keys, Descriptions& descriptions, const MasterConfig& bus, Node& node)
+        : keys_(keys), report_(keys.report()), descriptions_(descriptions), bus_(bus), node_(node) {}
+    void read();
+
+private:
+    struct PdoWish {
+        unsigned                           number = 0;
+        bool                               to_node = false;
+        const Line*                        objects = nullptr;
+        std::map<std::string, const Line*> options{};
+    };
+    void                                         describe();
+    void                                         identity(const char* key, std::uint32_t& to, std::uint64_t described);
+    void                                         settings();
+    void                                         firmware();
+    void                                         writes();
+    void                                         values_of_dcf();
+    void                                         write_one(const Line& line);
+    void                                         pdos();
+    std::map<std::pair<bool, unsigned>, PdoWish> wishes(const char* what = "pdo", unsigned most = 512);
+    void                                         pdo(const PdoWish& wish);
+    void                                         pdo_options(const PdoWish& wish, Pdo& pdo);
+    void                                         objects_of(const Word& list, Pdo& pdo);
+    void                                         srdos();
+    void                                         srdo(const PdoWish& wish);
+    void                                         srdo_options(const PdoWish& wish, Pdo& pdo);
+    void                                         configure_srdos();
+    bool                                         multiplexable(const Object& o, const Pdo& pdo);
+    bool                                         default_objects(const PdoWish& wish, Pdo& pdo);
+    bool                                         object(const Word& word, Pdo& pdo, Object& out);
+    Object                                       known_object(const Known& known, unsigned bits) const;
+    void                                         scanner_list();
+    void                                         configure(Pdo& pdo);
+    void                                         object_options();
+    void                                         option(Object& object, const std::string& property, const Line& line);
+    bool                                         set_safe(Object& object, const Line& line);
+    void                                         finish_objects();
+    void                                         name_feedback();
+    void                                         leftover();
+
+    Keys&                         keys_;
+    Report&                       report_;
+    Descriptions&                 descriptions_;
+    const MasterConfig&           bus_;
+    Node&                         node_;
+    const eds::DeviceDescription* eds_ = nullptr;
+    std::unique_ptr<Catalog>      catalog_;
+    bool undescribed_ = false;  // its description was no good, which was said: what is not known without it need not be
+};
+
+/// What the node is told of a PDO that has its identifier. [setup]
+void configure_pdo(NodeSetup&, const Pdo&);
+
+/// An SRDO as the node has to be configured. [setup]
+SrdoDescription node_srdo(const Pdo&);
+
+/// The object's bits for a value of its pin. The value is cut off at the object's limits.
+std::uint64_t raw_of(const Object&, double pin_value);
+
+}  // namespace hal::canopen::config

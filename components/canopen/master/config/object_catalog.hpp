@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// What is known of a device's objects: from its EDS, DCF or XDD, or from the profile it follows.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "canopen/eds/eds.hpp"
+#include "master_config.hpp"
+
+namespace hal::canopen::config {
+
+/// One value of a device.
+struct Known {
+    std::uint16_t             index = 0;
+    std::uint8_t              sub = 0;
+    bool                      single = true;            ///< the object has no sub-indices
+    std::string               name;              ///< as pins are called
+    std::string               about;             ///< as the description has it
+    Type                      type = Type::none;
+    bool                      to_node = false, from_node = false, writable = true, readable = true;
+    std::vector<std::uint8_t> value{};  ///< at power-on, or what a DCF configures; for the node-id asked for
+};
+
+class Catalog {
+public:
+    /// Of a device description, for the node with this id.
+    Catalog(const eds::DeviceDescription&, unsigned node_id);
+    /// Of a profile: "cia401", "cia402" with that many axes, "jr3"; nothing known when the name is empty.
+    Catalog(std::string_view profile, unsigned axes);
+    static std::vector<std::string> profiles() { return {"cia401", "cia402", "jr3"}; }
+
+    const Known* find(std::uint16_t index, std::uint8_t sub) const;
+    const Known* find(std::string_view name) const;
+    /// Whether there is any sub-index of it.
+    bool          has(std::uint16_t index) const;
+    bool          empty() const { return all_.empty(); }
+    std::uint64_t number(std::uint16_t index, std::uint8_t sub, std::uint64_t otherwise) const;
+    /// Names of objects that a PDO in this direction may carry.
+    std::vector<std::string> names(bool to_node) const;
+    std::vector<std::string> names() const;
+
+private:
+    void finish();
+
+    std::vector<Known>                              all_;  // by index and sub-index
+    std::map<std::string, std::size_t, std::less<>> by_name_;
+};
+
+}  // namespace hal::canopen::config

@@ -1,0 +1,398 @@
+// SPDX-License-Identifier: MIT
+#include "runner.hpp"
+
+#include <algorithm>
+#include <time.h>
+#include <utility>
+
+namespace hal::canopen {
+
+namespace {
+
+// All nodes send for the first time, and frames of an instance before this one still come.
+constexpr Time start_transient = 100 * millisecond;
+
+void set_value(Entry& e, std::uint64_t value) noexcept { std::memcpy(e.data, &value, e.size < 8 ? e.size : 8); }
+
+DeviceSettings device_settings(const config::MasterConfig& config) {
+    DeviceSettings s;
+    s.node_id = config.node_id;
+    s.queue = 4096;
+    s.obeys_nmt = false;
+    s.lss = false;
+    return s;
+}
+
+}  // namespace
+
+Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
+    : config_(config),
+      events_(events),
+      own_(own_node(config)),
+      device_(own_.description, device_settings(config), *this),
+      master_(config.setup(), device_.out(), *this),
+      master_objects_(device_.dictionary(), master_),
+      flying_(config.flying, device_.out()) {
+    place_.fill(255);
+    for (std::size_t n = 0; n < config.nodes.size(); ++n) {
+        const std::uint8_t id = config.nodes[n].setup.id;
+        place_[id] = static_cast<std::uint8_t>(n);
+        statuses_.push_back(&master_.status(id));
+        if (config.at_stop == config::AtStop::nothing) continue;
+        can::Frame f(
+            0, {static_cast<std::uint8_t>(config.at_stop == config::AtStop::stopped ? NmtCommand::stop : NmtCommand::enter_pre_operational),
+                id});
+        farewell_.push_back(f);
+    }
+    for (const Placed& p : own_.placed) {
+        Slot s;
+        s.entry = device_.dictionary().find(p.index, p.sub);
+        s.node = static_cast<std::uint16_t>(p.node), s.to_node = p.to_node, s.object = p.object;
+        s.has_safe = p.object->safe.has_value(), s.safe = p.object->safe.value_or(0);
+        if (s.to_node && s.has_safe) set_value(*s.entry, s.safe);
+        slots_.push_back(s);
+    }
+    for (const Sent& sent : own_.sent) {
+        if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) device_.pdos().send_on_change(sent.number);
+        outputs_.push_back({&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
+    }
+    for (const Sent& sent : own_.sent)
+        if (sent.pdo->multiplexed())
+            for (const Sent::Part& part : sent.parts)
+                alone_.push_back({sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
+    for (const Received& r : own_.received)
+        if (r.pdo->request != 0) asked_.push_back({r.number, r.node, r.pdo->request});
+    device_.srdos().listen(*this);
+    for (const OwnSrdo& s : own_.srdos)
+        if (s.pdo->to_node) device_.srdos().invert_here(s.number);
+    open_.assign(statuses_.size(), 0);
+    was_operational_.assign(statuses_.size(), 0);
+    ever_operational_.assign(statuses_.size(), 0);
+    produces_ = config.sync == config::SyncMode::cycle || config.sync == config::SyncMode::timed;
+    sync_frame_ = make_frame(config.sync_cob, config.sync_counter != 0 ? 1 : 0);
+    foreign_.resize(ours_.size());
+    if (produces_) ours_.set(sync_frame_.id);
+    if (config.time_period > 0) ours_.set(0x100);
+    if (!config.flying.enabled) ours_.set(0);
+    ours_.set(0x80U + config.node_id);
+    for (const config::Node& n : config.nodes) ours_.set(0x600U + n.setup.id);
+    for (const Output& out : outputs_)
+        if (!out.frame.extended) ours_.set(out.frame.id), ours_to_nodes_.set(out.frame.id);
+}
+
+void Runner::open(can::Link& link) noexcept {
+    link_ = &link;
+    bus_state_ = can::State::active;
+    had_bus_ = false;
+    boots_.store(true);
+}
+
+/// From nothing: a flying master finds out first whether it is the one.
+void Runner::begin(Time now) noexcept {
+    was_active_ = false;
+    foreign_from_ = now + start_transient;
+    if (!config_.flying.enabled) return boot(now);
+    device_.out().clear();
+    device_.start(now);
+    master_.stand_by(now);
+    flying_.start(now);
+}
+
+void Runner::boot(Time now) noexcept {
+    if (!config_.flying.enabled) {
+        device_.out().clear();
+        device_.start(now);
+    }
+    device_.command(NmtCommand::start, now);
+    master_.start(now);
+    std::fill(ever_operational_.begin(), ever_operational_.end(), std::uint8_t{0});
+    sync_begun_ = time_begun_ = false;
+    // A node that is kept alive needs the SYNC while it is found out that it is.
+    sync_open_ = config_.sync_at_boot ||
+                 std::any_of(config_.nodes.begin(), config_.nodes.end(), [](const auto& n) { return n.setup.keep_alive; });
+    steps_changed_ = true;
+    vain_waits_ = 0;
+}
+
+/// The network goes over to this master or to another one.
+void Runner::fly(Time now) noexcept {
+    flying_.poll(now);
+    if (flying_.state() != flying_state_) {
+        flying_state_ = flying_.state();
+        events_.on_flying();
+    }
+    if (flying_.active() == was_active_) return;
+    was_active_ = flying_.active();
+    if (was_active_) return boot(now);
+    master_.stand_by(now);  // the nodes are the other one's: nothing is said to them
+    device_.command(NmtCommand::enter_pre_operational, now);
+}
+
+void Runner::note_sync(const can::Frame& f, Time now) noexcept {
+    if (f.id != config_.sync_cob || f.extended || f.remote || config_.sync != config::SyncMode::follow) return;
+    ++syncs_heard_;
+    sync_came_ = f.time_ns != 0 ? f.time_ns : now;
+    sync_ours_ = f.own;
+}
+
+void Runner::receive(Time now) noexcept {
+    if (link_ == nullptr) return;
+    now_ = now;
+    if (boots_.exchange(false)) begin(now);
+    take_frames(now);
+    statistics_ = link_->statistics();
+    for (can::Rejected what; link_->rejected(what);) events_.on_rejected(what);
+    const auto out_of_order = [](can::State s) { return s == can::State::bus_off || s == can::State::down; };
+    had_bus_ = had_bus_ || !out_of_order(statistics_.state);
+    if (statistics_.state != bus_state_) {
+        if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) device_.bus_off(now);
+        if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) device_.bus_back();
+        bus_state_ = statistics_.state;
+        events_.on_bus_state(bus_state_);
+    }
+    if (config_.flying.enabled) fly(now);
+    if (active()) master_.poll(now);
+    open_and_close();
+    watch_srdos(now);
+    if (config_.sync == config::SyncMode::follow) send(now);  // what a SYNC asked for does not wait for transmit()
+}
+
+std::size_t Runner::take_frames(Time now) noexcept {
+    constexpr std::size_t most = 4096;
+    std::array<can::Frame, 32> frames;
+    std::size_t                taken = 0;
+    while (taken < most) {
+        const std::size_t count = link_->receive(frames, now);
+        for (std::size_t i = 0; i < count; ++i) take(frames[i], now);
+        taken += count;
+        if (count < frames.size()) break;
+    }
+    return taken;
+}
+
+void Runner::take(const can::Frame& f, Time now) noexcept {
+    // Another master of this process makes our heartbeat, and its NMT commands are no stranger's.
+    const bool own_beat = f.id == 0x700U + config_.node_id && !f.extended;
+    if ((own_beat && (f.own || !leads_)) || (f.id == 0 && !leads_)) return;
+    note_sync(f, now);
+    if (config_.flying.enabled && flying_.handle(f, now)) return;
+    if (!f.own && active()) note_foreign(f, now);
+    device_.handle(f, now);
+    if (!active()) return;
+    if (f.id >> 7 == 0x580 >> 7) vain_waits_ = 0;
+    master_.handle(f, now);
+    open_and_close();  // what follows in this cycle may be the node's first PDO
+}
+
+void Runner::take_wishes() noexcept {
+    for (std::size_t n = 0; n < statuses_.size(); ++n) {
+        const bool now = statuses_[n]->operational;
+        if (now && was_operational_[n] == 0)  // it has not heard what was sent on a change before
+            for (const Output& out : outputs_)
+                for (const Sent::Part& part : out.sent->parts)
+                    if (slots_[part.placed].node == n) device_.pdos().trigger(out.sent->number);
+        if (now && was_operational_[n] == 0)
+            for (Alone& a : alone_)
+                if (slots_[a.slot].node == n) a.told = false;
+        was_operational_[n] = now ? 1 : 0;
+        if (now) ever_operational_[n] = 1;
+    }
+    for (Slot& s : slots_) {
+        if (!s.to_node) continue;
+        // One that is kept alive may be operational before we know: it gets what it is to have, not what we would have it held at.
+        const bool kept = config_.nodes[s.node].setup.keep_alive && ever_operational_[s.node] == 0;
+        if (statuses_[s.node]->operational || kept) set_value(*s.entry, s.wish);
+        else if (s.has_safe) set_value(*s.entry, s.safe);
+    }
+}
+
+/// In turn, so that one that changes in every cycle keeps none of the others back.
+void Runner::tell_alone(Time now) noexcept {
+    for (std::size_t n = alone_.size(); n > 0; --n, next_alone_ = (next_alone_ + 1) % alone_.size()) {
+        Alone&      a = alone_[next_alone_ % alone_.size()];
+        const Slot& s = slots_[a.slot];
+        const auto  value = static_cast<std::uint32_t>(number_in(*s.entry) & (~std::uint64_t{0} >> (64 - s.object->bits)));
+        if (!statuses_[s.node]->operational || (a.told && value == a.said)) continue;
+        const auto sent = device_.pdos().tpdo(a.number);
+        if (a.inhibit != 0 && sent.count != 0 && now - sent.last < a.inhibit) continue;
+        if (!device_.pdos().send_to(a.number, statuses_[s.node]->id, s.object->index, s.object->sub, value)) return;
+        a.said = value, a.told = true;
+    }
+}
+
+/// PDOs that nodes send on request.
+void Runner::ask(Time now) noexcept {
+    for (Asked& a : asked_) {
+        if (!statuses_[a.node]->operational || now < a.next || !device_.pdos().request(a.number)) continue;
+        a.next = std::max(a.next + a.every, now + a.every / 2);
+    }
+}
+
+/// Of a node that works every SRDO is expected; what is not believed shows its safe values in this very cycle.
+void Runner::watch_srdos(Time now) noexcept {
+    if (own_.srdos.empty()) return;
+    for (const OwnSrdo& s : own_.srdos) device_.srdos().expect(s.number, statuses_[s.node]->operational, now);
+    device_.srdos().poll(now);
+    for (const OwnSrdo& s : own_.srdos) {
+        if (s.pdo->to_node || device_.srdos().status(s.number).believed) continue;
+        for (const std::size_t n : s.placed)
+            if (slots_[n].has_safe) set_value(*slots_[n].entry, slots_[n].safe);
+    }
+}
+
+void Runner::transmit(Time now, Time period, bool leads) noexcept {
+    if (link_ == nullptr || boots_.load()) return;
+    now_ = now;
+    take_wishes();
+    open_and_close();
+    sync_open_ = sync_open_ || mandatory_are_configured();
+    if (produces_ && sync_open_ && leads && active()) produce_sync(now, period);
+    if (config_.time_period > 0 && leads && active()) produce_time(now);
+    if (active()) tell_alone(now), ask(now);
+    device_.poll(now);
+    leads_ = leads;
+    send(now);
+    serve_boot(now, period);
+}
+
+void Runner::produce_sync(Time now, Time period) noexcept {
+    if (config_.sync == config::SyncMode::timed) {
+        // On a grid of its own, but never more than half a thread period early: the period may be no multiple of it.
+        if (!sync_begun_) next_sync_ = now;
+        if (now + period / 2 < next_sync_) return;
+        const Time behind = now > next_sync_ ? (now - next_sync_ + period / 2) / config_.sync_period : 0;
+        next_sync_ += (behind + 1) * config_.sync_period;
+    }
+    // Nodes that are being configured fill the queue, too.
+    const NetworkStatus& network = master_.status();
+    const bool settled = network.state == NetworkState::operational && now - network.operational_since >= start_transient;
+    const bool behind = sync_begun_ && settled && statistics_.queued != 0;
+    sync_begun_ = true;
+    if (behind) {
+        ++overruns_;
+        events_.on_sync_overrun();
+    }
+    if (device_.produce_sync(now)) ++syncs_;
+}
+
+void Runner::produce_time(Time now) noexcept {
+    if (time_begun_ && now < next_time_) return;
+    next_time_ = (time_begun_ ? next_time_ : now) + config_.time_period;
+    if (next_time_ <= now) next_time_ = now + config_.time_period;
+    time_begun_ = true;
+    constexpr std::int64_t day_ms = 86'400'000, days_to_1984 = 5113;
+    std::int64_t           ms = now / millisecond;  // on a bus in memory every run is the same
+    if (!link_->description().simulated) {
+        timespec t{};
+        clock_gettime(CLOCK_REALTIME, &t);
+        ms = t.tv_sec * 1000 + t.tv_nsec / 1'000'000 - days_to_1984 * day_ms;
+    }
+    device_.time().produce({static_cast<std::uint32_t>(ms % day_ms), static_cast<std::uint16_t>(ms / day_ms)});
+}
+
+void Runner::send(Time now) noexcept {
+    const bool stuck = is_stuck(now);
+    if (!stuck && std::exchange(kept_back_, false)) tell_again();
+    while (const Frame* f = device_.out().front()) {
+        const bool heartbeat = f->id == 0x700U + config_.node_id && !f->extended;
+        if (stuck && is_process_data(*f)) {
+            ++withheld_;
+            kept_back_ = true;
+            device_.out().drop();
+            continue;
+        }
+        const can::Sent sent = heartbeat && !leads_ ? can::Sent::queued : link_->send(*f, now);
+        if (sent == can::Sent::full) break;  // it stays, and goes first in the next cycle
+        device_.out().drop();
+    }
+    link_->flush(now);
+}
+
+/// What is sent on a change only was lost with what was kept back.
+void Runner::tell_again() noexcept {
+    for (const Output& out : outputs_) device_.pdos().trigger(out.sent->number);
+    for (Alone& a : alone_) a.told = false;
+}
+
+/// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would wait in the queue, and move the
+/// machine by what was wanted long ago when the cable is back.
+bool Runner::is_stuck(Time now) noexcept {
+    constexpr Time longest_wait = 20 * millisecond;
+    constexpr Time longest_frame_bits = 160;  // 29-bit identifier, eight bytes, all stuff bits
+    const can::Statistics s = link_->statistics();
+    if (moved_ == 0 || s.queued == 0 || s.sent != sent_before_) moved_ = now;
+    sent_before_ = s.sent;
+    return now - moved_ > std::max(longest_wait, 100 * longest_frame_bits * second / std::max<Time>(config_.bit_rate, 1));
+}
+
+bool Runner::is_process_data(const can::Frame& f) const noexcept {
+    const auto same = [&](const can::Frame& other) { return f.id == other.id && f.extended == other.extended; };
+    const bool asks = f.remote && (f.extended || f.id < 0x700);  // not the guarding of a node
+    return asks || same(sync_frame_) || std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& o) { return same(o.frame); });
+}
+
+void Runner::make_safe() noexcept {
+    if (link_ == nullptr || boots_.exchange(true)) return;  // nothing was started
+    if (!active()) return;                                  // the network is another one's
+    bool synchronous = false;
+    for (Output& out : outputs_) {
+        if (!out.open) continue;
+        if (out.sent->pdo->multiplexed()) {
+            make_safe_alone(out);
+            continue;
+        }
+        std::uint64_t image = 0;
+        for (const Sent::Part& part : out.sent->parts) {
+            const Slot&         s = slots_[part.placed];
+            const std::uint64_t value = s.has_safe ? s.safe : number_in(*s.entry);
+            image |= (part.bits >= 64 ? value : value & ((std::uint64_t{1} << part.bits) - 1)) << part.first;
+        }
+        store(out.frame.data.data(), image);
+        link_->send(out.frame, now_);
+        synchronous = synchronous || out.sent->pdo->synchronous();
+    }
+    if (synchronous && produces_) link_->send(sync_frame_, now_);
+    for (const OwnSrdo& srdo : own_.srdos) {  // silence alone would take the node its SCT
+        if (!srdo.pdo->to_node) continue;
+        std::uint64_t image = 0;
+        unsigned      bit = 0;
+        for (const std::size_t n : srdo.placed) {
+            const Slot&         s = slots_[n];
+            const unsigned      bits = s.object->bits;
+            const std::uint64_t value = s.has_safe ? s.safe : number_in(*s.entry);
+            image |= (bits >= 64 ? value : value & ((std::uint64_t{1} << bits) - 1)) << bit;
+            bit += bits;
+        }
+        can::Frame f = make_frame(srdo.pdo->cob, static_cast<std::uint8_t>(srdo.pdo->bytes()));
+        store(f.data.data(), image);
+        link_->send(f, now_);
+        f.id = srdo.pdo->cob + 1;
+        store(f.data.data(), ~image);
+        link_->send(f, now_);
+    }
+    for (const can::Frame& f : farewell_) link_->send(f, now_);
+    link_->flush(now_);
+}
+
+void Runner::make_safe_alone(const Output& out) noexcept {
+    for (const Sent::Part& part : out.sent->parts) {
+        const Slot& s = slots_[part.placed];
+        can::Frame  f = out.frame;
+        f.data[0] = static_cast<std::uint8_t>(0x80 | statuses_[s.node]->id);
+        store(f.data.data() + 1, s.object->index);
+        f.data[3] = s.object->sub;
+        store(f.data.data() + 4, static_cast<std::uint32_t>(s.has_safe ? s.safe : number_in(*s.entry)));
+        link_->send(f, now_);
+    }
+}
+
+void Runner::on_step(const NodeStatus& status) noexcept {
+    steps_changed_ = true;
+    if (place_[status.id & 0x7f] != 255) events_.on_step(place_[status.id & 0x7f], status);
+}
+void Runner::on_network(const NetworkStatus& status) noexcept { events_.on_network(status); }
+void Runner::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
+    if (place_[node & 0x7f] != 255) events_.on_emergency(place_[node & 0x7f], e);
+}
+
+}  // namespace hal::canopen

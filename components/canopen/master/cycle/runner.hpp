@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT
+// A master on a link, a cycle at a time:
+//
+//     Runner runner(config);                  // [setup]
+//     runner.open(*link);
+//     each cycle:
+//         runner.receive(now);                // what came is in the objects
+//         for (auto& slot : runner.slots()) … // objects to pins, pins to slot.wish
+//         runner.transmit(now, period);       // SYNC and PDOs are on their way
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <bitset>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "canopen/master/boot/flying_master.hpp"
+#include "canopen/master/boot/master_objects.hpp"
+#include "canopen/master/boot/nmt_master.hpp"
+#include "canopen/protocol/device.hpp"
+#include "link/can.hpp"
+#include "master_node.hpp"
+
+namespace hal::canopen {
+
+/// An object at work. The value is the object's: of a real its bits, of a number all 64.
+struct Slot {
+    Entry*                entry = nullptr;
+    std::uint16_t         node = 0;
+    bool                  to_node = false, has_safe = false;
+    std::uint64_t         safe = 0;
+    std::uint64_t         wish = 0;           ///< to_node: what is to be sent while the node is operational
+    const config::Object* object = nullptr;
+};
+
+/// The value in an object: of a real its bits, of a number all 64. [realtime]
+inline std::uint64_t number_in(const Entry& e) noexcept {
+    const auto raw = Dictionary::value<std::uint64_t>(e);
+    if (!is_signed(e.type) || e.size == 0 || e.size >= 8) return raw;
+    const unsigned bits = 8 * e.size;
+    return (raw >> (bits - 1) & 1) != 0 ? raw | ~std::uint64_t{0} << bits : raw;
+}
+
+/// What the runner noticed. [realtime]
+class RunnerEvents {
+public:
+    virtual ~RunnerEvents() = default;
+    virtual void on_step(std::size_t node, const NodeStatus&) noexcept { (void)node; }
+    virtual void on_network(const NetworkStatus&) noexcept {}
+    virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
+    /// A PDO of a node did not come for its time-out. `place` is that in OwnNode::received.
+    virtual void on_late(std::size_t place) noexcept { (void)place; }
+    /// It came with fewer bytes than its objects have; they keep their values. `place` is that in OwnNode::received.
+    virtual void on_short(std::size_t place, unsigned bytes) noexcept { (void)place, (void)bytes; }
+    /// Another device sends what only this master may send. `begins`: after a second without it.
+    struct Foreign {
+        std::uint16_t               id = 0;
+        std::array<std::uint8_t, 2> data{};
+        std::uint32_t               frames = 0;  ///< since it was told last
+        bool                        sync = false, rpdo = false, begins = false;
+    };
+    virtual void on_foreign(const Foreign&) noexcept {}
+    /// Another device has the master's own node-id.
+    virtual void on_own_id_taken() noexcept {}
+    /// An SRDO is not to be believed (any more); its objects have their safe values. `place` is that in OwnNode::srdos.
+    virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
+    virtual void on_bus_state(can::State) noexcept {}
+    /// The link did not pass on what its sender may not send.
+    virtual void on_rejected(const can::Rejected&) noexcept {}
+    /// Another of the flying masters' states; Runner::flying() has it.
+    virtual void on_flying() noexcept {}
+    /// What belongs to one SYNC was not all sent when the next was due.
+    virtual void on_sync_overrun() noexcept {}
+};
+
+class Runner final : private MasterEvents, private SafetyEvents {
+public:
+    Runner(const config::MasterConfig&, RunnerEvents&);  // [setup] the configuration outlives it
+
+    /// The next receive() boots the network. [setup]
+    void open(can::Link& link) noexcept;
+    /// Nothing is received or sent any more. [setup]
+    void close() noexcept { link_ = nullptr; }
+
+    /// [realtime]
+    void receive(Time now) noexcept;
+    /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them otherwise. [realtime]
+    void transmit(Time now, Time period, bool leads = true) noexcept;
+    /// All outputs to their safe values, nodes out of the operational state as configured. The network boots anew when cycles go on.
+    /// Async-signal-safe.
+    void make_safe() noexcept;
+
+    std::span<Slot>             slots() noexcept { return slots_; }
+    bool                        operational(std::size_t node) const noexcept { return statuses_[node]->operational; }
+    const NodeStatus&           status(std::size_t node) const noexcept { return *statuses_[node]; }
+    const NetworkStatus&        network() const noexcept { return master_.status(); }
+    const can::Statistics&      link_statistics() const noexcept { return statistics_; }
+    /// Process data and SYNCs that were not sent because the bus took nothing: what they said would have come too late.
+    std::uint64_t               withheld() const noexcept { return withheld_; }
+    std::uint64_t               syncs() const noexcept { return syncs_; }
+    std::uint64_t               sync_overruns() const noexcept { return overruns_; }
+    // The newest SYNC of another node.
+    std::uint64_t               syncs_heard() const noexcept { return syncs_heard_; }
+    Time                        sync_came() const noexcept { return sync_came_; }
+    bool                        sync_is_ours() const noexcept { return sync_ours_; }  ///< it was made by another master of this process
+    const FlyingMaster&         flying() const noexcept { return flying_; }
+    /// It is the NMT master: the only one, or the active one of several.
+    bool                        active() const noexcept { return !config_.flying.enabled || flying_.active(); }
+    /// The bus was in order, now or earlier: before that it is only waited for.
+    bool                        had_bus() const noexcept { return had_bus_; }
+    const OwnNode&              own() const noexcept { return own_; }
+    Master&                     master() noexcept { return master_; }
+    Device&                     device() noexcept { return device_; }
+    const config::MasterConfig& config() const noexcept { return config_; }
+    /// [realtime]
+    void restart_node(std::size_t node, Time now) noexcept { master_.restart(config_.nodes[node].setup.id, now); }
+    void restart(Time now) noexcept {
+        if (active()) boot(now);
+    }
+    Srdos::Status               srdo(std::size_t place) const noexcept { return device_.srdos().status(own_.srdos[place].number); }
+    /// Its fault is seen to: it is believed from the next good one on. [realtime]
+    void acknowledge_srdo(std::size_t place, Time now) noexcept { device_.srdos().acknowledge(own_.srdos[place].number, now); }
+    /// The global fail-safe command goes out with the next transmit(). [realtime]
+    bool send_fail_safe() noexcept { return device_.srdos().send_fail_safe(); }
+
+private:
+    /// A PDO for when things go wrong.
+    struct Output {
+        const Sent* sent;
+        can::Frame  frame;
+        bool        open = false;  // for a node that is configured
+    };
+    /// An object that goes alone, by a multiplexed PDO, whenever its value is another.
+    struct Alone {
+        unsigned      number = 0;  // of our TPDO
+        std::size_t   slot = 0;
+        Time          inhibit = 0;
+        std::uint32_t said = 0;
+        bool          told = false;  // since the node is operational
+    };
+    void begin(Time now) noexcept;
+    void boot(Time now) noexcept;
+    std::size_t take_frames(Time now) noexcept;
+    void take(const can::Frame&, Time now) noexcept;
+    void note_foreign(const can::Frame&, Time now) noexcept;
+    void open_and_close() noexcept;
+    bool mandatory_are_configured() const noexcept;
+    void serve_boot(Time now, Time period) noexcept;
+    void fly(Time now) noexcept;
+    void note_sync(const can::Frame&, Time now) noexcept;
+    void send(Time now) noexcept;
+    bool is_stuck(Time now) noexcept;
+    bool is_process_data(const can::Frame&) const noexcept;
+    void produce_sync(Time now, Time period) noexcept;
+    void produce_time(Time now) noexcept;
+    void take_wishes() noexcept;
+    void tell_alone(Time now) noexcept;
+    void ask(Time now) noexcept;
+    void tell_again() noexcept;
+    void make_safe_alone(const Output&) noexcept;
+    void watch_srdos(Time now) noexcept;
+
+    void on_step(const NodeStatus&) noexcept override;
+    void on_network(const NetworkStatus&) noexcept override;
+    void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
+    void on_rpdo_late(unsigned number, Time) noexcept override { events_.on_late(number - 1); }
+    void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override { events_.on_short(number - 1, bytes); }
+    void on_id_collision(Time) noexcept override { events_.on_own_id_taken(); }
+    void on_srdo_fault(unsigned number, SrdoFault fault, Time) noexcept override { events_.on_srdo_fault(number - 1, fault); }
+
+    const config::MasterConfig&    config_;
+    RunnerEvents&                  events_;
+    const OwnNode                  own_;
+    Device                         device_;
+    Master                         master_;
+    MasterObjects                  master_objects_;
+    FlyingMaster                   flying_;
+    can::Link*                     link_ = nullptr;
+    std::vector<Slot>              slots_;
+    std::vector<const NodeStatus*> statuses_;
+    std::array<std::uint8_t, 128>  place_{};     // node-id to place in the configuration; 255: none
+    std::vector<std::uint8_t>      open_;  // by node: it is configured, so PDOs go to and fro
+    bool                           steps_changed_ = true, sync_open_ = false;
+    /// What others sent under an identifier of ours.
+    struct ForeignCount {
+        Time          last = 0, told = 0;
+        std::uint32_t frames = 0;
+    };
+    std::vector<ForeignCount>      foreign_;     // by identifier
+    Time                           foreign_from_ = 0;
+    std::bitset<2048>              ours_, ours_to_nodes_;  // identifiers that only we send; RPDOs among them
+    unsigned                       vain_waits_ = 0;        // of serve_boot(), in a row
+    std::vector<std::uint8_t> was_operational_, ever_operational_;  // by node; ever: since the network was booted
+    std::vector<Output>            outputs_;
+    /// A PDO of a node that is asked for.
+    struct Asked {
+        unsigned    number = 0;  // of our RPDO
+        std::size_t node = 0;
+        Time        every = 0, next = 0;
+    };
+    std::vector<Asked>             asked_;
+    std::vector<Alone>             alone_;
+    std::size_t                    next_alone_ = 0;
+    std::vector<can::Frame>        farewell_;          // NMT commands for make_safe()
+    can::Frame                     sync_frame_;
+    can::Statistics                statistics_{};
+    can::State                     bus_state_ = can::State::active;
+    Time                           now_ = 0, next_sync_ = 0, next_time_ = 0;
+    std::uint64_t                  syncs_ = 0, overruns_ = 0, syncs_heard_ = 0;
+    Time                           sync_came_ = 0;
+    std::uint64_t                  sent_before_ = 0, withheld_ = 0;  // for is_stuck()
+    Time                           moved_ = 0;
+    bool                           kept_back_ = false;  // something was withheld since the bus took the last
+    bool                           sync_ours_ = false, was_active_ = false, had_bus_ = false;
+    FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
+    bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
+    std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
+};
+
+}  // namespace hal::canopen

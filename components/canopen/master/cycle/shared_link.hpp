@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// One controller for several masters of this process: two that are each other's strangers would send NMT commands, SYNCs and heartbeats
+// with one identifier at the same time, which no bus can carry.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "link/can.hpp"
+#include "link/ring.hpp"
+
+namespace hal::canopen {
+
+class SharedBus;
+
+/// A master's share of a link. What one sends the others hear, too. Those of one bus belong into one thread; in another one a master that
+/// finds the link in use waits for its next cycle.
+class SharedLink final : public can::Link {
+public:
+    /// Opens the address, or joins those that have it open. [setup]
+    static std::unique_ptr<SharedLink> open(const std::string& address, const can::Options&, std::string& problem);
+    ~SharedLink() override;
+
+    /// True for the one of those with this node-id that makes the SYNC and the heartbeat. When it goes, or has not asked for four periods,
+    /// another takes over. [realtime]
+    bool leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t period_ns) noexcept;
+
+    can::Sent send(const can::Frame&, std::int64_t now_ns) noexcept override;
+    void flush(std::int64_t now_ns) noexcept override;
+    std::size_t receive(std::span<can::Frame> room, std::int64_t now_ns) noexcept override;
+    can::Statistics statistics() const noexcept override;
+    can::State state() const noexcept override;
+    void restart() noexcept override;
+    bool set_filters(std::span<const can::Filter>) override { return false; }
+    const can::Description& description() const noexcept override;
+    std::vector<can::DeliveryTime> delivery_times() const override;
+    bool wait(std::int64_t at_most_ns) override;
+    bool rejected(can::Rejected&) noexcept override;
+
+private:
+    friend class SharedBus;
+    explicit SharedLink(std::shared_ptr<SharedBus>);
+
+    const std::shared_ptr<SharedBus> bus_;
+    link::Ring<can::Frame> incoming_{2048};  // pushed and popped by whoever holds the bus
+};
+
+}  // namespace hal::canopen

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// `sync = follow`: another node's SYNC is the beat of this machine's threads.
+#pragma once
+
+#include <utility>
+
+#include "canopen/master/config/master_config.hpp"
+#include "hal/discipline.hpp"
+#include "runner.hpp"
+
+namespace hal::canopen {
+
+/// Holds the thread's cycles at a constant time after the SYNC, and tells how well.
+class SyncFollower {
+public:
+    enum class Said : std::uint8_t {
+        nothing,
+        lost,      ///< five SYNCs in a row did not come: the threads run by their own clock
+        in_vain,   ///< the SYNC moves with the threads
+        unequal,   ///< its period is no multiple of the thread's
+    };
+
+    SyncFollower(Component& component, const Function& shows, const config::MasterConfig& config)
+        : config_(config),
+          locked_(component, shows, "sync-locked", "the cycles are at their time after the SYNC"),
+          error_(component, shows, "sync-error-us", "how much later than at that time the newest SYNC came", {.unit = "us"}),
+          rate_(component, shows, "sync-rate-ppm", "how much slower its clock runs than ours", {.unit = "ppm"}) {}
+
+    /// Throws when the threads follow somebody else. [setup]
+    void start() {
+        beat_.lose();
+        seen_ = 0;
+        following_ = false;
+        clock_.claim();
+    }
+
+    /// Once a cycle, after Runner::receive(). [realtime]
+    Said cycle(const Runner& runner, Time start, Time period) noexcept {
+        const Time every = config_.sync_period > 0 ? config_.sync_period : period;
+        if (every % period != 0) {
+            const bool told = std::exchange(unequal_, true);
+            return told ? Said::nothing : Said::unequal;
+        }
+        Said said = Said::nothing;
+        if (runner.syncs_heard() != seen_) {
+            seen_ = runner.syncs_heard();
+            ours_ = runner.sync_is_ours();
+            if (ours_) following_ = false;
+            else said = take(runner.sync_came(), every, start, period);
+        } else if (following_) {
+            said = miss(every, start);
+        }
+        locked_ = ours_ || beat_.locked();
+        rate_ = beat_.rate() * 1e6;
+        return said;
+    }
+    /// Time since the newest SYNC, s.
+    double silence(Time now) const noexcept { return static_cast<double>(now - came_) * 1e-9; }
+
+private:
+    static constexpr unsigned most_missed = 5;
+
+    Said take(Time came, Time every, Time start, Time period) noexcept {
+        const Time phase = config_.sync_phase >= 0 ? config_.sync_phase : period / 2;
+        Time       error = (came + phase - start) % period;  // cycles follow each other, so it counts within half of one
+        if (error >= (period + 1) / 2) error -= period;
+        if (error < -period / 2) error += period;
+        came_ = came;
+        following_ = true;
+        missed_ = 0;
+        const bool was_in_vain = beat_.in_vain();
+        clock_.step(beat_.follow(error, every, clock_.limit_ns()));
+        error_ = static_cast<double>(error) * 1e-3;
+        return beat_.in_vain() && !was_in_vain ? Said::in_vain : Said::nothing;
+    }
+
+    Said miss(Time every, Time start) noexcept {
+        if (start - came_ <= static_cast<Time>(missed_ + 2) * every) return Said::nothing;
+        if (++missed_ < most_missed) {
+            clock_.step(beat_.coast(every, clock_.limit_ns()));
+            return Said::nothing;
+        }
+        beat_.lose();
+        following_ = false;
+        return Said::lost;
+    }
+
+    const config::MasterConfig& config_;
+    DisciplinedClock            clock_;
+    Discipline                  beat_;
+    Time                        came_ = 0;
+    std::uint64_t               seen_ = 0;
+    unsigned                    missed_ = 0;
+    bool                        following_ = false, ours_ = false, unequal_ = false;
+    Out<bool>                   locked_;
+    Out<double>                 error_, rate_;
+};
+
+}  // namespace hal::canopen

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// CiA 309-3: a gateway that text lines command and a CANopen network obeys. It owns no bus, no socket and no clock; it takes memory as it
+// needs it, so it is for programs without a cycle.
+//
+//     Gateway gateway(1);
+//     const int client = gateway.connect();
+//     ... gateway.receive(client, bytes, now); gateway.handle(1, frame, now); gateway.poll(now);
+//     ... send gateway.output(client) to the client, gateway.out(1) to the bus ...
+#pragma once
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "canopen/master/network.hpp"
+#include "canopen/protocol/dictionary.hpp"
+#include "gateway_command.hpp"
+#include "gateway_pdo.hpp"
+
+namespace hal::canopen::gateway {
+
+/// `ERROR:0x06020000 #object does not exist …`, as an answer.
+std::string abort_text(Abort);
+/// What a gateway reports of itself: `info version`, and in its own node 1018h, 1008h (product name) and 2000h (the three names).
+struct Identity {
+    static constexpr std::size_t most_name = 200;  ///< bytes of a name
+    std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;  ///< as registered with CiA; 0: none. revision: major << 16 | minor
+    std::string   vendor_name = "Halcyon", product_name = "Halcyon CiA 309-3 gateway", order_code = "";
+};
+/// What Net::own holds.
+Description own_objects(const Identity&);
+
+class Gateway {
+public:
+    static constexpr std::size_t most_line = 4 << 20, most_output = 32 << 20, most_pending = 64;
+
+    /// Nets count from 1. With one net it is every client's default.
+    explicit Gateway(unsigned nets, Identity identity = {});
+    ~Gateway();
+
+    /// What `init` does to the bus: the index of a bit rate as in CiA 305, 9 is automatic. False: it cannot be had.
+    std::function<bool(unsigned net, std::uint32_t bit_rate_index)> initialise = [](unsigned, std::uint32_t) { return true; };
+    /// What `store` keeps: commands that set the gateway up again. False: there is no place for them.
+    std::function<bool(const std::string& commands)> keep = [](const std::string&) { return false; };
+    /// Carries out what `keep` was given.
+    void configure(std::string_view commands, Time now);
+
+    int connect();
+    /// Ends what the client waits for.
+    void disconnect(int client);
+    /// Bytes of the client, whole lines or not.
+    void receive(int client, std::string_view bytes, Time now);
+    /// Lines for the client; the caller takes them out. More than most_output: it does not read, and is better left.
+    std::string& output(int client) { return clients_[static_cast<std::size_t>(client)].out; }
+
+    FrameQueue& out(unsigned net) { return nets_[net - 1]->out; }
+    void        handle(unsigned net, const Frame&, Time now);
+    void        poll(Time now);
+    /// Nobody waits for anything.
+    bool idle() const { return pending_.empty(); }
+
+private:
+    struct Client {
+        bool        there = false, skips = false;  ///< skips: the rest of a line that was too long
+        std::string in, out;
+        unsigned    net = 0, node = 0;         ///< defaults; 0: none
+        std::size_t pending = 0;
+    };
+    struct Pending;
+    struct Net final : Events {
+        Net(Gateway& gateway, unsigned number);
+        void on_node(std::uint8_t node, NodeEvent, NmtState, Time) noexcept override;
+        void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
+
+        Gateway&       gateway;
+        const unsigned number;
+        FrameQueue     out{4096};
+        Network        network;
+        LssMaster      lss;
+        Pdos           pdos;
+        std::uint8_t   id = 0;     ///< own node; 0: none
+        Dictionary     own;        ///< its objects, for this gateway's clients; the bus does not reach them
+        Time           heartbeat = 0, next_heartbeat = 0;
+        Time           command_timeout = 0, sdo_timeout = 500 * millisecond;
+        std::size_t    command_size = 1 << 20;
+        bool           block = false, boot_up = true, watches[128] = {};
+        const Pending* lss_owner = nullptr;  ///< whose service it is
+    };
+    /// A command that has no answer yet.
+    struct Pending {
+        int                             client = 0;
+        unsigned                        net = 0;
+        std::uint8_t                    node = 0;
+        Command                         command = {};
+        SdoRequest                      request = {};
+        std::unique_ptr<std::uint8_t[]> room = {};
+        Time                            since = 0, limit = 0;
+        bool                            lss_started = false;
+        unsigned                        part = 0;            ///< of lss_inquire_addr
+        std::string                     text = {};
+    };
+
+    void line(int client, std::string_view text, Time now);
+    void execute(int client, Command&&, Time now);
+    bool address(Client&, const Command&, int client, bool node, unsigned& net_number, std::uint8_t& node_id);
+    void answer(int client, std::uint32_t sequence, const std::string& text);
+    void refuse(int client, std::uint32_t sequence, Error, const std::string& why = "");
+    void say(const std::string& event);
+
+    void network_command(int client, const Command&, Net&, std::uint8_t node, Time now);
+    void error_control(int client, const Command&, Net&, std::uint8_t node, Time now);
+    void setting(int client, const Command&, Net&, Time now);
+    void pdo_command(int client, Command&&, Net&, Time now);
+    void start_transfer(int client, Command&&, Net&, std::uint8_t node, Time now);
+    void start_lss(int client, Command&&, Net&, Time now);
+    void own_transfer(int client, const Command&, Net&, Time now);
+    bool enqueue(int client, Command&&, Net&, std::uint8_t node, Time now);
+    /// True: it has its answer.
+    bool        proceed(Pending&, Time now);
+    bool        proceed_transfer(Pending&, Time now);
+    bool        proceed_lss(Pending&, Time now);
+    bool        begin_lss(Pending&, Net&, Time now);
+    void        cancel(Pending&);
+    void        reset(Net&, Time now);
+    std::string commands() const;
+
+    const Identity                    identity_;
+    std::vector<std::unique_ptr<Net>> nets_;
+    std::vector<Client>               clients_;
+    std::list<Pending>                pending_;
+};
+
+}  // namespace hal::canopen::gateway

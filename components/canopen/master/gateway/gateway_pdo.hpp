@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// The gateway's own PDOs: no object dictionary, only values of types, as `set rpdo` and `set tpdo` name them.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "canopen/protocol/frames.hpp"
+#include "gateway_command.hpp"
+
+namespace hal::canopen::gateway {
+
+class Pdos {
+public:
+    explicit Pdos(FrameQueue& out) : out_(out) {}
+
+    /// `set rpdo` and `set tpdo`. No data types: there is none of that number any more.
+    Error configure(bool received, const Command&);
+    /// `r p N`: "pdo 1 2 17 -5". Error::state: nothing has come yet.
+    Error read(unsigned number, std::string& text) const;
+    /// `w p N`: sends it, now or as its transmission type says.
+    Error write(const Command&, std::string& why);
+    /// Asks for a PDO of type `rtr`; false when it is none.
+    bool request(unsigned number);
+    bool arrived(unsigned number) const;
+
+    /// Takes PDOs and SYNC. `on_pdo` gets the text of those received.
+    void handle(const Frame&, const std::function<void(const std::string&)>& on_pdo);
+    void clear() { received_.clear(), sent_.clear(); }
+
+private:
+    struct Pdo {
+        std::uint32_t               cob = 0, transmission = on_event;
+        std::vector<const Format*>  formats = {};
+        std::array<std::uint8_t, 8> data = {};
+        bool                        fresh = false;        ///< has a value; of a synchronous one sent: it waits for its SYNC
+        bool                        held = false;         ///< received, and waits for the SYNC
+        std::array<std::uint8_t, 8> waiting = {};
+        unsigned                    syncs = 0;
+    };
+    static unsigned    bits(const Pdo&);
+    static std::string text(unsigned number, const Pdo&);
+    bool               send(const Pdo&);
+
+    FrameQueue&             out_;
+    std::map<unsigned, Pdo> received_, sent_;
+};
+
+}  // namespace hal::canopen::gateway

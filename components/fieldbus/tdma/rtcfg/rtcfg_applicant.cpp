@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include "rtcfg_applicant.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "hal/replace_file.hpp"
+
+namespace hal::tdma::rtcfg {
+
+namespace {
+
+constexpr std::size_t   most_accepted = 1000;  // a server that changes its mind for ever
+constexpr std::uint32_t most_refusals = 3, most_dead = 100;  // that are said; a hostile station could go on and on
+
+/// The first error, without what a terminal would take as a command: the text is a stranger's.
+std::string first_error(const config::Reading& reading) {
+    std::string text = config::to_string(reading, "stage 1");
+    text.resize(std::min(text.find('\n'), text.size()));
+    std::replace_if(text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+    return text;
+}
+
+}  // namespace
+
+Applicant::Applicant(std::string instance, Station& station, Logical own, std::string file, Events& events)
+    : path_(std::move(file)),
+      station_(station),
+      events_(events),
+      client_(station, own, *this, !path_.empty()),
+      spare_(largest_stage_2),
+      log_(std::move(instance)) {}
+
+void Applicant::begin() noexcept {
+    client_.begin();
+    accepted_ = nullptr;
+    offered_ = writing_ = told_server_ = told_other_ = false;
+    file_bytes_ = dead_told_ = refusals_ = 0;
+    Offer           offer;
+    const Accepted* answer = nullptr;
+    File            file;
+    std::uint32_t   bytes = 0;
+    while (offers_.pop(offer) || answers_.pop(answer) || files_.pop(file) || written_.pop(bytes)) {}
+}
+
+void Applicant::on_stage_1(std::span<const std::uint8_t> text, const Address& server) noexcept {
+    if (offered_ || text.size() > std::tuple_size_v<decltype(Offer::text)>) return;
+    if (accepted_ != nullptr) {
+        if (std::equal(text.begin(), text.end(), accepted_->text.begin(), accepted_->text.end())) {
+            client_.accept(server, accepted_->schedule.heartbeat_ms);  // the server began anew: it is told again who is there
+            return;
+        }
+        const State state = station_.status().state;
+        if (state != State::unconfigured && state != State::listening) {  // slots in use do not move
+            ++foreign_;
+            if (!told_other_) told_other_ = true, events_.on_event(Event::other_configuration, server, 0);
+            return;
+        }
+    }
+    Offer offer;
+    offer.server = server;
+    offer.length = static_cast<std::uint16_t>(text.size());
+    std::copy(text.begin(), text.end(), offer.text.begin());
+    offered_ = offers_.push(offer);
+}
+
+void Applicant::on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address& server) noexcept {
+    if (writing_) return;
+    std::swap(file, spare_);
+    writing_ = files_.push({server, length});
+}
+
+void Applicant::on_dead_station(const Address& who) noexcept {
+    if (dead_told_ < most_dead) ++dead_told_, events_.on_event(Event::reported_dead, who, 0);
+}
+
+void Applicant::on_other_server(const Address& who) noexcept {
+    if (!told_server_) told_server_ = true, events_.on_event(Event::other_server, who, 0);
+}
+
+bool Applicant::cycle() noexcept {
+    if (std::uint32_t bytes = 0; written_.pop(bytes)) writing_ = false, file_bytes_ = bytes;
+    const Accepted* answer = nullptr;
+    if (!answers_.pop(answer)) return false;
+    offered_ = false;
+    if (answer == nullptr || !station_.reconfigure(answer->setup)) {
+        ++foreign_;
+        return false;
+    }
+    accepted_ = answer;
+    told_server_ = told_other_ = false;
+    client_.accept(answer->server, answer->schedule.heartbeat_ms);
+    return true;
+}
+
+void Applicant::work(std::int64_t now_ns) {
+    now_ns_ = now_ns;
+    for (Offer offer; offers_.pop(offer);) judge(offer);
+    for (File file; files_.pop(file);) write(file);
+    log_.flush(now_ns);
+}
+
+void Applicant::judge(const Offer& offer) {
+    std::string text(reinterpret_cast<const char*>(offer.text.data()), offer.length);
+    if (text == refused_) {
+        answers_.push(nullptr);
+        return;
+    }
+    const std::string server = ethernet::to_string(offer.server);
+    config::Reading   reading = config::read(text);
+    const bool        one = reading.good() && reading.schedule.stations.size() == 1 && !reading.schedule.stations[0].slots.empty();
+    if (!one || all_.size() >= most_accepted) {
+        refused_ = text;
+        if (++refusals_ <= most_refusals)
+            say("what " + server + " sent as this station's configuration cannot be used" +
+                (reading.good() ? one ? ", it was changed too often" : ": it is not the block of one station, with a slot"
+                                : "; " + first_error(reading)) +
+                "; this station waits for another" + (refusals_ == most_refusals ? ", and says no more of such" : ""));
+        answers_.push(nullptr);
+        return;
+    }
+    refusals_ = 0;
+    StationSetup setup = config::setup_of(reading.schedule, 0);
+    const auto&  entry = reading.schedule.stations[0];
+    const auto   count = std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");
+    say("configured by " + server + ": it is station " + entry.name + " with " + count + ", the cycle is " +
+        config::microseconds(reading.schedule.cycle));
+    FaultWords words(setup);
+    all_.push_back(std::make_unique<Accepted>(
+        Accepted{offer.server, std::move(text), std::move(reading.schedule), std::move(setup), std::move(words)}));
+    answers_.push(all_.back().get());
+}
+
+/// Replaces the file whole; a device or a pipe is written in place.
+void Applicant::write(const File& file) {
+    const std::string server = ethernet::to_string(file.server);
+    std::uint32_t     written = 0;
+    if (file.length == 0) {
+        say(server + " has no file (stage 2) for this station; '" + path_ + "' is not written");
+    } else {
+        const std::string why = replace_file(path_, {reinterpret_cast<const char*>(spare_.data()), file.length});
+        if (!why.empty()) {
+            say("the file from " + server + " cannot be written to '" + path_ + "': " + why + "; correct stage2=");
+        } else {
+            written = file.length;
+            say("the file from " + server + ", " + std::to_string(written) + " bytes, is in '" + path_ + "'");
+        }
+    }
+    written_.push(written);
+}
+
+void Applicant::finish() {
+    work(now_ns_);
+    log_.close();
+}
+
+void Applicant::say(const std::string& sentence) { log_.print(sentence, now_ns_); }
+
+}  // namespace hal::tdma::rtcfg

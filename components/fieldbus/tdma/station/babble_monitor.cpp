@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#include "babble_monitor.hpp"
+
+#include <algorithm>
+
+namespace hal::tdma {
+
+void BabbleMonitor::heard(const Address& address, Time arrived, Time cycle) noexcept {
+    for (std::size_t i = 0; i < used_; ++i) {
+        Peer& p = peers_[i];
+        if (p.address != address) continue;
+        if (arrived - p.since >= cycle) p.since = arrived, p.frames = 0;
+        p.most = std::max(p.most, ++p.frames);
+        return;
+    }
+    if (used_ < peers_.size()) peers_[used_++] = {address, arrived, 1, 1};
+}
+
+const Address* BabbleMonitor::babbler(std::uint32_t limit, std::uint32_t& frames) noexcept {
+    const Address* worst = nullptr;
+    frames = limit;
+    for (std::size_t i = 0; i < used_; ++i)
+        if (peers_[i].most > frames) frames = peers_[i].most, found_ = peers_[i].address, worst = &found_;
+    used_ = 0;  // an address that was invented once does not take a place for ever
+    return worst;
+}
+
+}  // namespace hal::tdma

@@ -1,0 +1,388 @@
+// SPDX-License-Identifier: MIT
+#include "cane.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <memory>
+#include <vector>
+
+#include "cane_settings.hpp"
+#include "cane_stations.hpp"
+#include "command_guard.hpp"
+#include "discipline/discipline.hpp"
+#include "link/filtering.hpp"
+#include "link/ring.hpp"
+#include "link/segment.hpp"
+#include "link/system.hpp"
+#include "seal.hpp"
+
+namespace hal::can::cane {
+
+namespace {
+
+constexpr unsigned most_messages = 255;  // of one packed frame: its count is a byte
+constexpr std::size_t most_payload = ethernet::largest_frame - ethernet::header_bytes;
+
+/// What share of the line this link's frames take, both ways. The sending and the receiving thread add; the receiving one closes windows.
+class Load {
+public:
+    void add(std::size_t frame_bytes) noexcept { bytes_.fetch_add(ethernet::wire_bytes(frame_bytes), std::memory_order_relaxed); }
+    void tick(std::int64_t now_ns, std::uint32_t mbit_per_s) noexcept {
+        constexpr std::int64_t window_ns = 100'000'000;
+        if (now_ns >= since_ns_ && now_ns - since_ns_ < window_ns) return;
+        const auto bits = 8.0 * static_cast<double>(bytes_.exchange(0, std::memory_order_relaxed));
+        const auto ns = static_cast<double>(now_ns > since_ns_ ? now_ns - since_ns_ : window_ns);
+        share_.store(mbit_per_s == 0 ? 0.0 : std::min(1.0, bits * 1e3 / mbit_per_s / ns), std::memory_order_relaxed);
+        since_ns_ = now_ns;
+    }
+    double share() const noexcept { return share_.load(std::memory_order_relaxed); }
+
+private:
+    std::int64_t since_ns_ = 0;
+    std::atomic<std::uint64_t> bytes_{0};
+    std::atomic<double> share_{0.0};
+};
+
+Description describe_settings(const Settings& s) {
+    Description d;
+    d.address = "cane:" + s.segment.substr(s.segment.starts_with("eth:") ? 4 : 0);
+    if (s.slot) d.address += "?slot=" + std::to_string(*s.slot);
+    d.transport = std::string("CAN in Ethernet frames, ") + (s.format == Format::packed ? "packed" : "one each");
+    d.segment = s.segment;
+    const auto line = ethernet::describe(s.segment);
+    d.simulated = line.simulated, d.in_memory = line.in_memory;
+    d.has_bit_rate = false, d.has_stamps = true;
+    return d;
+}
+
+class CaneLink final : public FilteringLink {
+public:
+    CaneLink(Settings settings, const Options& options, std::unique_ptr<ethernet::Port> port,
+             std::shared_ptr<ethernet::DisciplineHandle> discipline, std::uint16_t session)
+        : settings_(std::move(settings)), options_(options), port_(std::move(port)), discipline_(std::move(discipline)), session_(session),
+          simulated_(port_->description().simulated), process_data_(options.send_capacity), service_data_(options.send_capacity) {
+        for (const auto& [id, address] : settings_.nodes) nodes_.fix(id, address);
+        guard_.learn(settings_.learns);
+        if (settings_.master) guard_.fix(*settings_.master);
+        for (const auto& other : settings_.also) guard_.allow(other);
+        seal_ = Seal::take(settings_.key, simulated_);
+        description_ = describe_settings(settings_);
+        auto own = port_->address();
+        if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { own = d.address(); });
+        std::copy(own.begin(), own.end(), frame_.begin() + 6);
+        frame_[12] = ether_type >> 8, frame_[13] = ether_type & 0xff;
+        look_at_line();
+    }
+
+    Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
+        const auto drop = [this](Sent why) {
+            Counting::add(counting_.dropped);
+            return why;
+        };
+        if (!frame.valid() || frame.fd || options_.listen_only) return drop(Sent::refused);
+        guard_.sent(frame, now_ns != unclocked || simulated_ ? now_ns : link::monotonic_ns());
+        if (is_replaced(frame)) return Sent::queued;
+        auto& queue = is_service(frame) ? service_data_ : process_data_;
+        if (queue.push(frame)) return Sent::queued;
+        flush(now_ns);
+        return queue.push(frame) ? Sent::queued : drop(Sent::full);
+    }
+
+    void flush(std::int64_t now_ns) noexcept override {
+        if (settings_.format == Format::packed) flush_packed(now_ns);
+        else flush_single(now_ns);
+        held_ = process_data_.size();
+    }
+
+    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+        std::size_t count = 0;
+        while (count < room.size()) {
+            if (next_ == filled_ && !refill(now_ns)) break;
+            room[count++] = buffer_[next_++];
+        }
+        return count;
+    }
+
+    Statistics statistics() const noexcept override {
+        auto s = counting_.read(process_data_.size() + service_data_.size());
+        const auto line = port_->statistics();
+        // What found no room here is a gap in the sequence, too.
+        s.lost_on_wire = s.lost - std::min(s.lost, line.lost);
+        s.lost = s.lost_on_wire + line.lost;
+        s.errors += line.errors;
+        s.load = load_.share();
+        return s;
+    }
+    int descriptor() const noexcept override { return port_->descriptor(); }
+    bool rejected(Rejected& what) noexcept override { return rejections_.take(what); }
+    std::vector<DeliveryTime> delivery_times() const override {
+        return discipline_ ? discipline_->delivery_times(*settings_.slot) : std::vector<DeliveryTime>{};
+    }
+
+    bool wait(std::int64_t at_most_ns) override {
+        if (next_ != filled_) return true;
+        if (!simulated_) return port_->wait(link::monotonic_ns() + at_most_ns);
+        constexpr std::int64_t step_ns = 100'000;  // nobody wakes a waiter of a segment in memory
+        for (; !refill(ethernet::unclocked); at_most_ns -= step_ns) {
+            if (at_most_ns <= 0) return false;
+            const timespec pause{0, static_cast<long>(std::min(step_ns, at_most_ns))};
+            nanosleep(&pause, nullptr);
+        }
+        return true;
+    }
+
+private:
+    /// SDO, heartbeat, boot-up and LSS wait for process data, SYNC, NMT and EMCY: those have a cycle to keep.
+    static bool is_service(const Frame& f) noexcept { return f.id >= 0x580; }
+    /// Of SYNC and the PDOs of the predefined connection set the newest counts.
+    static bool is_state(const Frame& f) noexcept { return !f.extended && !f.remote && (f.id == 0x080 || (f.id >= 0x180 && f.id < 0x580)); }
+    /// It took the place of an older one that found no room in the last cycle: what is late must not make everything behind it late, too.
+    bool is_replaced(const Frame& frame) noexcept {
+        if (held_ == 0 || !is_state(frame)) return false;
+        for (std::size_t n = 0; n < held_; ++n) {
+            Frame& older = *process_data_.at(n);
+            if (older.id != frame.id || !is_state(older)) continue;
+            older = frame;
+            Counting::add(counting_.dropped);
+            return true;
+        }
+        return false;
+    }
+
+    /// Room for payload, as it is now; 0: nothing can leave.
+    std::size_t room() const noexcept {
+        if (!discipline_) return most_payload;
+        std::size_t room = 0;
+        discipline_->with([&](const ethernet::Discipline& d) { room = std::min(d.room(*settings_.slot), most_payload); });
+        return room;
+    }
+    bool is_up() const noexcept {
+        bool ready = !discipline_;
+        if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { ready = d.ready(); });
+        return line_up_ && ready;
+    }
+    void look_at_line() noexcept {
+        const auto line = port_->statistics();
+        line_up_ = line.up, speed_ = line.speed;
+        const auto is = is_up() ? State::active : State::down, was = counting_.state.exchange(is, std::memory_order_relaxed);
+        if (is == State::active && was == State::down && was_up_) Counting::add(counting_.restarts);
+        was_up_ = was_up_ || is == State::active;
+    }
+
+    void address_to(const ethernet::Address& to) noexcept { std::copy(to.begin(), to.end(), frame_.begin()); }
+
+    /// The frame in `frame_`, of that length. `full`: keep what it carries for the next time.
+    ethernet::Sent launch(std::size_t length, bool service, std::int64_t now_ns) noexcept {
+        ethernet::Finisher* const finisher = settings_.format == Format::packed ? seal_.get() : nullptr;
+        if (!is_up()) return ethernet::Sent::down;
+        const std::span whole(frame_.data(), length);
+        auto sent = ethernet::Sent::down;
+        if (!discipline_) sent = port_->send(whole, {.finisher = finisher}, now_ns);
+        else
+            discipline_->with([&](ethernet::Discipline& d) {
+                sent = d.send(whole, *settings_.slot, settings_.priority + (service ? 1 : 0), finisher);
+            });
+        if (sent == ethernet::Sent::queued) load_.add(length);
+        return sent;
+    }
+    /// Takes the first `count` messages out of a queue, as sent or as lost.
+    void done(link::Ring<Frame>& queue, std::size_t count, ethernet::Sent sent) noexcept {
+        if (sent == ethernet::Sent::queued)
+            for (std::size_t n = 0; n < count; ++n) counting_.count_sent(*queue.at(n));
+        else Counting::add(counting_.dropped, count);
+        queue.pop(count);
+    }
+
+    void flush_single(std::int64_t now_ns) noexcept {
+        for (auto* queue : {&process_data_, &service_data_})
+            while (const Frame* f = queue->front()) {
+                const auto to = f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
+                address_to(to.value_or(ethernet::broadcast));
+                const auto bytes = put_single(*f, settings_.order, std::span(frame_).subspan(ethernet::header_bytes, room()));
+                const auto sent = bytes == 0 ? ethernet::Sent::refused
+                                             : launch(ethernet::header_bytes + bytes, queue == &service_data_, now_ns);
+                if (sent == ethernet::Sent::full) return;
+                done(*queue, 1, sent);
+            }
+    }
+
+    /// As many messages as there are and fit, process data first. The frame goes to one station when all of them do.
+    void flush_packed(std::int64_t now_ns) noexcept {
+        while (process_data_.front() != nullptr || service_data_.front() != nullptr) {
+            const auto payload = room();
+            const std::size_t header = packed_header + (settings_.key ? counter_bytes : 0), tail = settings_.key ? tag_bytes : 0;
+            const auto space = payload < header + tail ? std::span<std::uint8_t>{}
+                                                       : std::span(frame_).subspan(ethernet::header_bytes + header, payload - header - tail);
+            std::size_t bytes = 0, counts[2] = {0, 0};
+            std::optional<ethernet::Address> to;
+            bool to_all = false, first = true, is_full = false;
+            for (std::size_t q = 0; q < 2 && !is_full; ++q)
+                while (const Frame* f = (q == 0 ? process_data_ : service_data_).at(counts[q])) {
+                    const auto more = counts[0] + counts[1] < most_messages ? put_packed(*f, space.subspan(bytes)) : 0;
+                    if (more == 0) {
+                        is_full = true;
+                        break;
+                    }
+                    const auto wants = f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
+                    to_all = to_all || !wants || (!first && wants != to);
+                    to = wants;
+                    first = false;
+                    bytes += more;
+                    ++counts[q];
+                }
+            auto sent = ethernet::Sent::refused;  // not even one fits
+            if (first) {
+                counts[process_data_.front() != nullptr ? 0 : 1] = 1;
+            } else {
+                const auto& destination = to_all ? ethernet::broadcast : *to;
+                address_to(destination);
+                const auto length = ethernet::header_bytes + header + bytes + tail;
+                const bool service = counts[0] == 0;
+                begin_packed(std::span(frame_.data(), length), static_cast<std::uint8_t>(counts[0] + counts[1]),
+                             service ? session_ | services_alone : session_, settings_.key.has_value());
+                sent = launch(length, service, now_ns);
+                if (sent == ethernet::Sent::full) return;
+            }
+            done(process_data_, counts[0], sent);
+            done(service_data_, counts[1], sent);
+        }
+    }
+
+    /// Takes the next frame that has messages for us. False: there is none.
+    bool refill(std::int64_t now_ns) noexcept {
+        next_ = filled_ = 0;
+        constexpr unsigned most_frames = 256;  // of one call: a babbling station must not keep a cycle
+        for (unsigned n = 0; n < most_frames; ++n) {
+            const auto arrival = port_->receive(now_ns);
+            if (!arrival) break;
+            take(*arrival);
+            if (filled_ != 0) return true;
+        }
+        const auto now = now_ns != ethernet::unclocked || simulated_ ? now_ns : link::monotonic_ns();
+        if (now != looked_at_) look_at_line(), looked_at_ = now;
+        if (now != ethernet::unclocked) load_.tick(now, speed_);
+        return false;
+    }
+
+    void take(const ethernet::Arrival& arrival) noexcept {
+        const auto whole = arrival.bytes;
+        if (whole.size() < ethernet::header_bytes || whole[12] != ether_type >> 8 || whole[13] != (ether_type & 0xff))
+            return Counting::add(counting_.errors);
+        ethernet::Address to, from;
+        std::copy_n(whole.begin(), 6, to.begin());
+        std::copy_n(whole.begin() + 6, 6, from.begin());
+        if ((from[0] & 1) != 0) return Counting::add(counting_.errors);  // no station has the address of a group
+        load_.add(whole.size());
+        using Origin = ethernet::Discipline::Origin;
+        Origin origin = Origin::plausible;
+        if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { origin = d.origin(from, arrival.time_ns, whole.size()); });
+        if (origin == Origin::stranger) return reject(Rejected::Why::stranger, 0, from, arrival.time_ns);
+        /// A frame that commands must be the master's, and in its slot.
+        const auto is_allowed = [&](const Frame& f) {
+            if (Guard::negotiates(f)) guard_.release();
+            if (!Guard::commands(f)) return true;
+            if (origin == Origin::out_of_slot) return reject(Rejected::Why::out_of_slot, f.id, from, arrival.time_ns), false;
+            return guard_.may_command(from, arrival.time_ns) || (reject(Rejected::Why::not_the_master, f.id, from, arrival.time_ns), false);
+        };
+        Frame f;
+        if (settings_.format == Format::single) {
+            if (get_single(whole.subspan(ethernet::header_bytes), settings_.order, f) != Wrong::none) return Counting::add(counting_.errors);
+            if (is_allowed(f)) keep(f, from, arrival.time_ns);
+            return;
+        }
+        Unpacker packed;
+        switch (packed.open(whole, settings_.key ? &*settings_.key : nullptr)) {
+        case Wrong::none: break;
+        case Wrong::not_signed: return reject(Rejected::Why::unsigned_frame, 0, from, arrival.time_ns);
+        case Wrong::tag: return reject(Rejected::Why::wrong_tag, 0, from, arrival.time_ns);
+        default: return Counting::add(counting_.errors);
+        }
+        if (settings_.key && !replays_.fresh(from, packed.counter())) return reject(Rejected::Why::replayed, 0, from, arrival.time_ns);
+        for (Unpacker look = packed; look.next(f);)
+            if (!is_allowed(f)) return;
+        const auto verdict = streams_.take(from, (to[0] & 1) != 0, packed.stamp(), arrival.time_ns);
+        if (verdict.lost != 0) Counting::add(counting_.lost, verdict.lost);
+        if (!verdict.fresh) return Counting::add(counting_.errors);
+        while (packed.next(f)) keep(f, from, arrival.time_ns);
+    }
+
+    void reject(Rejected::Why why, std::uint32_t id, const ethernet::Address& from, std::int64_t now_ns) noexcept {
+        Counting::add(counting_.rejected);
+        rejections_.add(why, id, from, now_ns);
+    }
+
+    void keep(Frame& f, const ethernet::Address& from, std::int64_t time_ns) noexcept {
+        f.time_ns = time_ns;
+        if (settings_.learns && !f.extended && !f.remote && !nodes_.learn(f.id, from, time_ns)) Counting::add(counting_.errors);
+        if (!filters_.pass(f)) return;
+        counting_.count_received(f);
+        buffer_[filled_++] = f;
+    }
+
+    const Settings settings_;
+    const Options options_;
+    const std::unique_ptr<ethernet::Port> port_;
+    const std::shared_ptr<ethernet::DisciplineHandle> discipline_;  // nullptr: frames leave at once
+    const std::uint16_t session_;
+    const bool simulated_;
+    Load load_;
+    Nodes nodes_;
+    std::atomic<bool> line_up_{true};  // written by the receiving thread
+
+    link::Ring<Frame> process_data_, service_data_;  // the sending thread's, as the next four
+    std::size_t held_ = 0;                     // at the front of the first: what the last flush() left
+    std::shared_ptr<Seal> seal_;
+    std::array<std::uint8_t, ethernet::largest_frame> frame_{};
+
+    Streams streams_;  // from here on: the receiving thread's
+    Guard guard_;
+    Rejections rejections_;
+    Replays replays_;
+    std::array<Frame, most_messages> buffer_;
+    std::size_t next_ = 0, filled_ = 0;
+    std::int64_t looked_at_ = ethernet::unclocked;
+    std::uint32_t speed_ = 0;
+    bool was_up_ = false;
+};
+
+}  // namespace
+
+Description describe(const std::string& place) {
+    Settings settings;
+    (void)parse(place, settings, false);  // open() reports what is wrong with the options
+    return describe_settings(settings);
+}
+
+Opened open(const std::string& place, const Options& options) {
+    Settings settings;
+    if (auto problem = parse(place, settings); !problem.empty()) return {nullptr, std::move(problem)};
+    if (options.fd) return {nullptr, "frames of CAN FD do not travel in 0x9023 frames; leave fd out"};
+    ethernet::Options how;
+    how.types = {ether_type};
+    how.receive_capacity = std::clamp<std::size_t>(options.receive_capacity / 8, 64, 1024);
+    const std::string segment = settings.segment + settings.segment_options;
+    auto opened = ethernet::open(segment, how);
+    if (!opened) {  // the caller says the address that was written
+        if (opened.problem.starts_with(segment + ": ")) opened.problem.erase(0, segment.size() + 2);
+        return {nullptr, std::move(opened.problem)};
+    }
+    std::shared_ptr<ethernet::DisciplineHandle> discipline;
+    if (settings.slot) {
+        discipline = ethernet::discipline_of(*opened.port);
+        if (!discipline)
+            return {nullptr, "no TDMA on " + settings.segment + " has slots; loadrt tdma for it first, or leave slot= out"};
+        std::size_t room = 0;
+        discipline->with([&](const ethernet::Discipline& d) { room = d.room(*settings.slot); });
+        if (room < packed_header + longest_message + (settings.key ? counter_bytes + tag_bytes : 0))
+            return {nullptr, "the TDMA on " + settings.segment + " has no slot " + std::to_string(*settings.slot) +
+                                 " of at least " + (settings.key ? "60" : "46") + " bytes; give it one, or name another"};
+    }
+    // Another one for each link of this machine, and on a segment in memory the same ones in every run.
+    static std::atomic<std::uint16_t> opened_before{0};
+    auto session = ++opened_before;
+    if (!opened.port->description().simulated) session = static_cast<std::uint16_t>(session ^ link::clock_ns(CLOCK_REALTIME) / 1'000'000);
+    session = static_cast<std::uint16_t>(session & ~services_alone);
+    return {std::make_unique<CaneLink>(std::move(settings), options, std::move(opened.port), std::move(discipline), session), {}};
+}
+
+}  // namespace hal::can::cane

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// Who may command: NMT, SYNC, TIME and set-points (RPDO 1 to 4 of the predefined connection set) are taken from one station, the master's.
+// Others are rejected while it is alive. No memory is taken after construction; all of it belongs to the receiving thread, except sent().
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "cane_format.hpp"
+
+namespace hal::can::cane {
+
+class Guard {
+public:
+    static constexpr std::int64_t alive_ns = 1'000'000'000;  ///< a master that commanded nothing for that long may be another
+
+    void fix(const ethernet::Address& master) { master_ = master, known_ = fixed_ = true; }  // [setup]
+    void allow(const ethernet::Address& other) { allowed_.push_back(other); }                // [setup]
+    /// Nothing is learnt: without fix() anybody may command. [setup]
+    void learn(bool on) { learns_ = on; }
+
+    /// [any]
+    static bool commands(const Frame& f) noexcept {
+        if (f.extended || f.remote) return false;
+        const std::uint32_t code = f.id & 0x780, node = f.id & 0x7f;
+        const bool is_rpdo = node != 0 && (code == 0x200 || code == 0x300 || code == 0x400 || code == 0x500);
+        return f.id == 0x000 || f.id == 0x080 || f.id == 0x100 || is_rpdo;
+    }
+    /// A flying master asks for the network (CiA 302-2: 071h to 076h): whoever is next may command at once.
+    static bool negotiates(const Frame& f) noexcept { return !f.extended && f.id >= 0x071 && f.id <= 0x076; }
+
+    /// May this station command? It is the master from now on when nobody else is. [realtime] receiver
+    bool may_command(const ethernet::Address& from, std::int64_t now_ns) noexcept {
+        for (const auto& other : allowed_)
+            if (other == from) return true;
+        const auto own = own_ns_.load(std::memory_order_relaxed);
+        if (fixed_) return from == master_;
+        if (!learns_) return true;
+        if (own != INT64_MIN && now_ns - own < alive_ns) return false;  // this station is the master
+        if (known_ && from != master_ && now_ns - heard_ns_ < alive_ns) return false;
+        known_ = true, master_ = from, heard_ns_ = now_ns;
+        return true;
+    }
+    /// [realtime] receiver
+    void release() noexcept {
+        if (!fixed_) known_ = false;
+        own_ns_.store(INT64_MIN, std::memory_order_relaxed);
+    }
+    /// This link sends a command itself. [realtime] sender
+    void sent(const Frame& f, std::int64_t now_ns) noexcept {
+        if (commands(f)) own_ns_.store(now_ns, std::memory_order_relaxed);
+    }
+
+private:
+    std::vector<ethernet::Address> allowed_;
+    ethernet::Address master_{};
+    bool known_ = false, fixed_ = false, learns_ = true;
+    std::int64_t heard_ns_ = 0;
+    std::atomic<std::int64_t> own_ns_{INT64_MIN};
+};
+
+/// Rejected frames, a report a second: what is rejected meanwhile is counted.
+class Rejections {
+public:
+    /// [realtime] receiver
+    void add(Rejected::Why why, std::uint32_t id, const ethernet::Address& from, std::int64_t now_ns) noexcept {
+        std::uint64_t number = 0;
+        for (const auto byte : from) number = number << 8 | byte;
+        if (waiting_.count == 0) waiting_ = {why, id, number, 0};
+        ++waiting_.count;
+        now_ns_ = now_ns;
+    }
+    bool take(Rejected& out) noexcept {
+        if (waiting_.count == 0 || (told_ && now_ns_ - told_ns_ < 1'000'000'000)) return false;
+        out = waiting_, waiting_ = {}, told_ = true, told_ns_ = now_ns_;
+        return true;
+    }
+
+private:
+    Rejected waiting_;
+    bool told_ = false;
+    std::int64_t now_ns_ = 0, told_ns_ = 0;
+};
+
+/// The newest counter of each sender of signed frames.
+class Replays {
+public:
+    /// False: it came before. Of a frame whose tag is right. [realtime] receiver
+    bool fresh(const ethernet::Address& from, std::uint64_t counter) noexcept {
+        Sender* s = nullptr;
+        for (auto& candidate : senders_)
+            if (candidate.counter != 0 && candidate.from == from) s = &candidate;
+        if (s == nullptr) {
+            s = &senders_[0];
+            for (auto& candidate : senders_)
+                if (candidate.counter < s->counter) s = &candidate;
+            *s = {from, 0};
+        }
+        if (counter <= s->counter) return false;
+        s->counter = counter;
+        return true;
+    }
+
+private:
+    struct Sender {
+        ethernet::Address from{};
+        std::uint64_t counter = 0;
+    };
+    std::array<Sender, 128> senders_{};
+};
+
+}  // namespace hal::can::cane

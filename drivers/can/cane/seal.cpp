@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+#include "seal.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <mutex>
+#include <vector>
+
+#include "link/system.hpp"
+
+namespace hal::can::cane {
+
+namespace {
+
+/// Grows with every frame of this process, and from one start to the next, as long as nobody sets the clock back.
+std::uint64_t next_counter(bool simulated) noexcept {
+    static std::atomic<std::uint64_t> last{0};
+    const auto clock = simulated ? std::uint64_t{0} : static_cast<std::uint64_t>(link::clock_ns(CLOCK_REALTIME));
+    auto before = last.load(std::memory_order_relaxed);
+    for (;;) {
+        const auto next = std::max(before + 1, clock);
+        if (last.compare_exchange_weak(before, next, std::memory_order_relaxed)) return next;
+    }
+}
+
+ethernet::Address destination(std::span<const std::uint8_t> frame) noexcept {
+    ethernet::Address to{};
+    std::copy_n(frame.begin(), to.size(), to.begin());
+    return to;
+}
+
+}  // namespace
+
+void Seal::leaves(std::span<std::uint8_t> frame) noexcept {
+    finish_packed(frame, sequences_of(frame).next(destination(frame)), key_ ? next_counter(simulated_) : 0, key_ ? &*key_ : nullptr);
+}
+
+void Seal::stayed(std::span<const std::uint8_t> frame) noexcept { sequences_of(frame).take_back(destination(frame)); }
+
+std::shared_ptr<Seal> Seal::take(const std::optional<Key>& key, bool simulated) {
+    static std::mutex mutex;
+    static std::vector<std::shared_ptr<Seal>> all;
+    constexpr long kept = 64;  // a frame waits for its time for a few cycles at most: the one given back longest ago has none any more
+    const std::lock_guard lock(mutex);
+    const auto is_free = [](const auto& s) { return s.use_count() == 1; };
+    const auto oldest = std::find_if(all.begin(), all.end(), is_free);
+    if (oldest == all.end() || std::count_if(all.begin(), all.end(), is_free) < kept) all.push_back(std::make_shared<Seal>());
+    else std::rotate(oldest, oldest + 1, all.end());
+    Seal& s = *all.back();
+    s.process_.clear(), s.service_.clear();
+    s.key_ = key, s.simulated_ = simulated;
+    return all.back();
+}
+
+}  // namespace hal::can::cane

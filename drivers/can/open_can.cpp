@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// From an address to a driver: the one list of them.
+#include <algorithm>
+#include <charconv>
+#include <optional>
+
+#include "can/cane/cane.hpp"
+#include "can/replay/can_replay.hpp"
+#include "can/sim/sim_can.hpp"
+#include "can/slcan/slcan.hpp"
+#include "can/socketcan/socketcan.hpp"
+#include "can/udp/can_udp.hpp"
+#include "link/address.hpp"
+#include "link/can.hpp"
+
+namespace hal::can {
+
+namespace {
+
+constexpr link::Driver<Opened, Options, Description> drivers[] = {
+    {"can", socketcan::open, socketcan::describe},
+    {"sim", simbus::open, simbus::describe},
+    {"udp", canudp::open, canudp::describe, nullptr, nullptr, "restart"},
+    {"slcan", slcan::open, slcan::describe, nullptr, nullptr, "own errors restart receivequeue"},
+    {"replay", replay::open, replay::describe, nullptr, nullptr, "own restart sendqueue receivequeue"},
+    {"cane", cane::open, cane::describe, cane::is_own_option, cane::own_options, "bitrate datarate own errors restart"},
+};
+
+using link::quoted;
+
+/// 500000, 500k, 1M, unlimited.
+std::optional<std::uint32_t> rate(std::string_view text) {
+    if (text == "unlimited") return unlimited;
+    double value = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (wrong != std::errc{}) return std::nullopt;
+    const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+    value *= unit == "k" ? 1e3 : unit == "M" ? 1e6 : unit.empty() ? 1.0 : -1.0;
+    if (!(value >= 1.0 && value <= 20e6)) return std::nullopt;
+    return static_cast<std::uint32_t>(value);
+}
+
+std::optional<std::uint32_t> number(std::string_view text) {
+    std::uint32_t value = 0;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (wrong != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+    return value;
+}
+
+/// What is wrong with `key=value`, or nothing.
+std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
+    const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
+    const auto to_rate = [&](std::uint32_t& to) -> std::string {
+        const auto r = rate(value);
+        if (!r) return std::string(key) + " is " + quoted(value) + "; write bits per second, as in 500000, 500k or 1M";
+        to = *r;
+        return {};
+    };
+    const auto to_number = [&](auto& to, std::uint32_t most) -> std::string {
+        const auto n = number(value);
+        if (!n || *n > most) return std::string(key) + " is " + quoted(value) + "; write a whole number up to " + std::to_string(most);
+        to = *n;
+        return {};
+    };
+    if (key == "bitrate") return to_rate(o.bit_rate);
+    if (key == "datarate") return o.fd = true, to_rate(o.data_rate);
+    if (key == "fd") return to_flag(o.fd);
+    if (key == "listen") return to_flag(o.listen_only);
+    if (key == "own") return to_flag(o.own_frames);
+    if (key == "errors") return to_flag(o.error_frames);
+    if (key == "stamps") return to_flag(o.stamps);
+    if (key == "restart") return to_number(o.restart_ms, 3'600'000);
+    if (key == "sendqueue") return to_number(o.send_capacity, 65536);
+    if (key == "receivequeue") return to_number(o.receive_capacity, 65536);
+    return std::string(link::no_option) + quoted(key) +
+           "; there are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue";
+}
+
+}  // namespace
+
+Opened open(std::string_view address, const Options& given) {
+    return link::open_address<Opened, Options, Description>(
+        address, given, drivers, apply,
+        "a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE");
+}
+
+Description describe(std::string_view address) { return link::describe_address<Opened, Options, Description>(address, drivers); }
+
+}  // namespace hal::can

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+// A CAN bus in memory. Its time is the newest `now_ns` its users told it; what happened up to there is worked out by whichever of
+// them comes first ("the pump"). Frames that start strictly before now are sent, so that all who send at the same time take part
+// in the same arbitration, in whatever order their functions run.
+//
+// Threads: every node has a queue to the bus and one from it, each with one writer and one reader. The bus itself belongs to who
+// holds `pumping_`. A cycle only tries to take it: when another thread is working, that thread does the work and the cycle goes on.
+//   1. thread A takes pumping_, works up to its now      2. thread B queues a frame, fails to take pumping_, goes on
+//   3. A gives pumping_ back                             4. the next call of any thread finds B's frame: it is late, not lost
+// On a bus without a bit rate (`unlimited`) A looks once more after 3, so that B's frame does not wait for a later call.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "link/can.hpp"
+#include "link/ring.hpp"
+#include "link/simulation.hpp"
+#include "link/timing.hpp"
+
+namespace hal::can::simbus {
+
+/// One end of the bus. Fields without a word belong to the pump.
+struct Node {
+    Node(const Options& options) : outgoing(options.send_capacity), incoming(options.receive_capacity) {}
+
+    link::Ring<Frame> outgoing;  ///< writer: the sending thread; `time_ns` is when it was queued
+    link::Ring<Frame> incoming;  ///< reader: the receiving thread; `time_ns` is when it is complete
+    std::vector<Filter> filters;
+    int number = 0;
+    bool fd = false, own_frames = false, error_frames = false, listen_only = false;
+    std::uint32_t restart_ms = 0;
+
+    unsigned tec = 0, rec = 0;
+    bool off = false;                     ///< bus off
+    bool leaving = false;                 ///< its link is gone
+    std::int64_t back_at = INT64_MAX;     ///< when bus off ends
+    std::int64_t hold_until = INT64_MIN;  ///< does not start a frame before
+    bool delayed = false, doubled = false, counted = false;  ///< of the frame at the front of `outgoing`
+    Frame babble;
+    std::int64_t babble_period = 0, babble_at = 0;
+
+    std::atomic<bool> cut{false};            ///< written by anyone
+    std::atomic<bool> wants_restart{false};  ///< written by the sending thread
+    std::atomic<State> state{State::active};
+    std::atomic<std::uint32_t> counters{0};  ///< tec << 16 | rec, for who asks
+    std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, thrown_away{0}, errors{0}, bus_offs{0},
+        restarts{0};
+    std::atomic<std::uint64_t> dropped{0};  ///< written by the sending thread
+};
+
+class Bus {
+public:
+    Bus(std::string name, std::uint32_t bit_rate, std::uint32_t data_rate, bool fd);
+
+    /// The bus of that name, made when there is none. Lives as long as one of its links. [setup]
+    static std::shared_ptr<Bus> find(const std::string& name, const Options&, std::string& problem);
+
+    void add(Node&);     ///< [setup]
+    /// What it has queued is still sent, as by a controller whose program ended. [setup]
+    void remove(std::unique_ptr<Node>);
+
+    /// Works the bus out up to `now_ns`, unless another thread is doing so. [realtime]
+    void pump(std::int64_t now_ns) noexcept;
+    /// `now_ns`, or the newest time known to the bus. [any]
+    std::int64_t time(std::int64_t now_ns) const noexcept { return now_ns == unclocked ? latest_.load(std::memory_order_relaxed) : now_ns; }
+    /// Frames were queued; on a bus without a bit rate they are delivered. [realtime]
+    void sent(std::int64_t now_ns) noexcept;
+
+    /// Calls `change` while nobody pumps. [setup]
+    template <class Change>
+    auto exclusively(Change&& change) {
+        const Hold hold(*this);
+        return change();
+    }
+
+    struct Active {
+        Disturbance what;
+        std::uint64_t matched = 0, hits = 0;
+    };
+    std::vector<Active> disturbances;  ///< only within exclusively(), as the next two
+    std::vector<Node*> nodes;
+    std::uint64_t random = 1;
+
+    const std::string name;
+    const std::uint32_t bit_rate, data_rate;  ///< bit_rate 0: frames take no time
+    const bool fd;
+    double load() const noexcept { return load_.load(std::memory_order_relaxed); }
+    void publish(Node&) noexcept;  ///< counters and state that follow from them
+
+private:
+    struct Hold {
+        explicit Hold(Bus&) noexcept;
+        ~Hold();
+        Bus& bus;
+    };
+    struct Candidate {
+        Node* node = nullptr;
+        const Frame* frame = nullptr;
+        bool babbling = false;
+    };
+
+    void work(std::int64_t now) noexcept;
+    void work_untimed(std::int64_t now) noexcept;
+    void recover(std::int64_t now) noexcept;
+    std::int64_t earliest() noexcept;
+    void transmit(std::int64_t start, std::int64_t now) noexcept;
+    void deliver(Node& from, const Frame&, std::int64_t time) noexcept;
+    void done(const Candidate&, std::int64_t time) noexcept;
+    void failed(Node&, std::int64_t time) noexcept;
+    void event(Node&, std::uint32_t error_class, std::int64_t time) noexcept;
+    void occupy(std::int64_t start, std::int64_t end) noexcept;
+    bool hears(const Node&) const noexcept;
+    Active* struck(const Candidate&, std::int64_t start) noexcept;
+    std::uint64_t draw() noexcept;
+    std::int64_t bits(unsigned count) const noexcept { return duration_ns({count, 0}, bit_rate); }
+
+    std::vector<std::unique_ptr<Node>> leaving_;  ///< [setup]
+    std::atomic_flag pumping_;
+    std::atomic<std::int64_t> latest_{INT64_MIN};
+    std::atomic<std::uint64_t> calls_{0};  ///< of sent(): a pump that sees it change looks again
+    std::int64_t free_at_ = INT64_MIN;     ///< the bus is idle from here on
+    std::atomic<std::int64_t> worked_until_{INT64_MIN};
+    std::int64_t window_start_ = INT64_MIN, busy_ns_ = 0;
+    std::atomic<double> load_{0.0};
+};
+
+}  // namespace hal::can::simbus

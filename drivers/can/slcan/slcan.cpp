@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: MIT
+#include "slcan.hpp"
+
+#include <fcntl.h>
+#include <termios.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "link/filtering.hpp"
+#include "link/ring.hpp"
+#include "link/system.hpp"
+#include "slcan_line.hpp"
+
+namespace hal::can::slcan {
+
+namespace {
+
+/// The commands that open the channel.
+std::string greeting(const Options& o) {
+    std::string text = "C\r";
+    if (o.bit_rate != 0 && o.bit_rate != unlimited) text += std::string(rate_command(o.bit_rate)) + "\r";
+    if (o.data_rate != 0) text += o.data_rate == 5'000'000 ? "Y5\r" : "Y2\r";
+    return text + (o.listen_only ? "L\r" : "O\r");
+}
+
+/// The line, raw, and the channel opened; nothing and `problem` when it cannot be had.
+link::Descriptor open_line(const std::string& device, const Options& o, std::string& problem) {
+    link::Descriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+    if (!fd) {
+        problem = errno == ENOENT   ? "there is no such device; `ls /dev/serial/by-id` lists adapters that are plugged in"
+                  : errno == EACCES ? "no permission; type: sudo usermod -aG dialout $USER, and log in again"
+                  : errno == EBUSY  ? "another program has the line; `fuser " + device + "` names it"
+                                    : "it cannot be opened: " + link::reason();
+        return {};
+    }
+    termios t{};
+    if (tcgetattr(fd.get(), &t) != 0) {
+        problem = "this is not a serial line; write slcan:/dev/ttyACM0";
+        return {};
+    }
+    cfmakeraw(&t);
+    t.c_cflag |= CLOCAL | CREAD;
+    t.c_cc[VMIN] = 0, t.c_cc[VTIME] = 0;
+    cfsetspeed(&t, B115200);  // adapters on USB do not care
+    tcsetattr(fd.get(), TCSANOW, &t);
+    tcflush(fd.get(), TCIOFLUSH);
+    const auto text = greeting(o);
+    if (::write(fd.get(), text.data(), text.size()) < 0 && errno != EAGAIN) {
+        problem = "nothing can be written to it: " + link::reason();
+        return {};
+    }
+    return fd;
+}
+
+class SerialLink final : public FilteringLink {
+public:
+    SerialLink(const std::string& device, const Options& options, link::Descriptor fd)
+        : options_(options), device_(device), line_(std::move(fd)), outgoing_(options.send_capacity), watcher_([this] { watch(); }) {
+        counting_.bit_rate = options.bit_rate != unlimited ? options.bit_rate : 0;
+        counting_.data_rate = options.data_rate;
+        description_ = describe(device);
+        description_.bit_rate = counting_.bit_rate, description_.data_rate = counting_.data_rate, description_.fd = options.fd;
+    }
+    ~SerialLink() override {
+        {
+            const std::lock_guard lock(mutex_);
+            ending_ = true;
+        }
+        changed_.notify_all();
+        watcher_.join();
+        flush(0);
+        (void)!::write(line_.get(), "C\r", 2);
+    }
+
+    Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
+        const auto drop = [this](Sent why) { return Counting::add(counting_.dropped), why; };
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::refused);
+        if (state() == State::down) return drop(Sent::down);
+        if (outgoing_.push(frame)) return Sent::queued;
+        flush(now_ns);
+        return outgoing_.push(frame) ? Sent::queued : drop(Sent::full);
+    }
+
+    void flush(std::int64_t) noexcept override {
+        if (state() == State::down) return forget();
+        for (;;) {
+            while (text_size_ + longest_line <= sizeof text_) {
+                const Frame* f = outgoing_.front();
+                if (f == nullptr) break;
+                Line line;
+                const auto size = encode(*f, line);
+                std::copy_n(line.data(), size, text_ + text_size_);
+                text_size_ += size;
+                counting_.count_sent(*f);
+                outgoing_.pop();
+            }
+            if (text_size_ == 0) return;
+            const auto written = ::write(line_.get(), text_, text_size_);
+            if (written <= 0) {
+                if (written < 0 && errno != EAGAIN && errno != EINTR) lose();
+                return;  // the line is slower than what is sent: next time
+            }
+            const auto done = static_cast<std::size_t>(written);
+            std::copy(text_ + done, text_ + text_size_, text_);
+            text_size_ -= done;
+        }
+    }
+
+    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+        const auto now = now_ns != unclocked ? now_ns : link::monotonic_ns();
+        std::size_t count = 0;
+        for (int reads = 0; count < room.size();) {
+            if (next_ == filled_) {
+                if (reads++ == 4) break;  // a line that never ends is left for the next cycle
+                const auto got = ::read(line_.get(), in_, sizeof in_);
+                next_ = filled_ = 0;
+                if (got <= 0) {
+                    // A pseudo-terminal without another end reads as an error, a serial adapter that was pulled out as the end of file.
+                    if (got == 0 ? hung_up() : errno != EAGAIN && errno != EINTR) lose();
+                    break;
+                }
+                filled_ = static_cast<std::size_t>(got);
+                arrived_ns_ = link::monotonic_ns();
+            }
+            switch (decoder_.take(in_[next_++])) {
+            case Decoder::Found::frame: {
+                Frame f = decoder_.frame();
+                if ((f.fd && !options_.fd) || !filters_.pass(f)) break;
+                f.time_ns = arrived_ns_;
+                counting_.count_received(f);
+                room[count++] = f;
+                break;
+            }
+            case Decoder::Found::error: Counting::add(counting_.errors); break;
+            case Decoder::Found::status: take_status(decoder_.status()); break;
+            case Decoder::Found::nothing: break;
+            }
+        }
+        counting_.tick(now);
+        return count;
+    }
+
+    Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
+    bool wait(std::int64_t at_most_ns) override {
+        if (next_ != filled_) return true;
+        if (state() != State::down) return link::readable_within(line_.get(), at_most_ns);
+        std::unique_lock lock(mutex_);  // a dead line is always readable
+        return changed_.wait_for(lock, std::chrono::nanoseconds(at_most_ns), [this] { return state() != State::down; });
+    }
+    int descriptor() const noexcept override { return line_.get(); }
+
+private:
+    void take_status(unsigned bits) noexcept {  // Lawicel: 2 warning, 3 overrun, 5 passive
+        if ((bits & 8) != 0) Counting::add(counting_.lost);
+        const auto state = (bits & 32) != 0 ? State::passive : (bits & 4) != 0 ? State::warning : State::active;
+        counting_.state.store(state, std::memory_order_relaxed);
+    }
+    bool hung_up() const noexcept {
+        pollfd p{line_.get(), 0, 0};
+        return ::poll(&p, 1, 0) > 0 && (p.revents & (POLLHUP | POLLERR)) != 0;
+    }
+    /// What was to be sent is old when the line is back, and half a line would spoil the first new one. The sending thread's.
+    void forget() noexcept {
+        text_size_ = 0;
+        for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
+    }
+    void lose() noexcept { counting_.state.store(State::down, std::memory_order_relaxed); }
+
+    /// The watcher's thread: opens the device again when it has gone; the new line takes the number of the old one.
+    void watch() {
+        std::unique_lock lock(mutex_);
+        while (!changed_.wait_for(lock, std::chrono::milliseconds(500), [this] { return ending_; })) {
+            if (state() != State::down) continue;
+            std::string problem;
+            const link::Descriptor fresh = open_line(device_, options_, problem);
+            if (!fresh || ::dup3(fresh.get(), line_.get(), O_CLOEXEC) < 0) continue;
+            Counting::add(counting_.restarts);
+            counting_.state.store(State::active, std::memory_order_relaxed);
+            changed_.notify_all();
+        }
+    }
+
+    const Options options_;
+    const std::string device_;
+    const link::Descriptor line_;
+    link::Ring<Frame> outgoing_;  // written and read by the sending thread
+
+    char text_[4096]{};  // the sending thread's: lines that are not yet written
+    std::size_t text_size_ = 0;
+    char in_[4096]{};  // from here on: the receiving thread's
+    std::size_t next_ = 0, filled_ = 0;
+    std::int64_t arrived_ns_ = 0;
+    Decoder decoder_;
+
+    std::mutex mutex_;  // the watcher and setup
+    std::condition_variable changed_;
+    bool ending_ = false;
+    std::thread watcher_;
+};
+
+}  // namespace
+
+Description describe(const std::string& device) {
+    return {.address = "slcan:" + device, .transport = "serial-line CAN", .fd_on_request = true};
+}
+
+Opened open(const std::string& device, const Options& options) {
+    if (device.empty()) return {nullptr, "the device is missing; write slcan:/dev/ttyACM0"};
+    if (options.bit_rate != 0 && options.bit_rate != unlimited && rate_command(options.bit_rate) == nullptr)
+        return {nullptr, "a serial-line adapter cannot be told " + std::to_string(options.bit_rate) +
+                             " bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M"};
+    if (options.data_rate != 0 && options.data_rate != 2'000'000 && options.data_rate != 5'000'000)
+        return {nullptr, "a serial-line adapter cannot be told a data rate of " + std::to_string(options.data_rate) +
+                             " bit/s; it knows 2M and 5M"};
+    std::string problem;
+    link::Descriptor line = open_line(device, options, problem);
+    if (!line) return {nullptr, problem};
+    return {std::make_unique<SerialLink>(device, options, std::move(line)), {}};
+}
+
+}  // namespace hal::can::slcan

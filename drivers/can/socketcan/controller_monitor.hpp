@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// Watches one interface from a thread of its own, so that no cycle has to: up or down, gone and back, its bit rate, the state of its
+// controller. All of it comes by rtnetlink.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "link/counting.hpp"
+#include "link/system.hpp"
+#include "netlink/link_monitor.hpp"
+
+namespace hal::can::socketcan {
+
+/// An interface as the kernel describes it.
+struct Interface {
+    int index = 0;  ///< 0: there is none of that name
+    bool is_can = false, up = false;
+    unsigned mtu = 0;
+    std::string kind;  ///< "vcan", "can", "vxcan", …
+    std::uint32_t bit_rate = 0, data_rate = 0;
+    bool has_state = false;
+    State state = State::active;
+    bool has_counters = false;
+    std::uint8_t send_errors = 0, receive_errors = 0;
+};
+
+/// Asks the kernel. [setup]
+Interface ask(const std::string& name);
+
+class ControllerMonitor {
+public:
+    /// `reopen` is called in the monitor's thread when an interface of that name has come back under another number. [setup]
+    ControllerMonitor(std::string name, Counting&, int index, std::uint32_t restart_ms, std::function<bool(int index)> reopen);
+
+    /// Look now. [realtime]: one write to an eventfd, which never waits.
+    void nudge() noexcept { monitor_->nudge(); }
+    std::atomic<bool> wants_restart{false};
+
+private:
+    void look();
+    bool restart_controller(int index);
+
+    const std::string name_;
+    Counting& counting_;
+    int index_;
+    const std::uint32_t restart_ms_;
+    const std::function<bool(int)> reopen_;
+    std::int64_t off_since_ns_ = 0;
+    std::optional<link::LinkMonitor> monitor_;  // the last one: its thread uses all of the above
+};
+
+}  // namespace hal::can::socketcan

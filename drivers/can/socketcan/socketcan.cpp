@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: MIT
+#include "socketcan.hpp"
+
+#include <fcntl.h>
+#include <linux/can/raw.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/uio.h>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "controller_monitor.hpp"
+#include "kernel_frames.hpp"
+#include "link/counting.hpp"
+#include "link/ring.hpp"
+#include "link/system.hpp"
+
+namespace hal::can::socketcan {
+
+namespace {
+
+constexpr std::size_t batch = 32;  // frames per system call
+constexpr std::size_t most_filters = CAN_RAW_FILTER_MAX;
+constexpr timeval patience{0, 20'000};  // of a receive that waits; the kernel adds up to a tick of its timer, 1 to 10 ms
+constexpr std::int64_t patience_ns = patience.tv_usec * 1000LL;
+
+template <class T>
+bool set(int fd, int level, int name, const T& value) {
+    return setsockopt(fd, level, name, &value, sizeof value) == 0;
+}
+
+/// A raw socket with all options, bound; nothing and `problem` when it cannot be had.
+link::Descriptor make_socket(int index, const Options& o, const std::vector<can_filter>& filters, std::string& problem) {
+    link::Descriptor fd(::socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
+    if (!fd) {
+        const int error = errno;
+        if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT)
+            problem = "this machine's kernel has no SocketCAN; type: sudo modprobe can-raw, or use a bus without it: "
+                      "sim:NAME, udp:239.74.163.2:43113, slcan:DEVICE";
+        else if (error == EPERM || error == EACCES)
+            problem = "no permission for a raw CAN socket; in a container: start it with the host's network";
+        else
+            problem = "no raw CAN socket: " + link::reason(error);
+        return {};
+    }
+    const int yes = 1;
+    if (o.fd && !set(fd.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, yes)) {
+        problem = "this machine's kernel does not know CAN FD; leave out fd";
+        return {};
+    }
+    const can_err_mask_t errors = CAN_ERR_MASK & ~static_cast<can_err_mask_t>(CAN_ERR_LOSTARB);
+    set(fd.get(), SOL_CAN_RAW, CAN_RAW_ERR_FILTER, errors);  // the state of the controller comes this way
+    if (o.own_frames) set(fd.get(), SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, yes);
+    set(fd.get(), SOL_CAN_RAW, CAN_RAW_FILTER, can_filter{});
+    if (!filters.empty())
+        setsockopt(fd.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size() * sizeof(can_filter)));
+    if (o.stamps) {
+        set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
+        set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
+    }
+    set(fd.get(), SOL_SOCKET, SO_RCVTIMEO, patience);
+    const int room = static_cast<int>(std::min<std::size_t>(o.receive_capacity, 65536) * 1024);  // the kernel's cost of a frame
+    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    sockaddr_can address{};
+    address.can_family = AF_CAN;
+    address.can_ifindex = index;
+    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        problem = "the interface cannot be used: " + link::reason();
+        return {};
+    }
+    return fd;
+}
+
+class SocketLink final : public Link {
+public:
+    SocketLink(const std::string& name, const Options& options, const Interface& interface, link::Descriptor socket)
+        : options_(options), socket_(std::move(socket)), outgoing_(options.send_capacity),
+          monitor_(name, counting_, interface.index, options.restart_ms, [this](int index) { return reopen(index); }) {
+        counting_.bit_rate = interface.bit_rate != 0 ? interface.bit_rate : options.bit_rate != unlimited ? options.bit_rate : 0;
+        counting_.data_rate = interface.data_rate != 0 ? interface.data_rate : options.data_rate;
+        if (interface.has_state) counting_.state = interface.state;
+        description_ = describe(name);
+        if (!interface.kind.empty()) description_.transport += " (" + interface.kind + ")";
+        description_.bit_rate = counting_.bit_rate, description_.data_rate = counting_.data_rate, description_.fd = options.fd;
+        for (std::size_t i = 0; i < batch; ++i) {
+            parts_[i] = {&raw_[i], sizeof raw_[i]};
+            in_[i].msg_hdr.msg_iov = &parts_[i];
+            in_[i].msg_hdr.msg_iovlen = 1;
+            in_[i].msg_hdr.msg_control = options.stamps ? control_[i] : nullptr;
+            in_[i].msg_hdr.msg_controllen = options.stamps ? sizeof control_[i] : 0;
+            out_parts_[i] = {&out_raw_[i], 0};
+            out_[i].msg_hdr = {};
+            out_[i].msg_hdr.msg_iov = &out_parts_[i];
+            out_[i].msg_hdr.msg_iovlen = 1;
+        }
+    }
+
+    Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
+        const auto drop = [this](Sent why) {
+            Counting::add(counting_.dropped);
+            return why;
+        };
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::refused);
+        const State state = counting_.state.load(std::memory_order_relaxed);
+        if (state == State::down) return drop(Sent::down);
+        if (state == State::bus_off) return drop(Sent::bus_off);
+        if (outgoing_.push(frame)) return Sent::queued;
+        flush(now_ns);
+        return outgoing_.push(frame) ? Sent::queued : drop(Sent::full);
+    }
+
+    void flush(std::int64_t) noexcept override {
+        // What was queued before the interface went must not come out when it is back.
+        if (state() == State::down)
+            for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
+        for (bool again = true;;) {
+            std::size_t count = 0;
+            for (; count < batch; ++count) {
+                const Frame* f = outgoing_.at(count);
+                if (f == nullptr) break;
+                out_parts_[count].iov_len = to_kernel(*f, out_raw_[count]);
+            }
+            if (count == 0) return;
+            const int sent = hand_over(count);
+            const int error = errno;
+            for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
+            if (sent > 0) outgoing_.pop(static_cast<std::size_t>(sent));
+            if (sent == static_cast<int>(count)) continue;
+            if (sent > 0) continue;  // the next try tells why
+            if (error == EINTR) continue;
+            if (error == ENOBUFS || error == EAGAIN) return;  // the interface's queue is full: next time
+            if (error == ENETDOWN || error == ENXIO || error == ENODEV) {
+                if (std::exchange(again, false)) continue;  // the first may be the late report of what is over
+                return lose_interface();
+            }
+            outgoing_.pop();  // the kernel takes everything but this frame
+            Counting::add(counting_.dropped);
+        }
+    }
+
+    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+        if (std::exchange(waited_, false)) refilled_at_ = now_ns;
+        else if (now_ns != unclocked && now_ns == drained_at_) return 0;  // a cycle asks the kernel once when that was enough
+        std::size_t count = 0;
+        while (count < room.size()) {
+            if (next_ == filled_ && ((count != 0 && last_batch_short_) || !refill(now_ns))) break;
+            room[count++] = buffer_[next_++];
+        }
+        return count;
+    }
+
+    Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
+    State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }
+    void restart() noexcept override {
+        monitor_.wants_restart.store(true);
+        monitor_.nudge();
+    }
+    bool set_filters(std::span<const Filter> filters) override {
+        if (filters.size() > most_filters) return false;
+        std::vector<can_filter> kernel;
+        for (const auto& f : filters) {
+            const auto whole = f.extended ? CAN_EFF_MASK : CAN_SFF_MASK;
+            kernel.push_back({(f.id & whole) | (f.extended ? CAN_EFF_FLAG : 0U), (f.mask & whole) | CAN_EFF_FLAG});
+        }
+        const std::lock_guard lock(mutex_);
+        filters_ = kernel;
+        if (kernel.empty()) kernel.push_back({0, 0});
+        const auto size = static_cast<socklen_t>(kernel.size() * sizeof(can_filter));
+        return setsockopt(socket_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, kernel.data(), size) == 0;
+    }
+    const Description& description() const noexcept override { return description_; }
+    /// What has come is received by the call that waits for it: poll and receive would be two, and as dear as the rest of a transfer. That
+    /// call's time-out is coarse, so the end of the time is waited for by poll.
+    bool wait(std::int64_t at_most_ns) override {
+        if (next_ != filled_) return true;
+        for (std::int64_t until = 0; at_most_ns >= patience_ns;) {
+            // Asking for a second frame where frames come one by one costs a tenth of the first: only now and then, or when many came.
+            const bool many = several_ || ++waits_ % 32 == 0;
+            const bool plain = !many && !options_.stamps && !options_.own_frames;
+            if (const int got = plain ? take_one() : take_batch(MSG_WAITFORONE, many ? batch : 1, unclocked); got > 0) {
+                if (many) several_ = got > 1;
+                else last_batch_short_ = true;  // what may be behind it comes with the next wait
+                return waited_ = true;
+            }
+            if (errno == EINTR) return false;
+            if (errno != EAGAIN) return true;
+            const auto now = link::monotonic_ns();
+            if (until == 0) until = now + at_most_ns - patience_ns;
+            at_most_ns = until - now;
+        }
+        return link::readable_within(socket_.get(), at_most_ns);
+    }
+    int descriptor() const noexcept override { return socket_.get(); }
+
+private:
+    /// Takes up to a batch from the kernel; false: nothing of interest came.
+    bool refill(std::int64_t now_ns) noexcept {
+        if (last_batch_short_ && now_ns != unclocked && now_ns == refilled_at_) {
+            drained_at_ = now_ns;
+            last_batch_short_ = false;
+            return false;
+        }
+        const int got = take_batch(MSG_DONTWAIT, batch, now_ns);
+        refilled_at_ = now_ns;
+        if (filled_ == 0 && now_ns != unclocked && got < static_cast<int>(batch)) drained_at_ = now_ns;
+        return filled_ != 0;
+    }
+
+    /// One system call: what it took from the kernel, or -1 and errno.
+    int take_batch(int flags, std::size_t most, std::int64_t now_ns) noexcept {
+        for (; used_ > 0; --used_) in_[used_ - 1].msg_hdr.msg_controllen = options_.stamps ? sizeof control_[0] : 0;
+        next_ = filled_ = 0;
+        const int got = ::recvmmsg(socket_.get(), in_, static_cast<unsigned>(most), flags, nullptr);
+        const int error = errno;
+        last_batch_short_ = got < static_cast<int>(most);
+        if (got < 0 && (error == ENETDOWN || error == ENODEV || error == ENXIO)) lose_interface();
+        if (got > 0 || now_ns == unclocked) {
+            const auto monotonic = options_.stamps || now_ns == unclocked ? link::monotonic_ns() : now_ns;
+            counting_.tick(now_ns != unclocked ? now_ns : monotonic);
+            const auto offset = options_.stamps ? monotonic - link::clock_ns(CLOCK_REALTIME) : 0;
+            for (int i = 0; i < got; ++i) take(in_[i], raw_[i], offset, options_.stamps ? 0 : monotonic);
+            used_ = static_cast<std::size_t>(got > 0 ? got : 0);
+        } else {
+            counting_.tick(now_ns);
+        }
+        errno = error;
+        return got;
+    }
+
+    /// Waits for one frame, without the time of the kernel: half a microsecond cheaper than take_batch(). 1, or -1 and errno.
+    int take_one() noexcept {
+        next_ = filled_ = 0;
+        const auto got = ::recv(socket_.get(), &raw_[0], sizeof raw_[0], 0);
+        if (got < 0) {
+            const int error = errno;
+            if (error == ENETDOWN || error == ENODEV || error == ENXIO) lose_interface();
+            counting_.tick(link::monotonic_ns());
+            errno = error;
+            return -1;
+        }
+        const auto monotonic = link::monotonic_ns();
+        counting_.tick(monotonic);
+        take(static_cast<std::size_t>(got), false, raw_[0], monotonic);
+        return 1;
+    }
+
+    /// What is ready in out_, in one system call: how many were taken, or -1 and errno.
+    int hand_over(std::size_t count) noexcept {
+        constexpr int flags = MSG_DONTWAIT | MSG_NOSIGNAL;
+        if (count > 1) return ::sendmmsg(socket_.get(), out_, static_cast<unsigned>(count), flags);
+        return ::send(socket_.get(), out_raw_, out_parts_[0].iov_len, flags) < 0 ? -1 : 1;
+    }
+
+    void take(const mmsghdr& message, const canfd_frame& raw, std::int64_t offset, std::int64_t time_ns) noexcept {
+        if (options_.stamps) time_ns = stamp_of(message, offset);
+        take(message.msg_len, (message.msg_hdr.msg_flags & MSG_CONFIRM) != 0, raw, time_ns);
+    }
+
+    void take(std::size_t length, bool own, const canfd_frame& raw, std::int64_t time_ns) noexcept {
+        Frame& f = buffer_[filled_];
+        if (!from_kernel(raw, length, f)) return Counting::add(counting_.errors);
+        f.own = own;
+        f.time_ns = time_ns;
+        if (f.error) {
+            controller_event(f);
+            if (!options_.error_frames) return;
+        } else {
+            counting_.count_received(f);
+        }
+        ++filled_;
+    }
+
+    std::int64_t stamp_of(const mmsghdr& message, std::int64_t offset) noexcept {
+        std::int64_t time_ns = 0;
+        auto* header = const_cast<msghdr*>(&message.msg_hdr);
+        for (cmsghdr* c = CMSG_FIRSTHDR(header); c != nullptr; c = CMSG_NXTHDR(header, c)) {
+            if (c->cmsg_level != SOL_SOCKET) continue;
+            if (c->cmsg_type == SCM_TIMESTAMPNS) {
+                timespec t{};
+                std::memcpy(&t, CMSG_DATA(c), sizeof t);
+                time_ns = t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
+            } else if (c->cmsg_type == SO_RXQ_OVFL) {
+                std::uint32_t lost = 0;
+                std::memcpy(&lost, CMSG_DATA(c), sizeof lost);
+                Counting::add(counting_.lost, lost - lost_before_);
+                lost_before_ = lost;
+            }
+        }
+        return time_ns;
+    }
+
+    void controller_event(const Frame& f) noexcept {
+        Counting::add(counting_.errors);
+        const auto to = [this](State s) { counting_.state.store(s, std::memory_order_relaxed); };
+        if ((f.id & CAN_ERR_CRTL) != 0) {
+            const auto what = f.data[1];
+            if ((what & (CAN_ERR_CRTL_RX_OVERFLOW)) != 0) Counting::add(counting_.lost);
+            if ((what & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) to(State::passive);
+            else if ((what & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) to(State::warning);
+            else if ((what & CAN_ERR_CRTL_ACTIVE) != 0) to(State::active);
+            counting_.send_errors.store(f.data[6], std::memory_order_relaxed);
+            counting_.receive_errors.store(f.data[7], std::memory_order_relaxed);
+        }
+        if ((f.id & CAN_ERR_BUSOFF) != 0) {
+            Counting::add(counting_.bus_offs);
+            to(State::bus_off);
+            monitor_.nudge();
+        }
+        if ((f.id & CAN_ERR_RESTARTED) != 0) {
+            Counting::add(counting_.restarts);
+            to(State::active);
+        }
+    }
+
+    /// The monitor says whether it is down: this may be the late report of what is over already.
+    void lose_interface() noexcept {
+        if (counting_.state.load(std::memory_order_relaxed) != State::down) monitor_.nudge();
+    }
+
+    /// The monitor's thread: a new socket takes the place of the old one under the same number, which the cycle does not notice.
+    bool reopen(int index) {
+        const std::lock_guard lock(mutex_);
+        std::string problem;
+        const link::Descriptor fresh = make_socket(index, options_, filters_, problem);
+        return fresh && ::dup3(fresh.get(), socket_.get(), O_CLOEXEC) >= 0;
+    }
+
+    const Options options_;
+    const link::Descriptor socket_;
+    Counting counting_;
+    link::Ring<Frame> outgoing_;  // written and read by the sending thread
+    Description description_;
+    std::mutex mutex_;  // setup and the monitor: filters_
+    std::vector<can_filter> filters_;
+
+    // The sending thread's.
+    mmsghdr out_[batch]{};
+    iovec out_parts_[batch]{};
+    canfd_frame out_raw_[batch]{};
+    // The receiving thread's.
+    mmsghdr in_[batch]{};
+    iovec parts_[batch]{};
+    canfd_frame raw_[batch]{};
+    alignas(cmsghdr) char control_[batch][CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))]{};
+    Frame buffer_[batch];
+    std::size_t next_ = 0, filled_ = 0;
+    std::int64_t drained_at_ = unclocked, refilled_at_ = unclocked;
+    std::size_t used_ = 0;  // how many of in_ the last batch wrote to
+    bool last_batch_short_ = false, waited_ = false, several_ = false;
+    unsigned waits_ = 0;
+    std::uint32_t lost_before_ = 0;
+
+    ControllerMonitor monitor_;  // last: its thread uses all of the above, and ends first
+};
+
+std::string up_command(const std::string& name, const Interface& i, const Options& o) {
+    const auto rate = o.bit_rate != 0 && o.bit_rate != unlimited ? o.bit_rate : 1'000'000U;
+    return "sudo ip link set " + name + " up" + (i.kind == "can" ? " type can bitrate " + std::to_string(rate) : std::string{});
+}
+
+}  // namespace
+
+Description describe(const std::string& interface) {
+    return {.address = "can:" + interface, .transport = "SocketCAN", .has_stamps = true, .interface = interface};
+}
+
+Opened open(const std::string& name, const Options& options) {
+    if (name.empty() || name.size() >= IFNAMSIZ) return {nullptr, "this is no name of a network interface; write can:can0"};
+    std::string problem;
+    const Interface interface = ask(name);
+    if (interface.index == 0) {
+        const link::Descriptor probe = make_socket(0, {}, {}, problem);
+        if (!probe) return {nullptr, problem};
+        return {nullptr, "there is no interface " + name + "; `ip -br link` lists those there are; a virtual one: sudo ip link add " +
+                             name + " type vcan && sudo ip link set " + name + " up"};
+    }
+    if (!interface.is_can) return {nullptr, name + " is not a CAN interface; `ip -br link show type can` lists those"};
+    link::Descriptor socket = make_socket(interface.index, options, {}, problem);
+    if (!socket) return {nullptr, problem};
+    if (!interface.up) return {nullptr, "the interface is down; type: " + up_command(name, interface, options)};
+    if (options.fd && interface.mtu < CANFD_MTU) {
+        const auto how = interface.kind == "can" ? "type can fd on dbitrate 2000000" : "mtu 72";
+        return {nullptr, "the interface is not set up for CAN FD; type: sudo ip link set " + name + " down && sudo ip link set " +
+                             name + " " + how + " && " + up_command(name, interface, options)};
+    }
+    if (options.bit_rate != 0 && interface.bit_rate != 0 && options.bit_rate != interface.bit_rate)
+        return {nullptr, "the interface runs at " + std::to_string(interface.bit_rate) + " bit/s; type: sudo ip link set " + name +
+                             " down && " + up_command(name, interface, options)};
+    return {std::make_unique<SocketLink>(name, options, interface, std::move(socket)), {}};
+}
+
+}  // namespace hal::can::socketcan

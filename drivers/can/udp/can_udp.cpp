@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: MIT
+#include "can_udp.hpp"
+
+#include <arpa/inet.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/uio.h>
+
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "datagram.hpp"
+#include "link/filtering.hpp"
+#include "link/ring.hpp"
+#include "link/system.hpp"
+
+namespace hal::can::canudp {
+
+namespace {
+
+constexpr std::size_t batch = 16;  // datagrams per system call
+
+/// Where the group is: IPv4 or IPv6, and on which interface (0: as the routes say).
+struct Place {
+    sockaddr_storage address{};
+    socklen_t size = 0;
+    unsigned interface = 0;
+    std::string text;
+    bool is_six() const { return address.ss_family == AF_INET6; }
+};
+
+/// `GROUP`, `GROUP:PORT`, `[GROUP6]:PORT`, each with `%INTERFACE` after the group.
+Place parse(std::string text, std::string& problem) {
+    std::string port = "43113", group = "239.74.163.2", interface;
+    if (!text.empty() && text[0] == '[') {
+        const auto end = text.find(']');
+        group = text.substr(1, end == text.npos ? end : end - 1);
+        if (end != text.npos && end + 1 < text.size() && text[end + 1] == ':') port = text.substr(end + 2);
+    } else if (!text.empty()) {
+        const auto colon = text.find(':');
+        if (colon != 0) group = text.substr(0, colon);
+        if (colon != text.npos) port = text.substr(colon + 1);
+    }
+    if (const auto percent = group.find('%'); percent != group.npos) interface = group.substr(percent + 1), group.resize(percent);
+    Place p;
+    char* end = nullptr;
+    const unsigned long number = std::strtoul(port.c_str(), &end, 10);
+    if (port.empty() || *end != '\0' || number == 0 || number > 65535) problem = "'" + port + "' is no port; write udp:239.74.163.2:43113";
+    if (!interface.empty() && (p.interface = if_nametoindex(interface.c_str())) == 0)
+        problem = "there is no interface " + interface + "; `ip -br link` lists those there are";
+    auto& four = reinterpret_cast<sockaddr_in&>(p.address);
+    auto& six = reinterpret_cast<sockaddr_in6&>(p.address);
+    if (inet_pton(AF_INET, group.c_str(), &four.sin_addr) == 1 && IN_MULTICAST(ntohl(four.sin_addr.s_addr))) {
+        four.sin_family = AF_INET;
+        four.sin_port = htons(static_cast<std::uint16_t>(number));
+        p.size = sizeof four;
+    } else if (inet_pton(AF_INET6, group.c_str(), &six.sin6_addr) == 1 && IN6_IS_ADDR_MULTICAST(&six.sin6_addr)) {
+        six.sin6_family = AF_INET6;
+        six.sin6_port = htons(static_cast<std::uint16_t>(number));
+        p.size = sizeof six;
+    } else if (problem.empty()) {
+        problem = "'" + group + "' is no multicast group; write udp:239.74.163.2:" + port + ", where stock tools meet";
+    }
+    p.text = "udp:" + (p.is_six() ? "[" + group + "]" : group) + (interface.empty() ? "" : "%" + interface) + ":" + port;
+    return p;
+}
+
+template <class T>
+bool set(int fd, int level, int name, const T& value) {
+    return setsockopt(fd, level, name, &value, sizeof value) == 0;
+}
+
+link::Descriptor receiver(const Place& p, const Options& o, std::string& problem) {
+    link::Descriptor fd(::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int yes = 1;
+    set(fd.get(), SOL_SOCKET, SO_REUSEADDR, yes);
+    set(fd.get(), SOL_SOCKET, SO_REUSEPORT, yes);
+    set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
+    set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
+    const int room = static_cast<int>((o.receive_capacity < 65536 ? o.receive_capacity : 65536) * 1024);  // the kernel's cost of a datagram
+    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    sockaddr_storage any = p.address;
+    bool joined = false;
+    if (p.is_six()) {
+        auto& six = reinterpret_cast<sockaddr_in6&>(any);
+        const ipv6_mreq request{six.sin6_addr, p.interface};
+        joined = set(fd.get(), IPPROTO_IPV6, IPV6_JOIN_GROUP, request);
+        six.sin6_addr = in6addr_any;
+    } else {
+        auto& four = reinterpret_cast<sockaddr_in&>(any);
+        const ip_mreqn request{four.sin_addr, {INADDR_ANY}, static_cast<int>(p.interface)};
+        joined = set(fd.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, request);
+        // The group, not any address: otherwise every group on this port arrives.
+    }
+    if (!joined) problem = "the group cannot be joined: " + link::reason() + "; when no route leads there: sudo ip route add 224.0.0.0/4 dev lo";
+    else if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&any), p.size) != 0)
+        problem = "the port cannot be used: " + link::reason() + "; another program may hold it alone: ss -ulp";
+    return fd;
+}
+
+link::Descriptor sender(const Place& p, std::string& problem) {
+    link::Descriptor fd(::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int one = 1;  // as far as the next router, and to this machine
+    if (p.is_six()) {
+        set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_HOPS, one);
+        if (p.interface != 0) set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_IF, p.interface);
+    } else {
+        set(fd.get(), IPPROTO_IP, IP_MULTICAST_TTL, one);
+        if (p.interface != 0) set(fd.get(), IPPROTO_IP, IP_MULTICAST_IF, ip_mreqn{{}, {INADDR_ANY}, static_cast<int>(p.interface)});
+    }
+    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&p.address), p.size) != 0)
+        problem = "no route to the group: " + link::reason() + "; type: sudo ip route add 224.0.0.0/4 dev lo";
+    return fd;
+}
+
+class UdpLink final : public FilteringLink {
+public:
+    UdpLink(const Place& place, const Options& options, link::Descriptor in, link::Descriptor out)
+        : options_(options), in_(std::move(in)), out_(std::move(out)), outgoing_(options.send_capacity) {
+        counting_.bit_rate = options.bit_rate != unlimited ? options.bit_rate : 0;
+        counting_.data_rate = options.data_rate;
+        description_.address = place.text, description_.transport = "CAN over UDP multicast";
+        description_.bit_rate = counting_.bit_rate, description_.data_rate = counting_.data_rate, description_.fd = options.fd;
+        socklen_t size = sizeof self_;
+        getsockname(out_.get(), reinterpret_cast<sockaddr*>(&self_), &size);
+    }
+
+    Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return Counting::add(counting_.dropped), Sent::refused;
+        if (outgoing_.push(frame)) return Sent::queued;
+        flush(now_ns);
+        return outgoing_.push(frame) ? Sent::queued : (Counting::add(counting_.dropped), Sent::full);
+    }
+
+    void flush(std::int64_t) noexcept override {
+        if (outgoing_.front() == nullptr) return;
+        const auto time = link::clock_ns(CLOCK_REALTIME);
+        for (;;) {
+            mmsghdr messages[batch]{};
+            iovec parts[batch]{};
+            unsigned count = 0;
+            for (; count < batch; ++count) {
+                const Frame* f = outgoing_.at(count);
+                if (f == nullptr) break;
+                parts[count] = {out_buffers_[count].data(), encode(*f, time, out_buffers_[count])};
+                messages[count].msg_hdr.msg_iov = &parts[count];
+                messages[count].msg_hdr.msg_iovlen = 1;
+            }
+            if (count == 0) return;
+            const int sent = ::sendmmsg(out_.get(), messages, count, MSG_DONTWAIT | MSG_NOSIGNAL);
+            if (sent <= 0) {
+                if (errno == EINTR) continue;
+                const bool waits = errno == EAGAIN || errno == ENOBUFS || errno == ECONNREFUSED;
+                counting_.state.store(waits ? State::active : State::down, std::memory_order_relaxed);
+                return;  // next time
+            }
+            counting_.state.store(State::active, std::memory_order_relaxed);
+            for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
+            outgoing_.pop(static_cast<std::size_t>(sent));
+        }
+    }
+
+    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+        std::size_t count = 0;
+        int useless = 0;
+        while (count < room.size()) {
+            if (next_ == filled_ && !refill(now_ns)) {
+                if (was_short_ || ++useless == 4) break;
+                continue;  // a whole batch that was not for us
+            }
+            room[count++] = buffer_[next_++];
+        }
+        return count;
+    }
+
+    Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
+    bool wait(std::int64_t at_most_ns) override { return next_ != filled_ || link::readable_within(in_.get(), at_most_ns); }
+    int descriptor() const noexcept override { return in_.get(); }
+
+private:
+    bool refill(std::int64_t now_ns) noexcept {
+        if (now_ns != unclocked && was_short_ && now_ns == asked_at_) return false;  // a cycle asks the kernel once when that was enough
+        mmsghdr messages[batch]{};
+        iovec parts[batch]{};
+        sockaddr_storage from[batch];
+        alignas(cmsghdr) char control[batch][CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))];
+        for (std::size_t i = 0; i < batch; ++i) {
+            parts[i] = {in_buffers_[i].data(), in_buffers_[i].size()};
+            messages[i].msg_hdr.msg_iov = &parts[i];
+            messages[i].msg_hdr.msg_iovlen = 1;
+            messages[i].msg_hdr.msg_name = &from[i];
+            messages[i].msg_hdr.msg_namelen = sizeof from[i];
+            messages[i].msg_hdr.msg_control = control[i];
+            messages[i].msg_hdr.msg_controllen = sizeof control[i];
+        }
+        const int got = ::recvmmsg(in_.get(), messages, batch, MSG_DONTWAIT, nullptr);
+        next_ = filled_ = 0;
+        asked_at_ = now_ns;
+        was_short_ = got < static_cast<int>(batch);
+        counting_.tick(now_ns != unclocked ? now_ns : link::monotonic_ns());
+        const auto offset = got > 0 ? link::real_to_monotonic_ns() : 0;
+        for (int i = 0; i < got; ++i) {
+            Frame& f = buffer_[filled_];
+            auto& header = messages[i].msg_hdr;
+            std::int64_t time = 0;
+            for (cmsghdr* c = CMSG_FIRSTHDR(&header); c != nullptr; c = CMSG_NXTHDR(&header, c)) {
+                if (c->cmsg_level != SOL_SOCKET) continue;
+                if (c->cmsg_type == SCM_TIMESTAMPNS) {
+                    timespec t{};
+                    std::memcpy(&t, CMSG_DATA(c), sizeof t);
+                    time = t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
+                } else if (c->cmsg_type == SO_RXQ_OVFL) {
+                    std::uint32_t lost = 0;
+                    std::memcpy(&lost, CMSG_DATA(c), sizeof lost);
+                    Counting::add(counting_.lost, lost - lost_before_);
+                    lost_before_ = lost;
+                }
+            }
+            if ((header.msg_flags & MSG_TRUNC) != 0 || !decode({in_buffers_[static_cast<std::size_t>(i)].data(), messages[i].msg_len}, f)) {
+                Counting::add(counting_.errors);
+                continue;
+            }
+            f.time_ns = time;
+            f.own = is_self(from[i]);
+            if ((f.own && !options_.own_frames) || (f.error && !options_.error_frames) || (f.fd && !options_.fd)) continue;
+            if (!f.error && !filters_.pass(f)) continue;
+            counting_.count_received(f);
+            ++filled_;
+        }
+        return filled_ != 0;
+    }
+
+    bool is_self(const sockaddr_storage& a) const noexcept {
+        if (a.ss_family != self_.ss_family) return false;
+        if (a.ss_family == AF_INET) {
+            const auto &x = reinterpret_cast<const sockaddr_in&>(a), &y = reinterpret_cast<const sockaddr_in&>(self_);
+            return x.sin_port == y.sin_port && x.sin_addr.s_addr == y.sin_addr.s_addr;
+        }
+        const auto &x = reinterpret_cast<const sockaddr_in6&>(a), &y = reinterpret_cast<const sockaddr_in6&>(self_);
+        return x.sin6_port == y.sin6_port && std::memcmp(&x.sin6_addr, &y.sin6_addr, sizeof x.sin6_addr) == 0;
+    }
+
+    const Options options_;
+    const link::Descriptor in_, out_;
+    link::Ring<Frame> outgoing_;  // written and read by the sending thread
+    sockaddr_storage self_{};
+
+    Datagram out_buffers_[batch];                             // the sending thread's
+    std::array<std::uint8_t, 512> in_buffers_[batch];  // from here on: the receiving thread's
+    Frame buffer_[batch];
+    std::size_t next_ = 0, filled_ = 0;
+    std::int64_t asked_at_ = unclocked;
+    bool was_short_ = false;
+    std::uint32_t lost_before_ = 0;
+};
+
+}  // namespace
+
+Description describe(const std::string& place) {
+    std::string problem;
+    const std::string text = parse(place, problem).text;
+    return {.address = problem.empty() ? text : "udp:" + place, .transport = "CAN over UDP multicast"};
+}
+
+Opened open(const std::string& place, const Options& options) {
+    std::string problem;
+    const Place p = parse(place, problem);
+    if (!problem.empty()) return {nullptr, problem};
+    link::Descriptor in = receiver(p, options, problem);
+    link::Descriptor out = problem.empty() ? sender(p, problem) : link::Descriptor{};
+    if (!problem.empty()) return {nullptr, problem};
+    return {std::make_unique<UdpLink>(p, options, std::move(in), std::move(out)), {}};
+}
+
+}  // namespace hal::can::canudp

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+// From an address to a driver of an Ethernet segment: the one list of them.
+#include <algorithm>
+#include <charconv>
+
+#include "ethernet/raw/raw_ethernet.hpp"
+#include "ethernet/replay/ethernet_replay.hpp"
+#include "ethernet/sim/sim_ethernet.hpp"
+#include "link/address.hpp"
+#include "link/ethernet.hpp"
+
+namespace hal::ethernet {
+
+namespace {
+
+constexpr link::Driver<Opened, Options, Description> drivers[] = {
+    {"eth", rawether::open, rawether::describe},
+    {"sim", simbus::open, simbus::describe},
+    {"replay", replay::open, replay::describe},
+};
+
+using link::quoted;
+
+template <class T>
+std::string to_number(std::string_view key, std::string_view value, T& to, long least, long most) {
+    long number = 0;
+    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
+    if (wrong != std::errc{} || end != value.data() + value.size() || number < least || number > most)
+        return std::string(key) + " is " + quoted(value) + "; write a whole number from " + std::to_string(least) + " to " +
+               std::to_string(most);
+    to = static_cast<T>(number);
+    return {};
+}
+
+/// 150us, 1ms, 20000ns.
+std::string to_duration(std::string_view key, std::string_view value, std::int64_t& to) {
+    double number = 0;
+    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
+    const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
+    number *= unit == "ns" ? 1.0 : unit == "us" ? 1e3 : unit == "ms" ? 1e6 : -1.0;
+    if (wrong != std::errc{} || !(number >= 0.0 && number <= 1e9))
+        return std::string(key) + " is " + quoted(value) + "; write a time up to a second with its unit, as in 150us";
+    to = static_cast<std::int64_t>(number);
+    return {};
+}
+
+std::string to_policy(std::string_view value, Policy& to) {
+    constexpr std::string_view words[] = {"hybrid", "block", "spin"};
+    const auto* const found = std::find(std::begin(words), std::end(words), value);
+    if (found == std::end(words)) return "policy is " + quoted(value) + "; write hybrid, block or spin";
+    to = static_cast<Policy>(found - std::begin(words));
+    return {};
+}
+
+/// What is wrong with `key=value`, or nothing.
+std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
+    const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
+    if (key == "policy") return to_policy(value, o.policy);
+    if (key == "spin") return to_duration(key, value, o.spin_ns);
+    if (key == "pacer") return to_flag(o.pacer);
+    if (key == "priority") return to_number(key, value, o.pacer_priority, 1, 99);
+    if (key == "cpu") return to_number(key, value, o.pacer_cpu, 0, 1023);
+    if (key == "promiscuous") return to_flag(o.promiscuous);
+    if (key == "txstamps") return to_flag(o.transmit_stamps);
+    if (key == "speed") return to_number(key, value, o.speed, 1, 100'000);
+    if (key == "forward") return to_duration(key, value, o.forward_ns);
+    if (key == "noise") return to_duration(key, value, o.noise_ns);
+    if (key == "sendqueue") return to_number(key, value, o.send_capacity, 1, 4096);
+    if (key == "receivequeue") return to_number(key, value, o.receive_capacity, 1, 16384);
+    if (key == "mac") {
+        const auto address = parse_address(value);
+        if (!address || ((*address)[0] & 1) != 0 || *address == Address{})
+            return "mac is " + quoted(value) + "; write the address of one station, as in 02:00:00:00:00:07";
+        o.address = *address;
+        return {};
+    }
+    return std::string(link::no_option) + quoted(key) +
+           "; there are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, forward, noise, sendqueue, receivequeue";
+}
+
+}  // namespace
+
+Opened open(std::string_view address, const Options& given) {
+    return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
+                                               "an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
+                                               "sim:NAME for a segment in memory or replay:FILE");
+}
+
+Description describe(std::string_view address) { return link::describe_address<Opened, Options, Description>(address, drivers); }
+
+}  // namespace hal::ethernet

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "link/ethernet.hpp"
+
+namespace hal::ethernet::replay {
+
+/// `replay:FILE`: the Ethernet frames of a capture at their times, the first when it is first asked for one. What is sent goes
+/// nowhere. [setup]
+Opened open(const std::string& file, const Options&);
+/// Describes what open() would return, as far as the place determines it. [setup]
+Description describe(const std::string& file);
+
+}  // namespace hal::ethernet::replay

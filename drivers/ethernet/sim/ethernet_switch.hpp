@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+// An Ethernet segment in memory: stations, each with a full-duplex line to one store-and-forward switch. Its time is the newest
+// `now_ns` its users told it; what happened up to there is worked out, in order of time, by whichever of them comes first ("the pump").
+// What starts strictly before now is done, so that the order in which functions run at one instant does not matter; things of one
+// instant happen in order of station, then user, then the order of sending.
+//
+// Threads: a user has a row of places for its frames. Their numbers go round: sender -> `outgoing` -> pump -> `unused` -> sender; each
+// queue has one writer and one reader. What has arrived is copied to `incoming`, which the receiving thread reads. All else belongs to
+// who holds `pumping_`. A cycle only tries to take it: when another thread works, that one does the work and the cycle goes on.
+//   1. thread A takes pumping_, works up to its now       2. thread B queues a frame, fails to take pumping_, goes on
+//   3. A gives pumping_ back                              4. the next call of any thread finds B's frame: it is late, not lost
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "link/ring.hpp"
+#include "link/segment.hpp"
+
+namespace hal::ethernet::simbus {
+
+using Bytes = std::array<std::uint8_t, largest_frame>;
+
+/// A frame of a user, from send() until the last line has it.
+struct Outgoing {
+    Bytes bytes;
+    std::size_t length = 0;
+    Launch launch;
+    std::int64_t at_ns = 0;     ///< not before
+    unsigned references = 0;    ///< events that still need it; the pump's
+};
+
+/// A frame on its way to a receiver. It may be taken out when its time has come; its stamp may be another.
+struct Incoming {
+    Bytes bytes;
+    std::size_t length = 0;
+    std::int64_t time_ns = 0, stamp_ns = 0;
+};
+
+struct Station;
+
+/// One port. Fields without a word belong to the pump.
+struct User {
+    explicit User(const Options&);
+
+    std::vector<Outgoing> places;
+    link::Ring<std::uint32_t> unused;    ///< writer: the pump, reader: the sending thread
+    link::Ring<std::uint32_t> outgoing;  ///< writer: the sending thread, reader: the pump
+    link::Ring<Incoming> incoming;       ///< writer: the pump, reader: the receiving thread
+    struct Waiting {
+        std::int64_t at_ns;
+        std::uint64_t sequence;
+        std::uint32_t place;
+        bool operator<(const Waiting& o) const noexcept { return at_ns != o.at_ns ? at_ns > o.at_ns : sequence > o.sequence; }
+    };
+    std::vector<Waiting> waiting;  ///< a heap, the next to leave first
+    std::uint64_t sequence = 0;
+    std::vector<std::uint16_t> types;
+    bool promiscuous = false;
+    bool leaving = false;          ///< its port is gone
+    const std::int64_t noise_ns;
+    Station* station = nullptr;    ///< for its life
+
+    std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, thrown_away{0}, late{0}, runts{0};
+    std::atomic<std::int64_t> launch_error_ns{0};
+    std::atomic<std::uint64_t> dropped{0}, refused{0};  ///< written by the sending thread
+};
+
+/// A line with its two directions. Fields without a word belong to the pump.
+struct Station {
+    std::string name;  ///< empty: of one user alone
+    int number = 0;
+    Address address{};
+    std::vector<User*> users;
+    std::int64_t to_switch_free = INT64_MIN, from_switch_free = INT64_MIN;
+    std::unique_ptr<User> babbler;  ///< its places carry what is babbled
+    Bytes babble{};
+    std::size_t babble_length = 0;
+    std::int64_t babble_period = 0, babble_at = 0;
+    std::atomic<bool> cut{false};            ///< written in setup, read by all
+    std::atomic<std::uint64_t> downs{0};
+};
+
+class Switch {
+public:
+    Switch(std::string name, const Options&);
+
+    /// The segment of that name, made when there is none. Lives as long as one of its ports. [setup]
+    static std::shared_ptr<Switch> find(const std::string& name, const Options&, std::string& problem);
+
+    /// False, and `problem` said, when the station exists with another address. [setup]
+    bool add(User&, const std::string& station, const Options&, std::string& problem);
+    /// What is due by now is still sent, as by a controller whose program ended. [setup]
+    void remove(std::unique_ptr<User>);
+
+    /// Works the segment out up to `now_ns`, unless another thread is doing so. [realtime]
+    void pump(std::int64_t now_ns) noexcept;
+    /// `now_ns`, or the newest time known to the segment. [any]
+    std::int64_t time(std::int64_t now_ns) const noexcept { return now_ns == unclocked ? latest_.load(std::memory_order_relaxed) : now_ns; }
+
+    /// Calls `change` while nobody pumps. [setup]
+    template <class Change>
+    auto exclusively(Change&& change) {
+        const Hold hold(*this);
+        return change();
+    }
+    Station* station(int number) noexcept;  ///< only within exclusively(), as all below
+
+    struct Active {
+        Disturbance what;
+        std::uint64_t matched = 0, hits = 0;
+    };
+    std::vector<Active> disturbances;
+    std::vector<std::unique_ptr<Station>> stations;  ///< in order of their numbers
+    std::uint64_t random = 1;
+
+    const std::string name;
+    const std::uint32_t speed;  ///< Mbit/s
+    const std::int64_t forward_ns;
+
+private:
+    struct Hold {
+        explicit Hold(Switch&) noexcept;
+        ~Hold();
+        Switch& held;
+    };
+    /// A frame that the switch has whole and is to pass on.
+    struct Event {
+        std::int64_t time_ns = 0;
+        std::uint64_t sequence = 0;
+        User* from = nullptr;
+        std::uint32_t place = 0;
+        std::int32_t to = -1;         ///< this station alone
+        std::uint32_t length = 0;
+        std::int32_t garbled = -1;    ///< this byte is another one,
+        std::uint8_t mask = 0;        ///< with these bits turned
+        bool operator<(const Event& o) const noexcept { return time_ns != o.time_ns ? time_ns > o.time_ns : sequence > o.sequence; }
+    };
+
+    void work(std::int64_t now) noexcept;
+    void collect(std::int64_t now) noexcept;
+    void launch(Station&, std::int64_t start) noexcept;
+    void pass_on(const Event&) noexcept;
+    void deliver(const Event&, Station& to) noexcept;
+    bool add_event(const Event&) noexcept;
+    bool disturbed(Event&, bool only_one) noexcept;
+    void release(const Event&) noexcept;
+    void give_back(User&, std::uint32_t place) noexcept;
+    std::int64_t wire_ns(std::size_t length) const noexcept { return static_cast<std::int64_t>(wire_bytes(length) * 8000 / speed); }
+    std::uint64_t draw() noexcept;
+    double noise() noexcept;
+    void sweep(std::vector<std::unique_ptr<User>>& gone, std::vector<std::unique_ptr<Station>>& empty);
+
+    std::vector<Event> events_;  ///< a heap, the next first
+    std::uint64_t sequence_ = 0;
+    std::vector<std::unique_ptr<User>> leaving_;  ///< [setup]
+    std::atomic_flag pumping_;
+    std::atomic<std::int64_t> latest_{INT64_MIN}, worked_until_{INT64_MIN};
+};
+
+}  // namespace hal::ethernet::simbus

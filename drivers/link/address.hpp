@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+// `DRIVER:PLACE?key=value&key=value`, taken apart for both kinds of bus. [setup]
+#pragma once
+
+#include <algorithm>
+#include <exception>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace hal::link {
+
+inline std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+/// How `apply` below begins what it says of a key that it does not know.
+inline constexpr std::string_view no_option = "there is no option ";
+
+/// `key`, `key=0` or `key=1`; what is wrong with it, or nothing.
+inline std::string to_flag(std::string_view key, std::string_view value, bool has_value, bool& flag) {
+    if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
+    flag = !has_value || value == "1";
+    return {};
+}
+
+/// One way to a bus. Options that are the driver's own stay behind the place, for the driver itself to read.
+template <class Opened, class Options, class Description>
+struct Driver {
+    std::string_view name;
+    Opened (*open)(const std::string& place, const Options&);
+    Description (*describe)(const std::string& place);
+    bool (*is_own_option)(std::string_view key) = nullptr;
+    std::string (*own_options)() = nullptr;  ///< their names, for people
+    std::string_view without = {};           ///< those of all drivers that mean nothing to this one, with a blank between two
+
+    bool lacks(std::string_view key) const {
+        const auto at = without.find(key);
+        if (key.empty() || at == without.npos) return false;
+        const auto end = at + key.size();
+        return (at == 0 || without[at - 1] == ' ') && (end == without.size() || without[end] == ' ');
+    }
+};
+
+/// Opens by the driver that the address names. `apply(key, value, has_value, options)` says what is wrong with an option, or nothing;
+/// `help` completes "'x' is no address of ".
+template <class Opened, class Options, class Description, class Apply>
+Opened open_address(std::string_view address, Options options, std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
+                    std::string_view help) {
+    const auto colon = address.find(':');
+    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) { return d.name == address.substr(0, colon); });
+    if (colon == address.npos || driver == drivers.end()) return {nullptr, quoted(address) + " is no address of " + std::string(help)};
+
+    const auto  place = address.substr(colon + 1);
+    const auto  question = std::min(place.find('?'), place.size());
+    auto        rest = place.substr(std::min(question + 1, place.size()));
+    std::string where(place.substr(0, question));
+    const char* separator = "?";
+    while (!rest.empty()) {
+        const auto end = std::min(rest.find('&'), rest.size());
+        const auto item = rest.substr(0, end);
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        const auto equals = std::min(item.find('='), item.size());
+        const auto key = item.substr(0, equals);
+        const bool has_value = equals < item.size();
+        if (driver->is_own_option != nullptr && driver->is_own_option(key)) {
+            where.append(std::exchange(separator, "&")).append(item);
+            continue;
+        }
+        std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
+        if (problem.starts_with(no_option) && driver->own_options != nullptr)
+            problem += ", and of " + std::string(driver->name) + ": " + driver->own_options();
+        if (problem.empty() && driver->lacks(key))
+            problem = "the option " + quoted(key) + " means nothing to " + std::string(driver->name) + "; take it out";
+        if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
+    }
+    try {
+        auto opened = driver->open(where, options);
+        if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
+        return opened;
+    } catch (const std::exception& e) {
+        return {nullptr, std::string(address) + ": " + e.what()};
+    }
+}
+
+/// Describes what the driver would open, without opening it. A driver's own options stay behind the place.
+template <class Opened, class Options, class Description>
+Description describe_address(std::string_view address, std::span<const Driver<Opened, Options, Description>> drivers) {
+    const auto colon = address.find(':');
+    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) { return d.name == address.substr(0, colon); });
+    if (colon == address.npos || driver == drivers.end()) return Description{.address = std::string(address), .transport = {}};
+    const auto  place = address.substr(colon + 1);
+    const auto  question = std::min(place.find('?'), place.size());
+    std::string where(place.substr(0, question));
+    const char* separator = "?";
+    for (auto rest = place.substr(std::min(question + 1, place.size())); !rest.empty();) {
+        const auto item = rest.substr(0, rest.find('&'));
+        rest.remove_prefix(std::min(item.size() + 1, rest.size()));
+        if (driver->is_own_option != nullptr && driver->is_own_option(item.substr(0, item.find('='))))
+            where.append(std::exchange(separator, "&")).append(item);
+    }
+    return driver->describe(where);
+}
+
+}  // namespace hal::link

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include "netlink/link_monitor.hpp"
+
+#include <linux/netlink.h>
+#include <linux/rtnetlink.h>
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+#include <utility>
+
+namespace hal::link {
+
+LinkMonitor::LinkMonitor(const char* thread_name, int every_ms, std::function<void()> look, int also)
+    : every_ms_(every_ms), also_(also), look_(std::move(look)),
+      events_(::socket(AF_NETLINK, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, NETLINK_ROUTE)), wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+    sockaddr_nl address{};
+    address.nl_family = AF_NETLINK;
+    address.nl_groups = RTMGRP_LINK;
+    const auto* where = reinterpret_cast<const sockaddr*>(&address);
+    if (events_ && ::bind(events_.get(), where, sizeof address) != 0) events_ = {};  // then it looks every `every_ms` only
+    thread_ = std::thread([this, thread_name] {
+        pthread_setname_np(pthread_self(), thread_name);
+        run();
+    });
+}
+
+LinkMonitor::~LinkMonitor() {
+    ending_ = true;
+    nudge();
+    thread_.join();
+}
+
+void LinkMonitor::nudge() noexcept {
+    const std::uint64_t one = 1;
+    (void)!::write(wake_.get(), &one, sizeof one);
+}
+
+void LinkMonitor::run() {
+    char discarded[8192];
+    while (!ending_) {
+        pollfd sources[] = {{wake_.get(), POLLIN, 0}, {events_.get(), POLLIN, 0}, {also_, POLLIN, 0}};
+        ::poll(sources, 3, every_ms_);
+        while (::read(wake_.get(), discarded, sizeof discarded) > 0) {}
+        while (::recv(events_.get(), discarded, sizeof discarded, 0) > 0) {}  // it only matters that something changed
+        if (!ending_) look_();
+    }
+}
+
+}  // namespace hal::link

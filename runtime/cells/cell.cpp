@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#include "cells/cell.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include <unistd.h>
+
+namespace hal {
+namespace {
+
+constexpr const char* watch = NodePins::component;
+
+SessionOptions of_node(SessionOptions options, const std::string& node) {
+    options.name += "-" + node;
+    return options;
+}
+
+ShellOptions of_node(ShellOptions options, const std::string& node) {
+    options.node = node;
+    return options;
+}
+
+}  // namespace
+
+/// What the nodes have in common is read once for each of them: what is said of it is printed once.
+class Cell::Once final : public Output {
+public:
+    explicit Once(Output& to) : to_(to) {}
+    void out(std::string_view text) override { to_.out(text); }
+    void err(std::string_view text) override {
+        // diagnostics are paragraphs
+        for (std::size_t at = 0; at < text.size();) {
+            const std::size_t end = std::min(text.find("\n\n", at), text.size());
+            std::string_view paragraph = text.substr(at, end - at);
+            while (paragraph.ends_with('\n')) paragraph.remove_suffix(1);
+            at = end + 2;
+            const std::size_t line = paragraph.find('\n');
+            const bool whole = line != paragraph.npos;
+            const bool count = !whole && !paragraph.empty() && paragraph[0] >= '0' && paragraph[0] <= '9';  // "2 errors" of one node
+            if (paragraph.empty() || count || (whole && !said_.insert(std::string(paragraph)).second)) continue;
+            to_.err((whole && any_ ? "\n" : "") + std::string(paragraph) + "\n");
+            any_ = any_ || whole;
+        }
+    }
+    bool is_process() const override { return to_.is_process(); }
+
+private:
+    Output& to_;
+    std::set<std::string> said_;
+    bool any_ = false;
+};
+
+Cell::Cell(std::string name, std::vector<NodeLine> nodes, const SessionOptions& session, const ShellOptions& shell)
+    : name_(std::move(name)), nodes_(std::move(nodes)), options_(shell) {
+    for (const NodeLine& node : nodes_) {
+        Machine machine;
+        machine.session = std::make_unique<Session>(of_node(session, node.name));
+        machine.shell = std::make_unique<Shell>(*machine.session, of_node(shell, node.name));
+        machines_.push_back(std::move(machine));
+    }
+}
+
+Cell::~Cell() {
+    for (Machine& machine : machines_) {
+        const std::lock_guard lock(machine.session->mutex);
+        machine.session->shut_down();
+    }
+}
+
+std::size_t Cell::find(std::string_view node) const {
+    return static_cast<std::size_t>(std::find_if(nodes_.begin(), nodes_.end(), [&](const NodeLine& n) { return n.name == node; }) -
+                                    nodes_.begin());
+}
+
+bool Cell::load(const std::vector<std::string>& files, const std::string& ini, Output& output) {
+    Once once(output);
+    bool good = true;
+    for (std::size_t i = 0; i < size(); ++i) {
+        Machine& machine = machines_[i];
+        {
+            const std::lock_guard lock(machine.session->mutex);
+            Transaction transaction = machine.session->begin();
+            machine.session->add_process(transaction, watch, ::getpid(), {});
+            for (const NodeLine& other : nodes_) {
+                if (other.name == nodes_[i].name) continue;
+                std::string problem;
+                OutsidePin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
+                OutsidePin refused{"node." + other.name + ".refused", HAL_TYPE_BIT, HAL_DIR_OUT};
+                OutsidePin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
+                machine.pins[other.name + ".online"] = machine.session->add_outside_pin(transaction, watch, online, problem);
+                machine.pins[other.name + ".refused"] = machine.session->add_outside_pin(transaction, watch, refused, problem);
+                machine.pins[other.name + ".age-ms"] = machine.session->add_outside_pin(transaction, watch, age, problem);
+            }
+            Diagnostics none;
+            transaction.commit(none);
+        }
+        if (!ini.empty() && machine.shell->read_ini(ini, once) != 0) return false;
+        for (const std::string& file : files) good = machine.shell->run_file(file, once) == 0 && good;
+    }
+    return good && connect(once);
+}
+
+Span Cell::place(std::size_t node, Span span) {
+    if (!span.known()) return span;
+    const Sources::Source& text = machines_[node].session->sources.get(span.source);
+    const auto [at, fresh] = known_texts_.try_emplace({text.name, text.first_line}, 0u);
+    if (fresh) at->second = texts_.add(text.name, text.text, text.first_line);
+    return {at->second, span.begin, span.end};
+}
+
+void Cell::report(Diagnostics& found, Output& output) const {
+    if (!found.all().empty() && options_.level != Level::nothing) output.err(render(found, texts_, options_.color));
+}
+
+bool Cell::connect(Output& output) {
+    std::vector<NodePart> parts;
+    for (std::size_t i = 0; i < size(); ++i)
+        parts.push_back({nodes_[i].name, &machines_[i].session->model(), nodes_[i].rate(), nodes_[i].deadline(),
+                         [this, i](Span span) { return place(i, span); }});
+    Diagnostics found;
+    topics_ = topics_between(parts, found);
+    report(found, output);
+    return !found.failed();
+}
+
+// --- on the virtual clock ---------------------------------------------------------------------------------------------------
+
+bool Cell::start(Output& output) {
+    bool good = true;
+    std::vector<std::string> links(size());
+    for (const NodeTopic& topic : topics_)
+        for (const NodeField& field : topic.fields)
+            for (const NodeReader& reader : field.readers) {
+                Machine& machine = machines_[reader.node];
+                const std::lock_guard lock(machine.session->mutex);
+                const std::string& from = nodes_[topic.from].name;
+                std::string problem;
+                OutsidePin pin{"node." + from + "." + field.signal, field.type, HAL_DIR_OUT};
+                pin.initial = reader.safe;
+                Transaction transaction = machine.session->begin();
+                machine.pins[from + "." + field.signal] = machine.session->add_outside_pin(transaction, watch, pin, problem);
+                Diagnostics none;
+                transaction.commit(none);
+                links[reader.node] += "net " + field.signal + " node." + from + "." + field.signal + "\n";
+            }
+    for (std::size_t i = 0; i < size(); ++i) {
+        if (!links[i].empty()) good = machines_[i].shell->run_text("<links of node " + nodes_[i].name + ">", links[i], output) == 0 && good;
+        const std::lock_guard lock(machines_[i].session->mutex);
+        if (!machines_[i].session->running() && !machines_[i].session->model().threads.empty()) machines_[i].session->start_threads();
+        machines_[i].session->note_latencies(node_latencies(*this, i, true));
+        for (const auto& thread : machines_[i].session->model().threads) step_ns_ = std::gcd(step_ns_, thread->options.period_ns);
+    }
+    if (step_ns_ == 0) step_ns_ = 1'000'000;
+    return good;
+}
+
+void Cell::advance(std::int64_t ns) {
+    for (const std::int64_t until = now_ns_ + ns; now_ns_ < until;) {
+        const std::int64_t step = std::min(step_ns_, until - now_ns_);
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (alone_ != SIZE_MAX && i != alone_) continue;
+            const std::lock_guard lock(machines_[i].session->mutex);
+            machines_[i].session->advance_ns(step);
+        }
+        const bool first = now_ns_ == 0;
+        now_ns_ += step;
+        if (alone_ != SIZE_MAX) continue;
+        for (const NodeTopic& topic : topics_)
+            if (now_ns_ % topic.rate_ns < step) deliver(topic);
+        if (first) greet();
+    }
+}
+
+// Since the first step all are there.
+void Cell::greet() {
+    for (Machine& machine : machines_) {
+        std::vector<std::pair<Pin*, hal_value>> online;
+        for (const auto& [name, pin] : machine.pins)
+            if (name.ends_with(".online") && pin) online.emplace_back(pin, hal_value{.raw = 1});
+        const std::lock_guard lock(machine.session->mutex);
+        machine.session->write_outside(online);
+    }
+}
+
+void Cell::deliver(const NodeTopic& topic) {
+    std::vector<std::string> names;
+    for (const NodeField& field : topic.fields) names.push_back(field.signal);
+    std::vector<std::optional<Reading>> values;
+    {
+        Session& from = *machines_[topic.from].session;
+        const std::lock_guard lock(from.mutex);
+        values = from.read(names);
+    }
+    std::vector<std::vector<std::pair<Pin*, hal_value>>> rows(size());
+    for (std::size_t i = 0; i < topic.fields.size(); ++i)
+        for (const NodeReader& reader : topic.fields[i].readers)
+            if (Pin* const pin = machines_[reader.node].pins[nodes_[topic.from].name + "." + names[i]]; pin && values[i])
+                rows[reader.node].emplace_back(pin, values[i]->value);
+    for (std::size_t i = 0; i < size(); ++i) {
+        if (rows[i].empty()) continue;
+        const std::lock_guard lock(machines_[i].session->mutex);
+        machines_[i].session->write_outside(rows[i]);
+    }
+}
+
+}  // namespace hal

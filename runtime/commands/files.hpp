@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Text files that are read as commands, and paths as users write them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hal {
+
+/// The whole file into `text`. False: `problem` says why ("No such file or directory", "it is a directory" …). With `descriptors`,
+/// /dev/fd/N and /dev/stdin may be pipes.
+bool read_text_file(const std::string& path, std::string& text, std::string& problem, bool descriptors = false);
+/// Where a netlist is looked for, as LinuxCNC does it: in `directory`, then in the folders of HALLIB_PATH and HALLIB_DIR and in the
+/// installed library; `LIB:NAME` in HALLIB_DIR and the installed library only.
+std::vector<std::string> netlist_places(const std::string& name, const std::string& directory);
+/// Reads the first that can be read; `path` becomes its place. False: `problem` says why not.
+bool read_netlist(const std::string& name, const std::string& directory, std::string& path, std::string& text, std::string& problem);
+/// `~` and `~/…` become the home directory; a relative path is taken from `directory` unless that is empty.
+std::string resolve_path(const std::string& path, const std::string& directory);
+/// The one name of the file, whatever way leads to it; `path` itself when it does not exist.
+std::string canonical_path(const std::string& path);
+/// "a/b.hal" gives "a", "b.hal" gives "".
+std::string folder_of(const std::string& path);
+
+}  // namespace hal

@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: MIT
+// loadusr, waitusr, unloadusr: programs outside the runtime.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <poll.h>
+#include <unistd.h>
+
+#include <fcntl.h>
+
+#include "commands/table.hpp"
+#include "machine/processes.hpp"
+
+namespace hal {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Plan {
+    bool wait_ready = false, wait_end = false, ignore_status = false;
+    bool any_name = true;  ///< no -Wn: whatever the program calls its component
+    RestartPolicy restart;
+    std::string name;  ///< as component
+    std::size_t name_at = 0, program = 0;
+    std::int64_t timeout_ns = 0;  ///< of waiting; 0: none
+};
+
+/// The time behind `-t` at argument i, or 0 after reporting.
+std::int64_t timeout_option(Context& context, std::size_t i) {
+    if (i < context.count())
+        if (const auto time = parse_duration_ns(context.argument(i), false); time && *time >= 1'000'000 && *time <= 86'400'000'000'000)
+            return *time;
+    context.diagnostics.error("unknown-option", context.span(i), "-t takes a time from 1ms to 24h, such as -t 10s");
+    return 0;
+}
+
+/// True for an option about restarts, which it has then taken or reported.
+bool restart_option(Context& context, Plan& plan, std::size_t i, const std::string& option) {
+    const auto equals = option.find('=');
+    const std::string key = option.substr(0, equals), value = equals == option.npos ? "" : option.substr(equals + 1);
+    if (key == "--restart") {
+        static constexpr std::pair<const char*, Restart> words[] = {
+            {"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
+        const auto word = std::find_if(std::begin(words), std::end(words), [&](const auto& w) { return value == w.first; });
+        if (word != std::end(words)) plan.restart.when = word->second;
+        else context.diagnostics.error("unknown-option", context.span(i), "--restart is no, on-failure or always", "", context.usage());
+        return true;
+    }
+    if (key != "--restart-delay") return false;
+    if (const auto delay = parse_duration_ns(value, false); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000)
+        plan.restart.delay_ns = *delay;
+    else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay is a time from 10ms to 1h", "", context.usage());
+    return true;
+}
+
+/// The options before the program. False after reporting.
+bool read_options(Context& context, Plan& plan) {
+    std::size_t i = 0;
+    for (; i < context.count() && context.argument(i).starts_with('-'); ++i) {
+        const std::string& option = context.argument(i);
+        if (option == "-W") plan.wait_ready = true;
+        else if (option == "-w") plan.wait_end = true;
+        else if (option == "-i") plan.ignore_status = true;
+        else if (option == "-iw" || option == "-wi") plan.wait_end = plan.ignore_status = true;
+        else if (restart_option(context, plan, i, option)) {
+            if (context.diagnostics.failed()) return false;
+        } else if (option == "-Wn" && i + 1 < context.count()) {
+            plan.wait_ready = true;
+            plan.any_name = false;
+            plan.name = context.argument(++i);
+            plan.name_at = i;
+        } else if (option == "-t") {
+            plan.timeout_ns = timeout_option(context, ++i);
+            if (plan.timeout_ns == 0) return false;
+        } else {
+            context.diagnostics.error("unknown-option", context.span(i),
+                                      "loadusr has no option '" + option + "'" + (option == "-Wn" ? " without a name" : ""), "", context.usage());
+            return false;
+        }
+    }
+    plan.program = i;
+    if (plan.timeout_ns != 0 && !plan.wait_ready && !plan.wait_end) {
+        context.diagnostics.error("unknown-option", context.span(0), "-t limits the wait of -W, -Wn or -w; none of them is given", "", context.usage());
+        return false;
+    }
+    if (plan.wait_end && plan.restart.when != Restart::no) {
+        context.diagnostics.error("unknown-option", context.span(0), "-w waits for a program's end, --restart does not let it end", "", context.usage());
+        return false;
+    }
+    if (i == context.count()) {
+        context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' needs a program to start",
+                                  "something is missing", context.usage());
+        return false;
+    }
+    if (plan.name.empty()) {
+        const std::string& program = context.argument(i);
+        plan.name = program.substr(program.rfind('/') + 1);
+        plan.name_at = i;
+        if (plan.name.ends_with(".py")) plan.name.resize(plan.name.size() - 3);
+    }
+    return true;
+}
+
+/// Two pipes through which a child's stdout and stderr reach an Output that is not this process's own.
+class Pipes {
+public:
+    Pipes() {
+        for (auto& pipe : pipes_)
+            if (pipe2(pipe.data(), O_CLOEXEC) == 0) fcntl(pipe[0], F_SETFL, O_NONBLOCK);
+    }
+    ~Pipes() {
+        close_writers();
+        for (auto& pipe : pipes_) close_one(pipe[0]);
+    }
+    Pipes(const Pipes&) = delete;
+    int out() const { return pipes_[0][1]; }
+    int err() const { return pipes_[1][1]; }
+    void close_writers() {
+        for (auto& pipe : pipes_) close_one(pipe[1]);
+    }
+    /// Hands on what has come, waiting at most so long for something. False when both ends are closed.
+    bool pass_on(Output& output, int timeout_ms) {
+        std::array<pollfd, 2> ready{pollfd{pipes_[0][0], POLLIN, 0}, pollfd{pipes_[1][0], POLLIN, 0}};
+        poll(ready.data(), ready.size(), timeout_ms);
+        for (std::size_t i = 0; i < 2; ++i) {
+            if (pipes_[i][0] < 0) continue;
+            std::array<char, 4096> text;
+            ssize_t got;
+            while ((got = read(pipes_[i][0], text.data(), text.size())) > 0) {
+                const std::string_view part(text.data(), static_cast<std::size_t>(got));
+                if (total_ > most) continue;  // read and thrown away, so that the program is not held up
+                total_ += part.size();
+                if (i == 0) output.out(part);
+                else output.err(part);
+                if (total_ > most) output.err("\n(output cut here: more than 1 MiB)\n");
+            }
+            if (got == 0) close_one(pipes_[i][0]);
+        }
+        return pipes_[0][0] >= 0 || pipes_[1][0] >= 0;
+    }
+
+private:
+    static constexpr std::size_t most = std::size_t{1} << 20;
+    static void close_one(int& file) {
+        if (file >= 0) close(file);
+        file = -1;
+    }
+    std::array<std::array<int, 2>, 2> pipes_{{{-1, -1}, {-1, -1}}};
+    std::size_t total_ = 0;
+};
+
+/// How long a command has waited: when it is time to report it, and when it is enough.
+class Patience {
+public:
+    explicit Patience(std::int64_t limit_ns) : limit_(limit_ns) {}
+    bool over() const { return limit_.count() != 0 && waited() >= limit_; }
+    /// True after 1 s, 10 s, and then every minute.
+    bool report_due() {
+        if (waited() < report_) return false;
+        report_ = report_ < 10s ? 10s : report_ < 60s ? 60s : report_ + 60s;
+        return true;
+    }
+    std::string text() const { return std::to_string(std::chrono::duration_cast<std::chrono::seconds>(waited()).count()) + " s"; }
+
+private:
+    std::chrono::nanoseconds waited() const { return std::chrono::steady_clock::now() - begin_; }
+    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+    std::chrono::nanoseconds limit_, report_ = 1s;
+};
+
+void report_wait(Context& context, Patience& patience, const auto& what) {
+    if (!patience.report_due() || context.options().level == Level::nothing) return;
+    const std::string text = context.command.name.text + ": " + what() + " (" + patience.text() + ")\n";
+    context.lock.unlock();
+    context.output.notice(text);
+    context.lock.lock();
+}
+
+void timed_out(Context& context, std::int64_t limit_ns, const std::string& what, std::string help) {
+    context.diagnostics.error("program-timeout", context.command.span, what + " within " + format_duration(static_cast<double>(limit_ns)),
+                              "", std::move(help));
+}
+
+/// Waits until the name that the program is to have is free or a dead program's. False after reporting.
+bool wait_for_name(Context& context, const Plan& plan, Patience& patience) {
+    while (true) {
+        const auto* const entry = context.processes.find(plan.name);
+        const bool dead = entry && entry->dead(), runs = entry && entry->child && !entry->ended;
+        const bool comes_back = dead && (entry->restart_ns != 0 || (runs && entry->restart.when != Restart::no));
+        if (dead && !comes_back && !runs) return true;
+        if (!entry && !context.session.model().find_component(plan.name) && !context.session.model().find_instance(plan.name)) return true;
+        if (!entry || !(entry->stopping || (dead && !comes_back))) {
+            const std::string who = !entry ? "a component in the machine" : "process " + std::to_string(entry->pid) + ", " + entry->state();
+            context.diagnostics.error("name-taken", context.span(plan.name_at), "the name '" + plan.name + "' is in use (" + who + ")",
+                                      "in use", entry ? "end the program first: unload " + plan.name : "give the program another name");
+            return false;
+        }
+        if (patience.over()) {
+            timed_out(context, plan.timeout_ns, "the previous '" + plan.name + "' (process " + std::to_string(entry->pid) + ") did not end",
+                      "nothing was started; kill -9 " + std::to_string(entry->pid) + " ends it by force");
+            return false;
+        }
+        report_wait(context, patience, [&] {
+            return "waiting for the previous '" + plan.name + "' to end: process " + std::to_string(entry->pid) +
+                   (entry->stopping ? " has got SIGTERM and still runs" : " has lost its connection and still runs");
+        });
+        if (context.interrupted()) return false;
+        context.processes.wait(context.lock, 100ms);
+    }
+}
+
+constexpr const char* initializing = "has registered it and is initializing";
+
+/// Why the component that is waited for is not there yet: what the program has done so far.
+std::string progress(Context& context, const Plan& plan, pid_t pid) {
+    const auto* const entry = context.processes.find(plan.name);
+    if (entry && entry->owner != 0 && !entry->dead()) return initializing;
+    if (const std::string why = context.processes.refusal_of(pid); !why.empty()) return "could not register: " + why;
+    const auto names = context.processes.registered_by(pid);
+    if (names.empty()) return "has not registered a component";
+    return "has registered " + (names.size() == 1 ? "'" + names[0] + "'" : listed(names)) + " instead";
+}
+
+/// `fresh`: no dead program had the name before.
+void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64_t number, bool fresh, Patience& patience) {
+    const std::string& program = context.argument(plan.program);
+    std::string last = "has not registered a component";
+    while (true) {
+        const auto* const child = context.processes.find(pid);
+        if (child || !context.processes.refusal_of(pid).empty()) last = progress(context, plan, pid);
+        auto* const entry = context.processes.find_number(number);
+        if (entry && entry->ready) return;
+        const auto* const named = plan.any_name ? nullptr : context.processes.find(plan.name);
+        if (named && named->ready) return;
+        if (!child && !(entry && entry->dead() && (entry->restart_ns != 0 || !entry->ended))) {
+            const bool registered = last == initializing || (fresh && entry && entry->dead());
+            context.diagnostics.error(
+                "program-ended", context.span(plan.program), "'" + program + "' ended before a component '" + plan.name + "' was ready", "",
+                registered                                 ? "it registered the component and ended while it was initializing"
+                : last == "has not registered a component" ? "a program registers over the control socket; without -W nobody waits for it"
+                                                           : "it " + last);
+            if (fresh && entry && entry->dead()) context.processes.give_up(*entry);
+            return;
+        }
+        if (patience.over()) {
+            if (entry) context.processes.give_up(*entry);
+            return timed_out(context, plan.timeout_ns, "component '" + plan.name + "' was not ready",
+                             "'" + program + "' " + last + "; it was ended");
+        }
+        report_wait(context, patience, [&] {
+            return "waiting for component '" + plan.name + "': '" + program + "' (process " + std::to_string(pid) + ") " + last;
+        });
+        if (context.interrupted()) return;
+        context.processes.wait(context.lock, 100ms);
+    }
+}
+
+void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes, const Patience& patience) {
+    while (true) {
+        const auto* const entry = context.processes.find(pid);
+        if (entry->ended) break;
+        if (patience.over()) {
+            timed_out(context, plan.timeout_ns, "'" + context.argument(plan.program) + "' did not end", "the program was ended");
+            context.processes.give_up(*context.processes.find(pid));
+            return context.processes.abandon(pid);
+        }
+        if (context.interrupted()) {
+            context.processes.terminate(*context.processes.find(pid));
+            return context.processes.abandon(pid);
+        }
+        if (pipes) {
+            context.lock.unlock();
+            const bool open = pipes->pass_on(context.output, 20);
+            context.lock.lock();
+            if (open) continue;
+        }
+        context.processes.wait(context.lock, 100ms);
+    }
+    const int status = context.processes.find(pid)->status;
+    context.processes.collect(pid);
+    if (pipes) pipes->pass_on(context.output, 0);
+    if (status == 0 || plan.ignore_status) return;
+    const std::string how =
+        status > 128 ? "was ended by signal " + std::to_string(status - 128) : "failed with exit status " + std::to_string(status);
+    context.diagnostics.error("program-failed", context.span(plan.program), "'" + context.argument(plan.program) + "' " + how, "",
+                              "-i before the program's name ignores the status");
+}
+
+}  // namespace
+
+void command_loadusr(Context& context) {
+    Plan plan;
+    if (!read_options(context, plan)) return;
+
+    ProcessStart start;
+    start.directory = context.options().directory;
+    for (std::size_t i = plan.program; i < context.count(); ++i) start.arguments.push_back(context.argument(i));
+    if (start.arguments[0].starts_with('~')) start.arguments[0] = context.path(start.arguments[0]);
+    std::optional<Pipes> pipes;
+    if (plan.wait_end && context.output.is_process()) {
+        start.keep_stdin = isatty(0);
+    } else if (plan.wait_end) {
+        pipes.emplace();
+        start.out = pipes->out();
+        start.err = pipes->err();
+    }
+
+    Patience patience(plan.timeout_ns);
+    if (!plan.any_name && !plan.wait_end && !wait_for_name(context, plan, patience)) return;
+    const bool fresh = !plan.any_name && !context.processes.find(plan.name);
+    std::string problem;
+    const pid_t pid = context.processes.start(start, plan.wait_end, problem);
+    if (pid == 0) {
+        context.diagnostics.error("no-program", context.span(plan.program), "'" + start.arguments[0] + "' cannot be started: " + problem);
+        return;
+    }
+    if (pipes) pipes->close_writers();
+    if (plan.wait_end) return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr, patience);
+    // A program that will say its name itself is entered under its process's name until then.
+    const std::uint64_t number = context.processes.add(pid, plan.name, context.command, !plan.any_name);
+    context.processes.keep_alive(pid, start, plan.restart);
+    if (plan.wait_ready) wait_until_ready(context, plan, pid, number, fresh, patience);
+}
+
+void command_waitusr(Context& context) {
+    const bool limited = context.argument(0) == "-t";
+    const std::int64_t limit_ns = limited ? timeout_option(context, 1) : 0;
+    if (context.diagnostics.failed()) return;
+    if (context.count() != (limited ? 3U : 1U)) {
+        context.diagnostics.error("wrong-arguments", context.command.span, "'waitusr' needs one program", "", context.usage());
+        return;
+    }
+    const std::size_t at = limited ? 2 : 0;
+    const std::string& name = context.argument(at);
+    if (!context.processes.find(name)) {
+        const bool component = context.session.model().find_component(name) != nullptr;
+        if (component)
+            context.diagnostics.error("not-a-program", context.span(at), "'" + name + "' is a component in this process, not a program", "",
+                                      "waitusr waits for programs started by loadusr");
+        return;  // gone already: that is what was waited for
+    }
+    const Patience patience(limit_ns);
+    // the one that has the name now; another that takes the name over meanwhile is not waited for
+    const std::uint64_t number = context.processes.find(name)->number;
+    const auto living = [&]() -> const Processes::Entry* {
+        const auto* const entry = context.processes.find_number(number);
+        const bool lives = entry && entry->name == name && (!entry->dead() || entry->restart_ns != 0 || (entry->child && !entry->ended));
+        return lives ? entry : nullptr;
+    };
+    while (const auto* const entry = living()) {
+        if (patience.over())
+            return timed_out(context, limit_ns,
+                             "'" + name + "' (process " + std::to_string(entry->pid) + ", " + entry->state() + ") did not end", "");
+        if (context.interrupted()) return;
+        context.processes.wait(context.lock, 100ms);
+    }
+}
+
+namespace {
+
+void no_program(Context& context, const std::string& name) {
+    const auto names = context.processes.names();
+    context.diagnostics.error("not-a-program", context.span(0), "there is no program '" + name + "'", did_you_mean(name, names),
+                              names.empty() ? "no program runs" : "programs: " + listed(names));
+}
+
+}  // namespace
+
+void command_unloadusr(Context& context) {
+    const std::string& name = context.argument(0);
+    const auto unload = [&](Processes::Entry& entry) {
+        const std::string why = context.processes.unload(*context.transaction, entry);
+        if (!why.empty()) context.diagnostics.error("not-a-program", context.span(0), why, "", "end it as that user, or as root");
+    };
+    if (name == "all") {
+        for (const auto& each : context.processes.names()) unload(*context.processes.find(each));
+    } else if (auto* const entry = context.processes.find(name)) {
+        unload(*entry);
+    } else {
+        no_program(context, name);
+    }
+}
+
+bool unload_processes(Context& context) {
+    if (context.count() != 1) return false;
+    const std::string& name = context.argument(0);
+    if (name != "all" && !(context.processes.find(name) && context.session.model().find_component(name))) return false;
+    command_unloadusr(context);
+    return name != "all";
+}
+
+}  // namespace hal

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// status, fault, and what `show` reports beyond LinuxCNC: timing, latency, faults.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "commands/table.hpp"
+#include "commands/json_text.hpp"
+#include "commands/describe.hpp"
+#include "commands/listing.hpp"
+#include "commands/script.hpp"
+
+namespace hal {
+namespace {
+
+void lock_status(std::string& text, unsigned lock) {
+    static constexpr std::pair<unsigned, const char*> bits[] = {
+        {1, "  HAL_LOCK_LOAD    - loading of new components is locked\n"},
+        {2, "  HAL_LOCK_CONFIG  - link and addf is locked\n"},
+        {4, "  HAL_LOCK_PARAMS  - setting params is locked\n"},
+        {8, "  HAL_LOCK_RUN     - running/stopping HAL is locked\n"}};
+    text += fmt::format("HAL locking status:\n  current lock value {} ({:02x})\n", lock, lock);
+    if (lock == 0) text += "  HAL_LOCK_NONE - nothing is locked\n";
+    for (const auto& [bit, line] : bits)
+        if (lock & bit) text += line;
+}
+
+struct Counts {
+    std::size_t components = 0, instances = 0, pins = 0, parameters = 0, aliases = 0, signals = 0, functions = 0, threads = 0;
+};
+
+Counts count(const Model& model) {
+    Counts counts{model.components.size(), model.instance.size(), 0, 0, 0, model.signals.size(),
+                  model.function.size(),   model.threads.size()};
+    for (const auto& [name, pin] : model.pin) {
+        if (name != pin->name) ++counts.aliases;
+        else ++(is_parameter(*pin) ? counts.parameters : counts.pins);
+    }
+    return counts;
+}
+
+/// In place of LinuxCNC's memory table: there is no fixed memory here that could run out, nor anything recycled.
+void memory_status(std::string& text, const Model& model) {
+    const Counts counts = count(model);
+    text += "HAL memory status\n";
+    const auto add = [&](const char* what, std::size_t number) {
+        text += fmt::format("  active {:<12} {}\n", std::string(what) + ":", number);
+    };
+    add("components", counts.components);
+    add("instances", counts.instances);
+    add("pins", counts.pins);
+    add("parameters", counts.parameters);
+    add("aliases", counts.aliases);
+    add("signals", counts.signals);
+    add("functions", counts.functions);
+    add("threads", counts.threads);
+}
+
+std::string status_json(const Session& session) {
+    const Counts c = count(session.model());
+    std::string text = "{\"instance\":";
+    json_quote(text, session.options().name);
+    return text +
+           fmt::format(
+               ",\"running\":{},\"lock\":{},\"faults\":{},\"components\":{},\"instances\":{},\"pins\":{},\"parameters\":{},\"aliases\":{},"
+               "\"signals\":{},\"functions\":{},\"threads\":{}}}\n",
+               session.running(), session.lock, session.fault_count(), c.components, c.instances, c.pins, c.parameters, c.aliases,
+               c.signals, c.functions, c.threads);
+}
+
+/// Three figures of a distribution in one column each.
+std::string figures(double p50, double p99, double max) {
+    return fmt::format("{:>9} {:>9} {:>9}", format_duration(p50), format_duration(p99), format_duration(max));
+}
+
+/// What is not ordinary about a thread.
+std::string state_of(const ThreadReport& r) {
+    std::string text = r.supervised ? "" : ", not supervised";
+    if (r.hung)
+        text += fmt::format(", hangs{} for {}", r.function.empty() ? "" : " in '" + r.function + "'",
+                            format_duration(static_cast<double>(r.silent_ns)));
+    else if (r.faulted) text += ", stopped by a fault";
+    return text;
+}
+
+}  // namespace
+
+void command_status(Context& context) {
+    const std::string_view what = context.argument_or(0, "all");
+    if (what == "instance") return context.output.out(context.session.status_text());
+    if (what != "all" && what != "lock" && what != "mem") {
+        context.diagnostics.error("unknown-word", context.span(0), "there is no status of '" + std::string(what) + "'", "",
+                                  "the choices are: lock, mem, instance, all");
+        return;
+    }
+    if (context.options().json) return context.output.out(status_json(context.session));
+    std::string text;
+    if (what != "mem") lock_status(text, context.script.locks());
+    if (what != "lock") memory_status(text, context.session.model());
+    context.output.out(text);
+}
+
+void show_timing(Context& context) {
+    std::vector<std::string> words;
+    for (std::size_t i = 1; i < context.count(); ++i) words.push_back(context.argument(i));
+    const Patterns patterns(std::move(words));
+    std::string text;
+    if (context.options().json) {
+        describe(text, context.session, context.processes, Listed::threads, patterns, std::nullopt);
+        return context.output.out(text + "\n");
+    }
+    const auto threads = threads_slowest_first(context.session.model(), patterns);
+    text += "Threads:                                                 wake-up lateness              execution time\n"
+            "Name                     Period     Cycles   Missed       p50       p99       max       p50       p99       max  Scheduling\n";
+    for (const Thread* const thread : threads) {
+        const ThreadReport r = context.session.thread_report(*thread);
+        text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name, format_duration(static_cast<double>(r.period_ns)),
+                            r.cycles, r.missed, figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
+                            figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
+                            r.cpu >= 0 ? fmt::format(", CPU {}", r.cpu) : "", state_of(r));
+    }
+    text += clock_text(context.session);
+    text += "\nFunctions:                                    Mean       Max   Samples  Thread\n";
+    std::vector<const Pin*> maxima;
+    std::vector<const LoadedFunction*> functions;
+    for (const Thread* const thread : threads)
+        for (const LoadedFunction* const function : thread->functions) {
+            const Pin* const tmax = context.session.model().find_pin(function->name + ".tmax");
+            if (!tmax) continue;
+            functions.push_back(function);
+            maxima.push_back(tmax);
+        }
+    const auto values = context.session.read_pins(maxima);
+    for (std::size_t i = 0; i < functions.size(); ++i) {
+        const LoadedFunction& function = *functions[i];
+        const auto samples = function.times->samples.load(std::memory_order_relaxed);
+        const auto total = function.times->total_ns.load(std::memory_order_relaxed);
+        const double mean = samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);
+        text += fmt::format("{:<40} {:>9} {:>9} {:>9}  {}\n", function.name, format_duration(mean), format_duration(values[i].s32), samples,
+                            function.thread->name);
+    }
+    context.output.out(text + "\n");
+}
+
+void show_latency(Context& context) {
+    std::vector<std::string> words;
+    for (std::size_t i = 1; i < context.count(); ++i) words.push_back(context.argument(i));
+    const Patterns patterns(std::move(words));
+    std::string text;
+    for (const auto& line : context.session.latency_lines())
+        if (patterns.match(line)) text += line + "\n";
+    context.output.out(text);
+}
+
+void show_faults(Context& context) {
+    const auto records = context.session.faults();
+    std::string text;
+    if (context.options().json) {
+        for (const auto& record : records) {
+            text += fmt::format("{}{{\"number\":{},\"age_ns\":{},\"cycle\":{},\"count\":{},\"span_ns\":{},\"thread\":", text.empty() ? "" : ",",
+                                record.number, record.age_ns, record.cycle, record.count, record.span_ns);
+            json_quote(text, record.thread);
+            json_quote(text += ",\"code\":", record.code);
+            json_quote(text += ",\"sentence\":", record.sentence);
+            text += '}';
+        }
+        return context.output.out("[" + text + "]\n");
+    }
+    for (const auto& record : records)
+        text += fmt::format("{:>4}  {} ago  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)), record.line());
+    if (records.empty()) text = "no faults\n";
+    else text += fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", context.session.fault_count());
+    context.output.out(text);
+}
+
+void command_fault(Context& context) {
+    Session& session = context.session;
+    if (context.argument(0) == "clear") return context.transaction->when_committed([&session] { session.clear_faults(); });
+    context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' cannot be done to faults", "",
+                              "type `fault clear`, or `show fault` to see them");
+}
+
+}  // namespace hal

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+// start, stop, advance, lock, unlock: commands that act on the machine as a whole.
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <thread>
+
+#include "commands/table.hpp"
+
+namespace hal {
+namespace {
+
+constexpr auto look_again = std::chrono::milliseconds(1);
+
+std::optional<std::uint64_t> whole_number(std::string_view text) {
+    std::uint64_t number = 0;
+    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return status == std::errc{} && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
+}
+
+/// Waits without the session's mutex until `done` says so (with it).
+template <class Done>
+void wait_for(Context& context, Done&& done) {
+    while (!done() && !context.interrupted()) {
+        context.lock.unlock();
+        std::this_thread::sleep_for(look_again);
+        context.lock.lock();
+    }
+}
+
+/// On the virtual clock in pieces, so that somebody else can look at the machine and a long simulation can be ended.
+void advance_ns(Context& context, std::int64_t ns) {
+    Session& session = context.session;
+    if (session.options().virtual_clock) {
+        constexpr std::int64_t piece = 100'000'000;
+        for (; ns > 0 && !context.interrupted(); ns -= piece) {
+            session.advance_ns(std::min(ns, piece));
+            context.lock.unlock();
+            context.lock.lock();
+        }
+        return;
+    }
+    const std::int64_t end = session.now_ns() + ns;
+    wait_for(context, [&] { return session.now_ns() >= end; });
+}
+
+void advance_cycles(Context& context, std::uint64_t cycles) {
+    Session& session = context.session;
+    if (session.model().threads.empty()) {
+        context.diagnostics.error("no-thread", context.span(0), "there is no thread whose cycles could be counted", "",
+                                  "make one with `newthread servo-thread 1000000`");
+        return;
+    }
+    if (session.options().virtual_clock) {
+        constexpr std::uint64_t piece = 1000;
+        for (; cycles > 0 && !context.interrupted(); cycles -= std::min(cycles, piece)) {
+            session.advance_cycles(std::min(cycles, piece));
+            context.lock.unlock();
+            context.lock.lock();
+        }
+        return;
+    }
+    const std::string fastest = session.model().threads.front()->name;
+    const std::uint64_t end = session.thread_report(*session.model().threads.front()).cycles + cycles;
+    wait_for(context, [&] {
+        const Thread* const thread = session.model().find_thread(fastest);
+        if (!thread) return true;
+        const ThreadReport report = session.thread_report(*thread);
+        return report.cycles >= end || (report.hung && session.hung_threads(context.diagnostics));
+    });
+}
+
+}  // namespace
+
+void command_start(Context& context) {
+    Session& session = context.session;
+    if (!context.transaction) {
+        session.start_threads(&context.diagnostics);
+        return;
+    }
+    context.transaction->needs_threads();
+    context.transaction->when_committed([&session] { session.start_threads(); });
+}
+
+void command_stop(Context& context) {
+    Session& session = context.session;
+    if (!context.transaction) {
+        session.stop_threads(&context.diagnostics);
+        return;
+    }
+    context.transaction->needs_threads();
+    context.transaction->when_committed([&session] { session.stop_threads(); });
+}
+
+void command_advance(Context& context) {
+    const std::string& amount = context.argument(0);
+    if (context.count() == 2) {
+        const auto cycles = whole_number(amount);
+        if (cycles && context.argument(1).starts_with("cycle")) return advance_cycles(context, *cycles);
+    } else if (!whole_number(amount)) {
+        if (const auto ns = parse_duration_ns(amount, false)) return advance_ns(context, *ns);
+    }
+    context.diagnostics.error("bad-duration", context.span(0), "'" + amount + "' says neither how many cycles nor how long", "",
+                              "type `advance 10 cycles`, or a time with its unit: `advance 250ms`");
+}
+
+void command_lock(Context& context) {
+    const std::string_view level = context.argument_or(0, "all");
+    if (level == "none") *context.locks = static_cast<unsigned>(Lock::none);
+    else if (level == "tune") *context.locks = static_cast<unsigned>(Lock::tune);
+    else if (level == "all") *context.locks = static_cast<unsigned>(Lock::all);
+    else
+        context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "'", "",
+                                  "the locks are: none, tune, all");
+}
+
+void command_unlock(Context& context) {
+    const std::string_view level = context.argument_or(0, "all");
+    if (level == "all") *context.locks = static_cast<unsigned>(Lock::none);
+    else if (level == "tune") *context.locks &= ~static_cast<unsigned>(Lock::tune);
+    else
+        context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "' to take off", "",
+                                  "the choices are: all, tune");
+}
+
+}  // namespace hal

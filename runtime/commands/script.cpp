@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: MIT
+#include "commands/script.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "text/quoting.hpp"
+#include "netlist/nodes.hpp"
+#include "commands/files.hpp"
+
+namespace hal {
+namespace {
+
+/// Commands that only look at the machine. `save` with a file acts.
+bool only_looks(const CommandRow& row, const Command& command) {
+    return (row.flags & command_query) && !(row.function.act == command_save && command.args.size() > 1);
+}
+
+}  // namespace
+
+std::string Context::path(const std::string& text) const { return resolve_path(text, options().directory); }
+
+Script::Script(Shell& shell, Shell::State& state, Output& output)
+    : shell_(shell),
+      state_(state),
+      session_(state.session),
+      output_(output),
+      lock_(state.session.mutex),
+      collected_before_(state.collected.size()) {}
+
+Script::~Script() = default;
+
+std::string Script::own_path(std::uint32_t source) const {
+    const std::string& name = session_.sources.get(source).name;
+    return name.starts_with('<') ? "" : canonical_path(resolve_path(name, shell_.options.directory));
+}
+
+Script::Parsed Script::parse_text(std::uint32_t source) {
+    Parsed parsed;
+    auto variable = state_.variable;
+    if (!shell_.options.node.empty())
+        variable = [this](const std::string& name) -> std::optional<std::string> {
+            if (name == "NODE") return shell_.options.node;
+            if (state_.variable) return state_.variable(name);
+            const char* const value = std::getenv(name.c_str());
+            return value ? std::optional<std::string>(value) : std::nullopt;
+        };
+    parsed.commands = parse(session_.sources, source, {state_.ini ? &*state_.ini : &session_.ini, std::move(variable)},
+                            parsed.problems);
+    for (Command& command : parsed.commands)  // quotes stay in the words of a netlist, and are no part of a file's name
+        if (command.name.text == "source" || command.name.text == "save")
+            for (Token& word : command.args) word.text = without_quotes(word.text);
+    const auto files = std::count_if(files_.begin(), files_.end(), [](const Open& open) { return !open.path.empty(); });
+    if (files <= 1 && !session_.sources.get(source).name.starts_with('<')) take_part(source, parsed);
+    return parsed;
+}
+
+// Of a netlist for several machines: the part of this one.
+void Script::take_part(std::uint32_t source, Parsed& parsed) {
+    const auto line = std::find_if(parsed.commands.begin(), parsed.commands.end(), is_node_line);
+    if (line == parsed.commands.end()) return;
+    std::vector<NodeLine> nodes;
+    collect_nodes(parsed.commands, nodes, parsed.problems);
+    if (!shell_.options.node.empty()) return keep_part(shell_.options.node, parsed.commands);
+    if (!nodes.empty()) {
+        std::vector<std::string> names;
+        for (const NodeLine& node : nodes) names.push_back(node.name);
+        parsed.problems.clear();  // of a text that is nobody's; $(NODE) has no value here
+        parsed.problems.error("several-nodes", line->span,
+                              "this netlist is for " + counted(nodes.size(), "machine") + ": " + listed(names, 100), "",
+                              "hal run " + session_.sources.get(source).name + " --node " + names.front() + " loads the part of one");
+    }
+    parsed.commands.clear();
+}
+
+int Script::run(std::uint32_t source) {
+    const bool collecting_before = state_.collecting;
+    const std::size_t collected_before = state_.collected.size();
+    files_.push_back({own_path(source), {}});
+    run_commands(source);
+    files_.pop_back();
+    finish();
+    const bool file = !session_.sources.get(source).name.starts_with('<');
+    if (state_.collecting && collecting_before && failed_) forget_collected(collected_before);
+    if (file && state_.collecting && !collecting_before) {
+        const std::size_t lost = state_.collected.size();
+        state_.collecting = false;
+        forget_collected(0);
+        if (!failed_) {
+            pending_.error("open-transaction", {}, "'begin' without 'commit': " + counted(lost, "collected edit") + " did not take effect",
+                           "", "end the row of edits with commit");
+            finish();
+        }
+    }
+    if (separately() && errors_ > 0 && file && shell_.options.level != Level::nothing)
+        output_.err(counted(errors_, "error") + "; lines with an error changed nothing, all others took effect\n");
+    return failed_ ? 1 : 0;
+}
+
+int Script::run(const Command& command) {
+    files_.push_back({"", {}});
+    run_line(command);
+    files_.pop_back();
+    finish();
+    return failed_ ? 1 : 0;
+}
+
+void Script::run_commands(std::uint32_t source) {
+    Parsed parsed = parse_text(source);
+    auto problem = parsed.problems.all().begin();
+    const auto take_problems_before = [&](std::uint32_t place) {
+        for (; problem != parsed.problems.all().end() && (problem->labels.empty() || problem->labels[0].span.begin < place); ++problem) {
+            pending_.add(*problem);
+            if (separately()) finish();
+        }
+    };
+    rows_.push_back({&parsed.commands, 0, parsed.commands.size()});
+    for (const Command& command : parsed.commands) {
+        take_problems_before(command.span.begin);
+        if (stop()) break;
+        ++rows_.back().next;
+        run_line(command);
+        if (separately()) finish();
+        if (stop()) break;
+    }
+    if (!stop()) take_problems_before(UINT32_MAX);
+    rows_.pop_back();
+}
+
+void Script::run_row(const std::vector<Command>& commands, std::size_t from, std::size_t to) {
+    rows_.push_back({&commands, from, to});
+    while (rows_.back().next < to && !stop()) {
+        run_line(commands[rows_.back().next++]);
+        if (separately()) finish();
+    }
+    rows_.pop_back();
+}
+
+void Script::run_line(const Command& command) {
+    if (shell_.options.echo) echo_line(session_.sources.text(command.span), session_.sources.place(command.span).line);
+    const CommandRow* const row = row_of(command);
+    if (!row) {
+        const bool argument = command.name.text.find('=') != std::string::npos;
+        lines_.push_back(command.span);
+        pending_.error("unknown-command", command.name.span, "there is no command '" + command.name.text + "'",
+                       did_you_mean(command.name.text, command_names()),
+                       argument ? "an assignment has blanks around the =: NAME = VALUE" : "`help` lists all commands");
+        return;
+    }
+    if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) return lines_.push_back(command.span);
+    if (row->flags & command_transaction) return group(command);
+    if ((state_.collecting || checked_begin_) && collect(command, *row)) return;
+    if (row->edits()) return edit(command, *row);
+    if (row->flags & command_deferred) return defer(command, *row);
+    act(command, *row);
+}
+
+Transaction& Script::transaction() {
+    if (!transaction_) transaction_.emplace(session_.begin());
+    return *transaction_;
+}
+
+void Script::edit(const Command& command, const CommandRow& row) {
+    lines_.push_back(command.span);
+    if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
+    ++edits_;
+    if (command.name.text == "unload" && !shell_.options.check) {
+        Context context{*this, shell_, session_, *state_.processes, output_, row, command, pending_, lock_, &transaction()};
+        if (unload_processes(context)) return;
+    }
+    if (!(row.flags & command_traceless)) text_is_kept_ = true;
+    transaction().apply(row.form(), command, pending_);
+}
+
+void Script::defer(const Command& command, const CommandRow& row) {
+    if (shell_.options.check && !(row.flags & command_checked)) return;
+    lines_.push_back(command.span);
+    if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
+    ++edits_;
+    if (!locks_) locks_ = session_.lock;
+    Context context{*this, shell_, session_, *state_.processes, output_, row, command, pending_, lock_, &transaction(), &*locks_};
+    row.function.act(context);
+}
+
+void Script::act(const Command& command, const CommandRow& row) {
+    if (shell_.options.check && row.function.act == command_loadusr) return note_program(command);
+    if (shell_.options.check && !(row.flags & command_checked)) return;
+    const bool apart = (row.flags & command_apart) || only_looks(row, command);
+    if (!apart) {
+        if (!rows_.empty()) --rows_.back().next;  // not carried out yet
+        finish();
+        if (!rows_.empty()) ++rows_.back().next;
+        if (stop()) return;
+    } else if (only_looks(row, command) && pending_.failed()) {
+        return;  // it would show edits that are rolled back
+    }
+    const std::size_t errors_before = pending_.errors();
+    if (!check_lock(row, command, locks(), session_.model(), pending_)) {
+        lines_.push_back(command.span);
+        return finish();
+    }
+    // Commands about one thing take a range of them: getp pid.[0..2].output
+    const bool about_one = (row.flags & command_each) != 0;
+    const auto plain = about_one ? expand(command, pending_) : std::vector<Command>{command};
+    for (const Command& one : plain) {
+        if (one.args.size() > 1 && about_one) {  // a range among the arguments is a list of names
+            for (const Token& name : one.args) {
+                const Command single{one.name, {name}, one.span};
+                Context context{*this, shell_, session_, *state_.processes, output_, row, single, pending_, lock_};
+                row.function.act(context);
+            }
+            continue;
+        }
+        Context context{*this, shell_, session_, *state_.processes, output_, row, one, pending_, lock_};
+        row.function.act(context);
+    }
+    if (row.function.act == command_loadusr) text_is_kept_ = true;  // its component remembers the place
+    const bool failed = pending_.errors() > errors_before;
+    if (apart) {
+        if (failed && row.function.act != command_source) lines_.push_back(command.span);
+        return;
+    }
+    if (failed) half_done_ = true;
+    else effective_.push_back(command.span);
+    finish();
+}
+
+bool Script::collect(const Command& command, const CommandRow& row) {
+    const bool acts = row.function.act == command_start || row.function.act == command_stop;
+    if (row.edits() || (row.flags & command_deferred) || acts) {
+        const auto other = std::find_if(state_.collected.begin(), state_.collected.end(), [&](const Command& one) {
+            return acts && one.name.text != command.name.text && (row_of(one)->flags & command_collected);
+        });
+        if (other != state_.collected.end()) {
+            Diagnostic found{Severity::error,
+                             "open-transaction",
+                             "'" + command.name.text + "' and '" + other->name.text + "' are in one transaction",
+                             {{command.name.span, "second"}, {other->name.span, "first"}},
+                             {"all of a transaction happens together; commit first, then type " + command.name.text}};
+            pending_.add(std::move(found));
+            lines_.push_back(command.span);
+            return true;
+        }
+        if (checked_begin_) return false;
+        state_.collected.push_back(command);
+        text_is_kept_ = true;
+        return true;
+    }
+    if ((row.flags & command_apart) || (row.flags & command_query) || row.function.act == command_advance) return false;
+    const bool typed = session_.sources.get(command.span.source).name.starts_with('<');
+    pending_.error("open-transaction", command.name.span, "'" + command.name.text + "' cannot be part of a transaction", "",
+                   std::string(typed ? "the transaction is still open; type this" : "write it") + " before `begin` or after `commit`");
+    lines_.push_back(command.span);
+    return true;
+}
+
+void Script::forget_collected(std::size_t from) {
+    for (; state_.collected.size() > from; state_.collected.pop_back()) idle_.push_back(state_.collected.back().span);
+}
+
+void Script::group(const Command& command) {
+    finish();
+    const std::string& name = command.name.text;
+    if (shell_.options.check) checked_begin_ = name == "begin";
+    if (stop() || shell_.options.check) return;
+    if (name == "begin") {
+        if (state_.collecting)
+            pending_.error("open-transaction", command.name.span, "edits are being collected already", "",
+                           "`commit` makes them take effect, `abort` forgets them");
+        else collected_before_ = 0;
+        state_.collecting = true;
+    } else if (!state_.collecting) {
+        pending_.error("no-transaction", command.name.span, "there is nothing to " + name + ": no 'begin' came before", "",
+                       "`begin` starts to collect edits");
+    } else if (name == "abort") {
+        state_.collecting = false;
+        forget_collected(0);
+    } else {
+        state_.collecting = false;
+        for (Command& one : std::exchange(state_.collected, {})) {
+            if (!one.name.span.known()) resolve_set(session_.model(), one);
+            const CommandRow& row = *row_of(one);
+            if (row.edits()) edit(one, row);
+            else defer(one, row);
+        }
+    }
+    finish();
+}
+
+void Script::source(Context& context) {
+    const std::string& given = context.argument(0);
+    std::string path = context.path(given), text, problem;
+    if (!read_netlist(given, context.options().directory, path, text, problem)) {
+        // Relative to the file it stands in, too: so that a folder of netlists can be run from anywhere.
+        const std::string beside = resolve_path(given, folder_of(files_.back().path));
+        std::string ignored;
+        if (given.starts_with('/') || !read_text_file(beside, text, ignored)) {
+            if (shell_.options.check) session_.note_missing_text(given);
+            context.diagnostics.error("unreadable-file", context.span(0), "'" + given + "' cannot be read: " + problem);
+            return;
+        }
+        path = beside;
+    }
+    const std::string canonical = canonical_path(path);
+    for (auto open = files_.begin(); open != files_.end(); ++open) {
+        if (open->path != canonical) continue;
+        Diagnostic found{
+            Severity::error, "recursive-source", "'" + given + "' is being read already", {{context.span(0), "reads it again"}}, {}};
+        for (auto inner = open + 1; inner != files_.end(); ++inner) found.labels.push_back({inner->at, "reached from here"});
+        context.diagnostics.add(std::move(found));
+        return;
+    }
+    text_is_kept_ = true;
+    const std::uint32_t source = session_.sources.add(path, std::move(text));
+    const bool collecting = state_.collecting;
+    const std::size_t collected = state_.collected.size();
+    files_.push_back({canonical, context.command.span});
+    run_commands(source);
+    files_.pop_back();
+    if (collecting && state_.collecting && (pending_.failed() || stopped_)) forget_collected(collected);  // all of the file or nothing
+    ended_ = false;  // a `quit` in there ended that file
+}
+
+void Script::echo_line(std::string_view line, std::uint32_t number) {
+    output_.err("(" + std::to_string(number) + ")<echo>: " + std::string(line) + "\n");
+}
+
+}  // namespace hal

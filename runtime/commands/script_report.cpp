@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+// The end of a transaction of a text, and what is printed about it.
+#include <map>
+#include <set>
+#include <utility>
+
+#include "text/quoting.hpp"
+#include "commands/script.hpp"
+
+namespace hal {
+namespace {
+
+std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes) {
+    std::string text;
+    const auto add = [&](std::size_t number, const char* noun) {
+        if (number > 0) text += (text.empty() ? "" : ", ") + counted(number, noun);
+    };
+    add(errors, "error");
+    add(warnings, "warning");
+    add(notes, "note");
+    return text;
+}
+
+/// "lines 1 to 4 and 7 of a.hal, line 2 of b.hal". Lines of `others` end a run.
+std::string lines_of(const Sources& sources, const std::vector<Span>& spans, const std::vector<Span>& others, bool several) {
+    std::map<std::uint32_t, std::set<std::uint32_t>> lines, breaks;
+    std::vector<std::uint32_t> order;
+    for (const Span span : spans) {
+        if (!span.known()) continue;
+        if (!lines.contains(span.source)) order.push_back(span.source);
+        lines[span.source].insert(sources.place(span).line);
+    }
+    for (const Span span : others)
+        if (span.known()) breaks[span.source].insert(sources.place(span).line);
+    std::string text;
+    for (const std::uint32_t source : order) {
+        std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;
+        for (const std::uint32_t line : lines[source]) {
+            const auto between = runs.empty() ? breaks[source].end() : breaks[source].lower_bound(runs.back().second);
+            if (runs.empty() || (between != breaks[source].end() && *between <= line)) runs.push_back({line, line});
+            else runs.back().second = line;
+        }
+        std::string row;
+        for (std::size_t i = 0; i < runs.size(); ++i) {
+            row += i == 0 ? "" : i + 1 == runs.size() ? " and " : ", ";
+            row += std::to_string(runs[i].first);
+            if (runs[i].second != runs[i].first) row += " to " + std::to_string(runs[i].second);
+        }
+        text += text.empty() ? "" : ", ";
+        text += (runs.size() == 1 && runs[0].first == runs[0].second ? "line " : "lines ") + row;
+        if (several) text += " of " + sources.get(source).name;
+    }
+    return text;
+}
+
+}  // namespace
+
+void Script::finish() {
+    if (!transaction_ && edits_ == 0 && pending_.all().empty()) return;
+    const std::size_t edits = std::exchange(edits_, 0);
+    const bool open = transaction_.has_value();
+    if (locks_ && transaction_) transaction_->when_committed([&session = session_, locks = *locks_] { session.lock = locks; });
+    const bool took_effect = open && transaction_->commit(pending_);
+    transaction_.reset();
+    locks_.reset();
+    Diagnostics found;
+    found.take(pending_);
+    const bool failed = found.failed() || (open && !took_effect);
+    auto& where = failed ? idle_ : effective_;
+    where.insert(where.end(), lines_.begin(), lines_.end());
+    lines_.clear();
+    report(found, edits, took_effect);
+    if (!failed) return;
+    errors_ += found.errors();
+    failed_ = true;
+    if (!separately()) stopped_ = true;
+}
+
+void Script::report(Diagnostics& found, std::size_t edits, bool took_effect) {
+    const ShellOptions& options = shell_.options;
+    if (options.level == Level::nothing) return;
+    Diagnostics shown;
+    for (const Diagnostic& one : found.all())
+        if (one.severity != Severity::note || options.notes || options.level >= Level::results) shown.add(one);
+    if (!shown.all().empty()) {
+        std::string text = render(shown, session_.sources, options.color);
+        const std::string counts = "\n" + summary(shown.errors(), shown.warnings(), shown.notes());
+        if (!separately() && options.check && edits > 0) {
+            text += counts + "\n";
+        } else if (!separately() && shown.failed()) {
+            if (const std::string became = outcome(edits > 0); !became.empty()) text += counts + "; " + became + "\n";
+        } else if (!separately() && edits > 0) {
+            text += counts + "; the edit took effect\n";
+        }
+        output_.err(text);
+    } else if (options.level >= Level::results && edits > 0 && took_effect) {
+        output_.err(counted(edits, "edit") + " took effect\n");
+    }
+}
+
+std::string Script::outcome(bool edited) const {
+    std::vector<Span> without = idle_;
+    for (std::size_t i = collected_before_; i < state_.collected.size(); ++i) without.push_back(state_.collected[i].span);
+    const bool alone = without.size() <= 1;  // nothing but the line with the error
+    for (auto row = rows_.rbegin(); row != rows_.rend(); ++row)
+        for (std::size_t i = row->next; i < row->end; ++i) without.push_back((*row->commands)[i].span);
+    if (effective_.empty() && !half_done_) return edited || !alone || without.size() > 1 ? "nothing was changed" : "";
+    bool several = false;
+    const Span* first = nullptr;
+    for (const auto* const spans : {&effective_, &std::as_const(without)})
+        for (const Span& span : *spans) {
+            if (!span.known()) continue;
+            if (!first) first = &span;
+            several = several || span.source != first->source;
+        }
+    std::string text;
+    if (!effective_.empty()) text = lines_of(session_.sources, effective_, without, several) + " took effect";
+    if (!without.empty()) text += (text.empty() ? "" : "; ") + lines_of(session_.sources, without, effective_, several) + " had no effect";
+    return text;
+}
+
+bool Script::interrupted(Context& context) {
+    if (!state_.cancelled.load(std::memory_order_relaxed)) return false;
+    if (!context.diagnostics.failed())
+        context.diagnostics.error("interrupted", context.command.span, "'" + context.command.name.text + "' was interrupted");
+    return true;
+}
+
+bool Context::interrupted() { return script.interrupted(*this); }
+
+}  // namespace hal

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// `[HAL]TWOPASS`: several texts with the loads of all of them done first.
+#include <algorithm>
+#include <utility>
+
+#include "commands/files.hpp"
+#include "commands/script.hpp"
+
+namespace hal {
+namespace {
+
+bool is_include(const Command& command) { return command.name.text == "source" && command.args.size() == 1; }
+
+/// `#NOTWOPASS` anywhere in a text, case and blanks ignored.
+bool opts_out(std::string_view text) {
+    static constexpr std::string_view magic = "#notwopass";
+    for (std::size_t at = 0; at < text.size();) {
+        const auto end = std::min(text.find('\n', at), text.size());
+        std::string line;
+        for (const char c : text.substr(at, end - at))
+            if (c != ' ' && c != '\t' && c != '\r') line += static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+        if (line.starts_with(magic)) return true;
+        at = end + 1;
+    }
+    return false;
+}
+
+}  // namespace
+
+int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
+    // Loading is additive here, so that the loads of all files need not be merged into one line per component: doing
+    // them first, in order, gives the same instances. loadusr comes before that, as in LinuxCNC's first pass.
+    std::vector<Command> programs, loads, rest;
+    std::vector<std::size_t> whole;  // places in `rest` where a text that opted out runs as it is
+    std::vector<std::uint32_t> opted_out;
+    const auto sort_in = [&](const auto& self, std::uint32_t text) -> void {
+        Parsed parsed = parse_text(text);
+        pending_.take(parsed.problems);
+        for (Command& command : parsed.commands) {
+            if (command.name.text == "loadusr") programs.push_back(std::move(command));
+            else if (command.name.text == "loadrt") loads.push_back(std::move(command));
+            else if (is_include(command)) {
+                std::string path = resolve_path(command.args[0].text, shell_.options.directory), content, problem;
+                const bool again =
+                    std::any_of(files_.begin(), files_.end(), [&](const Open& open) { return open.path == canonical_path(path); });
+                if (again || !read_netlist(command.args[0].text, shell_.options.directory, path, content, problem)) {
+                    rest.push_back(std::move(command));  // run in its turn, it says what is wrong
+                    continue;
+                }
+                files_.push_back({canonical_path(path), command.span});
+                self(self, session_.sources.add(path, std::move(content)));
+                files_.pop_back();
+            } else rest.push_back(std::move(command));
+        }
+    };
+    for (const std::uint32_t text : texts) {
+        if (opts_out(session_.sources.get(text).text)) {
+            whole.push_back(rest.size());
+            opted_out.push_back(text);
+            continue;
+        }
+        files_.push_back({own_path(text), {}});
+        sort_in(sort_in, text);
+        files_.pop_back();
+    }
+    text_is_kept_ = true;
+    files_.push_back({"", {}});
+    run_row(programs, 0, programs.size());
+    run_row(loads, 0, loads.size());
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+        run_row(rest, at, whole[i]);
+        at = whole[i];
+        finish();
+        if (stop()) break;
+        const bool kept = std::exchange(shell_.options.keep_going, true);
+        run_commands(opted_out[i]);
+        shell_.options.keep_going = kept;
+    }
+    run_row(rest, at, rest.size());
+    files_.pop_back();
+    finish();
+    return failed_ ? 1 : 0;
+}
+
+}  // namespace hal

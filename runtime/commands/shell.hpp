@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+// The command language on a session: a line, a file, completion. The command table is in commands.hpp.
+// One Shell per user of the session (the program itself, each connection of the server); they share the machine and the
+// processes started by loadusr, but neither options nor an open `begin`. All members take Session::mutex themselves, and
+// only while they work: a command that waits (loadusr -w, waitusr, advance on a real clock) lets others go on.
+// [setup], one thread at a time per Shell, but for cancel().
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "commands/completion.hpp"
+
+namespace hal {
+
+class Ini;
+class Session;
+struct Command;
+
+/// Where the text of commands goes.
+class Output {
+public:
+    virtual ~Output() = default;
+    virtual void out(std::string_view text) = 0;
+    virtual void err(std::string_view text) = 0;
+    /// What a command that waits reports meanwhile; on stderr unless there is a faster way to the user.
+    virtual void notice(std::string_view text) { err(text); }
+    /// True: this is the process's own stdout and stderr, and programs run by `loadusr -w` may write there directly.
+    virtual bool is_process() const { return false; }
+};
+
+/// Keeps the text.
+class TextOutput final : public Output {
+public:
+    void out(std::string_view text) override { out_text += text; }
+    void err(std::string_view text) override { err_text += text; }
+    std::string out_text, err_text;
+};
+
+/// Writes to stdout and stderr of the process, unbuffered between the two.
+class ProcessOutput final : public Output {
+public:
+    void out(std::string_view text) override;
+    void err(std::string_view text) override;
+    bool is_process() const override { return true; }
+};
+
+/// How much is said: `-Q`, `-q` (the default), `-v`, `-V`.
+enum class Level { nothing, errors, results, debug };
+
+struct ShellOptions {
+    bool keep_going = false;  ///< -k: each line is a transaction of its own, an error does not stop the file
+    bool echo = false;        ///< -e: each line to stderr as `(LINE)<echo>: TEXT`
+    bool script = false;      ///< -s: no titles, owner names, one line per thread and signal
+    bool json = false;        ///< show, list, getp, gets, ptype, stype and status answer in JSON
+    bool color = false;       ///< of diagnostics
+    bool notes = false;       ///< print notes (stale reads …) as well as errors and warnings
+    bool check = false;       ///< `hal check`: a file is one transaction, commands that act are only looked at
+    Level level = Level::errors;
+    std::string node = {};    ///< of a netlist with `node` lines: whose part is loaded; `$NODE` in it
+    std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
+};
+
+struct Processes;
+
+class Shell {
+public:
+    /// The session must outlive it.
+    explicit Shell(Session& session, ShellOptions options = {});
+    /// Another shell on the same machine, with options of its own.
+    Shell(Shell& sibling, ShellOptions options);
+    ~Shell();
+    Shell(const Shell&) = delete;
+
+    ShellOptions options;
+    Session& session() const;
+
+    /// Runs one line. Returns LinuxCNC's exit status: 0 all good, 1 something failed. `name` is what messages call the
+    /// source: "<shell>" or "<commandline>"; `number` is the line's in it.
+    int execute(std::string_view line, Output& output, std::string_view name = "<shell>", std::uint32_t number = 1);
+    /// Runs one command whose words are given as they are: no quotes, no comments, nothing to substitute.
+    int execute(const std::vector<std::string>& words, Output& output, std::string_view name = "<commandline>");
+    /// Runs a text as a file: consecutive edits are one transaction, ended by commands that act and by the end.
+    int run_text(std::string name, std::string text, Output& output);
+    /// Runs a .hal file, or an .ini file with its [HAL] section: HALFILE=, HALCMD=, TWOPASS=. An .ini file also becomes
+    /// what [SECTION]KEY is looked up in.
+    int run_file(const std::string& path, Output& output);
+    /// Reads an .ini file for [SECTION]KEY only (`-i`).
+    int read_ini(const std::string& path, Output& output);
+
+    /// True between `begin` and `commit` or `abort`; the edits wait in this shell and nobody sees them.
+    bool collecting() const;
+    /// Adds commands that set NAME VALUE to those collected since `begin`.
+    void collect(const std::vector<Command>& commands);
+    /// True after `quit` or `exit` was executed; whoever reads lines stops reading.
+    bool quit() const;
+    /// Ends a command that waits; it reports that it was interrupted, as do all later ones until `false` is said. [any]
+    void cancel(bool on = true);
+    /// True when executing the line may wait for something outside (loadusr -w …), so that a server needs a thread for it.
+    static bool may_wait(std::string_view text);
+
+    /// What could stand at `cursor` (a byte offset) of the line: only what the command would take there.
+    Completion complete(std::string_view line, std::size_t cursor) const;
+
+    /// The manual of all commands in Markdown, made from the command table.
+    static std::string manual();
+    /// The page of a diagnostic code for `hal explain CODE`; empty when there is no such code.
+    static std::string explain(std::string_view code);
+
+    /// What $NAME means in commands; empty: the environment of this process. A client of the socket brings its own.
+    void look_up(std::function<std::optional<std::string>(const std::string&)> variable);
+    /// What [SECTION]KEY means in commands; without a value, the INI file of the session. A client of the socket brings its own.
+    void look_in(std::optional<Ini> ini);
+
+    Processes& processes() const;
+    struct State;
+
+private:
+    int run_ini(const std::string& path, Output& output);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace hal

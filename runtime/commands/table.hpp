@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+// The command table: a row per command. Arity, help, completion, the manual and the rules of transactions come from it.
+// Internal to the shell.
+#pragma once
+
+#include <cstddef>
+#include <mutex>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "text/diagnostic.hpp"
+#include "netlist/netlist.hpp"
+#include "netlist/usage.hpp"
+#include "machine/session.hpp"
+#include "commands/shell.hpp"
+
+namespace hal {
+
+struct Processes;
+class Script;
+struct CommandRow;
+
+/// One command that is being executed by its function. The session's mutex is held; who waits gives it back meanwhile.
+struct Context {
+    Script& script;
+    Shell& shell;
+    Session& session;
+    Processes& processes;
+    Output& output;
+    const CommandRow& row;
+    const Command& command;
+    Diagnostics& diagnostics;            ///< an error in here is the command's failure
+    std::unique_lock<std::mutex>& lock;
+    Transaction* transaction = nullptr;  ///< of a deferred command: where it queues what it does
+    unsigned* locks = nullptr;           ///< of a deferred command: Session::lock as it is when the transaction has taken effect
+
+    const ShellOptions& options() const { return shell.options; }
+    std::size_t count() const { return command.args.size(); }
+    const std::string& argument(std::size_t i) const { return command.args[i].text; }
+    std::string_view argument_or(std::size_t i, std::string_view fallback) const { return i < count() ? argument(i) : fallback; }
+    Span span(std::size_t i) const { return i < count() ? command.args[i].span : command.span; }
+    std::string usage() const;
+    /// A path of the command line, relative to the shell's directory, `~` expanded.
+    std::string path(const std::string& text) const;
+    /// True when the command should stop waiting; reports `interrupted`.
+    bool interrupted();
+};
+
+/// What a command does: an edit changes the model, all others act on the machine or look at it.
+struct CommandFunction {
+    using Act = void (*)(Context&);
+    using Edit = void (*)(Elaboration&, std::span<const Token>);
+    constexpr CommandFunction(Act function) : act(function) {}
+    constexpr CommandFunction(Edit function) : edit(function) {}
+    Act act = nullptr;
+    Edit edit = nullptr;
+};
+
+enum CommandFlags : unsigned {
+    command_plain = 0,        ///< acts on the machine: what was edited before takes effect first
+    command_apart = 1,        ///< does not look at the machine: does not end a transaction
+    command_waits = 2,        ///< may wait for something outside
+    command_transaction = 4,  ///< begin, commit, abort
+    command_checked = 8,      ///< works the same way under `hal check`
+    command_query = 16,       ///< only looks at the machine, with the edits made so far: does not end a transaction
+    command_deferred = 32,    ///< part of a transaction: happens when it has taken effect, and not at all when it does not
+    command_collected = 64,   ///< acts at once, but after `begin` it is deferred
+    command_arrows = 128,     ///< an edit with arrows among its arguments
+    command_traceless = 256,  ///< an edit that leaves nothing in the model that points into its text
+    command_each = 512,       ///< takes one name; a range of them is a command for each
+};
+
+struct CommandRow {
+    const char* name;
+    const char* also;       ///< a second name, or ""
+    std::string_view arguments;  ///< what Usage says; the number of arguments follows from it
+    const char* summary;    ///< one line
+    const char* help;       ///< more about it, or ""
+    CommandFunction function;
+    unsigned lock;          ///< bits of Lock that forbid it
+    unsigned flags;
+
+    bool edits() const { return function.edit != nullptr; }
+    Usage usage() const { return {name, arguments}; }
+    EditForm form() const { return {usage(), function.edit, (flags & command_arrows) != 0}; }
+};
+
+/// All rows, in the order `help` lists them.
+std::span<const CommandRow> command_table();
+/// By either name; nullptr when there is none.
+const CommandRow* find_command(std::string_view name);
+/// What the row of `NAME = VALUE` is: setp.
+const CommandRow* row_of(const Command& command);
+std::vector<std::string> command_names();
+
+/// Applies an edit by its row. Reports unknown-command when there is none.
+void apply_edit(Transaction& transaction, const Command& command, Diagnostics& diagnostics);
+
+/// Checks the locks. False after reporting which one and how to take it off. Values of pins and signals are free, as in LinuxCNC.
+bool check_lock(const CommandRow& row, const Command& command, unsigned lock, const Model& model, Diagnostics& diagnostics);
+
+/// Makes a command that sets `NAME VALUE` a sets when NAME is a signal, else a setp.
+void resolve_set(const Model& model, Command& command);
+
+// --- functions, by file ---------------------------------------------------------------------------------------------------
+// show.cpp
+void command_show(Context&);
+void command_list(Context&);
+// report.cpp
+void command_status(Context&);
+void command_fault(Context&);
+void show_timing(Context&);
+void show_latency(Context&);
+void show_faults(Context&);
+// save.cpp
+void command_save(Context&);
+// value.cpp
+void command_getp(Context&);
+void command_gets(Context&);
+void command_ptype(Context&);
+void command_stype(Context&);
+// run.cpp
+void command_start(Context&);
+void command_stop(Context&);
+void command_advance(Context&);
+void command_lock(Context&);
+void command_unlock(Context&);
+// programs.cpp
+void command_loadusr(Context&);
+void command_waitusr(Context&);
+void command_unloadusr(Context&);
+/// The part of `unload NAME|all` that is about processes, a deferred command. True: nothing is left to do.
+bool unload_processes(Context&);
+// help.cpp
+void command_source(Context&);
+void command_print(Context&);
+void command_echo(Context&);
+void command_unecho(Context&);
+void command_debug(Context&);
+void command_help(Context&);
+void command_explain(Context&);
+void command_quit(Context&);
+void command_nothing(Context&);
+void command_node(Context&);
+
+}  // namespace hal

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// getp, gets, ptype, stype: one value or type.
+#include <algorithm>
+
+#include "commands/table.hpp"
+#include "commands/json_text.hpp"
+#include "commands/listing.hpp"
+
+namespace hal {
+namespace {
+
+const Pin* pin_named(Context& context) {
+    const auto& name = context.argument(0);
+    if (const Pin* const pin = context.session.model().find_pin(name)) return pin;
+    std::vector<std::string> names;
+    for (const auto& [key, pin] : context.session.model().pin) names.emplace_back(key);
+    const bool signal = context.session.model().find_signal(name) != nullptr;
+    const char* const other = context.command.name.text == "getp" ? "gets" : "stype";
+    context.diagnostics.error("no-such-pin", context.span(0), "there is no pin or parameter '" + name + "'", did_you_mean(name, names),
+                              signal ? "it is a signal: " + std::string(other) + " " + name : "");
+    return nullptr;
+}
+
+const Signal* signal_named(Context& context) {
+    const auto& name = context.argument(0);
+    if (const Signal* const signal = context.session.model().find_signal(name)) return signal;
+    std::vector<std::string> names;
+    for (const auto& [key, signal] : context.session.model().signal) names.emplace_back(key);
+    const bool pin = context.session.model().find_pin(name) != nullptr;
+    const char* const other = context.command.name.text == "gets" ? "getp" : "ptype";
+    context.diagnostics.error("no-such-signal", context.span(0), "there is no signal '" + name + "'", did_you_mean(name, names),
+                              pin ? "it is a pin: " + std::string(other) + " " + name : "");
+    return nullptr;
+}
+
+void print_value(Context& context, hal_type type, const hal_value& value) {
+    if (!context.options().json) return context.output.out(format_value(type, value) + "\n");
+    std::string text = "{\"name\":";
+    json_quote(text, context.argument(0));
+    text += ",\"type\":\"";
+    text += name(type);
+    text += "\",\"value\":";
+    json_value(text, type, value);
+    context.output.out(text + "}\n");
+}
+
+void print_type(Context& context, hal_type type) {
+    if (!context.options().json) return context.output.out(std::string(name(type)) + "\n");
+    context.output.out(std::string("{\"type\":\"") + name(type) + "\"}\n");
+}
+
+}  // namespace
+
+void command_getp(Context& context) {
+    if (const Pin* const pin = pin_named(context)) print_value(context, pin->type, context.session.read_pins({pin})[0]);
+}
+
+void command_gets(Context& context) {
+    if (const Signal* const signal = signal_named(context)) print_value(context, signal->type, context.session.read_signals({signal})[0]);
+}
+
+void command_ptype(Context& context) {
+    if (const Pin* const pin = pin_named(context)) print_type(context, pin->type);
+}
+
+void command_stype(Context& context) {
+    if (const Signal* const signal = signal_named(context)) print_type(context, signal->type);
+}
+
+}  // namespace hal

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// The other end of the control socket, for tools: docs/protocol.md. Knows the base and JSON, not the session.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "machine/address.hpp"
+#include "commands/completion.hpp"
+
+namespace hal {
+
+class Client {
+public:
+    /// Connects to a running instance by its name. nullptr: `problem` is a sentence that says why and what to type.
+    static std::unique_ptr<Client> connect(std::string_view instance, std::string& problem);
+    ~Client();
+    Client(const Client&) = delete;
+
+    const std::string& instance() const;
+    const std::string& version() const;  ///< of the runtime on the other side
+    std::int64_t pid() const;
+    /// False once the other side has gone; then every answer has status 1 and says so.
+    bool connected() const;
+    /// Looks whether the other side is still there, without waiting; events that have come are kept.
+    bool look();
+    /// Why the other side closed the connection, as it said; "" when it did not.
+    const std::string& closed_because() const;
+    /// Who is told what a command that waits reports meanwhile; without one nobody is.
+    void on_notice(std::function<void(std::string_view)> take);
+    int fd() const;  ///< for poll(); readable when next_event() may have something
+    /// A non-blocking descriptor (a signalfd, say) that becomes readable when the user wants no more of the command that
+    /// runs: then it is emptied and the command cancelled; a second time, the connection is given up.
+    void cancel_on(int descriptor);
+
+    struct Options {
+        bool keep_going = false, echo = false, script = false, json = false, color = false, notes = false;
+        std::string level = "errors";  ///< nothing, errors, results, debug
+        std::string directory;         ///< for relative paths in commands; the tool's working directory
+        std::vector<std::array<std::string, 3>> ini = {};  ///< section, key, value of what [SECTION]KEY means; empty: the instance's INI file
+    };
+    /// Holds for all commands of this connection from now on.
+    bool set_options(const Options& options);
+
+    struct Answer {
+        int status = 1;
+        std::string out, err;
+        bool quit = false;        ///< the command was quit or exit
+        bool collecting = false;  ///< between begin and commit
+    };
+    /// Runs one line; waits for its end. `number` is the line's in what messages call `name`.
+    Answer run(std::string_view line, std::string_view name = "<shell>", std::uint32_t number = 1);
+    /// Runs one command of words that are passed as they are.
+    Answer run(const std::vector<std::string>& words, std::string_view name = "<commandline>");
+    /// Runs a text as a file; $NAME in it is looked up in this process's environment.
+    Answer run_text(std::string_view name, std::string_view text);
+    Completion complete(std::string_view line, std::size_t cursor);
+    /// Ends the instance.
+    Answer stop();
+
+    /// Any request: `body` without an id. Waits for its reply, which is a JSON object as docs/protocol.md says; when the
+    /// connection is lost: {"ok":false,"error":"…"}. Events that come meanwhile are kept for next_event().
+    nlohmann::json request(nlohmann::json body);
+    /// Sends without waiting; replies come in the order of the requests through wait().
+    std::uint64_t send(nlohmann::json body);
+    nlohmann::json wait(std::uint64_t id);
+    /// The next event (values of a subscription …): true and `event`, or false after `timeout_ms` (-1: waits for ever).
+    bool next_event(nlohmann::json& event, int timeout_ms);
+
+private:
+    Client();
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace hal

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+#include "control/connection.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <unistd.h>
+
+#include "commands/json_text.hpp"
+#include "control/connection_state.hpp"
+#include "paths.hpp"
+
+namespace hal {
+namespace {
+
+constexpr int deepest = 16;  // brackets within brackets of a request
+
+/// Arrays and objects in each other, counted without building them: a hostile line costs one pass.
+bool too_deep(std::string_view line) {
+    int depth = 0;
+    bool quoted = false;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        const char c = line[i];
+        if (quoted) {
+            if (c == '\\') ++i;
+            else if (c == '"') quoted = false;
+        } else if (c == '"') {
+            quoted = true;
+        } else if (c == '[' || c == '{') {
+            if (++depth > deepest) return true;
+        } else if (c == ']' || c == '}') {
+            --depth;
+        }
+    }
+    return false;
+}
+
+std::string dumped(const Json& value) { return value.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+struct Verb {
+    const char* name;
+    void (Connection::State::*handle)(const Json&, std::string&);
+    const char* members;  ///< beside the verb itself and id, each followed by a blank
+};
+
+constexpr Verb verbs[] = {
+    {"run", &Connection::State::run, "name line env "},
+    {"script", &Connection::State::script, "name env "},
+    {"options", &Connection::State::options, ""},
+    {"read", &Connection::State::read, ""},
+    {"set", &Connection::State::set, ""},
+    {"subscribe", &Connection::State::subscribe, "every_ms changes "},
+    {"unsubscribe", &Connection::State::unsubscribe, ""},
+    {"list", &Connection::State::list, "patterns "},
+    {"describe", &Connection::State::describe_kind, "patterns type "},
+    {"complete", &Connection::State::complete, "cursor "},
+    {"component", &Connection::State::component, "prefix pins ready timeout_ms every_ms safe "},
+    {"exchange", &Connection::State::exchange, "write read alive "},
+    {"exit", &Connection::State::exit, ""},
+    {"port", &Connection::State::port, "read peek write "},
+    {"stream", &Connection::State::stream, "take records create owner "},
+    {"stop", &Connection::State::end, ""},
+    {"cancel", &Connection::State::cancelled, ""},
+};
+
+/// True when `word` is one of those in `words`, each followed by a blank.
+bool listed_in(std::string_view words, std::string_view word) {
+    for (std::size_t at = 0, blank; (blank = words.find(' ', at)) != words.npos; at = blank + 1)
+        if (words.substr(at, blank - at) == word) return true;
+    return false;
+}
+
+/// The one verb of a request; refuses what is not understood, so that a misspelt member is not silently without effect.
+const Verb& verb_of(const Json& body) {
+    const Verb* found = nullptr;
+    for (auto entry = body.begin(); entry != body.end(); ++entry) {
+        const auto verb = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return entry.key() == v.name; });
+        if (verb == std::end(verbs)) continue;
+        if (found && listed_in(found->members, verb->name)) continue;  // read is a member of exchange, too
+        if (found && !listed_in(verb->members, found->name))
+            throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
+        found = verb;
+    }
+    if (!found) {
+        std::vector<std::string> names;
+        for (const Verb& verb : verbs) names.emplace_back(verb.name);
+        throw Refusal{"there is no verb in this request; the verbs are: " + listed(names, names.size())};
+    }
+    for (auto entry = body.begin(); entry != body.end(); ++entry) {
+        const std::string& key = entry.key();
+        if (key != "id" && key != found->name && !listed_in(found->members, key))
+            throw Refusal{"'" + key.substr(0, 60) + "' is no member of a request to " + found->name};
+    }
+    return *found;
+}
+
+}  // namespace
+
+Connection::Connection(Shell& shell, pid_t peer) : state_(new State(shell, peer)) {}
+
+Connection::~Connection() {
+    const std::scoped_lock lock(state_->session.mutex);
+    state_->shell.processes().withdraw(state_->owner);
+}
+
+void Connection::on_event(std::function<void(std::string)> take) { state_->event = std::move(take); }
+
+bool Connection::idle() const {
+    if (state_->engaged || !state_->subscriptions.empty()) return false;
+    const std::scoped_lock lock(state_->session.mutex);
+    return !state_->shell.processes().answers(state_->owner);
+}
+
+std::string Connection::hello() const {
+    std::string line = "{\"halcyon\":1,\"name\":";
+    json_quote(line, state_->session.options().name);
+    json_quote(line += ",\"version\":", paths::version);
+    return line + ",\"pid\":" + std::to_string(getpid()) + "}\n";
+}
+
+Connection::Handled Connection::handle(std::string_view line, std::string& replies, bool may_wait) {
+    State& state = *state_;
+    const State::Engaged engaged(state);
+    std::string id = "null";
+    const auto refuse = [&](const std::string& sentence) {
+        replies += "{\"id\":" + id + ",\"ok\":false,\"error\":";
+        json_quote(replies, sentence);
+        replies += "}\n";
+        return Handled::done;
+    };
+    if (too_deep(line)) {
+        ++state.rubbish;
+        return refuse("more than " + std::to_string(deepest) + " brackets within each other");
+    }
+    const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
+    if (!body.is_object()) {
+        ++state.rubbish;
+        return refuse(body.is_discarded() ? "this is not JSON; a request is one JSON object in one line" : "a request is a JSON object");
+    }
+    if (const Json& given = member(body, "id");
+        given.is_number() || (given.is_string() && given.get_ref<const std::string&>().size() <= 200))
+        id = dumped(given);
+    const std::size_t before = replies.size();
+    try {
+        const Verb& verb = verb_of(body);
+        const bool script = verb.handle == &State::script;
+        if (!may_wait && (verb.handle == &State::run || script)) {
+            const Json& text = body[script ? "script" : "run"];
+            if (text.is_string() && Shell::may_wait(text.get_ref<const std::string&>())) return Handled::wants_thread;
+            if (text.is_array() && !text.empty() && text[0].is_string() && Shell::may_wait(text[0].get_ref<const std::string&>()))
+                return Handled::wants_thread;
+        }
+        ++state.requests;
+        replies += "{\"id\":" + id + ",\"ok\":true";
+        (state.*verb.handle)(body, replies);
+        replies += "}\n";
+    } catch (const Refusal& refusal) {
+        replies.resize(before);
+        return refuse(refusal.sentence);
+    } catch (const std::bad_alloc&) {
+        replies.resize(before);
+        return refuse("not enough memory for this request");
+    }
+    return std::exchange(state.stop, false) ? Handled::stop : Handled::done;
+}
+
+bool Connection::cancels(std::string_view line) {
+    if (line.find("\"cancel\"") == line.npos || line.size() > 1000 || too_deep(line)) return false;
+    const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
+    if (!body.is_object() || member(body, "cancel") != true) return false;
+    cancel();
+    return true;
+}
+
+void Connection::cancel(bool on) { state_->shell.cancel(on); }
+
+std::int64_t Connection::next_due_ns() const { return state_->subscriptions.next_due_ns(); }
+
+void Connection::publish(std::int64_t now_ns, bool congested, std::string& events) {
+    state_->subscriptions.publish(state_->session, now_ns, congested, events);
+}
+
+std::uint64_t Connection::requests() const { return state_->requests; }
+std::uint64_t Connection::rubbish() const { return state_->rubbish; }
+
+}  // namespace hal

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// The control socket of an instance: one thread that serves any number of clients, docs/protocol.md.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "text/diagnostic.hpp"
+
+namespace hal {
+
+class Shell;
+
+struct ServerOptions {
+    std::function<void()> stop;                      ///< a client asked the instance to end; called in the server's thread
+    std::function<void(std::string_view)> log;       ///< one sentence when a client is dropped; may be empty
+    std::size_t max_request = std::size_t{16} << 20; ///< bytes of one request
+    std::size_t queue = std::size_t{1} << 20;        ///< replies waiting for a client before it is no longer listened to
+    int stall_ms = 10000;                            ///< a client with a full queue that reads nothing for so long is dropped
+    std::size_t max_clients = 256;
+    std::size_t reserved = 8;                        ///< connections beyond these, for short commands: an operator always gets in
+    int idle_ms = 1000;                              ///< after this time without a request, a client on which nothing depends counts as idle
+};
+
+struct ServerCounts {
+    std::uint64_t clients = 0;   ///< connected now
+    std::uint64_t accepted = 0, dropped = 0, reclaimed = 0, refused = 0, requests = 0, rubbish = 0;
+};
+
+class Server {
+public:
+    /// Serves the shell's session; each client gets a shell of its own. The shell must outlive the server.
+    explicit Server(Shell& shell, ServerOptions options = {});
+    ~Server();  ///< ends all connections and waits for the thread; removes the socket
+    Server(const Server&) = delete;
+
+    /// Makes the socket (named by the session's instance name) and starts the thread. False: `diagnostics` says why, for
+    /// instance that an instance of this name runs already. A socket left over by a dead process is replaced.
+    bool start(Diagnostics& diagnostics);
+    const std::string& path() const;
+    ServerCounts counts() const;  ///< [any]
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace hal

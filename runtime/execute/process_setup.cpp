@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#include "execute/process_setup.hpp"
+
+#include <cstdint>
+#include <cstdlib>
+#include <fcntl.h>
+#include <fstream>
+#include <linux/capability.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace hal {
+namespace {
+
+/// CAP_IPC_LOCK: no limit counts (mlockall(2)).
+bool may_lock_memory() {
+    std::ifstream file("/proc/self/status");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("CapEff:")) return std::strtoull(line.c_str() + 7, nullptr, 16) >> CAP_IPC_LOCK & 1;
+    return false;
+}
+
+}  // namespace
+
+std::vector<std::string> prepare_process() {
+    std::vector<std::string> refused;
+    // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page fault.
+    const rlimit all{RLIM_INFINITY, RLIM_INFINITY};
+    rlimit now{};
+    const bool unlimited = setrlimit(RLIMIT_MEMLOCK, &all) == 0 || (getrlimit(RLIMIT_MEMLOCK, &now) == 0 && now.rlim_cur == RLIM_INFINITY);
+    if ((!unlimited && !may_lock_memory()) || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) refused.emplace_back("memory locking");
+    // keeps the CPU out of deep sleep states for as long as the file stays open
+    static const int latency = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
+    if (latency >= 0) {
+        const std::int32_t none = 0;
+        [[maybe_unused]] const auto written = ::write(latency, &none, sizeof none);
+    }
+    return refused;
+}
+
+}  // namespace hal

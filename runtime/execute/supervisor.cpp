@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: MIT
+#include "execute/supervisor.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <fcntl.h>
+#include <poll.h>
+#include <sched.h>
+#include <stdexcept>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace hal {
+namespace {
+
+constexpr std::int64_t shortest_interval_ns = 2'000'000, longest_interval_ns = 50'000'000;
+constexpr std::int64_t feed_every_ns = 100'000'000;
+
+class Hold {
+public:
+    explicit Hold(pthread_mutex_t& mutex) : mutex_(mutex) { pthread_mutex_lock(&mutex_); }
+    ~Hold() { pthread_mutex_unlock(&mutex_); }
+    Hold(const Hold&) = delete;
+
+private:
+    pthread_mutex_t& mutex_;
+};
+
+std::int64_t clock_ns(clockid_t clock) noexcept {
+    timespec now{};
+    return clock_gettime(clock, &now) == 0 ? now.tv_sec * 1'000'000'000LL + now.tv_nsec : 0;
+}
+
+std::int64_t cpu_time_ns(pthread_t thread) noexcept {
+    clockid_t clock{};
+    return pthread_getcpuclockid(thread, &clock) == 0 ? clock_ns(clock) : 0;
+}
+
+/// A small file of /proc, without taking memory: a thread may hang while it holds the allocator's lock.
+void read_file(const char* path, char* to, std::size_t room) noexcept {
+    to[0] = '\0';
+    const int file = open(path, O_RDONLY | O_CLOEXEC);
+    if (file < 0) return;
+    const ssize_t got = read(file, to, room - 1);
+    to[got > 0 ? got : 0] = '\0';
+    close(file);
+}
+
+struct KernelView {
+    char state = '?';
+    int tracer = 0;
+};
+
+KernelView kernel_view(int tid) noexcept {
+    char path[64], text[2048];
+    std::snprintf(path, sizeof path, "/proc/self/task/%d/status", tid);
+    read_file(path, text, sizeof text);
+    KernelView view;
+    if (const char* const at = std::strstr(text, "\nState:")) {
+        const char* letter = at + 7;
+        while (*letter == ' ' || *letter == '\t') ++letter;
+        if (*letter) view.state = *letter;
+    }
+    if (const char* const at = std::strstr(text, "\nTracerPid:")) view.tracer = std::atoi(at + 11);
+    return view;
+}
+
+/// Above every thread it watches, as far as the system grants that.
+void raise_priority() noexcept {
+    sched_param parameters{};
+    parameters.sched_priority = sched_get_priority_max(SCHED_FIFO);
+    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters) == 0) return;
+    rlimit limit{};
+    if (getrlimit(RLIMIT_RTPRIO, &limit) != 0 || limit.rlim_cur < 1) return;
+    parameters.sched_priority = static_cast<int>(std::min<rlim_t>(limit.rlim_cur, static_cast<rlim_t>(parameters.sched_priority)));
+    pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+}
+
+}  // namespace
+
+Supervisor::Supervisor(FaultBoard& board) : board_(board) {
+    shared.size = sizeof shared;
+    pthread_mutexattr_t attributes;
+    pthread_mutexattr_init(&attributes);
+    pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
+    if (pthread_mutex_init(&mutex_, &attributes) != 0) pthread_mutex_init(&mutex_, nullptr);
+    pthread_mutexattr_destroy(&attributes);
+}
+
+Supervisor::~Supervisor() {
+    if (started_) {
+        quit_ = true;
+        eventfd_write(wake_, 1);
+        pthread_join(thread_, nullptr);
+    }
+    if (wake_ >= 0) close(wake_);
+    pthread_mutex_destroy(&mutex_);
+}
+
+void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cpu) {
+    {
+        const Hold hold(mutex_);
+        watched_.push_back({&core, thread, tid, priority, cpu});
+        std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
+    }
+    if (!started_) {
+        wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+        looked_ns_ = monotonic_ns();
+        sigset_t all, before;  // signals are for the program's own thread; a crash is this one's
+        sigfillset(&all);
+        for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) sigdelset(&all, crash);
+        pthread_sigmask(SIG_SETMASK, &all, &before);
+        const int failed = pthread_create(&thread_, nullptr, [](void* self) -> void* {
+            static_cast<Supervisor*>(self)->work();
+            return nullptr;
+        }, this);
+        pthread_sigmask(SIG_SETMASK, &before, nullptr);
+        if (failed) {
+            remove(core);
+            throw std::runtime_error(std::string("no thread for the supervisor: ") + std::strerror(failed));
+        }
+        started_ = true;
+    }
+    settle_down();
+}
+
+void Supervisor::remove(const Core& core) {
+    {
+        const Hold hold(mutex_);
+        std::erase_if(watched_, [&](const Watched& one) { return one.core == &core; });
+    }
+    settle_down();
+}
+
+void Supervisor::fence() { const Hold hold(mutex_); }
+
+Supervisor::Watched* Supervisor::find(const Core& core) {
+    const auto at = std::find_if(watched_.begin(), watched_.end(), [&](const Watched& one) { return one.core == &core; });
+    return at == watched_.end() ? nullptr : &*at;
+}
+
+void Supervisor::set_priority(const Core& core, int priority) {
+    const Hold hold(mutex_);
+    Watched* const of = find(core);
+    if (!of) return;
+    of->priority = priority;
+    sched_param parameters{};
+    parameters.sched_priority = priority;
+    if (!of->demoted) pthread_setschedparam(of->thread, SCHED_FIFO, &parameters);
+    std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
+}
+
+bool Supervisor::reset(Core& core) {
+    const Hold hold(mutex_);
+    if (core.hung()) return false;
+    core.clear_stop();
+    if (Watched* const of = find(core); of && of->demoted) {
+        sched_param parameters{};
+        parameters.sched_priority = of->priority;
+        of->demoted = pthread_setschedparam(of->thread, SCHED_FIFO, &parameters) != 0;
+    }
+    return true;
+}
+
+bool Supervisor::demoted(const Core& core) {
+    const Hold hold(mutex_);
+    const Watched* const of = find(core);
+    return of && of->demoted;
+}
+
+std::int64_t Supervisor::process_gap_ns(std::int64_t until_ns, std::int64_t silent_ns) const {
+    const auto within = [&](std::int64_t end_ns, std::int64_t gap_ns) { return end_ns + silent_ns > until_ns && 2 * gap_ns > silent_ns; };
+    // it may not have looked yet since the process goes on
+    const std::int64_t now = monotonic_ns(), now_gap = now - looked_ns_ - interval_ns_;
+    if (within(now, now_gap)) return now_gap;
+    return within(gap_end_ns_, gap_ns_) ? gap_ns_.load() : 0;
+}
+
+// Half of the time of the shortest overrun that is a fault, so that each is seen at least once; a limit is looked at eight times.
+void Supervisor::settle_down() {
+    const Hold hold(mutex_);
+    std::int64_t interval = longest_interval_ns;
+    cpu_set_t left;
+    if (sched_getaffinity(getpid(), sizeof left, &left) != 0) CPU_ZERO(&left);
+    cpu_set_t all = left;
+    for (const Watched& one : watched_) {
+        interval = std::min(interval, Core::longest_overrun * one.core->period_ns() / 2);
+        if (const std::int64_t limit = one.core->supervise_ns; limit > 0) interval = std::min(interval, limit / 8);
+        if (one.cpu >= 0) CPU_CLR(static_cast<std::size_t>(one.cpu), &left);
+    }
+    interval_ns_ = std::max(interval, shortest_interval_ns);
+    own_cpu_ = CPU_COUNT(&left) > 0;
+    if (started_) {
+        pthread_setaffinity_np(thread_, sizeof left, own_cpu_ ? &left : &all);
+        eventfd_write(wake_, 1);
+    }
+}
+
+void Supervisor::work() {
+    raise_priority();
+    const auto asleep = [] { return clock_ns(CLOCK_BOOTTIME) - clock_ns(CLOCK_MONOTONIC); };
+    std::int64_t asleep_before = asleep();
+    while (!quit_) {
+        const std::int64_t interval = interval_ns_;
+        const timespec timeout{interval / 1'000'000'000, interval % 1'000'000'000};
+        pollfd woken{wake_, POLLIN, 0};
+        if (ppoll(&woken, 1, &timeout, nullptr) > 0) {
+            eventfd_t ignored;
+            eventfd_read(wake_, &ignored);
+        }
+        const Hold hold(mutex_);
+        const std::int64_t now = monotonic_ns(), gap = now - looked_ns_ - interval, slept = asleep();
+        if (gap > longest_interval_ns / 2) {
+            gap_ns_ = gap;
+            gap_end_ns_ = now;
+        }
+        looked_ns_ = now;
+        if (look(now, gap, slept - asleep_before)) {
+            __atomic_fetch_add(&shared.progress, 1, __ATOMIC_RELEASE);
+            feed_watchdog(now);
+        }
+        asleep_before = slept;
+    }
+}
+
+void Supervisor::feed_watchdog(std::int64_t now_ns) {
+    const int descriptor = watchdog_;
+    if (descriptor < 0 || now_ns - fed_ns_ < feed_every_ns) return;
+    fed_ns_ = now_ns;
+    [[maybe_unused]] const auto written = ::write(descriptor, "", 1);
+}
+
+// Returns whether all supervised threads are within their limits.
+bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns) {
+    bool well = true;
+    for (Watched& one : watched_) {
+        Core& core = *one.core;
+        core.sample();
+        if (core.hung()) {  // what it goes on writing does not last
+            core.stand_in(now_ns, false);
+            well = false;
+            continue;
+        }
+        const std::int64_t limit = core.supervise_ns;
+        if (limit == 0) continue;
+        const std::int64_t silent = now_ns - core.overdue_since_ns();
+        if (suspended_ns <= limit && silent > limit && behind_hog(one, now_ns)) continue;
+        if (silent > limit || suspended_ns > limit) {
+            declare(one, now_ns, gap_ns, suspended_ns);
+            well = false;
+        } else if (silent <= limit / 4) {
+            one.mark_ns = 0;
+        } else if (one.mark_ns == 0) {
+            one.mark_ns = now_ns;
+            one.mark_cpu_ns = cpu_time_ns(one.thread);
+        }
+    }
+    return well;
+}
+
+// A thread of higher priority occupies its CPU and is about to be declared hung itself, which frees the CPU.
+bool Supervisor::behind_hog(const Watched& watched, std::int64_t now_ns) const {
+    return watched.cpu >= 0 && std::any_of(watched_.begin(), watched_.end(), [&](const Watched& other) {
+        const std::int64_t limit = other.core->supervise_ns, since = other.core->busy_since_ns();
+        return other.cpu == watched.cpu && other.priority > watched.priority && limit > 0 && since != 0 && !other.core->hung() &&
+               2 * (now_ns - since) > limit && limit - (now_ns - since) < watched.core->supervise_ns / 4;
+    });
+}
+
+void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns) {
+    Core& core = *watched.core;
+    Stall stall;
+    stall.thread = core.id();
+    stall.function = core.hung_function();
+    stall.cycle = core.cycles;
+    stall.limit_ns = core.supervise_ns;
+    stall.silent_ns = now_ns - core.finished_ns();
+    stall.time_ns = now_ns;
+    stall.cpu = watched.cpu;
+    if (!core.declare_hung()) return;
+    core.stand_in(now_ns, true);  // outputs first
+    if (suspended_ns > stall.limit_ns) {
+        stall.cause = Stall::Cause::suspended;
+        stall.silent_ns = suspended_ns;
+    } else if (2 * gap_ns > stall.silent_ns) {
+        stall.cause = Stall::Cause::process;
+        stall.silent_ns = gap_ns;
+    } else {
+        find_cause(watched, stall, now_ns);
+        name_starved(watched, stall, now_ns);  // before they run
+        if (stall.cause != Stall::Cause::starved && watched.priority > 0 && !watched.demoted) {
+            const sched_param ordinary{};
+            stall.demoted = watched.demoted = pthread_setschedparam(watched.thread, SCHED_OTHER, &ordinary) == 0;
+        }
+    }
+    board_.count({HAL_FAULT_SILENT_THREAD, stall.function, stall.cycle, now_ns, static_cast<double>(stall.silent_ns), nullptr, nullptr},
+                 core.id());
+    stalls_.push(stall);
+}
+
+void Supervisor::find_cause(const Watched& watched, Stall& stall, std::int64_t now_ns) const {
+    const KernelView seen = kernel_view(watched.tid);
+    stall.tracer = seen.tracer;
+    const std::int64_t used = cpu_time_ns(watched.thread) - watched.mark_cpu_ns, since = now_ns - watched.mark_ns;
+    if (seen.state == 't' || seen.state == 'T') {
+        stall.cause = Stall::Cause::stopped;
+    } else if (seen.state == 'S' || seen.state == 'D' || seen.state == 'I') {
+        stall.cause = Stall::Cause::waiting;
+    } else if (watched.mark_ns != 0 && used < since / 10) {
+        stall.cause = Stall::Cause::starved;
+        for (const Watched& other : watched_)
+            if (&other != &watched && other.cpu == watched.cpu && other.priority > watched.priority && other.core->busy_since_ns() != 0) {
+                stall.occupant = other.core->id();
+                break;
+            }
+    } else {
+        stall.cause = Stall::Cause::busy;
+    }
+}
+
+// The threads that got no CPU time beside it; they have as long again to go on now that the CPU is free.
+void Supervisor::name_starved(Watched& hog, Stall& stall, std::int64_t now_ns) {
+    if (stall.cause != Stall::Cause::busy || hog.cpu < 0 || hog.priority == 0) return;
+    for (Watched& other : watched_) {
+        if (&other == &hog || other.cpu != hog.cpu || other.priority >= hog.priority || other.core->hung()) continue;
+        if (now_ns - other.core->finished_ns() < 2 * other.core->period_ns() + shortest_interval_ns) continue;
+        if (stall.starved_count < Stall::most_starved) stall.starved[stall.starved_count++] = other.core->id();
+        other.core->excuse(now_ns);
+    }
+}
+
+}  // namespace hal

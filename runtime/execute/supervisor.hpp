@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// Watches the threads from outside of them: one that ends no cycle for longer than its limit is stopped, its outputs take their safe
+// values in its place, and the session learns why. An ordinary thread with a priority above the threads it watches, where the system
+// grants one, so that an endless loop cannot keep it from looking.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <pthread.h>
+
+#include "execute/core.hpp"
+#include "hal/queue.hpp"
+#include "hal/supervision.h"
+
+namespace hal {
+
+/// What the supervisor found when a thread hung.
+struct Stall {
+    enum class Cause : std::uint8_t {
+        busy,       ///< uses CPU time: a long computation or an endless loop
+        waiting,    ///< blocked in the kernel
+        stopped,    ///< by a debugger or a signal
+        starved,    ///< ready to run, but gets no CPU time
+        process,    ///< the whole process got no CPU time
+        suspended,  ///< the host was suspended
+    };
+    static constexpr std::size_t most_starved = 8;
+    Cause cause = Cause::busy;
+    bool demoted = false;              ///< its real-time priority was taken from it
+    std::uint32_t thread = 0;          ///< Core::id
+    std::uint32_t function = 0;        ///< the model's number; 0: between two functions or two cycles
+    std::uint32_t occupant = 0;        ///< starved: Core::id of the thread that uses its CPU; 0: unknown
+    std::int32_t tracer = 0, cpu = -1; ///< process ID of the debugger; CPU the thread is bound to
+    std::uint64_t cycle = 0;
+    std::int64_t time_ns = 0, silent_ns = 0, limit_ns = 0;
+    std::uint32_t starved[most_starved]{};  ///< Core::id of threads that got no CPU time beside it
+    std::uint32_t starved_count = 0;
+};
+
+class Supervisor {
+public:
+    explicit Supervisor(FaultBoard& board);
+    ~Supervisor();
+    Supervisor(const Supervisor&) = delete;
+
+    // [setup], like all below
+    /// Watches a thread from now on. `priority`: of SCHED_FIFO, 0: another policy; `cpu`: -1: not bound to one.
+    void add(Core& core, pthread_t thread, int tid, int priority, int cpu);
+    /// No longer; what is being done for it is done when this returns.
+    void remove(const Core& core);
+    /// Waits until nothing is being done for any thread: after a plan was taken, before the old one goes.
+    void fence();
+    void set_priority(const Core& core, int priority);
+    /// Lets the thread's functions run again, at the priority they had. False: it still hangs.
+    bool reset(Core& core);
+    /// The thread has been deprived of its real-time priority.
+    bool demoted(const Core& core);
+    /// Takes the oldest fault that was not taken yet.
+    bool next(Stall& stall) { return stalls_.pop(stall); }
+    /// Whether the process as a whole got no CPU time, or hardly any, in the time before `until_ns`: how long.
+    std::int64_t process_gap_ns(std::int64_t until_ns, std::int64_t silent_ns) const;
+    /// A CPU is left to it beside those the threads are bound to. True while there is no thread.
+    bool has_own_cpu() const { return own_cpu_.load(); }
+    std::int64_t interval_ns() const { return interval_ns_.load(); }
+    /// Writes a byte there several times a second, as long as all supervised threads make progress.
+    void feed(int descriptor) { watchdog_.store(descriptor); }
+    int feeding() const { return watchdog_.load(); }
+
+    hal_supervision shared{};  ///< given out as extension "hal.supervision/1"; written with atomic builtins
+
+private:
+    struct Watched {
+        Core* core;
+        pthread_t thread;
+        int tid, priority, cpu;
+        bool demoted = false;
+        std::int64_t mark_ns = 0, mark_cpu_ns = 0;    // when it was first seen late, and the CPU time it had used by then
+    };
+    void work();
+    bool look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
+    bool behind_hog(const Watched& watched, std::int64_t now_ns) const;
+    void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
+    void name_starved(Watched& hog, Stall& stall, std::int64_t now_ns);
+    void find_cause(const Watched& watched, Stall& stall, std::int64_t now_ns) const;
+    void settle_down();  // interval and CPUs, after the threads have changed
+    void feed_watchdog(std::int64_t now_ns);
+    Watched* find(const Core& core);
+
+    FaultBoard& board_;
+    pthread_mutex_t mutex_;                   // of watched_; its holder inherits the priority of who waits
+    std::vector<Watched> watched_;            // highest priority first
+    pthread_t thread_{};
+    bool started_ = false;
+    int wake_ = -1;                           // eventfd
+    std::atomic<bool> quit_{false}, own_cpu_{true};
+    std::atomic<std::int64_t> interval_ns_{50'000'000};
+    std::atomic<std::int64_t> looked_ns_{0}, gap_end_ns_{0}, gap_ns_{0};  // the newest look, and the newest time without one
+    std::atomic<int> watchdog_{-1};
+    std::int64_t fed_ns_ = 0;
+    Queue<Stall> stalls_{64};
+};
+
+}  // namespace hal

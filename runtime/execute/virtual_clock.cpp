@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#include "execute/virtual_clock.hpp"
+
+namespace hal {
+
+void VirtualClock::advance(std::int64_t ns) {
+    const std::int64_t end = now_ns_ + ns;
+    for (bool ran = false;;) {
+        Runner* next = nullptr;
+        std::int64_t next_ns = 0;
+        for (const auto& runner : runners_)  // fastest first, so it wins at equal instants
+            if (const std::int64_t due = timeline_.due_ns(runner->grid_ns); due <= end && (!next || due < next_ns)) {
+                next = runner.get();
+                next_ns = due;
+            }
+        if (ran && (!next || next_ns != now_ns_))
+            background_.run(now_ns_);
+        if (!next) break;
+        ran = true;
+        now_ns_ = next_ns;
+        __atomic_fetch_add(&supervisor_.shared.progress, 1, __ATOMIC_RELAXED);
+        next->core.cycle(next->grid_ns, next_ns, next_ns);
+        next->grid_ns += next->options.period_ns;
+    }
+    now_ns_ = end;
+}
+
+void VirtualClock::advance_cycles(const Runner& of, std::uint64_t cycles) {
+    if (!timeline_.led()) return advance(static_cast<std::int64_t>(cycles) * of.core.period_ns());
+    for (; cycles > 0; --cycles) advance(timeline_.due_ns(of.grid_ns) - now_ns_);
+}
+
+}  // namespace hal

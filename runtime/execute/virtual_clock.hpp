@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// The clock of `hal sim`: it moves from one due cycle to the next and runs each on the caller's thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "execute/background.hpp"
+#include "execute/runner.hpp"
+#include "execute/supervisor.hpp"
+#include "execute/timeline.hpp"
+
+namespace hal {
+
+/// [setup] throughout. What it is given must outlive it.
+class VirtualClock {
+public:
+    /// `runners`: fastest first, so that the fastest runs first at equal instants.
+    VirtualClock(const std::vector<std::unique_ptr<Runner>>& runners, const Timeline& timeline, Background& background, Supervisor& supervisor)
+        : runners_(runners), timeline_(timeline), background_(background), supervisor_(supervisor) {}
+
+    std::int64_t now_ns() const { return now_ns_; }
+    /// Runs every cycle due within the next `ns`.
+    void advance(std::int64_t ns);
+    /// Runs until `of` has done this many more cycles, and what else is due until then.
+    void advance_cycles(const Runner& of, std::uint64_t cycles);
+
+private:
+    const std::vector<std::unique_ptr<Runner>>& runners_;
+    const Timeline& timeline_;
+    Background& background_;
+    Supervisor& supervisor_;
+    std::int64_t now_ns_ = 0;
+};
+
+}  // namespace hal

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+#include "machine/construct.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <set>
+
+#include "machine/construction.hpp"
+#include "machine/setup_call.hpp"
+
+namespace hal {
+
+std::string dashed(std::string text) {
+    std::replace(text.begin(), text.end(), '_', '-');
+    return text;
+}
+
+void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
+    if (bytes > (std::size_t{1} << 32) || align == 0 || align > 4096) return nullptr;
+    try {
+        // room to align by hand: arrays of char are aligned for any ordinary type only
+        instance.allocations.push_back(std::make_unique<char[]>(bytes + align));
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
+    const auto address = reinterpret_cast<std::uintptr_t>(instance.allocations.back().get());
+    return reinterpret_cast<void*>((address + align - 1) / align * align);
+}
+
+namespace {
+
+// A given argument that nothing asked for, and that is nearly one of those that were: more of the truth than what the constructor missed.
+bool is_misspelled(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked,
+                   Diagnostics& diagnostics) {
+    const std::vector<std::string> all(asked.begin(), asked.end());
+    for (const auto& [name, given] : request.arguments)
+        if (const std::string hint = asked.contains(name) ? "" : did_you_mean(name, all); !hint.empty()) {
+            diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", hint);
+            return true;
+        }
+    return false;
+}
+
+// One instance: memory, constructor, declarations into the model.
+bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics,
+                   std::unique_ptr<Instance> instance, Construction& c) {
+    c.sources = &sources;
+    c.diagnostics = &diagnostics;
+    const hal_host host = host_for(c);
+    c.texts.reserve(request.arguments.size());  // pointers into it are handed out
+    const auto create = [&] {
+        const SetupCall call(instance->name, component.name, "its constructor");
+        return component.plugin->create(&host, instance->memory);
+    };
+    if (!create()) {
+        if (c.no_memory) throw std::bad_alloc();
+        if (c.said_why && c.failure.empty()) return false;
+        const std::string why = c.failure.empty() ? "it gave no reason" : c.failure;
+        for (const auto& [name, given] : request.arguments)
+            if (why.starts_with(name + "=")) {
+                diagnostics.error("bad-argument", given.at, "component '" + component.name + "': " + why, "",
+                                  "hal doc " + component.name + " lists its arguments");
+                return false;
+            }
+        if (is_misspelled(component, request, c.asked, diagnostics)) return false;
+        diagnostics.error("construct-failed", request.at,
+                          "component '" + component.name + "' cannot make '" + instance->name + "': " + why);
+        return false;
+    }
+    instance->constructed = true;
+    // whatever goes wrong from here, what was constructed is destroyed, until the model owns it
+    struct Undo {
+        std::unique_ptr<Instance>& instance;
+        ~Undo() { if (instance) destroy_instance(*instance); }
+    } const undo{instance};
+    if (c.no_memory) throw std::bad_alloc();
+    if (!c.failure.empty()) {
+        diagnostics.error("construct-failed", request.at,
+                          "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
+        return false;
+    }
+    std::vector<std::unique_ptr<LoadedFunction>> own;
+    std::vector<std::pair<LoadedFunction*, plan::Step>> extended;
+    std::map<const void*, LoadedFunction*> by_identity;
+    for (const DeclaredFunction& decl : c.functions) {
+        LoadedFunction* function = decl.shared ? c.model.find_function(decl.full) : nullptr;
+        if (function && function->shared && function->component == &component) {
+            extended.emplace_back(function, plan::Step{decl.step, decl.self});
+        } else {
+            auto made = std::make_unique<LoadedFunction>();
+            function = made.get();
+            function->name = decl.full;
+            function->doc = c.model.keep(decl.doc);
+            function->steps.push_back({decl.step, decl.self});
+            function->row = {decl.row, decl.step};
+            function->instances.push_back(instance.get());
+            function->component = &component;
+            function->shared = decl.shared;
+            function->id = c.model.next_id++;
+            edit.add_time_pins(*function);
+            own.push_back(std::move(made));
+        }
+        by_identity[decl.identity] = function;
+        instance->functions.push_back(function);
+    }
+    for (auto& [pin, identity] : c.pins) {
+        if (identity) pin->function = by_identity[identity];
+        if (pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_FINITE)) instance->finite.push_back(pin.get());
+        instance->pins.push_back(std::move(pin));
+    }
+    std::set<std::string_view> names;
+    for (const auto& pin : instance->pins)
+        if (!names.insert(pin->name).second) {
+            diagnostics.error("construct-failed", request.at, "component '" + component.name + "' declares pin '" + pin->name + "' twice");
+            return false;
+        }
+    Instance& made = *instance;
+    if (!edit.add_instance(component, instance, std::move(own))) return false;
+    for (const auto& [function, step] : extended) edit.extend_function(*function, step, made);
+    return true;
+}
+
+}  // namespace
+
+namespace {
+
+std::size_t stride_of(const hal_component& plugin) {
+    return (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align;
+}
+
+// Cleared memory for so many instances in a row.
+std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
+    const std::align_val_t align{std::max<std::size_t>(plugin.instance_align, 64)};
+    void* const memory = ::operator new(count * stride_of(plugin), align);
+    std::memset(memory, 0, count * stride_of(plugin));
+    return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
+}
+
+bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+    for (const auto& [name, given] : request.arguments) {
+        if (asked.contains(name)) continue;
+        std::vector<std::string> all(asked.begin(), asked.end());
+        all.insert(all.end(), {"names", "count", "personality"});
+        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'",
+                          did_you_mean(name, all), "its arguments: " + listed(all));
+        return false;
+    }
+    return true;
+}
+
+/// In the indices, for more instances like `one`: they grow once and not twenty times.
+void make_room(Model& model, const Instance& one, std::size_t more) {
+    std::size_t pins = one.pins.size();
+    for (const LoadedFunction* const function : one.functions) pins += function->pins.size();
+    model.instance.reserve(model.instance.size() + more);
+    model.function.reserve(model.function.size() + more * one.functions.size());
+    model.pin.reserve(model.pin.size() + more * pins);
+}
+
+}  // namespace
+
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
+                     Diagnostics& diagnostics) {
+    edit.diagnostics = &diagnostics;
+    const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
+    for (std::size_t i = 0; i < old.instances.size(); ++i) {
+        const Instance& before = *old.instances[i];
+        const Load& load = old.loads[before.load];
+        LoadRequest request;
+        request.at = at;
+        for (const auto& [name, value] : load.arguments) request.arguments.emplace(name, GivenArgument{value, at});
+        auto instance = std::make_unique<Instance>();
+        instance->component = &fresh;
+        instance->loaded = before.loaded;
+        instance->name = before.name;
+        instance->load = before.load;
+        instance->number = before.number;
+        instance->memory = static_cast<char*>(storage.get()) + i * stride_of(*fresh.plugin);
+        instance->storage = storage;
+        const std::string personality = load.personalities.empty() ? "" : load.personalities[before.number % load.personalities.size()];
+        Construction c{beside, request, *instance, before.number, personality, {}, {}, {}, {}, 0, {}, {}};
+        if (!construct_one(edit, fresh, request, sources, diagnostics, std::move(instance), c)) return false;
+        if (!all_known(fresh, request, c.asked, diagnostics)) return false;
+    }
+    return true;
+}
+
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
+               Diagnostics& diagnostics) {
+    const hal_component& plugin = *component.plugin;
+    const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
+    const std::size_t stride = stride_of(plugin);
+    const auto block = [&](std::size_t count) { return block_of(plugin, count); };
+    bool known = singleton || !request.names.empty() || request.count >= 0;
+    std::size_t total = singleton                ? 1
+                        : !request.names.empty() ? request.names.size()
+                                                 : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
+    if (singleton && (request.names.size() > 1 || request.count > 1)) {
+        diagnostics.error("bad-argument", request.count_at.known() ? request.count_at : request.at,
+                          "component '" + component.name + "' has one instance only");
+        return false;
+    }
+    std::shared_ptr<void> storage = known ? block(std::max<std::size_t>(total, 1)) : block(1);
+    std::size_t in_block = 0;
+    std::set<std::string> asked;
+    for (std::size_t i = 0; !known || i < total; ++i) {
+        auto instance = std::make_unique<Instance>();
+        instance->component = &component;
+        instance->loaded = request.at;
+        const std::string serial = !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
+        instance->name = !request.names.empty() ? request.names[i]
+                         : singleton            ? dashed(component.name)
+                                                : dashed(component.name) + "." + serial;
+        instance->memory = static_cast<char*>(storage.get()) + in_block++ * stride;
+        instance->storage = storage;
+        instance->load = component.loads.empty() ? 0 : component.loads.size() - 1;
+        instance->number = i;
+        const std::string personality = request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()];
+        Construction c{model, request, *instance, i, personality, {}, {}, {}, {}, 0, {}, {}};
+        c.serial = serial;
+        if (!construct_one(edit, component, request, sources, diagnostics, std::move(instance), c)) return false;
+        asked.insert(c.asked.begin(), c.asked.end());
+        if (i == 0) {
+            if (!all_known(component, request, c.asked, diagnostics)) return false;
+            if (!known) {
+                known = true;
+                total = c.list_length > 0 ? c.list_length : plugin.default_count;
+                if (total > 1) storage = block(total - 1);
+                in_block = 0;
+            } else if (const auto list = c.list_length > total ? request.arguments.find(*c.lists.begin()) : request.arguments.end();
+                       list != request.arguments.end()) {  // a default may say more instances than are wanted
+                diagnostics.error("bad-argument", list->second.at,
+                                  "argument '" + list->first + "' lists " + std::to_string(c.list_length) + " values for " +
+                                      std::to_string(total) + (total == 1 ? " instance" : " instances"));
+                return false;
+            }
+            if (total > 1) make_room(model, *component.instances.back(), total - 1);
+        }
+    }
+    return true;
+}
+
+}  // namespace hal

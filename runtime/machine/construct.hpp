@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// Hosting the C interface: makes instances of a component and takes their declarations into the model.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "text/diagnostic.hpp"
+#include "hal/status.h"
+#include "model/edit.hpp"
+#include "model/model.hpp"
+
+namespace hal {
+
+class Executor;
+
+/// A load argument as it was given.
+struct GivenArgument {
+    std::string value;
+    Span at;
+};
+
+struct LoadRequest {
+    Span at;                                    ///< of the component's name
+    std::vector<std::string> names;             ///< names=; empty: numbered
+    std::int64_t count = -1;                    ///< count= or num_chan=; -1: not given
+    Span count_at;
+    std::vector<std::string> personalities;
+    std::map<std::string, GivenArgument> arguments;
+};
+
+/// The instances of a component once more, from another plugin and in a model beside: same names, arguments and personalities.
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
+                     Diagnostics& diagnostics);
+
+/// Instances of `my_comp` and their pins are named my-comp…
+std::string dashed(std::string component);
+
+/// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes with the commit. `sources` takes the
+/// texts that components find something wrong in.
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
+               Diagnostics& diagnostics);
+
+/// Memory that lives as long as the instance; nullptr: there is none, or the request is senseless.
+void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept;
+
+/// Starts one instance: it may acquire hardware. The reason of a refusal, or empty.
+std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);
+/// The instance that makes the threads follow an outside beat, or nullptr.
+const Instance* clock_leader(const Model& model);
+/// [setup] Not while a thread runs its functions.
+void stop_instance(Instance& instance) noexcept;
+void destroy_instance(Instance& instance) noexcept;
+
+}  // namespace hal

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// The host of a component's constructor: what it declares, asks for and reports is gathered here. Internal to construct.cpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <new>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hal/naming.h"
+#include "hal/texts.h"
+#include "machine/construct.hpp"
+
+namespace hal {
+
+struct DeclaredFunction {
+    std::string full, doc;
+    hal_step step;
+    hal_row row;
+    void* self;
+    const void* identity;
+    bool shared;
+};
+
+/// What one constructor declares while it runs.
+struct Construction {
+    Model& model;
+    const LoadRequest& request;
+    Instance& instance;
+    std::size_t number;                 // of this instance in the request
+    std::string personality;
+    std::vector<std::pair<std::unique_ptr<Pin>, const void*>> pins;  // with the identity of their function
+    std::vector<DeclaredFunction> functions;
+    std::set<std::string> asked, lists;  // arguments it asked for; those that are per instance
+    std::size_t list_length = 0;
+    std::vector<std::string> texts;      // keeps what argument() gave
+    std::string failure;
+    bool no_memory = false;
+    std::string serial = {};             // of an instance that is named after its component
+    bool whole_function_names = false;
+    Sources* sources = nullptr;
+    Diagnostics* diagnostics = nullptr;
+    std::string text_name = {}, text = {};  // what it reads
+    std::uint32_t text_source = 0;          // 0: nothing was said of it yet
+    bool said_why = false;                  // an error was
+    std::size_t said = 0;                   // messages of this text; those beyond the limit are dropped
+    std::deque<std::string> found = {};     // what find_text() gave
+};
+
+/// The interface for the constructor; its callbacks write to `construction`, which must outlive it. [setup]
+hal_host host_for(Construction& construction);
+
+/// The construction behind the host that a callback got.
+inline Construction& construction_of(const hal_host* host) { return *static_cast<Construction*>(host->data); }
+/// Notes why the constructor fails, unless it is known already. Returns false.
+bool refuse(Construction& construction, std::string why);
+
+/// Runs an action for a plugin, which must not throw into it: its frames may be C. Without memory it returns `otherwise`.
+template <class Result, class Action>
+Result guarded(Construction& c, Result otherwise, Action action) noexcept {
+    try {
+        return action();
+    } catch (const std::bad_alloc&) {
+        c.no_memory = true;
+        return otherwise;
+    }
+}
+
+extern const hal_naming naming_extension;  ///< names that LinuxCNC makes otherwise than COMPONENT.N
+extern const hal_texts texts_extension;    ///< finds files the component reads, and takes what it finds wrong in them
+
+}  // namespace hal

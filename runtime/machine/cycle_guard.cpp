@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include "machine/cycle_guard.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+
+#include <unistd.h>
+
+#include "base/types.hpp"
+#include "execute/crash_table.hpp"
+#include "machine/crash.hpp"
+
+namespace hal {
+
+CyclePatience::Verdict CyclePatience::look(const CycleNow& now, std::int64_t now_ns) noexcept {
+    if (now.core != seen_.core || now.cycle != seen_.cycle) {
+        cycle_since_ns_ = function_since_ns_ = now_ns;
+        slow_ = false;
+    } else if (now.function != seen_.function) {
+        function_since_ns_ = now_ns;
+    }
+    seen_ = now;
+    if (!now.core) return Verdict::none;
+    const std::int64_t took = cycle_ns(now_ns);
+    if (limit_ns > 0 && took >= limit_ns) return Verdict::end;
+    if (took < first_report_ns) return Verdict::none;
+    if (!slow_) slow_ = true, ++slow_cycles_;
+    if (reported_ns_ != 0) {
+        if (now_ns - reported_ns_ < pause_ns_) return Verdict::none;
+        pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
+    }
+    reported_ns_ = now_ns;
+    return Verdict::report;
+}
+
+CycleGuard::~CycleGuard() {
+    if (!thread_.joinable()) return;
+    {
+        const std::lock_guard lock(mutex_);
+        over_ = true;
+    }
+    wake_.notify_all();
+    thread_.join();
+}
+
+void CycleGuard::begin(std::int64_t limit_ns) {
+    patience_.limit_ns = limit_ns;
+    thread_ = std::thread([this] { work(); });
+}
+
+void CycleGuard::end_soon() {
+    const std::lock_guard lock(mutex_);
+    const std::int64_t limit = ending_limit_ns + (patience_.in_cycle() ? patience_.cycle_ns(monotonic_ns()) : 0);
+    if (patience_.limit_ns == 0 || patience_.limit_ns > limit) patience_.limit_ns = limit;
+}
+
+namespace {
+
+std::string wall_time(std::int64_t ns) { return format_duration(static_cast<double>(ns / 100'000'000 * 100'000'000)); }
+
+}  // namespace
+
+void CycleGuard::work() {
+    std::unique_lock lock(mutex_);
+    while (!over_) {
+        const std::int64_t interval = patience_.limit_ns > 0 ? std::clamp<std::int64_t>(patience_.limit_ns / 8, 1'000'000, 100'000'000) : 100'000'000;
+        if (wake_.wait_for(lock, std::chrono::nanoseconds(interval), [this] { return over_; })) return;
+        const CycleNow now = cycle_now();
+        const std::int64_t now_ns = monotonic_ns();
+        const CyclePatience::Verdict verdict = patience_.look(now, now_ns);
+        if (verdict == CyclePatience::Verdict::none) continue;
+        const CycleNames names = names_of(now);
+        const bool end = verdict == CyclePatience::Verdict::end;
+        const std::int64_t took = patience_.cycle_ns(now_ns);
+        std::string text = "hal: " + names.thread + ": ";
+        if (!names.function.empty() && patience_.one_function()) text += names.function + " has not returned for ";
+        else text += "the cycle has not ended for ";
+        text += took < 1'000'000'000 ? format_duration(static_cast<double>(took)) : wall_time(took);
+        text += " of wall time";
+        if (!names.function.empty() && !patience_.one_function()) text += ", now in " + names.function;
+        text += " (cycle " + std::to_string(now.cycle) + ")";
+        if (end) {
+            make_all_safe();
+            text += "; outputs were set to their safe values; the process ends [hung-thread]\n";
+        } else {
+            if (patience_.slow_cycles() > 1)
+                text += "; " + std::to_string(patience_.slow_cycles()) + " cycles took longer than " + wall_time(CyclePatience::first_report_ns);
+            text += "; it goes on (--cycle-limit TIME ends it)\n";
+        }
+        [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
+        if (end) _exit(1);
+    }
+}
+
+}  // namespace hal

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+// The edits that load, unload and reload components.
+#include "machine/elaborate.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "text/quoting.hpp"
+#include "machine/construct.hpp"
+#include "machine/thread_options.hpp"
+
+namespace hal {
+namespace {
+
+using edits::Args;
+
+constexpr std::int64_t most_instances = 200'000;  // of one loadrt; a slip of the finger must not take all memory
+
+std::vector<std::string> split_list(const std::string& text) {
+    std::vector<std::string> parts;
+    std::size_t from = 0;
+    for (std::size_t at; (at = text.find(',', from)) != std::string::npos; from = at + 1) parts.push_back(text.substr(from, at - from));
+    parts.push_back(text.substr(from));
+    return parts;
+}
+
+std::string unquoted(std::string text) {
+    text.erase(std::remove(text.begin(), text.end(), '"'), text.end());
+    if (text.size() >= 2 && text.front() == '\'' && text.back() == '\'') text = text.substr(1, text.size() - 2);
+    return text;
+}
+
+void load_threads(Elaboration& on, const Token& name, Args args, const std::string& written) {
+    std::vector<NewThread> threads;
+    if (!parse_threads(args, name.span, threads, on.diagnostics)) {
+        for (const Token& token : args)
+            if (token.text.starts_with("name")) on.edit.absences().note(token.text.substr(token.text.find('=') + 1));
+        return;
+    }
+    LoadedComponent* component = on.model.find_component("threads");
+    if (!component) component = &on.edit.add_component("threads", name.span);
+    on.edit.note_arguments(*component, written, {});
+    for (NewThread& thread : threads) {
+        fit_period(on.model, thread, on.diagnostics);
+        if (Thread* const made = on.edit.add_thread({thread.name, thread.at}, thread.options)) made->component = component;
+    }
+}
+
+// count=, names= … are the component's own arguments: it names its pins itself.
+bool names_itself(Elaboration& on, const Token& name) {
+    if (const LoadedComponent* const loaded = on.model.find_component(name.text))
+        return loaded->plugin && (loaded->plugin->flags & HAL_COMPONENT_WHOLE_NAMES);
+    Diagnostics ignored;
+    const auto plugin = on.plugins.open(name.text, name.span, ignored);
+    return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
+}
+
+/// The arguments of loadrt that say which instances there shall be, and the others; false after saying what is wrong.
+bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& request) {
+    request.at = name.span;
+    bool good = true;
+    Span names_at;
+    for (const Token& token : args) {
+        const auto equals = token.text.find('=');
+        if (equals == std::string::npos || equals == 0) {
+            on.diagnostics.error("bad-argument", token.span, quoted(token.text) + " is not an argument", "",
+                                 "arguments are written NAME=VALUE, without blanks around the =");
+            good = false;
+            continue;
+        }
+        const std::string key = token.text.substr(0, equals), value = unquoted(token.text.substr(equals + 1));
+        const bool says_instances =
+            (key == "names" || key == "count" || key == "num_chan" || key == "personality") && !names_itself(on, name);
+        if (says_instances && key == "names") {
+            request.names = split_list(value);
+            names_at = token.span;
+            for (const std::string& one : request.names)
+                if (one.empty()) {
+                    on.diagnostics.error("bad-argument", token.span, "names= lists an empty name", "",
+                                         "write names=first,second without blanks");
+                    good = false;
+                }
+        } else if (says_instances && key != "personality") {
+            const auto [end, problem] = std::from_chars(value.data(), value.data() + value.size(), request.count);
+            request.count_at = token.span;
+            const bool number = end == value.data() + value.size() && !value.empty() && value[0] != '-';
+            if (number && (problem == std::errc::result_out_of_range || request.count > most_instances)) {
+                on.diagnostics.error(
+                    "bad-argument", token.span,
+                    key + "=" + value + " exceeds the limit of " + std::to_string(most_instances) + " instances per loadrt",
+                    "1.." + std::to_string(most_instances));
+                good = false;
+            } else if (problem != std::errc{} || !number || request.count < 1) {
+                on.diagnostics.error("bad-argument", token.span, quoted(value) + " is not a number of instances",
+                                     "1.." + std::to_string(most_instances));
+                good = false;
+            }
+        } else if (says_instances) {
+            request.personalities = split_list(value);
+        } else if (!request.arguments.emplace(key, GivenArgument{value, token.span}).second) {
+            on.diagnostics.error("bad-argument", token.span, "argument '" + key + "' is given twice", "second time");
+            good = false;
+        }
+    }
+    if (!request.names.empty() && request.count >= 0) {
+        Diagnostic d{Severity::error,
+                     "names-and-count",
+                     "names= and count= are both given",
+                     {{request.count_at, "how many"}, {names_at, "and which"}},
+                     {"keep names=, it says how many there are"}};
+        on.diagnostics.add(std::move(d));
+        good = false;
+    }
+    return good;
+}
+
+bool make_instances(Elaboration& on, const Token& name, const LoadRequest& request, const std::string& written) {
+    LoadedComponent* component = on.model.find_component(name.text);
+    if (component && !component->plugin) {
+        on.diagnostics.error("name-taken", name.span, quoted(name.text) + " is a program started by loadusr");
+        return false;
+    }
+    if (!component) {
+        auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
+        if (!plugin) return false;
+        component = &on.edit.add_component(plugin->component->name, name.span);
+        component->plugin = plugin->component;
+        component->library = plugin->library;
+        component->path = plugin->path;
+    }
+    Load load;
+    for (const auto& [key, given] : request.arguments) load.arguments.emplace(key, given.value);
+    load.personalities = request.personalities;
+    on.edit.note_arguments(*component, written, std::move(load));
+    return construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
+}
+
+LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
+    LoadedComponent* const component = on.model.find_component(name.text);
+    if (component) return component;
+    std::vector<std::string> loaded;
+    for (const auto& one : on.model.components) loaded.push_back(one->name);
+    on.diagnostics.error("no-such-component", name.span, "there is no component " + quoted(name.text) + " here",
+                         did_you_mean(name.text, loaded), loaded.empty() ? "nothing is loaded" : "loaded: " + listed(loaded));
+    return nullptr;
+}
+
+}  // namespace
+
+void edits::loadrt(Elaboration& on, Args args) {
+    std::string text;
+    for (const Token& token : args.subspan(1)) text += (text.empty() ? "" : " ") + written(token.text);
+    if (args[0].text == "threads") return load_threads(on, args[0], args.subspan(1), text);
+    LoadRequest request;
+    const bool known = on.model.find_component(args[0].text) || !on.plugins.find(args[0].text).empty();
+    Absences& absences = on.edit.absences();
+    std::optional<Absences::Cause> cause = known ? std::nullopt : absences.assumed(args[0].text);
+    if (read_request(on, args[0], args.subspan(1), request) && !cause && make_instances(on, args[0], request, text)) return;
+    if (!known && !cause)
+        cause = absences.add("component " + quoted(args[0].text), "which is missing", args[0].span,
+                             request.names.empty() ? Absences::Scope::component : Absences::Scope::names);
+    for (const std::string& name : request.names) absences.note(name, cause);
+    if (!request.names.empty()) return;
+    absences.note(args[0].text, cause);
+    absences.note(dashed(args[0].text), cause);
+}
+
+void edits::unload(Elaboration& on, Args args) {
+    if (args[0].text == "all") {
+        for (std::size_t i = on.model.components.size(); i-- > 0;) {
+            LoadedComponent& component = *on.model.components[i];
+            if (component.process == 0 && component.name != "threads") on.edit.remove_component(component);
+        }
+        while (!on.model.threads.empty()) on.edit.remove_thread({on.model.threads.back()->name, args[0].span});
+        if (LoadedComponent* const threads = on.model.find_component("threads")) on.edit.remove_component(*threads);
+        return;
+    }
+    if (Instance* const instance = on.model.find_instance(args[0].text); instance && !on.model.find_component(args[0].text)) {
+        LoadedComponent& component = *instance->component;
+        on.edit.remove_instance(*instance);
+        if (component.instances.empty()) on.edit.remove_component(component);
+        return;
+    }
+    LoadedComponent* const component = loaded_component(on, args[0]);
+    if (!component) return;
+    if (component->process != 0) {
+        on.diagnostics.error("is-a-program", args[0].span, quoted(args[0].text) + " is a program's component", "",
+                             "unloadusr " + component->name + " ends it");
+        return;
+    }
+    if (component->name == "threads")
+        for (std::size_t i = on.model.threads.size(); i-- > 0;)
+            if (on.model.threads[i]->component == component) on.edit.remove_thread({on.model.threads[i]->name, args[0].span});
+    on.edit.remove_component(*component);
+}
+
+void edits::reload(Elaboration& on, Args args) {
+    const Token& name = args[0];
+    if (const Instance* const instance = on.model.find_instance(name.text); instance && !on.model.find_component(name.text)) {
+        on.diagnostics.error("no-such-component", name.span,
+                             quoted(name.text) + " is an instance; a component is reloaded with all its instances", "",
+                             "reload " + instance->component->name);
+        return;
+    }
+    LoadedComponent* const component = loaded_component(on, name);
+    if (!component) return;
+    if (!component->plugin) {
+        on.diagnostics.error(
+            "no-such-component", name.span,
+            component->process != 0 ? quoted(name.text) + " is a program, not a plugin" : quoted(name.text) + " belongs to the runtime", "",
+            component->process != 0 ? "unload it and start it again by loadusr" : "its threads are removed by delthread");
+        return;
+    }
+    auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
+    if (!plugin) return;
+    if (std::string_view(plugin->component->name) != component->name) {
+        on.diagnostics.error("reload-conflict", name.span,
+                             "'" + plugin->path + "' holds component '" + plugin->component->name + "' now, not '" + component->name + "'",
+                             "", "load it beside the old one: loadrt " + std::string(plugin->component->name));
+        return;
+    }
+    // constructed beside the model; what was made and is not taken over is destroyed here
+    Model beside = on.model.beside();
+    Edit making(beside);
+    LoadedComponent& fresh = making.add_component(component->name, name.span);
+    fresh.plugin = plugin->component;
+    fresh.library = plugin->library;
+    fresh.path = plugin->path;
+    struct Undo {
+        LoadedComponent& component;
+        bool taken = false;
+        ~Undo() {
+            if (taken) return;
+            for (auto it = component.instances.rbegin(); it != component.instances.rend(); ++it) destroy_instance(**it);
+        }
+    } undo{fresh};
+    const bool made = construct_again(beside, making, *component, fresh, name.span, on.sources, on.diagnostics);
+    on.model.next_id = beside.next_id;
+    if (made) undo.taken = on.edit.replace(*component, beside.components.front(), name.span);
+}
+
+}  // namespace hal

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// Programs outside the runtime: those started by loadusr, and those that registered themselves over the socket.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <sys/types.h>
+
+#include "hal/abi.h"
+#include "netlist/netlist.hpp"
+#include "machine/spawner.hpp"
+
+namespace hal {
+
+class Session;
+class Transaction;
+struct Pin;
+
+enum class Restart { no, on_failure, always };
+
+/// Whether a program that has ended is started again, in the spirit of systemd's Restart=, RestartSec= and StartLimit….
+struct RestartPolicy {
+    Restart when = Restart::no;
+    std::int64_t delay_ns = 1'000'000'000;
+    static constexpr std::size_t most = 5;                       ///< restarts within …
+    static constexpr std::int64_t within_ns = 10'000'000'000;    ///< … so long; then it is given up
+};
+
+struct ProcessStart {
+    std::vector<std::string> arguments;  ///< the program first; looked up in PATH
+    std::string directory;               ///< to run in; empty: this process's
+    int out = -1, err = -1;              ///< file descriptors for its stdout and stderr; -1: this process's
+    bool keep_stdin = false;             ///< false: it reads /dev/null
+};
+
+/// A stream between programs: one feeds it, one reads it.
+struct ProgramStream {
+    std::string name, types;
+    std::vector<hal_value> memory;
+    hal_stream stream{};
+};
+
+/// All members need Session::mutex held, and those that take a lock give it back while they wait.
+struct Processes {
+    struct Entry {
+        std::uint64_t number = 0;  ///< of this entry, for as long as it lives
+        std::string name = {};  ///< as component; empty: not registered as one
+        pid_t pid = 0;
+        bool child = false;     ///< started by loadusr, so that its end is seen here
+        bool ready = false;     ///< has said over the socket that it is a component
+        bool waited = false;    ///< a `loadusr -w` waits for its status: kept after its end, until collect()
+        bool ended = false;
+        int status = 0;         ///< exit status, or 128 + signal
+        bool reserved = false;  ///< until it is ready, the name is that of this process, whatever else the process registers
+        bool again = false;     ///< dead, and a successor has been started
+        std::uint64_t owner = 0;        ///< the connection that answers for the component; 0: none
+        std::vector<Pin*> pins = {};    ///< of the living program, by its numbers
+        static constexpr std::int64_t usual_timeout_ns = 1'000'000'000;
+        std::int64_t timeout_ns = usual_timeout_ns;  ///< from its death until its pins take their declared values; < 0: never
+        std::int64_t dead_ns = 0;       ///< since when it is dead, on the steady clock; 0: it lives
+        std::string obituary = {};      ///< "since 12:34:56 (exit status 1)"
+        bool declared = false;          ///< dead, and its pins have taken their declared values
+        bool stopping = false;          ///< told to end: not started again
+        RestartPolicy restart = {};
+        ProcessStart start = {};        ///< how to start it again
+        std::vector<std::int64_t> restarts = {};  ///< when it was, lately
+        std::int64_t restart_ns = 0;    ///< when it is to be started again; 0: not
+        std::int64_t kill_ns = 0;       ///< when it gets SIGKILL; 0: never
+
+        std::int64_t every_ns = 0;      ///< the longest time between two exchanges that it has declared; 0: none
+        std::int64_t heard_ns = 0;      ///< when it last gave a sign of life; kept while every_ns is not 0
+        std::string silence = {};       ///< "since 12:34:56" while it does not respond
+        std::vector<std::pair<Pin*, hal_value>> before_silence = {};  ///< what its pins had when they took their declared values
+
+        std::vector<std::shared_ptr<ProgramStream>> streams = {};  ///< it made; they go with it
+
+        bool dead() const { return dead_ns != 0; }
+        bool responds() const { return ready && silence.empty(); }
+        /// When it is no longer waited for; meaningful while every_ns is not 0.
+        std::int64_t due_ns() const { return heard_ns + every_ns + (timeout_ns >= 0 ? timeout_ns : usual_timeout_ns); }
+        /// As `show comp` says it.
+        std::string state() const;
+    };
+
+    explicit Processes(Session& session);
+    ~Processes();  ///< terminates all children: SIGTERM, then after two seconds SIGKILL
+
+    /// Starts a program. 0: `problem` says why not. `waited`: somebody will ask for its status and then collect() it.
+    pid_t start(const ProcessStart& start, bool waited, std::string& problem);
+    /// Makes a started program a component of the session. Its entry's number. The name is made unique if it is taken; when it is
+    /// `reserved`, which must be free or a dead program's, it is this process's alone.
+    std::uint64_t add(pid_t pid, const std::string& name, const Command& command, bool reserved = false);
+    /// A started program is started again when it ends, as the policy says.
+    void keep_alive(pid_t pid, const ProcessStart& start, const RestartPolicy& policy);
+    /// A program says that it is the component `name`, and ready unless told otherwise. A dead one's place is taken over,
+    /// pins and all. Empty, or why not. `owner` is the connection that says so.
+    std::string announce(pid_t pid, const std::string& name, std::uint64_t owner = 0, bool ready = true);
+    /// The component of that name if this connection answers for it, or nullptr.
+    Entry* owned(std::string_view name, std::uint64_t owner);
+    void set_ready(Entry& entry, bool ready);
+    /// A component is lost: its pins keep their values, later take the declared ones, and wait for a successor.
+    void die(Entry& entry, const std::string& how);
+    /// A sign of life of a component that has declared a rate; one that did not respond gets its values back.
+    void hear(Entry& entry);
+    /// A component declares that it exchanges values at least so often; 0: no longer.
+    void set_rate(Entry& entry, std::int64_t every_ns);
+    /// A component leaves in good order: its pins go.
+    void leave(Entry& entry);
+    /// A connection has ended; what it answered for and did not leave() is dead.
+    void withdraw(std::uint64_t owner);
+    /// Whether a component depends on this connection.
+    bool answers(std::uint64_t owner) const;
+    /// The next connection's number.
+    std::uint64_t new_owner() { return ++owners_; }
+    ProgramStream* find_stream(std::string_view name);
+    std::vector<std::string> stream_names() const;
+    Entry* find(std::string_view name);
+    Entry* find(pid_t pid);
+    Entry* find_number(std::uint64_t number);
+    /// The components that the process has registered.
+    std::vector<std::string> registered_by(pid_t pid) const;
+    /// Why the last registration of a child was rejected, also of one that has ended since; "" when none was.
+    std::string refusal_of(pid_t pid) const;
+    std::vector<std::string> names() const;
+    bool idle() const { return entries_.empty(); }  ///< no program is known
+    /// Takes the entry of a waited child out of the list.
+    void collect(pid_t pid);
+    /// Nobody waits for it any more.
+    void abandon(pid_t pid);
+    bool terminate(Entry& entry);  ///< SIGTERM, and no restart; a dead one is forgotten
+    /// `unload` and `unloadusr` in a transaction: the component of a dead program leaves the model with it; a living one is
+    /// terminated when it has taken effect. Empty, or why it cannot be.
+    std::string unload(Transaction& transaction, Entry& entry);
+    /// Ends a program whose start has failed: its name is free at once, and SIGKILL follows SIGTERM after 5 s.
+    void give_up(Entry& entry);
+
+    /// Sleeps until something about a process changes, at most so long.
+    void wait(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds most) { changed_.wait_for(lock, most); }
+
+private:
+    void work();          // starts the thread below
+    void reap();
+    void child_ended(pid_t pid, int status);
+    void schedule(Entry& entry);
+    void act_in_time(std::int64_t overslept_ns);
+    void fall_silent(Entry& entry);
+    std::string name_in_use(const Entry& entry) const;
+    int sleep_ms() const;
+    pid_t spawn(const ProcessStart& start, std::string& problem);
+    bool has_pins(const Entry& entry) const;
+    void forget(Entry& entry);
+    void add_to_model(const std::string& name, pid_t pid, const Command& command);
+    void replace_in_model(std::string_view name, pid_t pid);
+    void remove_from_model(std::string_view name);
+
+    Session& session_;
+    std::vector<Entry> entries_;
+    std::condition_variable changed_;
+    std::uint64_t owners_ = 0, numbers_ = 0;
+    std::unique_ptr<Spawner> spawner_;
+    std::deque<std::pair<pid_t, std::string>> refusals_;  // the newest first
+    static constexpr std::size_t most_refusals = 16;
+    std::thread reaper_;   // sleeps in poll() on the children's pidfds, and until something is due
+    int wake_ = -1;        // eventfd: the list of children has changed, something is due, or the reaper is to end
+    bool ending_ = false;
+    bool ending_children_ = false;  // nothing is started again
+    struct Watched {
+        pid_t pid;
+        int pidfd;
+    };
+    std::vector<Watched> watched_;
+};
+
+}  // namespace hal

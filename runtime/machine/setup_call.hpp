@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// What the machine is doing in a component outside of the cycle: its constructor, start, stop or destructor. It holds the session's mutex
+// meanwhile, so when the call does not return, this is all that can be told.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "execute/core.hpp"
+
+namespace hal {
+
+/// The names are whole as long as `since_ns` does not change.
+struct SetupCallNow {
+    char instance[128] = "", component[128] = "";
+    std::atomic<const char*> what{""};
+    std::atomic<std::int64_t> since_ns{0};  ///< on the monotonic clock; 0: none
+};
+
+class SetupCall {
+public:
+    /// There is one at a time in a process: the session's mutex is held.
+    SetupCall(const std::string& instance, const std::string& component, const char* what) noexcept {
+        copy(instance, now.instance);
+        copy(component, now.component);
+        now.what = what;
+        now.since_ns.store(monotonic_ns(), std::memory_order_release);
+    }
+    ~SetupCall() { now.since_ns.store(0, std::memory_order_release); }
+    SetupCall(const SetupCall&) = delete;
+
+    inline static SetupCallNow now;  ///< [any]
+
+private:
+    static void copy(const std::string& from, char (&to)[128]) noexcept {
+        const std::size_t size = from.size() < sizeof to ? from.size() : sizeof to - 1;
+        std::memcpy(to, from.data(), size);
+        to[size] = '\0';
+    }
+};
+
+/// After the end was asked for, names the call that holds it up, and ends the process when it does not return within 15 s.
+class SetupGuard {
+public:
+    ~SetupGuard() { *over_ = true; }
+    /// [any] The end was asked for.
+    void end_soon();
+
+private:
+    std::shared_ptr<std::atomic<bool>> over_ = std::make_shared<std::atomic<bool>>(false);
+    std::atomic<bool> begun_{false};
+};
+
+}  // namespace hal

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// The life of an instance after its construction: start, stop, destroy.
+#include <cstring>
+
+#include "execute/executor.hpp"
+#include "hal/supervision.h"
+#include "hal/way.h"
+#include "machine/construct.hpp"
+#include "machine/setup_call.hpp"
+
+namespace hal {
+namespace {
+struct Starting {
+    Instance& instance;
+    const Model& model;
+    Executor& executor;
+    const hal_status& status;
+    std::string failure;
+
+    bool fail(const char* reason) noexcept {
+        try {
+            if (failure.empty()) failure = reason;
+        } catch (const std::bad_alloc&) {}  // then it gives no reason
+        return false;
+    }
+};
+
+bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) {
+    Starting& starting = *static_cast<Starting*>(host->data);
+    try {
+        Instance& instance = starting.instance;
+        instance.streams.emplace_back(*name ? instance.name + "." + name : instance.name, stream);
+        return true;
+    } catch (const std::bad_alloc&) {
+        return starting.fail("there is no memory left for its stream");
+    }
+}
+constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};
+
+bool tell_way(const hal_way*, const hal_host* host, const char* pin, const char* far, std::uint32_t cycles, std::uint32_t round_trip,
+              std::int64_t worst_ns) {
+    Instance& instance = static_cast<Starting*>(host->data)->instance;
+    try {
+        const std::string name = instance.name + "." + pin;
+        for (const auto& one : instance.pins)
+            if (one->name == name) instance.ways.push_back({one.get(), far, cycles, round_trip, worst_ns});
+        return true;
+    } catch (const std::bad_alloc&) {
+        return false;
+    }
+}
+constexpr hal_way way_host{sizeof way_host, tell_way};
+
+bool claim_clock(const hal_clock*, const hal_host* host) {
+    Starting& starting = *static_cast<Starting*>(host->data);
+    if (const Instance* const other = clock_leader(starting.model); other && other != &starting.instance) {
+        try {
+            return starting.fail(("the threads follow the beat of '" + other->name + "' (" + other->component->name +
+                                  "), and they can follow only one: let this one not follow, or unload '" + other->name + "' first")
+                                     .c_str());
+        } catch (const std::bad_alloc&) {
+            return starting.fail("the threads follow the beat of another instance, and they can follow only one");
+        }
+    }
+    starting.instance.leads_clock = true;
+    starting.executor.lead();
+    return true;
+}
+}  // namespace
+
+const Instance* clock_leader(const Model& model) {
+    for (const auto& component : model.components)
+        for (const auto& instance : component->instances)
+            if (instance->leads_clock) return instance.get();
+    return nullptr;
+}
+
+std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status) {
+    Starting starting{instance, model, executor, status, {}};
+    executor.clock().claim = claim_clock;
+    const hal_host host{
+        sizeof host, &starting,
+        [](const hal_host* h, const hal_pin_decl*, hal_pin*) {
+            return static_cast<Starting*>(h->data)->fail("pins are declared in the constructor, not in start");
+        },
+        [](const hal_host* h, const hal_function_decl*) {
+            return static_cast<Starting*>(h->data)->fail("functions are declared in the constructor, not in start");
+        },
+        [](const hal_host*, const hal_argument_decl* decl) { return decl->fallback; },
+        [](const hal_host* h, std::size_t bytes, std::size_t align) {
+            return allocate_for(static_cast<Starting*>(h->data)->instance, bytes, align);
+        },
+        [](const hal_host* h, const char* reason) { static_cast<Starting*>(h->data)->fail(reason ? reason : ""); },
+        [](const hal_host* h, const char* id) -> const void* {
+            if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
+            if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
+            if (std::strcmp(id, HAL_STATUS) == 0) return &static_cast<Starting*>(h->data)->status;
+            if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
+            if (std::strcmp(id, HAL_SUPERVISION) == 0) return &static_cast<Starting*>(h->data)->executor.supervisor().shared;
+            if (std::strcmp(id, HAL_WAY) == 0) return &way_host;
+            if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
+            return nullptr;
+        }};
+    {
+        const SetupCall call(instance.name, instance.component->name, "start");
+        instance.started = instance.component->plugin->start(instance.memory, &host);
+    }
+    if (instance.started) return {};
+    instance.streams.clear();
+    instance.ways.clear();
+    instance.leads_clock = false;
+    return starting.failure.empty() ? "it gave no reason" : starting.failure;
+}
+
+void stop_instance(Instance& instance) noexcept {
+    if (!instance.started) return;
+    const hal_cycle none{.size = sizeof none, .pad = 0, .period_ns = 0, .period_s = 0.0, .start_ns = 0, .number = 0};
+    for (const plan::Step& step : instance.emergency) step.step(step.self, &none);
+    const SetupCall call(instance.name, instance.component->name, "stop");
+    instance.component->plugin->stop(instance.memory);
+    instance.streams.clear();
+    instance.ways.clear();
+    instance.leads_clock = false;
+    instance.started = false;
+}
+
+void destroy_instance(Instance& instance) noexcept {
+    stop_instance(instance);
+    if (!instance.constructed) return;
+    const SetupCall call(instance.name, instance.component->name, "its destructor");
+    instance.component->plugin->destroy(instance.memory);
+    instance.constructed = false;
+}
+
+}  // namespace hal

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// What a Session holds; private to this folder.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "execute/executor.hpp"
+#include "hal/status.h"
+#include "model/compile.hpp"
+#include "machine/elaborate.hpp"
+#include "machine/plugins.hpp"
+#include "machine/session.hpp"
+
+namespace hal {
+
+struct Session::State {
+    explicit State(SessionOptions o);
+    ~State();
+
+    SessionOptions options;
+    Plugins plugins;
+    Model model;
+    std::unique_ptr<Executor> executor;
+    std::unordered_map<const Thread*, Core*> cores;
+    std::unordered_map<const Thread*, std::unique_ptr<plan::Plan>> plans;  ///< what each thread runs
+    std::vector<std::unique_ptr<plan::Plan>> stuck;  ///< kept after an edit that a thread did not answer: places in them may be in use
+    std::vector<std::shared_ptr<void>> left_cells;   ///< of the swap before: a loose pin's other thread may use one a moment longer
+    std::uint64_t epoch = 0;
+
+    bool open = false;                       ///< a Transaction exists
+    std::unique_ptr<Edit> edit;              ///< what it has edited; made by its first edit
+    std::vector<std::function<void()>> when_committed;
+    bool needs_threads = false;              ///< the open transaction does not take effect while a thread hangs
+    Absences absences;                       ///< of `hal check`: of all texts so far
+    std::vector<AutoOrder> auto_orders;
+    std::size_t commands = 0;                ///< in the open transaction
+    std::set<std::string> reported;          ///< warnings and notes said before
+
+    /// What the open transaction put in place of, should it be withdrawn after a thread has taken it.
+    struct {
+        Notes<Pin, hal_value> pins;
+        Notes<Signal, hal_value> signals;
+    } before;
+    bool touched = false;                    ///< threads may have been made, ended or given a plan for the open transaction
+    std::unique_ptr<char[]> reserve;         ///< given back when memory has run out, so that undoing has some
+
+    struct LoggedFault {
+        FaultRecord record;   ///< its age is the time of the first
+        FaultEvent event;     ///< compared with those that follow; no code: no other one belongs to it
+    };
+    std::deque<LoggedFault> fault_log;
+    std::uint64_t fault_number = 0;          ///< of the newest
+    hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
+    std::vector<std::string> latencies;      ///< of signals that pass between machines
+    std::vector<std::string> refused;        ///< by the system: "memory locking"
+    bool shut = false;
+    int watchdog = -1;                       ///< the open device, until it is disarmed
+    bool abandoned = false;                  ///< a thread hangs and may go on using everything here
+
+    Core* core(const Thread* thread) const;
+    /// Adds threads that have no core yet. False after reporting.
+    bool make_threads(Diagnostics& diagnostics);
+    /// Ends threads that left the model.
+    bool end_threads(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics);
+    /// Compiles the model and makes all threads run it; in two steps when functions move between threads.
+    bool synchronise(Diagnostics& diagnostics);
+    /// Makes the open transaction take effect. False after reporting; then it is to be withdrawn.
+    bool carry_out(Diagnostics& diagnostics);
+    /// Undoes the open transaction, in the model and in threads that have taken it.
+    void withdraw(Diagnostics* diagnostics = nullptr);
+    /// Reports that there is no memory left, and makes some.
+    void out_of_memory(Diagnostics& diagnostics);
+    void collect_faults();
+    /// One error for a thread that hangs.
+    void hung_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const;
+    /// New values of what threads own, into their queues.
+    bool write_values(const Notes<Pin, hal_value>& pins, const Notes<Signal, hal_value>& signals,
+                      Diagnostics& diagnostics);
+    /// The edit of the open transaction, whose next problems go to `diagnostics`.
+    Edit& editing(Diagnostics& diagnostics);
+    bool start_replaced(Diagnostics& diagnostics);
+    void restart_replaced(Diagnostics& diagnostics);
+    void retire();
+    /// The transaction is over: what is no longer in the model is destroyed.
+    void close_edit();
+    /// Waits until each thread is between two cycles. False after reporting those that hang.
+    bool all_answer(Diagnostics& diagnostics);
+
+private:
+    bool swap(const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics);
+    void keep_values();
+    void observe_unknowns(Compiled& compiled);
+    void settle(Compiled& compiled, const std::vector<Core*>& silent);
+    void collect_faults(const Thread& thread);
+    void silent_thread(const Core* core, Diagnostics& diagnostics) const;
+    void collect_stalls();
+
+public:
+    /// The orderly end: the device does not reset the host.
+    void disarm_watchdog();
+};
+
+/// hal_status::text; its data is the Session.
+std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t room);
+
+/// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any more.
+void watch_for_crashes(Session::State* state);
+
+/// How long a thread may take to answer beyond two of its periods.
+inline constexpr std::int64_t answer_timeout_ns = 1'000'000'000;
+
+}  // namespace hal

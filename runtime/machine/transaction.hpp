@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// The only way to change the model of a Session: one edit, which takes effect whole or not at all.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <utility>
+
+#include "text/diagnostic.hpp"
+#include "netlist/netlist.hpp"
+#include "netlist/usage.hpp"
+
+namespace hal {
+
+class Session;
+struct Elaboration;
+
+/// How an edit is written and what carries it out: from its row of the command table.
+struct EditForm {
+    Usage usage;
+    void (*elaborate)(Elaboration& on, std::span<const Token> args);
+    bool arrows = false;  ///< arrows may stand among its arguments and are not counted
+};
+
+/// The open transaction of a session, made by Session::begin(). There is at most one at a time; whoever holds it holds
+/// Session::mutex. Destruction rolls back. [setup]
+class Transaction {
+public:
+    Transaction(Transaction&& other) noexcept : session_(std::exchange(other.session_, nullptr)) {}
+    Transaction& operator=(Transaction&&) = delete;
+    ~Transaction() { roll_back(); }
+
+    /// Elaborates one command, whose names of several things stand for a command each, by the form of its row in the command
+    /// table. Problems, among them a wrong number of arguments, go to `diagnostics`.
+    void apply(const EditForm& form, const Command& command, Diagnostics& diagnostics);
+    /// Queues an action that commit() carries out right after the edits have taken effect, in the order of these calls. A
+    /// transaction that is rolled back forgets it. The action may begin a transaction of its own.
+    void when_committed(std::function<void()> action);
+    /// It is rejected when a thread hangs at the commit: what is done then needs its answer.
+    void needs_threads();
+    /// Ends the transaction: checks, starts new instances, compiles, swaps and returns true; or reports and rolls back everything.
+    /// With any error already in `diagnostics` it rolls back. Throws std::logic_error when the transaction has ended before.
+    bool commit(Diagnostics& diagnostics);
+    /// Ends the transaction and undoes everything. Does nothing when it has ended before.
+    void roll_back();
+
+private:
+    friend class Session;
+    explicit Transaction(Session& session) : session_(&session) {}
+    Session* session_;  ///< nullptr: it has ended
+};
+
+}  // namespace hal

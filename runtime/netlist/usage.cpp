@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include "netlist/usage.hpp"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace hal {
+namespace {
+
+constexpr std::string_view between_forms = " | ";
+
+std::vector<std::string_view> forms_of(std::string_view arguments) {
+    std::vector<std::string_view> forms;
+    for (std::size_t at; (at = arguments.find(between_forms)) != arguments.npos; arguments.remove_prefix(at + between_forms.size()))
+        forms.push_back(arguments.substr(0, at));
+    forms.push_back(arguments);
+    return forms;
+}
+
+std::vector<UsageWord> words_of(std::string_view text) {
+    std::vector<UsageWord> words;
+    std::size_t at = 0;
+    while (at < text.size()) {
+        if (text[at] == ' ') {
+            ++at;
+            continue;
+        }
+        // A bracket may hold a blank: "[-t TYPE]" is one optional group of two words.
+        const bool optional = text[at] == '[';
+        auto end = optional ? text.find(']', at) : text.find(' ', at);
+        if (end == text.npos) end = text.size();
+        std::string_view inner = text.substr(at + (optional ? 1 : 0), end - at - (optional ? 1 : 0));
+        if (optional) ++end;
+        bool repeats = false;
+        if (text.substr(end).starts_with("...")) {
+            repeats = true;
+            end += 3;
+        }
+        if (inner.ends_with("...")) {
+            repeats = true;
+            inner.remove_suffix(3);
+        }
+        for (std::size_t begin = 0; begin <= inner.size();) {
+            const auto blank = std::min(inner.find(' ', begin), inner.size());
+            words.push_back({inner.substr(begin, blank - begin), optional, repeats, begin > 0});
+            begin = blank + 1;
+        }
+        at = end;
+    }
+    return words;
+}
+
+}  // namespace
+
+std::string to_string(const Usage& usage) {
+    std::string text;
+    for (const std::string_view form : forms_of(usage.arguments)) {
+        if (!text.empty()) text += ", or ";
+        text += usage.name;
+        if (!form.empty()) (text += ' ') += form;
+    }
+    return text;
+}
+
+std::vector<std::vector<UsageWord>> usage_forms(std::string_view arguments) {
+    std::vector<std::vector<UsageWord>> forms;
+    for (const std::string_view form : forms_of(arguments)) forms.push_back(words_of(form));
+    return forms;
+}
+
+bool check_arity(const Usage& usage, const Token& name, std::span<const Token> args, Diagnostics& diagnostics) {
+    const auto forms = usage_forms(usage.arguments);
+    const auto by_option = std::find_if(forms.begin() + 1, forms.end(), [&](const auto& form) {
+        return !form.empty() && !args.empty() && form.front().text == args.front().text;
+    });
+    std::size_t least = 0, most = 0;
+    for (const UsageWord& word : by_option == forms.end() ? forms.front() : *by_option) {
+        if (!word.optional) ++least;
+        most = word.repeats || most == SIZE_MAX ? SIZE_MAX : most + 1;
+    }
+    const std::size_t given = args.size();
+    if (given >= least && given <= most) return true;
+    const bool few = given < least;
+    const std::size_t bound = few ? least : most;
+    Span at = name.span;
+    if (!few) {
+        at = args[most].span;
+        if (const Span last = args.back().span; last.source == at.source && last.end > at.end) at.end = last.end;
+    }
+    diagnostics.error("wrong-arguments", at,
+                      std::string(usage.name) + " takes " + (least == most ? "" : few ? "at least " : "at most ") + std::to_string(bound) +
+                          (bound == 1 ? " argument, not " : " arguments, not ") + std::to_string(given),
+                      "", to_string(usage));
+    return false;
+}
+
+}  // namespace hal

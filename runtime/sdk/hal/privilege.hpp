@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// What to type when the kernel denies a program what it needs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include <unistd.h>
+
+namespace hal {
+
+namespace privilege {
+/// The capabilities this process could use, as a set of bits.
+inline std::uint64_t permitted() {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("CapPrm:")) return std::stoull(line.substr(7), nullptr, 16);
+    return 0;
+}
+
+inline std::string program() {
+    std::array<char, 4096> path{};
+    const ssize_t size = readlink("/proc/self/exe", path.data(), path.size());
+    std::string name = size > 0 ? std::string(path.data(), static_cast<std::size_t>(size)) : "hal";
+    constexpr std::string_view deleted = " (deleted)", helper = "/hal-bus";
+    if (name.ends_with(deleted)) name.resize(name.size() - deleted.size());  // built again since it was started
+    if (name.ends_with(helper)) name.resize(name.size() - helper.size() + 4);  // `hal` passes its capabilities on to it
+    return name;
+}
+
+inline std::string shell_word(const std::string& word) {
+    if (word.find_first_of(" \t\n'\"\\$`*?[]{}()<>|&;#~!") == std::string::npos) return word;
+    std::string text = "'";
+    for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return text + "'";
+}
+
+}  // namespace privilege
+
+/// Returns the command that grants this program the capabilities of real-time threads and raw frames, and CAP_NET_ADMIN where `net_admin` is
+/// set or it already has that one: `sudo setcap ... /usr/local/bin/hal`. File capabilities are replaced as a whole, so it names all of
+/// them. [setup]
+inline std::string grant_command(bool net_admin = false) {
+    constexpr unsigned cap_net_admin = 12;
+    const bool admin = net_admin || (geteuid() != 0 && ((privilege::permitted() >> cap_net_admin) & 1U) != 0);
+    return "sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw" + std::string(admin ? ",cap_net_admin" : "") + "=ep " +
+           privilege::shell_word(privilege::program());
+}
+
+}  // namespace hal

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// Codes of faults of a running machine that are not those of a command, too, and their pages for `hal explain`, as in code_pages.hpp: sorted by
+// name, which never changes. tests/errors/<name>.sh provokes them.
+#pragma once
+
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+#include <vector>
+
+#include "text/code_pages.hpp"
+
+namespace hal {
+
+inline constexpr CodePage fault_pages[] = {
+    {"budget",
+     "A fault: a cycle took longer than the budget of its thread (`newthread ... budget=TIME`). It is recorded when the cycle ends, names "
+     "the function the cycle was last seen in, and the thread goes on. `show timing` counts such cycles as over budget.\n\n"
+     "`show timing THREAD` and the parameters FUNCTION.tmax show which functions take long. A budget is a warning before a deadline is "
+     "missed; a cycle of 10 periods or more is an `overrun`, whatever the budget."},
+    {"component",
+     "A fault that a component raised: a lost node, a sensor out of its range, a value it rejected. The sentence names the instance, what "
+     "it found and what it did; the thread goes on. How a fault resets is the component's: `hal doc COMPONENT`.\n\n"
+     "`show fault` lists all faults, `fault clear` acknowledges them. The component `faults` has pins for the safety chain (`ok`, `last-code`)."},
+    {"exception",
+     "A fault: a function threw an exception in its cycle. No function of its thread runs any more, and the outputs of the thread were "
+     "set to their safe values; other threads go on. `start` lets the thread's functions run again. The exit status is then 1.\n\n"
+     "Functions of a cycle are `noexcept` and must not throw: they set an output or raise a fault of their own instead. "
+     "`hal compile --check-rt` finds such components before they are loaded."},
+    {"not-finite",
+     "A fault: an output that its component declares finite became NaN or infinite, after a division by zero for example. The output was "
+     "set to its declared safe value instead (0 where it declares none), and the thread goes on. It is recorded once until the value is "
+     "finite again.\n\n"
+     "`show pin INSTANCE` shows the component's inputs: one of them is usually 0, NaN or far out of its range."},
+    {"overrun",
+     "A fault: a cycle took 10 periods of its thread or more. It is recorded when the cycle ends and names the function the cycle was last "
+     "seen in. The periods that passed meanwhile are missed, the thread keeps its phase and goes on. A cycle that does not end within the "
+     "supervision limit of the thread is `hung-thread` instead.\n\n"
+     "Possible causes: a function that blocks, waits or computes for long; a thread without real-time scheduling on a busy host (`hal "
+     "doctor`); a period that is too short. `show timing` and the parameters FUNCTION.tmax show which function it was."},
+};
+
+/// Code of a fault; naming one without a page does not compile.
+class FaultCode {
+public:
+    consteval FaultCode(const char* name) : name_(name) {
+        const auto is_it = [name](const CodePage& page) { return std::string_view(page.name) == name; };
+        if (std::none_of(std::begin(fault_pages), std::end(fault_pages), is_it) && std::none_of(std::begin(code_pages), std::end(code_pages), is_it))
+            throw "this code is neither in fault_pages.hpp nor in code_pages.hpp";
+    }
+    constexpr const char* name() const { return name_; }
+
+private:
+    const char* name_;
+};
+
+/// All pages, by name.
+inline std::vector<CodePage> all_code_pages() {
+    std::vector<CodePage> all(std::begin(code_pages), std::end(code_pages));
+    all.insert(all.end(), std::begin(fault_pages), std::end(fault_pages));
+    std::sort(all.begin(), all.end(), [](const CodePage& a, const CodePage& b) { return std::string_view(a.name) < b.name; });
+    return all;
+}
+
+}  // namespace hal

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""hal check: several files, INI files, what is missing; files that are no regular files, for every command that reads one."""
+import os
+import subprocess
+import unittest
+
+from harness import Case, SERVO
+
+MACHINE = """loadrt [KINS]KINEMATICS
+loadrt motmod servo_period_nsec=[EMCMOT]PERIOD num_joints=2
+loadrt hal_card cfg="0x378 out"
+loadrt pid names=pid.x,pid.y
+loadusr -Wn panel pyvcp -c panel panel.xml
+addf card.0.read servo-thread
+addf motion-command-handler servo-thread
+addf motion-controller servo-thread
+addf pid.x.do-pid-calcs servo-thread
+addf pid.y.do-pid-calcs servo-thread
+net x-cmd joint.0.motor-pos-cmd => pid.x.command
+net y-cmd joint.1.motor-pos-cmd => pid.y.command
+net x-out pid.x.output => card.0.dac-00
+net y-out pid.y.output => card.0.dac-01
+net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
+net bar panel.bar halui.machine.is-on
+setp pid.x.Pgain 5
+"""
+INI = """[HAL]
+HALFILE = machine.hal
+HALFILE = LIB:library.hal
+HALFILE = more.hal
+POSTGUI_HALFILE = after.hal
+HALUI = halui
+HALCMD = setp pid.y.Pgain 7
+[KINS]
+KINEMATICS = trivkins coordinates=XY
+[EMCMOT]
+PERIOD = 1000000
+[EMCIO]
+EMCIO = io
+[DISPLAY]
+DISPLAY = axis
+"""
+
+
+class Check(Case):
+    def setUp(self):
+        super().setUp()
+        (self.folder / "library").mkdir()
+        self.environment["HALLIB_DIR"] = str(self.folder / "library")
+        self.write("machine.hal", MACHINE)
+        self.write("library/library.hal", "net lib pid.x.error joint.0.f-error-lim\n")
+        self.write("more.hal", "net more joint.0.amp-enable-out => pid.x.enable\nsetp pid.x.Igain 1\nsetp pid.y.Dgain 2\n")
+        self.write("after.hal", "net after axisui.notifications-clear => pyvcp.led\n")
+        self.ini = self.write("machine.ini", INI)
+
+    def errors(self, text):
+        return [line for line in text.splitlines() if ": error: " in line or line.startswith("error: ")]
+
+    def test_one_cause_one_error(self):
+        said = self.bad("check", "machine.ini")
+        self.assertEqual(["trivkins", "motmod", "hal_card"], [line.split("'")[1] for line in self.errors(said)], said)
+        self.assertIn("9 lines name what nothing loaded has; they were not checked", said)
+        self.assertIn("possibly of component 'trivkins', component 'motmod', component 'hal_card'", said)
+        self.assertIn("depends on program 'pyvcp', which is not started here; it was not checked", said)
+        self.assertIn("depends on program 'io', which is not started here", said)
+
+    def test_a_single_missing_component_has_all_lines(self):
+        self.write("a.hal", "loadrt motmod\nloadrt pid names=pid.x\nnet c joint.0.pos-cmd => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n")
+        self.write("b.hal", "net d joint.0.pos-fb pid.x.feedback\nsetp pid.x.Pgain 1\n")
+        said = self.bad("check", "a.hal", "b.hal")
+        self.assertEqual(["a.hal:1:8: error: there is no component 'motmod' [no-such-component]"], self.errors(said), said)
+        self.assertIn("= help: 2 lines depend on it; they were not checked", said)
+        self.assertIn("b.hal:1:1: warning: 1 line depends on component 'motmod', which is missing; it was not checked [unchecked-lines]", said)
+
+    def test_real_errors_are_still_errors(self):
+        self.write("b.hal", "net d pdi.x.command joint.0.x\nsetp pid.x.Nogain 3\nsetp pid.x.Pgain no\naddf pid.z.do-pid-calcs servo-thread\nsets nothing 3\n")
+        said = self.bad("check", "machine.ini", "b.hal")
+        self.assertEqual([f"b.hal:{line}" for line in (1, 2, 3, 4, 5)],
+                         [":".join(line.split(":")[:2]) for line in self.errors(said) if line.startswith("b.hal")], said)
+        for name in ("pdi.x.command", "pid.x.Nogain", "pid.z.do-pid-calcs", "'nothing'"):
+            self.assertIn(name, "\n".join(self.errors(said)))
+
+    def test_assume(self):
+        said = self.run_program("check", "--assume", "trivkins", "--assume", "motmod", "--assume", "hal_card", "machine.ini")
+        self.assertEqual((0, []), (said.returncode, self.errors(said.stderr)), said.stderr)
+        self.assertIn("9 lines name what nothing loaded has", said.stderr)
+        self.write("c.hal", "loadrt and2 names=a\nnet s far.out => a.in0\n")
+        self.assertIn("far.out", self.bad("check", "c.hal"))
+        said = self.run_program("check", "--assume", "far", "c.hal")
+        self.assertEqual(0, said.returncode, said.stderr)
+        self.assertIn("1 line depends on 'far', which is assumed to exist; it was not checked [unchecked-lines]", said.stderr)
+
+    def test_files_of_the_library(self):
+        self.write("x.ini", "[HAL]\nHALFILE = LIB:nowhere.hal\n")
+        self.assertIn("'LIB:nowhere.hal' cannot be read: it is not in HALLIB_DIR", self.bad("check", "x.ini"))
+        del self.environment["HALLIB_DIR"]
+        self.assertIn("HALLIB_DIR is not set", self.bad("check", "x.ini"))
+        self.write("library/s.hal", "loadrt and2 names=q\nprint found\n")
+        self.write("y.ini", "[HAL]\nHALFILE = s.hal\n")
+        self.environment["HALLIB_PATH"] = ".:" + str(self.folder / "library")
+        self.assertIn("no errors", self.run_program("check", "y.ini").stderr)
+        self.assertIn("HALCMD MSG: found", self.run_program("y.ini", name="halrun").stderr)
+
+    def test_what_has_errors_is_still_there_for_the_next_file(self):
+        self.write("a.hal", SERVO + "setp adder.nothing 1\n")
+        said = self.bad("check", "a.hal", self.write("b.hal", "net total => adder.in0\n"))
+        self.assertEqual(1, len(self.errors(said)), said)
+
+
+class SpecialFiles(Case):
+    """A FIFO without a writer would block whoever opens it; a device may never end; a directory is not a text."""
+
+    def setUp(self):
+        super().setUp()
+        os.mkfifo(self.folder / "fifo.hal")
+        os.mkfifo(self.folder / "fifo.ini")
+        for kind in ("cpp", "c", "comp", "matrices", "canopen", "tdma", "eds", "pcapng", "log"):
+            os.mkfifo(self.folder / f"fifo.{kind}")
+        (self.folder / "folder.hal").mkdir()
+        (self.folder / "zero.hal").symlink_to("/dev/zero")
+        (self.folder / "fifo.dds").symlink_to("fifo.hal")
+
+    def test_every_command_that_reads_a_file(self):
+        for name, why in (("fifo.hal", "FIFO"), ("folder.hal", "directory"), ("zero.hal", "device")):
+            self.write("source.hal", f"source {name}\n")
+            self.write("named.ini", f"[HAL]\nHALFILE = {name}\n")
+            for words in (["check", name], ["run", name], ["sim", name], ["fmt", name], ["graph", name], ["check", "source.hal"], ["run", "source.hal"],
+                          ["sim", "source.hal"], ["check", "named.ini"], ["run", "named.ini"], ["sim", "--ini", name, "source.hal"]):
+                with self.subTest(words=words):
+                    self.assertIn(why, self.bad(*words))
+        for words in (["check", "fifo.ini"], ["sim", "fifo.ini"], ["compile", "fifo.cpp"], ["compile", "fifo.c"], ["compile", "fifo.comp"],
+                      ["canopen", "check", "fifo.canopen"], ["can", "eds", "check", "fifo.eds"]):
+            with self.subTest(words=words):
+                self.assertRegex(self.bad(*words), "FIFO|regular file")
+        self.write("included.ini", "#INCLUDE fifo.ini\n")
+        self.assertIn("FIFO", self.bad("check", "included.ini"))
+
+    def test_in_a_running_machine(self):
+        self.start("run", self.write("a.hal", SERVO))
+        self.assertIn("FIFO", self.shell("source", "fifo.hal").stderr)
+        self.assertIn("FIFO", self.shell("-f", "fifo.hal").stderr)
+        self.assertIn("FIFO", self.run_program("-f", "fifo.hal", name="halcmd").stderr)
+
+    def test_a_descriptor_of_the_shell_is_read(self):
+        done = subprocess.run(["bash", "-c", f"exec '{self.hal()}' sim <(echo print hello)"], cwd=self.folder, env=self.environment,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60)
+        self.assertIn("HALCMD MSG: hello", done.stderr)
+
+    @staticmethod
+    def hal():
+        from harness import HAL
+        return HAL
+
+
+if __name__ == "__main__":
+    unittest.main()

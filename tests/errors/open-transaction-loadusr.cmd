@@ -1,0 +1,1 @@
+hal sim open-transaction-loadusr.hal

@@ -1,0 +1,1 @@
+hal sim program-timeout.hal

@@ -1,0 +1,1 @@
+hal check --assume motmod unchecked-lines.hal

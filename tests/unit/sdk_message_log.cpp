@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "hal/message_log.hpp"
+
+using hal::MessageLog;
+
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+
+struct MessageLogTest : testing::Test {
+    std::vector<std::string> lines;
+    MessageLog log{"it.0", [this](const std::string& line) { lines.push_back(line); }};
+    using Lines = std::vector<std::string>;
+};
+
+TEST_F(MessageLogTest, First_message_of_each_subject_is_printed_at_once) {
+    log.print("5", "node 5 is lost", 0);
+    log.print("6", "node 6 is lost", 0);
+    EXPECT_EQ(lines, (Lines{"it.0: node 5 is lost\n", "it.0: node 6 is lost\n"}));
+}
+
+TEST_F(MessageLogTest, Storm_is_one_line_per_second_with_the_newest_message_and_a_count) {
+    for (int i = 0; i < 3000; ++i) log.print("storm", "late by " + std::to_string(i) + " us", i * ms);
+    EXPECT_EQ(lines, (Lines{"it.0: late by 0 us\n", "it.0: late by 999 us (999 times in 1.0 s)\n",
+                            "it.0: late by 1999 us (1000 times in 1.0 s)\n"}));
+    log.flush(3000 * ms);
+    EXPECT_EQ(lines.size(), 4u);
+    EXPECT_EQ(lines.back(), "it.0: late by 2999 us (1000 times in 1.0 s)\n");
+    log.flush(4000 * ms);
+    log.print("storm", "late by 1 us", 4500 * ms);
+    EXPECT_EQ(lines.back(), "it.0: late by 1 us\n") << "after a quiet second it is printed at once again";
+    EXPECT_EQ(lines.size(), 5u);
+}
+
+TEST_F(MessageLogTest, One_repetition_has_no_count) {
+    log.print("a", "x", 0);
+    log.print("a", "x", 10 * ms);
+    log.flush(500 * ms);
+    EXPECT_EQ(lines.size(), 1u);
+    log.flush(1000 * ms);
+    EXPECT_EQ(lines, (Lines{"it.0: x\n", "it.0: x\n"}));
+}
+
+TEST_F(MessageLogTest, Alternating_states_keep_their_order) {
+    log.print("lost", "lost", 0);
+    log.print("back", "back", 100 * ms);
+    log.print("lost", "lost", 200 * ms);
+    log.print("back", "back", 300 * ms);
+    for (int i = 300; i < 2000; ++i) log.flush(i * ms);
+    EXPECT_EQ(lines, (Lines{"it.0: lost\n", "it.0: back\n", "it.0: lost\n", "it.0: back\n"}));
+}
+
+TEST_F(MessageLogTest, What_was_counted_is_printed_before_news_about_another_subject) {
+    log.print("frozen", "frozen", 0);
+    log.print("good", "good again", 100 * ms);
+    log.print("frozen", "frozen", 200 * ms);
+    log.print("good", "good again", 300 * ms);
+    log.print("gone", "unplugged", 400 * ms);
+    EXPECT_EQ(lines, (Lines{"it.0: frozen\n", "it.0: good again\n", "it.0: frozen\n", "it.0: good again\n", "it.0: unplugged\n"}));
+}
+
+TEST_F(MessageLogTest, Without_a_subject_numbers_do_not_count) {
+    log.print("no frame for 1.5 s", 0);
+    log.print("no frame for 12 s", 1 * ms);
+    EXPECT_EQ(lines.size(), 1u);
+    EXPECT_EQ(MessageLog::without_numbers("can0: 0x1F is 1.5 s, 12."), "can#: #x#F is # s, #.");
+}
+
+TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
+    for (int i = 0; i < 100'000; ++i) log.print(std::to_string(i), "stranger " + std::to_string(i), 0);
+    EXPECT_EQ(lines.size(), MessageLog::most_subjects);
+    log.flush(1000 * ms);
+    ASSERT_EQ(lines.size(), MessageLog::most_subjects + 1);
+    EXPECT_EQ(lines.back(), "it.0: 99744 messages about further subjects not shown\n");
+}
+
+TEST_F(MessageLogTest, Close_prints_what_was_only_counted) {
+    for (int i = 0; i < 5; ++i) log.print("a", "x", i * 100 * ms);
+    log.close();
+    EXPECT_EQ(lines.back(), "it.0: x (4 times in 0.4 s)\n");
+    log.close();
+    EXPECT_EQ(lines.size(), 2u);
+}
+
+}  // namespace

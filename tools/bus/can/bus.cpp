@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+#include "bus/can/bus.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <fmt/core.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "link/capture.hpp"
+
+namespace hal::tools {
+
+std::int64_t now_ns() {
+    timespec t{};
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
+}
+
+std::string out_of_reach(const can::Description& bus) {
+    if (!bus.simulated || bus.transport == "capture") return {};
+    return fmt::format(
+        "'{}' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to one that they do: "
+        "hal shell loadrt can_bridge a={} b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and here "
+        "udp:239.74.163.2:43113",
+        bus.address, bus.address);
+}
+
+namespace {
+
+/// Nothing after printing the reason.
+std::unique_ptr<can::Link> open_link(const Options& options, const std::string& address, bool fd, std::span<const std::string> wanted) {
+    std::vector<can::Filter> filters(wanted.size());
+    std::string problem;
+    for (std::size_t i = 0; i < filters.size(); ++i)
+        if (!parse_filter(wanted[i], filters[i], problem)) return fail(options, problem), nullptr;
+    can::Options how;
+    how.error_frames = how.own_frames = how.stamps = true;
+    how.receive_capacity = 16384;
+    how.fd = fd && !can::describe(address).fd_on_request;
+    can::Opened opened = can::open(address, how);
+    if (!opened && how.fd) {
+        how.fd = false;
+        opened = can::open(address, how);
+    }
+    if (!opened) return fail(options, opened.problem), nullptr;
+    if (const std::string why = out_of_reach(opened.link->description()); !why.empty()) return fail(options, why), nullptr;
+    if (!opened.link->set_filters(filters))
+        return fail(options, "these are more filters than the driver holds; use a MASK: 180/780"), nullptr;
+    return std::move(opened.link);
+}
+
+}  // namespace
+
+bool Bus::open(const Options& options, const std::string& address, bool fd, std::span<const std::string> filters) {
+    stop.listen();
+    return (link = open_link(options, address, fd, filters)) != nullptr;
+}
+
+bool Bus::open(const Options& options, std::span<const std::string> addresses, std::span<const std::string> filters) {
+    if (!open(options, addresses.front(), true, filters)) return false;
+    for (const std::string& address : addresses.subspan(1))
+        if (more.push_back(open_link(options, address, true, filters)); !more.back()) return false;
+    return true;
+}
+
+void Bus::announce(const Options& options) const {
+    std::string text;
+    const auto add = [&text](const can::Description& d) {
+        text += fmt::format("{}{} ({}", text.empty() ? "" : ", ", d.address, d.transport);
+        if (d.bit_rate != 0) text += fmt::format(", {} bit/s", d.bit_rate);
+        text += ")";
+    };
+    add(link->description());
+    for (const auto& other : more) add(other->description());
+    write_all(STDERR_FILENO, fmt::format("{}: listening on {}; Ctrl-C ends it\n", options.program, text));
+}
+
+void listen(Bus& bus, std::int64_t for_ns, const std::function<bool(std::span<const can::Frame>)>& take, std::int64_t slice_ns,
+            const std::function<void()>& idle) {
+    std::vector<can::Frame> room(256);
+    const std::int64_t end = for_ns >= 0 ? now_ns() + for_ns : INT64_MAX;
+    for (;;) {
+        const std::size_t count = bus.link->receive(room, can::unclocked);
+        if (count > 0 && !take(std::span(room).first(count))) return;
+        if (idle) idle();
+        const std::int64_t now = now_ns();
+        if (now >= end || bus.stop.requested()) return;
+        if (count > 0) continue;
+        if (bus.is_capture() && bus.link->state() == can::State::down) return;
+        bus.link->wait(std::min(slice_ns, end - now));
+    }
+}
+
+bool send_patiently(Bus& bus, const can::Frame& frame) {
+    can::Frame heard[16];
+    for (int tries = 0;; ++tries) {
+        while (bus.link->receive(heard, can::unclocked) > 0) {}  // its answers and acknowledgements are for the link; we do not listen
+        const std::uint64_t waiting = bus.link->statistics().queued;
+        if (waiting < 256 || tries == 1000 || bus.stop.requested()) return bus.link->send(frame, can::unclocked) == can::Sent::queued;
+        bus.link->flush(can::unclocked);
+        bus.stop.wait_ns(1'000'000);
+    }
+}
+
+int finish_sending(Bus& bus, const Options& options, std::uint64_t wanted) {
+    can::Frame heard[16];
+    for (int tries = 0; tries < 1000; ++tries) {
+        bus.link->flush(can::unclocked);
+        while (bus.link->receive(heard, can::unclocked) > 0) {}
+        if (bus.link->statistics().queued == 0) break;
+        bus.stop.wait_ns(1'000'000);
+    }
+    const can::Statistics s = bus.link->statistics();
+    if (s.dropped == 0 && s.queued == 0) return 0;
+    return fail(options, fmt::format("{} of {} frames were not sent; the bus is {}{}", s.dropped + s.queued, wanted, can::word(s.state),
+                                     s.queued > 0 ? ": is another node there to acknowledge, at this bit rate?" : ""));
+}
+
+namespace {
+
+bool hex(std::string_view text, std::uint32_t& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+    return !text.empty() && error == std::errc() && end == text.data() + text.size();
+}
+
+bool identifier(std::string_view text, std::uint32_t& id, bool& extended) {
+    if (text.starts_with("0x")) text.remove_prefix(2);
+    if (text.size() > 8 || !hex(text, id) || id > 0x1fffffff) return false;
+    extended = text.size() == 8 || id > 0x7ff;
+    return true;
+}
+
+}  // namespace
+
+bool parse_frame(std::string_view text, can::Frame& frame, std::string& problem) {
+    const auto mark = text.find('#');
+    std::string plain(text.substr(0, mark));
+    const std::string quoted = fmt::format("'{}' is no frame", text);
+    std::uint32_t id = 0;
+    if (mark == text.npos) return problem = quoted + ": write IDENTIFIER#DATA, such as 123#1122AABB", false;
+    if (!hex(plain, id) || (plain.size() != 3 && plain.size() != 8) || id > (plain.size() == 3 ? 0x7ffU : 0x1fffffffU))
+        return problem =
+                   fmt::format("{}: '{}' is no identifier; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one",
+                               quoted, plain),
+               false;
+    for (const char c : text.substr(mark))
+        if (c != '.') plain += c;  // 11.22.33
+    if (can::parse_log_line("(0) x " + plain, frame)) return true;
+    const bool fd = plain.find("##") != plain.npos;
+    return problem =
+               quoted + (fd ? ": behind ## stand one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, 24, 32, 48 or 64 bytes"
+                            : ": behind # stand up to 8 bytes of two hex digits, or R and the length asked for; FD is written ##"),
+           false;
+}
+
+bool parse_filter(std::string_view text, can::Filter& filter, std::string& problem) {
+    const auto slash = text.find('/');
+    bool wide = false;
+    if (identifier(text.substr(0, slash), filter.id, filter.extended)) {
+        if (slash == text.npos) return filter.mask = filter.extended ? 0x1fffffff : 0x7ff, true;
+        if (identifier(text.substr(slash + 1), filter.mask, wide)) return filter.extended = filter.extended || wide, true;
+    }
+    return problem = fmt::format("'{}' is no filter; write an identifier in hex, 181, or one with the bits that count, 180/780", text),
+           false;
+}
+
+std::string id_text(const can::Frame& f) { return f.error ? "error" : fmt::format("{:0{}X}", f.id, f.extended ? 8 : 3); }
+
+std::string data_text(const can::Frame& f, const char* separator) {
+    if (f.remote) return fmt::format("remote request, {} byte{}", f.length, f.length == 1 ? "" : "s");
+    std::string text;
+    for (const auto byte : f.bytes()) text += fmt::format("{}{:02X}", text.empty() ? "" : separator, byte);
+    return text;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "bus/can/bus_options.hpp"
+
+namespace hal::tools {
+
+struct DcfReadOptions : Options {
+    std::string eds, output;
+    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS NODE", "the bus; a node 1-127");
+        declare_eds(set, eds, "the node's description, EDS, DCF or XDD: which objects it has");
+        set.value("-o,--output", output, "FILE", "the DCF; without it: standard output");
+        declare_timeout(set, timeout_ns);
+    }
+};
+
+struct DcfWriteOptions : Options {
+    bool check = false;           ///< only compare
+    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS NODE FILE", "the bus; a node 1-127; a DCF");
+        set.flag("--check", check, "only say what differs; exit code 1 if anything does");
+        declare_timeout(set, timeout_ns);
+    }
+};
+
+/// `hal can dcf read`. Returns the exit code.
+int run_can_dcf_read(const DcfReadOptions&);
+
+/// `hal can dcf write`. Returns the exit code.
+int run_can_dcf_write(const DcfWriteOptions&);
+
+}  // namespace hal::tools

@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: MIT
+// `hal can drive`: a drive of CiA 402 by hand, one command or a shell of them.
+#include "bus/can/drive.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "base/types.hpp"
+#include "bus/can/drive_shell.hpp"
+#include "cli/output.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal::tools {
+
+using namespace canopen::cia402;
+
+namespace {
+
+constexpr std::int64_t step_ns = 15'000'000'000, motion_ns = 60'000'000'000;  // for a command, when no time is given
+
+struct Verb {
+    const char *name, *arguments, *what;
+};
+constexpr Verb verbs[] = {
+    {"on", "", "walk to operation enabled"},
+    {"off", "", "brake and switch off"},
+    {"go", "POSITION [relative] [nowait]", "move there (pp); ends when it is there"},
+    {"speed", "SPEED [nowait]", "turn at that speed (pv; in mode vl: r/min)"},
+    {"torque", "PERMILLE [nowait]", "give that torque, in thousandths of the rated one (tq)"},
+    {"stop", "", "stand still, and stay on"},
+    {"quickstop", "", "brake as fast as the drive may, and switch off"},
+    {"home", "[METHOD]", "find the home position; a method of CiA 402, 1 to 37"},
+    {"reset", "", "reset a fault"},
+    {"mode", "pp|pv|tq|vl", "mode of operation"},
+    {"wait", "", "until the target is reached"},
+    {"status", "", "state, mode, position, speed, torque, error"},
+    {"set", "NAME VALUE", "a value of the drive, or a factor: position-factor 4096/360"},
+    {"help", "", "this list"},
+    {"quit", "", "end, and leave the axes as they are: on, or moving"},
+};
+
+const char* arguments_of(const std::string& verb) {
+    const auto* row = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return verb == v.name; });
+    return row == std::end(verbs) ? "" : row->arguments;
+}
+
+}  // namespace
+
+DriveShell::DriveShell(const Options& options, Station& station, Supervision& supervision, const Settings& settings)
+    : options_(options), station_(station), supervision_(supervision), settings_(settings) {}
+
+bool DriveShell::print_line(const std::string& text) const { return print(text + "\n"); }
+bool DriveShell::wrong(const std::string& sentence) const { return fail(options_, sentence), false; }
+
+std::string DriveShell::help_text() {
+    std::string text = "  commands stand behind the letter of an axis: A on\n";
+    for (const Verb& v : verbs) text += fmt::format("  {:38} {}\n", std::string(v.name) + " " + v.arguments, v.what);
+    text +=
+        "  within TIME behind a command: it fails when it takes longer, and a motion is stopped; default 60s, of on, off, stop ... 15s\n";
+    text += "  values: set NAME VALUE writes, NAME? reads; position?, speed?, torque?, mode? and state? are read only\n";
+    return text + value_help() + "  HELP lists the words with the axis behind them: ONA: GA:1000 APA?\n";
+}
+
+int DriveShell::execute(std::string_view line) {
+    line = line.substr(0, line.find('#'));
+    pressed_.store(false);
+    bool good = true;
+    if (const auto done = letter_line(line)) {
+        good = *done;
+    } else {
+        Words words;
+        for (std::size_t at = 0; at < line.size();) {
+            const std::size_t end = std::min(line.find_first_of(" \t\r\n:", at), line.size());
+            if (end > at) words.emplace_back(line.substr(at, end - at));
+            at = end + 1;
+        }
+        if (words.empty()) return 0;
+        good = run(std::move(words));
+    }
+    if (supervision_.collided() && !over_) {
+        good =
+            wrong(fmt::format("another device sends heartbeats as node {}, so the drive would not notice the end of this program; "
+                              "start again with another --heartbeat-id",
+                              supervision_.own_node()));
+        over_ = true;
+    }
+    over_ = over_ || (!good && settings_.ends_at_failure);
+    pressed_.store(false);
+    return good ? 0 : 1;
+}
+
+std::function<void()> DriveShell::meanwhile() {
+    return [this] {
+        station_.turn(0);
+        if (pressed_.load() || supervision_.collided()) station_.bus.stop.request();  // no command is running that it could be for
+    };
+}
+
+HandAxis::Interruption DriveShell::interruption() const {
+    using enum HandAxis::Interruption;
+    return station_.bus.stop.requested() || supervision_.collided() ? end : pressed_.load() ? stop : none;
+}
+
+HandAxis& DriveShell::axis(unsigned number) {
+    auto& made = axes_[number];
+    if (!made) made = std::make_unique<HandAxis>(options_, station_, settings_.node, number);
+    made->interrupted = [this] { return interruption(); };
+    return *made;
+}
+
+bool DriveShell::watched(HandAxis& a) { return a.look() && supervision_.arm(a.number()); }
+
+int DriveShell::end(bool leave, const char* why, bool expected) {
+    bool all = true;
+    for (auto& a : axes_) {
+        if (!a || !a->touched()) continue;
+        if (leave) {
+            if (supervision_.active() && a->moves())
+                write_all(STDERR_FILENO,
+                          fmt::format("{0}: {1}: still moving, and not supervised any more; to stop it: hal can drive {2} --node {3} "
+                                      "{1} stop\n",
+                                      options_.program, a->letter(), options_.words.front(), settings_.node));
+            continue;
+        }
+        std::string what;
+        const bool done = a->secure(what);
+        all = all && done;
+        if (what.empty()) continue;
+        if (done && expected) print(fmt::format("{}: {} ({})\n", a->letter(), what, why));
+        else
+            fail(options_, fmt::format("{}: {}{} ({})", a->letter(), what,
+                                       !done && supervision_.active() ? "; the drive stops when it misses our heartbeat" : "", why));
+    }
+    // An axis that could not be stopped stays watched: the heartbeat ends with this program, and the drive reacts.
+    return all && supervision_.release() ? 0 : 1;
+}
+
+bool DriveShell::run(Words words) {
+    unsigned number = settings_.axis;
+    if (words[0].size() == 1) {
+        const char letter = static_cast<char>(words[0][0] & ~0x20);
+        if (letter < 'A' || letter > 'H') return wrong(fmt::format("'{}' is no axis; write A to H", words[0]));
+        number = static_cast<unsigned>(letter - 'A');
+        words.erase(words.begin());
+        if (words.empty()) return wrong(fmt::format("what shall axis {} do? type: help", letter));
+    }
+    const std::string verb = words[0];
+    words.erase(words.begin());
+    if (verb == "quit" || verb == "exit") return left_ = over_ = true;
+    if (verb == "help") return print(help_text());
+    HandAxis& a = axis(number);
+    if (verb.ends_with('?')) return query(a, verb.substr(0, verb.size() - 1));
+    const auto* row = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return verb == v.name; });
+    if (row == std::end(verbs)) {
+        Words names;
+        for (const Verb& v : verbs) names.emplace_back(v.name);
+        const std::string hint = did_you_mean(verb, names);
+        return wrong(fmt::format("there is no command '{}'; {}", verb, hint.empty() ? "type: help" : hint));
+    }
+    return command(a, verb, std::move(words));
+}
+
+bool DriveShell::command(HandAxis& a, const std::string& verb, Words arguments) {
+    const std::string rest = arguments_of(verb), shown = fmt::format("type: {} {}{}{}", a.letter(), verb, rest.empty() ? "" : " ", rest);
+    const auto usage = [&] { return wrong(shown); };
+    std::int64_t within = settings_.within_ns;
+    if (const auto at = std::find(arguments.begin(), arguments.end(), "within"); at != arguments.end()) {
+        const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1], false);
+        if (!ns || *ns <= 0) return wrong(fmt::format("{} within what? type: {} {} within 30s", verb, a.letter(), verb));
+        within = *ns;
+        arguments.erase(at, at + 2);
+    }
+    const bool moving = verb == "go" || verb == "speed" || verb == "torque" || verb == "home";
+    a.allow(within > 0 ? within : moving || verb == "wait" ? motion_ns : step_ns);
+    if (moving) return motion(a, verb, std::move(arguments), shown);
+    const char letter = a.letter();
+    if (verb == "mode") {
+        constexpr Mode by_hand[] = {Mode::profile_position, Mode::profile_velocity, Mode::profile_torque, Mode::velocity};
+        if (arguments.size() != 1) return usage();
+        for (const Mode mode : by_hand)
+            if (arguments[0] == abbreviation(mode)) return a.set_mode(mode) && print_line(fmt::format("{}: mode {}", letter, arguments[0]));
+        for (const ModeRow& m : modes)
+            if (arguments[0] == m.abbreviation)
+                return wrong(m.mode == Mode::homing
+                                 ? fmt::format("homing is a command: {} home", letter)
+                                 : fmt::format("{} wants a set-point every cycle; use component cia402 in a netlist", m.abbreviation));
+        return wrong(fmt::format("'{}' is no mode; write pp, pv, tq or vl", arguments[0]));
+    }
+    if (verb == "set") {
+        if (arguments.size() == 1 && arguments[0].ends_with('?')) return query(a, arguments[0].substr(0, arguments[0].size() - 1));
+        return arguments.size() == 2 ? set(a, arguments[0], arguments[1]) : usage();
+    }
+    if (!arguments.empty()) return wrong(fmt::format("nothing is expected at '{}'; type: {} {}", arguments[0], letter, verb));
+    if ((verb == "on" || verb == "reset") && !watched(a)) return false;
+    if (verb == "on") return a.on() && print_line(fmt::format("{}: on", letter));
+    if (verb == "off") return a.off() && print_line(fmt::format("{}: off", letter));
+    if (verb == "stop") return a.stop() && print_line(fmt::format("{}: stands at {:.10g}", letter, a.position()));
+    if (verb == "quickstop") return a.quick_stop() && print_line(fmt::format("{}: stopped and off, at {:.10g}", letter, a.position()));
+    if (verb == "reset") return a.reset() && print_line(fmt::format("{}: no fault", letter));
+    if (verb == "wait") return a.wait() && print_line(fmt::format("{}: at {:.10g}", letter, a.position()));
+    return status(a);
+}
+
+bool DriveShell::motion(HandAxis& a, const std::string& verb, Words arguments, const std::string& usage) {
+    const auto flag = [&](const char* name) {
+        const auto found = std::find(arguments.begin(), arguments.end(), name);
+        if (found == arguments.end()) return false;
+        arguments.erase(found);
+        return true;
+    };
+    const char letter = a.letter();
+    double value = 0;
+    if (verb == "home") {
+        if (arguments.size() > 1) return wrong(usage);
+        std::optional<int> method;
+        if (!arguments.empty()) {
+            if (!parse_real(arguments[0], value) || value != std::floor(value) || value < -128 || value > 127)
+                return wrong(fmt::format("'{}' is no homing method; write 1 to 37, or what the drive's manual has below 0", arguments[0]));
+            method = static_cast<int>(value);
+        }
+        return watched(a) && a.home(method) && print_line(fmt::format("{}: homed, at {:.10g}", letter, a.position()));
+    }
+    const bool relative = verb == "go" && flag("relative"), nowait = flag("nowait");
+    if (arguments.size() != 1) return wrong(usage);
+    if (!parse_real(arguments[0], value))
+        return wrong(fmt::format("'{}' is no number; type: {} {} {}", arguments[0], letter, verb, arguments_of(verb)));
+    if (!watched(a)) return false;
+    if (verb == "go") {
+        if (!a.go(value, relative, !nowait)) return false;
+        return print_line(nowait ? fmt::format("{}: moves", letter) : fmt::format("{}: at {:.10g}", letter, a.position()));
+    }
+    if (verb == "speed") return a.speed(value, !nowait) && print_line(fmt::format("{}: speed {:.10g}", letter, value));
+    return a.torque(value, !nowait) && print_line(fmt::format("{}: torque {:.10g}", letter, value));
+}
+
+Completion DriveShell::complete(std::string_view line, std::size_t cursor) {
+    Completion completion;
+    const std::size_t begin = line.substr(0, cursor).find_last_of(" ") + 1;
+    completion.begin = begin;
+    const std::string_view typed = line.substr(begin, cursor - begin);
+    const auto offer = [&](std::string text, const char* hint) {
+        if (text.starts_with(typed)) completion.candidates.push_back({std::move(text), hint});
+    };
+    const bool value = line.find(" set ") < begin || line.starts_with("set ");
+    if (!value)
+        for (const Verb& v : verbs) offer(v.name, v.what);
+    for (const std::string& name : value_names(!value)) offer(name + (value ? "" : "?"), "");
+    return completion;
+}
+
+namespace {
+
+bool duration_of(const Options& options, const std::string& text, std::int64_t& to) {
+    const auto ns = parse_duration_ns(text, false);
+    if (!ns || *ns <= 0) return fail(options, fmt::format("'{}' is not a duration; write 200ms or 1s", text)), false;
+    return to = *ns, true;
+}
+
+/// Takes the options out of the words: they may stand before and behind the address. What is left is the command.
+bool take_options(DriveOptions& options) {
+    std::vector<std::string> rest;
+    std::string timeout;
+    for (std::size_t i = 0; i < options.words.size(); ++i) {
+        const std::string& w = options.words[i];
+        std::string* const to = w == "--node"           ? &options.node
+                                : w == "--axis"         ? &options.axis
+                                : w == "--timeout"      ? &timeout
+                                : w == "--within"       ? &options.within
+                                : w == "--supervise"    ? &options.supervise
+                                : w == "--heartbeat-id" ? &options.heartbeat_id
+                                                        : nullptr;
+        if (w == "-k" || w == "--keep-going") options.keep_going = true;
+        else if (to && i + 1 == options.words.size()) return fail(options, fmt::format("something is missing behind {}", w)), false;
+        else if (to) *to = options.words[++i];
+        else if (w.starts_with("--")) return fail(options, fmt::format("there is no option '{}'; see: hal help can drive", w)), false;
+        else rest.push_back(w);
+    }
+    options.words = std::move(rest);
+    return timeout.empty() || duration_of(options, timeout, options.timeout_ns);
+}
+
+bool supervision_of(const DriveOptions& options, SupervisionSettings& settings) {
+    if (!options.heartbeat_id.empty() && !node_of(options, options.heartbeat_id, settings.own_node)) return false;
+    if (options.supervise.empty()) return true;
+    if (options.supervise == "off") return settings.limit_ns = 0, true;
+    const auto ns = parse_duration_ns(options.supervise, false);
+    if (!ns || *ns < 50'000'000 || *ns > 65'000'000'000)
+        return fail(options, fmt::format("invalid --supervise '{}'; write 50ms to 65s, or off", options.supervise)), false;
+    return settings.limit_ns = *ns, true;
+}
+
+}  // namespace
+
+int run_can_drive(const DriveOptions& given) {
+    DriveOptions options = given;
+    if (!take_options(options)) return 1;
+    if (options.words.empty()) return fail(options, "the address is missing; type: hal can drive can:can0 --node 2 A on");
+    if (options.node.empty()) return fail(options, fmt::format("which node? type: hal can drive {} --node 2", options.words[0]));
+    std::uint8_t node = 0;
+    if (!node_of(options, options.node, node)) return 1;
+    const std::string& letter = options.axis;
+    const char axis = letter.empty() ? 'A' : static_cast<char>(letter[0] & ~0x20);
+    if (letter.size() > 1 || axis < 'A' || axis > 'H') return fail(options, fmt::format("'{}' is no axis; write A to H", letter));
+
+    SupervisionSettings watched;
+    std::int64_t within = 0;
+    if (!supervision_of(options, watched) || (!options.within.empty() && !duration_of(options, options.within, within)))
+        return 1;
+
+    Station station(options, options.timeout_ns);
+    const bool one_shot = options.words.size() > 1, terminal = ::isatty(STDIN_FILENO) == 1;
+    Supervision supervision(options, station, node, watched);
+    DriveShell shell(options, station, supervision,
+                     {.node = node,
+                      .axis = static_cast<unsigned>(axis - 'A'),
+                      .ends_at_failure = !terminal && !options.keep_going,
+                      .prompt = !one_shot && terminal,
+                      .within_ns = within});
+    station.bus.stop.on_signal = [&shell] { shell.press(); };
+    station.bus.stop.spare(terminal && !one_shot);  // there Ctrl-C ends a command, not the session
+    station.outlasts_stop = true;                   // axes are stopped before it ends
+    if (!station.open(options.words[0])) return 1;
+    int status = 1;
+    try {
+        if (one_shot) {
+            std::string line;
+            for (std::size_t i = 1; i < options.words.size(); ++i) line += options.words[i] + " ";
+            status = shell.execute(line);
+        } else {
+            if (terminal) print(fmt::format("node {} on {}; 'help' lists the commands, Tab completes\n", node, options.words[0]));
+            status = run_prompt_loop(shell, {"drive> ", "drive> "}, station.bus.stop.fd());
+        }
+    } catch (...) {
+        shell.end(false, "internal error", false);
+        throw;
+    }
+    const bool ended = station.bus.stop.requested();
+    const bool leave = !ended && (shell.left() || (one_shot && status == 0)), failed = one_shot || shell.over();
+    const char* const why = ended ? "interrupted" : failed ? "after the failure" : "end of input";
+    return std::max({status, shell.end(leave, why, !ended && !failed), ended ? 1 : 0});
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: MIT
+#include "bus/can/drive_axis.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <fmt/core.h>
+
+#include "canopen/protocol/emcy.hpp"
+#include "cia402/error_words.hpp"
+#include "cli/output.hpp"
+
+namespace hal::tools {
+
+using namespace canopen::cia402;
+using canopen::SdoRequest;
+
+namespace {
+
+constexpr std::int64_t rest_ns = 100'000'000;     // as long without a count it stands
+constexpr std::int64_t stall_ns = 2'000'000'000;  // as long without a count, and not there: it will not arrive
+
+}  // namespace
+
+HandAxis::HandAxis(const Options& options, Station& station, std::uint8_t node, unsigned axis)
+    : options_(options), station_(station), node_(node), axis_(axis) {
+    emergencies_ = station_.network.add(node_).emergencies();
+}
+
+bool HandAxis::refuse(const std::string& sentence) const {
+    std::string text = fmt::format("{}: {}", letter(), sentence);
+    canopen::RemoteNode& node = station_.network.add(node_);
+    if (node.emergencies() > emergencies_) {
+        const std::uint16_t code = node.emergency(0).code;
+        text += fmt::format("; last EMCY 0x{:04X}: {}", code, error_word(code));
+    }
+    return fail(options_, text), false;
+}
+
+bool HandAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing) {
+    std::uint8_t room[8] = {};
+    const std::uint16_t at = of_axis(index, axis_);
+    SdoRequest request{.index = at, .sub = sub, .upload = true, .room = room};
+    if (!station_.transfer(node_, request)) {
+        const bool none = request.aborted_there && (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
+        if (missing && none) return *missing = true, false;
+        return station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub)), false;
+    }
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, room, request.size);
+    const unsigned unused = 64 - 8 * static_cast<unsigned>(request.size);
+    value = is_signed && unused < 64 ? static_cast<std::int64_t>(bits << unused) >> unused : static_cast<std::int64_t>(bits);
+    return true;
+}
+
+bool HandAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes) {
+    std::uint8_t data[8];
+    std::memcpy(data, &value, sizeof data);
+    const std::uint16_t at = of_axis(index, axis_);
+    SdoRequest request{.index = at, .sub = sub, .data = std::span(data, bytes)};
+    if (station_.transfer(node_, request)) return true;
+    return station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub)), false;
+}
+
+bool HandAxis::look() {
+    std::int64_t value = 0;
+    bool missing = false;
+    if (!read(object::statusword, 0, value, false, &missing))
+        return missing &&
+               refuse(fmt::format("node {} has no such axis: object {:04X} is missing", node_, of_axis(object::statusword, axis_)));
+    feedback_.statusword = static_cast<std::uint16_t>(value);
+    const auto optional = [&](bool& there, std::uint16_t index, auto& to) {
+        missing = false;
+        if (!there) return true;
+        if (read(index, 0, value, true, &missing)) return to = static_cast<std::remove_reference_t<decltype(to)>>(value), true;
+        return missing ? (there = false, true) : false;
+    };
+    if (!optional(feedback_.has_mode, object::modes_of_operation_display, feedback_.mode)) return false;
+    if (!optional(feedback_.has_velocity, object::velocity_actual, feedback_.velocity)) return false;
+    if (!optional(has_torque_, object::torque_actual, feedback_.torque)) return false;
+    if (!read(object::position_actual, 0, value, true)) return false;
+    feedback_.position = static_cast<std::int32_t>(value);
+    feedback_.error_code = 0;
+    const State state = state_of(feedback_.statusword);
+    if ((state == State::fault || state == State::fault_reaction_active) && read(object::error_code, 0, value, false, &missing))
+        feedback_.error_code = static_cast<std::uint16_t>(value);
+    const std::int64_t now = now_ns();
+    if (feedback_.position != rest_position_ || rest_since_ == 0) rest_since_ = now;
+    rest_position_ = feedback_.position;
+    return true;
+}
+
+/// The drive may be running already, by an earlier command: it is taken over as it is.
+bool HandAxis::adopt() {
+    emergencies_ = station_.network.add(node_).emergencies();
+    if (adopted_) return true;
+    if (!look()) return false;
+    std::int64_t velocity = 0, torque = 0;
+    bool missing = false;
+    if (!read(object::target_velocity, 0, velocity, true, &missing) && !missing) return false;
+    missing = false;
+    if (!read(object::target_torque, 0, torque, true, &missing) && !missing) return false;
+    command_.mode = feedback_.mode;
+    command_.enable = state_of(feedback_.statusword) == State::operation_enabled;
+    command_.velocity = rules.velocity.to_user(static_cast<double>(velocity));
+    command_.torque = rules.torque.to_user(static_cast<double>(torque));
+    if (command_.mode == Mode::cyclic_position || command_.mode == Mode::cyclic_velocity || command_.mode == Mode::cyclic_torque ||
+        command_.mode == Mode::interpolated_position)
+        command_.mode = Mode::profile_position;  // nobody sends what these need
+    return adopted_ = true;
+}
+
+bool HandAxis::cycle() {
+    if (!look()) return false;
+    return tell(machine_.step(feedback_, command_, rules, now_ns()));
+}
+
+/// Writes what changed; the controlword last, because it makes the rest count.
+bool HandAxis::tell(const AxisOrders& orders) {
+    const auto put = [&](auto& told, auto value, std::uint16_t index) {
+        if (told == value) return true;
+        if (!write(index, 0, static_cast<std::int64_t>(value), sizeof value)) return false;
+        return told = value, true;
+    };
+    const auto mode = static_cast<std::int8_t>(orders.mode);
+    if (mode != 0 && !told_.mode && feedback_.mode == orders.mode) told_.mode = mode;
+    if (mode != 0 && !put(told_.mode, mode, object::modes_of_operation)) return false;
+    if (machine_.active()) {
+        if (orders.mode == Mode::profile_position && !put(told_.position, orders.target_position, object::target_position)) return false;
+        if (orders.mode == Mode::profile_velocity && !put(told_.velocity, orders.target_velocity, object::target_velocity)) return false;
+        if (orders.mode == Mode::profile_torque && !put(told_.torque, orders.target_torque, object::target_torque)) return false;
+        if (orders.mode == Mode::velocity && !put(told_.vl, orders.vl_target_velocity, object::vl_target_velocity)) return false;
+    }
+    return put(told_.controlword, orders.controlword, object::controlword);
+}
+
+bool HandAxis::standing() { return now_ns() - rest_since_ >= rest_ns; }
+
+/// Not there, and it has not moved for long.
+bool HandAxis::arrived() {
+    if (now_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
+    return refuse(
+        fmt::format("drive stands at {:.10g} and does not report target reached (statusword 0x{:04X})", position(), feedback_.statusword));
+}
+
+/// Why the machine gave up, after it has switched the axis off.
+bool HandAxis::report() {
+    const std::int64_t end = now_ns() + rules.limits.stop + rules.limits.step;
+    while (machine_.walking() && now_ns() < end && cycle()) {}
+    const Failure& failure = machine_.failure();
+    std::string why = text(failure);
+    if (failure.cause == Cause::not_enabled) why += fmt::format("; type: {} on", letter());
+    else if (failure.cause == Cause::drive_fault) why += fmt::format("; remove the cause, then type: {} reset", letter());
+    return refuse(why);
+}
+
+/// Cycles until `ready`; `still` says, and why not, whether it can become true.
+bool HandAxis::until(const Ready& ready, bool (HandAxis::*still)()) {
+    moved_at_ = now_ns();
+    for (;;) {
+        if (!cycle()) return false;
+        if (machine_.failure()) return report();
+        if (ready()) return true;
+        if (still && !(this->*still)()) return false;
+        const Interruption why = interrupted ? interrupted() : Interruption::none;
+        if (why == Interruption::end) return false;
+        if (why == Interruption::stop) {
+            interrupted = nullptr;
+            allow(rules.limits.stop);
+            const bool stopped = machine_.enabled() && stop();
+            return refuse(stopped ? "interrupted; it was stopped" : "interrupted");
+        }
+        if (now_ns() >= deadline_) return overdue();
+        station_.until([&] { return is_interrupted(); }, pause_ns);
+    }
+}
+
+bool HandAxis::on() {
+    if (!adopt()) return false;
+    touched_ = true;
+    if (command_.mode == Mode::none || command_.mode == Mode::homing) command_.mode = Mode::profile_position;
+    if (state_of(feedback_.statusword) != State::operation_enabled) command_.velocity = command_.torque = 0.0;
+    if (!look()) return false;
+    const State state = state_of(feedback_.statusword);
+    command_.quick_stop = command_.halt = command_.reset = false;
+    if (state != State::operation_enabled || !machine_.enabled()) {
+        if (state != State::fault && machine_.failure()) {  // only ours is forgotten; a fault of the drive asks for `reset`
+            command_.enable = false, command_.reset = true;
+            if (!cycle()) return false;
+            command_.reset = false;
+        }
+        command_.enable = state == State::operation_enabled;
+        if (!cycle()) return false;
+        if (machine_.failure()) return report();
+        command_.enable = true;
+    }
+    return until([&] { return machine_.active(); });
+}
+
+bool HandAxis::off() {
+    if (!adopt()) return false;
+    command_.enable = command_.go = command_.home = command_.halt = false;
+    return until([&] { return !machine_.walking() && state_of(feedback_.statusword) != State::operation_enabled; });
+}
+
+/// In that mode, enabled.
+bool HandAxis::begin_motion(Mode mode) {
+    if (!adopt()) return false;
+    if (!look()) return false;
+    if (state_of(feedback_.statusword) == State::fault && !machine_.failure()) {
+        if (!cycle()) return false;
+    }
+    if (machine_.failure() && machine_.failure().cause != Cause::drive_fault) {
+        command_.enable = false, command_.reset = true;
+        if (!cycle()) return false;
+        command_.reset = false;
+    }
+    if (machine_.failure()) return report();
+    if (!command_.enable || state_of(feedback_.statusword) != State::operation_enabled)
+        return refuse(fmt::format("is not on (drive is in \"{}\"); type: {} on", word(state_of(feedback_.statusword)), letter()));
+    command_.mode = mode, command_.home = command_.go = false;
+    touched_ = in_motion_ = true;
+    return until([&] { return machine_.active(); });
+}
+
+bool HandAxis::go(double position, bool relative, bool wait, bool queued) {
+    const double counts = position * rules.position.ratio();
+    if (std::fabs(counts) > 2147483647.0)
+        return refuse(
+            fmt::format("{:.10g} is {:.10g} of the drive's counts; its positions go from -2147483648 to 2147483647", position, counts));
+    if (adopt() && command_.mode != Mode::profile_position) command_.velocity = 0.0;
+    if (!begin_motion(Mode::profile_position)) return false;
+    command_.position = position, command_.relative = relative;
+    command_.immediate = wait || !queued, command_.go = true;  // in a row of `nowait` each waits its turn in the drive
+    if (!cycle()) return false;
+    command_.go = false;
+    if (machine_.failure()) return report();
+    const auto done = [&] { return machine_.set_points() == 0 && (machine_.target_reached() || !wait); };
+    if (!until(done, wait ? &HandAxis::arrived : nullptr)) return false;
+    if (wait) return true;
+    for (int n = 0; n < 3; ++n)  // the edge, and its end
+        if (!cycle()) return false;
+    return !machine_.failure() || report();
+}
+
+bool HandAxis::speed(double velocity, bool wait) {
+    if (!adopt()) return false;
+    const Mode mode = command_.mode == Mode::velocity ? Mode::velocity : Mode::profile_velocity;
+    if (command_.mode != mode) command_.velocity = 0.0;
+    if (!begin_motion(mode)) return false;
+    command_.velocity = velocity, command_.halt = false;
+    for (int n = 0; n < 3; ++n)  // what the drive says by then is about this speed
+        if (!cycle()) return false;
+    if (!wait || mode == Mode::velocity) return !machine_.failure() || report();
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &HandAxis::arrived);
+}
+
+bool HandAxis::torque(double permille, bool wait) {
+    if (adopt() && command_.mode != Mode::profile_torque) command_.torque = 0.0;
+    if (!begin_motion(Mode::profile_torque)) return false;
+    command_.torque = permille, command_.halt = false;
+    for (int n = 0; n < 3; ++n)
+        if (!cycle()) return false;
+    if (!wait) return !machine_.failure() || report();
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &HandAxis::arrived);
+}
+
+/// A drive knows some of the methods; 60E3h says which, where it is there.
+bool HandAxis::choose_homing(int method) {
+    const auto data = static_cast<std::uint8_t>(method);
+    const std::uint16_t at = of_axis(object::homing_method, axis_);
+    SdoRequest request{.index = at, .data = std::span(&data, 1)};
+    if (station_.transfer(node_, request)) return true;
+    using canopen::Abort;
+    if (!request.aborted_there || (request.abort != Abort::value && request.abort != Abort::too_high && request.abort != Abort::too_low))
+        return station_.fail_transfer(node_, request, fmt::format("{:04X}:0", at)), false;
+    std::string known;
+    std::int64_t count = 0, one = 0;
+    bool missing = false;
+    if (read(object::supported_homing_methods, 0, count, false, &missing))
+        for (unsigned sub = 1; sub <= count && sub < 255; ++sub) {
+            if (!read(object::supported_homing_methods, static_cast<std::uint8_t>(sub), one, true, &missing)) break;
+            known += fmt::format("{}{}", known.empty() ? "" : ", ", one);
+        }
+    if (known.empty() && !missing) return false;  // the bus failed
+    return refuse(fmt::format("the drive knows no homing method {}; {}", method,
+                              known.empty() ? "its manual lists those it has" : "it has " + known));
+}
+
+bool HandAxis::home(std::optional<int> method) {
+    if (!adopt()) return false;
+    if (method && !choose_homing(*method)) return false;
+    const Mode before = command_.mode == Mode::profile_position ? command_.mode : Mode::profile_position;
+    command_.velocity = command_.torque = 0.0;
+    if (!begin_motion(before)) return false;
+    command_.home = true;
+    if (!until([&] { return machine_.homed(); })) return false;
+    command_.home = false;
+    return until([&] { return !machine_.homing() && machine_.active(); });
+}
+
+bool HandAxis::reset() {
+    if (!adopt()) return false;
+    command_.enable = command_.reset = false;
+    if (!cycle()) return false;
+    command_.reset = true;
+    const bool good = until([&] { return !machine_.fault() && !machine_.walking(); });
+    command_.reset = false;
+    return good;
+}
+
+bool HandAxis::set_mode(Mode mode) {
+    if (!adopt()) return false;
+    command_.velocity = command_.torque = 0.0;
+    command_.mode = mode;
+    const std::int64_t end = now_ns() + rules.limits.step;
+    return until([&] { return feedback_.mode == mode || !feedback_.has_mode || now_ns() >= end; }) &&
+           (feedback_.mode == mode || !feedback_.has_mode ||
+            refuse(fmt::format("drive does not take mode {}, it shows {}", abbreviation(mode), abbreviation(feedback_.mode))));
+}
+
+bool HandAxis::wait() {
+    if (!adopt()) return false;
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0 && machine_.set_points() == 0; }, &HandAxis::arrived);
+}
+
+}  // namespace hal::tools

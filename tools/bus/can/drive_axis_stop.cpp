@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+// How an axis comes to rest: halt, quick stop, after too long a time, and at the end of the session whatever its state.
+#include <fmt/core.h>
+
+#include "bus/can/drive_axis.hpp"
+#include "cia402/error_words.hpp"
+
+namespace hal::tools {
+
+using namespace canopen::cia402;
+
+void HandAxis::allow(std::int64_t ns) { allowed_ = ns, deadline_ = now_ns() + ns, in_motion_ = false; }
+
+/// The command took too long: what it started is stopped.
+bool HandAxis::overdue() {
+    const double seconds = static_cast<double>(allowed_) / 1e9;
+    if (!in_motion_)
+        return refuse(
+            fmt::format("not done within {:g} s (timeout; drive is in \"{}\", statusword 0x{:04X}); for more time add: within {:g}s",
+                        seconds, word(state_of(feedback_.statusword)), feedback_.statusword, 2 * seconds));
+    allow(rules.limits.stop);
+    interrupted = nullptr;
+    const bool stopped = machine_.enabled() && stop();
+    return refuse(fmt::format("not done within {:g} s (timeout); {} at {:.10g}; for more time add: within {:g}s", seconds,
+                              stopped ? "the axis was stopped" : "the axis could not be stopped: it was last seen", position(),
+                              2 * seconds));
+}
+
+/// Halt, then what it was on is taken back, so that nothing goes on when halt ends.
+bool HandAxis::stop() {
+    if (!adopt()) return false;
+    if (!look()) return false;
+    if (state_of(feedback_.statusword) != State::operation_enabled) return true;
+    command_.enable = command_.halt = true, command_.home = command_.go = false;
+    in_motion_ = false;
+    rest_since_ = now_ns();
+    if (!until([&] { return standing(); })) return false;
+    command_.velocity = command_.torque = 0.0;
+    if (command_.mode == Mode::profile_position && machine_.active()) {
+        command_.position = machine_.position(), command_.relative = false, command_.immediate = command_.go = true;
+        if (!until([&] { return machine_.set_points() == 0; })) return false;
+        for (int n = 0; n < 3; ++n)
+            if (!cycle()) return false;
+        command_.go = false;
+    }
+    command_.halt = false;
+    const bool by_set_point = command_.mode == Mode::profile_position && machine_.active();
+    return until([&] { return !by_set_point || machine_.target_reached(); }, &HandAxis::arrived);
+}
+
+bool HandAxis::quick_stop() {
+    if (!adopt()) return false;
+    command_.quick_stop = true, command_.home = command_.go = false;
+    if (!until([&] { return !machine_.walking() && standing(); })) return false;
+    command_.quick_stop = command_.enable = false;
+    return true;
+}
+
+/// Without the state machine of the commands: that one may have failed, and this is for every state.
+bool HandAxis::secure(std::string& what) {
+    interrupted = nullptr;
+    touched_ = adopted_ = false;
+    told_ = {};
+    if (!look()) {  // an answer may be lost, and the command still arrive
+        const std::uint16_t at = of_axis(object::controlword, axis_);
+        for (const std::uint16_t order : {command::quick_stop, command::disable_voltage}) {
+            can::Frame f(0x600U + node_, {0x2b, static_cast<std::uint8_t>(at & 0xff), static_cast<std::uint8_t>(at >> 8), 0,
+                                          static_cast<std::uint8_t>(order), 0, 0, 0});
+            station_.out.push(f);
+            station_.until([] { return false; }, 10 * pause_ns);
+        }
+        return what = "quick stop and off were sent, and not answered", false;
+    }
+    State state = state_of(feedback_.statusword);
+    const auto has_torque = [&] { return state == State::operation_enabled || state == State::quick_stop_active; };
+    const bool had_torque = has_torque();
+    if (had_torque) {
+        if (!write(object::controlword, 0, command::quick_stop, 2)) return false;
+        rest_since_ = now_ns();
+        for (const std::int64_t end = now_ns() + rules.limits.stop; has_torque() && now_ns() < end;) {
+            station_.until([] { return false; }, pause_ns);
+            if (!look()) return false;
+            state = state_of(feedback_.statusword);
+            if (state == State::quick_stop_active && standing()) break;  // by 605Ah it may stay in this state
+        }
+    }
+    if (state != State::fault && state != State::fault_reaction_active && state != State::switch_on_disabled &&
+        !write(object::controlword, 0, command::disable_voltage, 2))
+        return false;
+    if (!look()) return false;
+    state = state_of(feedback_.statusword);
+    if (!had_torque) return true;
+    what = has_torque() ? fmt::format("did not stop within {:g} s", static_cast<double>(rules.limits.stop) / 1e9)
+           : state == State::fault || state == State::fault_reaction_active
+               ? fmt::format("in fault (error 0x{:04X}: {}), off, at {:.10g}", feedback_.error_code, error_word(feedback_.error_code),
+                             position())
+               : fmt::format("stopped and off, at {:.10g}", position());
+    return !has_torque();
+}
+
+bool HandAxis::moves() {
+    if (!touched_ || !look() || state_of(feedback_.statusword) != State::operation_enabled) return false;
+    if (command_.mode == Mode::profile_position) return (feedback_.statusword & status::target_reached) == 0;
+    return command_.velocity != 0.0 || command_.torque != 0.0;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+// `hal can dump`: what is on one bus or several, a line per frame.
+#include "bus/can/dump.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+#include <poll.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "bus/can/bus.hpp"
+#include "bus/can/frame_decoder.hpp"
+#include "bus/can/objects.hpp"
+#include "cli/output.hpp"
+#include "link/capture.hpp"
+#include "link/timing.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+constexpr const char* colour(FrameKind kind) {
+    switch (kind) {
+    case FrameKind::error:
+    case FrameKind::emergency: return "\x1b[31m";
+    case FrameKind::nmt:
+    case FrameKind::lss: return "\x1b[35m";
+    case FrameKind::sync:
+    case FrameKind::time:
+    case FrameKind::heartbeat: return "\x1b[2m";
+    case FrameKind::pdo: return "\x1b[32m";
+    case FrameKind::sdo: return "\x1b[36m";
+    default: return "";
+    }
+}
+
+/// A bus among several.
+struct Source {
+    can::Link* link = nullptr;
+    std::string name;            ///< in the lines; empty: it is the only bus
+    std::int64_t to_wall = 0;    ///< from the time of its frames to the time of day
+    std::uint64_t frames = 0;
+    std::int64_t busy = 0;       ///< time of the bus that its frames took
+    FrameDecoder decoder = {};
+    std::vector<can::Frame> room = std::vector<can::Frame>(256);
+};
+
+std::string line(const can::Frame& f, double time, const std::string& bus, const DecodedFrame& decoded, bool coloured) {
+    const char* mark = f.fd ? f.bit_rate_switch ? " FD+" : " FD" : "";
+    std::string text =
+        fmt::format("{:12.6f}  {}{}  {:>8}  [{}]{} {:23}", time, bus, f.own ? "tx" : "rx", id_text(f), f.length, mark, data_text(f, " "));
+    if (!decoded.text.empty()) text += "  " + decoded.text;
+    while (text.back() == ' ') text.pop_back();
+    const std::string_view start = coloured ? colour(decoded.kind) : "";
+    return start.empty() ? text + "\n" : fmt::format("{}{}\x1b[0m\n", start, text);
+}
+
+std::string bus_member(const Source& source) { return source.name.empty() ? "" : fmt::format(R"("bus":{},)", json_text(source.name)); }
+
+std::string json_line(const can::Frame& f, double time, const Source& source, const DecodedFrame& decoded) {
+    std::string text = fmt::format(R"({{"time":{:.6f},{}"direction":"{}","id":{},"extended":{},"length":{},"data":"{}")", time,
+                                   bus_member(source), f.own ? "tx" : "rx", f.id, f.extended, f.length, f.remote ? "" : data_text(f, ""));
+    if (f.remote) text += R"(,"remote":true)";
+    if (f.fd) text += fmt::format(R"(,"fd":true,"bit_rate_switch":{})", f.bit_rate_switch);
+    if (f.error) text += R"(,"error":true)";
+    if (!decoded.text.empty()) text += fmt::format(R"(,"meaning":"{}")", decoded.text);
+    return text + "}\n";
+}
+
+/// `can0` of `can:can0?bitrate=500k`.
+std::string short_name(const std::string& address) {
+    const std::string plain = address.substr(0, address.find('?'));
+    return plain.substr(plain.find(':') + 1);
+}
+
+/// From the time of a link's frames to the time of day. A capture is played now and keeps the times of its recording.
+std::int64_t shift_to_wall(const can::Link& link, const can::Frame& first) {
+    const can::Description& about = link.description();
+    if (!about.file.empty()) {
+        const can::Capture capture = can::read_capture(about.file);
+        for (const can::Frame& f : capture.frames)
+            if (f.same(first)) return f.time_ns - first.time_ns;  // not the first of the file where a filter left that out
+    }
+    timespec real{};
+    clock_gettime(CLOCK_REALTIME, &real);
+    return real.tv_sec * 1'000'000'000LL + real.tv_nsec - now_ns();
+}
+
+struct Heard {
+    const can::Frame* frame;
+    Source* source;
+};
+
+/// As `listen` does with one bus: batches in the order of their times.
+void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns, const std::function<bool(std::span<const Heard>)>& take) {
+    const std::int64_t end = for_ns >= 0 ? now_ns() + for_ns : INT64_MAX;
+    std::vector<Heard> batch;
+    std::vector<pollfd> descriptors{{bus.stop.fd(), POLLIN, 0}};
+    bool polled = true;
+    for (const Source& s : sources) {
+        polled = polled && s.link->descriptor() >= 0;
+        descriptors.push_back({s.link->descriptor(), POLLIN, 0});  // poll() skips what has none
+    }
+    for (;;) {
+        batch.clear();
+        bool over = true;
+        for (Source& s : sources) {
+            const std::size_t count = s.link->receive(s.room, can::unclocked);
+            for (const can::Frame& f : std::span(s.room).first(count)) batch.push_back({&f, &s});
+            over = over && count == 0 && s.link->description().transport == "capture" && s.link->state() == can::State::down;
+        }
+        std::stable_sort(batch.begin(), batch.end(), [](const Heard& a, const Heard& b) { return a.frame->time_ns < b.frame->time_ns; });
+        if (!batch.empty() && !take(batch)) return;
+        const std::int64_t now = now_ns();
+        if (now >= end || bus.stop.requested() || over) return;
+        if (batch.empty()) ::poll(descriptors.data(), descriptors.size(), polled ? 20 : 1);
+    }
+}
+
+bool report(const DumpOptions& options, const Source& source, double seconds) {
+    const can::Description& about = source.link->description();
+    const can::Statistics s = source.link->statistics();
+    const double load = static_cast<double>(source.busy) / 1e7 / seconds;
+    if (options.json) {
+        const std::string share = about.bit_rate ? fmt::format("{:.2f}", load) : "null";
+        return print(fmt::format(
+            R"({{"statistics":{{{}"frames":{},"seconds":{:.3f},"load_percent":{},"errors":{},"lost":{},"bus_offs":{},"state":"{}"}}}})"
+            "\n",
+            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs, can::word(s.state)));
+    }
+    const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load) : "unknown (add ?bitrate=500k to the address)";
+    write_all(STDERR_FILENO,
+              fmt::format("{}{}{} frame{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", source.name, source.name.empty() ? "" : ": ",
+                          source.frames, source.frames == 1 ? "" : "s", seconds, share, s.errors, s.lost,
+                          about.transport == "capture" ? "" : fmt::format(", bus {}", can::word(s.state))));
+    return true;
+}
+
+}  // namespace
+
+int run_can_dump(const DumpOptions& options) {
+    const bool delta = options.time == "delta", absolute = options.time == "absolute";
+    if (!options.time.empty() && options.time != "relative" && !delta && !absolute)
+        return fail(options, fmt::format("--time: unknown form '{}'; use relative, delta or absolute", options.time));
+    Bus bus;
+    if (!bus.open(options, options.words, options.filters)) return 1;
+    bus.announce(options);
+    const bool coloured = !options.json && colours(STDOUT_FILENO);
+    std::vector<Source> sources(1 + bus.more.size());
+    std::size_t width = 0;
+    for (std::size_t n = 0; n < sources.size(); ++n) {
+        sources[n].link = n == 0 ? bus.link.get() : bus.more[n - 1].get();
+        if (sources.size() > 1) sources[n].name = short_name(options.words[n]);
+        width = std::max(width, sources[n].name.size());
+    }
+    std::uint64_t frames = 0;
+    std::int64_t before = 0;
+    const std::int64_t began = now_ns();
+    bool written = true;
+    listen_to_all(bus, sources, options.for_ns, [&](std::span<const Heard> batch) {
+        std::string text;
+        for (const auto& [frame, source] : batch) {
+            const can::Frame& f = *frame;
+            if (absolute && source->frames == 0) source->to_wall = shift_to_wall(*source->link, f);
+            if (frames++ == 0) before = f.time_ns;
+            ++source->frames;
+            const double time = static_cast<double>(absolute ? f.time_ns + source->to_wall : f.time_ns - before) / 1e9;
+            if (delta) before = f.time_ns;
+            const DecodedFrame decoded = source->decoder.decode(f);
+            const std::string name = width == 0 ? "" : fmt::format("{:{}}  ", source->name, width);
+            text += options.json ? json_line(f, time, *source, decoded) : line(f, time, name, decoded, coloured);
+            const can::Description& about = source->link->description();
+            if (!f.error) source->busy += can::duration_ns(can::frame_bits(f), about.bit_rate, about.data_rate);
+            if (frames == options.count) break;
+        }
+        written = print(text);
+        return written && (options.count == 0 || frames < options.count);
+    });
+    if (!written) return 1;
+    const double seconds = static_cast<double>(now_ns() - began) / 1e9;
+    for (const Source& source : sources)
+        if (!report(options, source, seconds)) return 1;
+    return 0;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bus/can/bus_options.hpp"
+
+namespace hal::tools {
+
+struct DumpOptions : Options {
+    std::vector<std::string> filters;
+    std::uint64_t count = 0;   ///< 0: without end
+    std::int64_t for_ns = -1;  ///< -1: not given
+    std::string time;          ///< relative (the default), delta or absolute
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS",
+                  "one or more buses: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; options follow: ?bitrate=500k&datarate=2M&listen");
+        declare_filter(set, filters, count);
+        set.for_how_long(for_ns, "end after 2s, 500ms …; without it: until Ctrl-C");
+        set.value("--time", time, "relative|delta|absolute",
+                  "relative: seconds since the first frame (default); delta: since the frame before; absolute: since 1970, as in a .log file");
+        set.flag("--json", json, "a JSON object per line; the last one of each bus holds its statistics");
+    }
+};
+
+/// `hal can dump`. Returns the exit code.
+int run_can_dump(const DumpOptions&);
+
+}  // namespace hal::tools

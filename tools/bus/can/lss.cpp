@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+// `hal can lss`: node ids and bit rates of nodes that have none yet, or wrong ones.
+#include "bus/can/lss.hpp"
+
+#include <charconv>
+#include <fmt/core.h>
+
+#include "base/types.hpp"
+#include "bus/can/station.hpp"
+#include "cli/output.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal::tools {
+
+using canopen::Identity;
+using canopen::LssMaster;
+
+namespace {
+
+struct Lss {
+    const Options& options;
+    Station& station;
+    std::vector<std::string> arguments;
+
+    bool wait() const {
+        station.until([&] { return !station.lss.busy(); });
+        return station.lss.result().answered;
+    }
+    void sent() const {
+        station.until([&] { return station.out.size() == 0; }, 1'000'000'000);
+    }
+    int silent(const char* help) const {
+        if (station.bus.stop.requested()) return fail(options, "ended before there was an answer");
+        return fail(options, fmt::format("no slave answered; {}", help));
+    }
+    /// After a configuration service: its error byte in words.
+    int configured(const char* out_of_range) const {
+        if (!wait()) return silent("one slave has to be in configuration: see switch and select in: hal help can lss");
+        const LssMaster::Result& r = station.lss.result();
+        switch (r.error) {
+        case 0: return 0;
+        case 1: return fail(options, fmt::format("the slave refused: {}", out_of_range));
+        case 255: return fail(options, fmt::format("the slave refused with its own error 0x{:02X}; see its manual", r.specific));
+        default:
+            return fail(options, fmt::format("the slave refused with error {}: it has no access to its memory; see its manual", r.error));
+        }
+    }
+    bool number(std::size_t n, const char* what, std::uint64_t most, std::uint32_t& value) const {
+        const std::string& text = arguments[n];
+        const bool hex = text.starts_with("0x");
+        const char* end = text.data() + text.size();
+        std::uint64_t read = 0;
+        const auto [stop, error] = std::from_chars(text.data() + (hex ? 2 : 0), end, read, hex ? 16 : 10);
+        if (error == std::errc() && stop == end && read <= most) return value = static_cast<std::uint32_t>(read), true;
+        return fail(options, fmt::format("'{}' is no {}; write a number up to {}, or 0x…", text, what, most)), false;
+    }
+    bool identity(std::size_t from, Identity& out) const {
+        constexpr const char* parts[] = {"vendor id", "product code", "revision number", "serial number"};
+        for (std::size_t n = 0; n < 4; ++n)
+            if (!number(from + n, parts[n], UINT32_MAX, out[n])) return false;
+        return true;
+    }
+};
+
+std::string text_of(const Identity& id, const char* state) {
+    return fmt::format("vendor 0x{:08X}, product 0x{:08X}, revision 0x{:08X}, serial 0x{:08X}{}\n", id[0], id[1], id[2], id[3], state);
+}
+
+int switch_all(Lss& l) {
+    const bool configuration = l.arguments[0] == "configuration";
+    if (!configuration && l.arguments[0] != "waiting")
+        return fail(l.options, fmt::format("'{}' is no state; write configuration or waiting", l.arguments[0]));
+    l.station.lss.switch_global(configuration);
+    l.sent();
+    return 0;
+}
+
+int select(Lss& l) {
+    Identity id{};
+    if (!l.identity(0, id)) return 1;
+    l.station.lss.select(id, now_ns());
+    return l.wait() ? 0 : l.silent("hal can scan and the label on the device tell the four numbers: vendor, product, revision, serial");
+}
+
+int inquire(Lss& l) {
+    Identity id{};
+    for (unsigned part = 0; part < 5; ++part) {
+        l.station.lss.inquire(part, now_ns());
+        if (!l.wait()) return l.silent("one slave has to be in configuration: see switch and select in: hal help can lss");
+        if (part < 4) id[part] = l.station.lss.result().value;
+    }
+    const std::uint32_t node = l.station.lss.result().value;
+    return print(text_of(id, node == canopen::unconfigured ? ", no node id" : fmt::format(", node id {}", node).c_str())) ? 0 : 1;
+}
+
+int node_id(Lss& l) {
+    std::uint32_t id = canopen::unconfigured;
+    if (l.arguments[0] != "none" && (!l.number(0, "node id", 255, id) || (id != canopen::unconfigured && (id < 1 || id > 127))))
+        return id > 127 ? fail(l.options, fmt::format("'{}' is no node id; write 1 to 127, or none", l.arguments[0])) : 1;
+    l.station.lss.configure_node_id(static_cast<std::uint8_t>(id), now_ns());
+    return l.configured("the node id is out of its range");
+}
+
+int bit_rate(Lss& l) {
+    std::string text = l.arguments[0];
+    std::uint32_t scale = 1, rate = 0;
+    if (text.ends_with("k")) scale = 1000, text.pop_back();
+    else if (text.ends_with("M")) scale = 1'000'000, text.pop_back();
+    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), rate);
+    const std::uint8_t index = error == std::errc() && stop == text.data() + text.size() && rate <= 1'000'000 / scale
+                                   ? canopen::lss_bit_rate_index(rate * scale)
+                                   : std::uint8_t{255};
+    if (index == 255)
+        return fail(l.options,
+                    fmt::format("'{}' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k", l.arguments[0]));
+    l.station.lss.configure_bit_timing(index, now_ns());
+    return l.configured("it does not know this bit rate");
+}
+
+int activate(Lss& l) {
+    const auto ns = parse_duration_ns(l.arguments[0], false);
+    if (!ns || *ns < 0 || *ns > 65'535'000'000)
+        return fail(l.options, fmt::format("'{}' is no delay; write how long all are silent before and after: 1s, 500ms", l.arguments[0]));
+    l.station.lss.activate_bit_timing(static_cast<std::uint16_t>(*ns / 1'000'000));
+    l.sent();
+    return 0;
+}
+
+int store(Lss& l) {
+    l.station.lss.store_configuration(now_ns());
+    return l.configured("it cannot store");
+}
+
+int fastscan(Lss& l) {
+    l.station.lss.scan(now_ns());
+    if (!l.wait()) return l.silent("a scan finds slaves without node id, in the state waiting");
+    return print(text_of(l.station.lss.result().identity, ", now in configuration")) ? 0 : 1;
+}
+
+int identify(Lss& l) {
+    if (l.arguments.empty()) {
+        l.station.lss.identify_unconfigured(now_ns());
+        return l.wait() ? print("at least one slave has no node id\n") ? 0 : 1
+                        : l.silent("so none is without node id, as far as they know LSS");
+    }
+    Identity low{}, high{};
+    std::uint32_t revision = 0, serial = 0;
+    if (l.arguments.size() != 4 && l.arguments.size() != 6)
+        return fail(l.options,
+                    "identify takes nothing, VENDOR PRODUCT REVISION SERIAL, or the last two from and to: VENDOR PRODUCT FROM TO FROM TO");
+    if (l.arguments.size() == 4) {
+        if (!l.identity(0, low)) return 1;
+        high = low;
+    } else {
+        if (!l.number(0, "vendor id", UINT32_MAX, low[0]) || !l.number(1, "product code", UINT32_MAX, low[1]) ||
+            !l.number(2, "revision number", UINT32_MAX, low[2]) || !l.number(3, "revision number", UINT32_MAX, revision) ||
+            !l.number(4, "serial number", UINT32_MAX, low[3]) || !l.number(5, "serial number", UINT32_MAX, serial))
+            return 1;
+        high = {low[0], low[1], revision, serial};
+    }
+    l.station.lss.identify(low, high, now_ns());
+    return l.wait() ? print("there is such a slave\n") ? 0 : 1 : l.silent("so there is none of that identity, as far as they know LSS");
+}
+
+struct Command {
+    const char* name;
+    const char* arguments;
+    std::size_t least, most;
+    int (*run)(Lss&);
+};
+
+constexpr Command commands[] = {
+    {"scan", "", 0, 0, fastscan},
+    {"switch", " configuration|waiting", 1, 1, switch_all},
+    {"select", " VENDOR PRODUCT REVISION SERIAL", 4, 4, select},
+    {"inquire", "", 0, 0, inquire},
+    {"node-id", " NODE|none", 1, 1, node_id},
+    {"bit-rate", " RATE", 1, 1, bit_rate},
+    {"activate", " DELAY", 1, 1, activate},
+    {"store", "", 0, 0, store},
+    {"identify", " [VENDOR PRODUCT REVISION SERIAL]", 0, 6, identify},
+};
+
+}  // namespace
+
+int run_can_lss(const LssOptions& options) {
+    if (options.words.size() < 2)
+        return fail(options,
+                    "two words are needed; type: hal can lss ADDRESS scan|switch|select|inquire|node-id|bit-rate|activate|store|identify");
+    const std::string& word = options.words[1];
+    const Command* command = nullptr;
+    std::vector<std::string> names;
+    for (const Command& c : commands) {
+        names.emplace_back(c.name);
+        if (word == c.name) command = &c;
+    }
+    if (!command) {
+        const std::string hint = did_you_mean(word, names);
+        return fail(options, fmt::format("there is no command '{}'; {}", word, hint.empty() ? "see: hal help can lss" : hint));
+    }
+    std::vector<std::string> arguments(options.words.begin() + 2, options.words.end());
+    if (arguments.size() < command->least || arguments.size() > command->most)
+        return fail(options, fmt::format("{} takes other words; type: hal can lss ADDRESS {}{}", word, word, command->arguments));
+    Station station(options, options.timeout_ns);
+    if (!station.open(options.words[0])) return 1;
+    Lss lss{options, station, std::move(arguments)};
+    return command->run(lss);
+}
+
+}  // namespace hal::tools

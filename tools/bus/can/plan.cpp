@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+// `hal canopen plan`: what a configuration puts on the bus, and whether each message arrives in time. `hal canopen check`: what is wrong
+// in it, and the pins it makes.
+#include "bus/can/plan.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+#include <numeric>
+#include <unistd.h>
+
+#include "base/types.hpp"
+#include "canopen/master/config/bus_schedule.hpp"
+#include "cli/output.hpp"
+#include "link/can.hpp"
+#include "text/diagnostic.hpp"
+#include "text/glyphs.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+namespace plan = canopen::plan;
+namespace config = canopen::config;
+
+struct Row {
+    plan::Message message;
+    std::string name;
+    std::size_t line = 0;
+};
+
+struct Table {
+    plan::Bus bus;
+    std::vector<Row> rows;  ///< the most important first
+    std::string per_sync;   ///< what goes with a SYNC; empty: there is none
+};
+
+Table table_of(const config::Schedule& schedule) {
+    Table table{schedule.bus, {}, {}};
+    for (std::size_t i = 0; i < schedule.messages.size(); ++i)
+        table.rows.push_back({schedule.messages[i], schedule.names[i], schedule.places[i].line});
+    std::stable_sort(table.rows.begin(), table.rows.end(), [](const Row& a, const Row& b) { return plan::before(a.message, b.message); });
+    if (schedule.sync > 0)
+        table.per_sync = fmt::format("{} frames with each SYNC of {:g} ms take {:.3f} ms at most: {:.1f} %\n", schedule.per_sync,
+                                     static_cast<double>(schedule.sync) / 1e6,
+                                     schedule.sync_share * static_cast<double>(schedule.sync) / 1e6, 100 * schedule.sync_share);
+    return table;
+}
+
+/// Milliseconds, so that a column can be compared.
+std::string ms(std::int64_t ns) { return ns < 0 ? "endless" : fmt::format("{:.3f}", static_cast<double>(ns) / 1e6); }
+
+std::string id_of(const plan::Message& m) { return fmt::format("{:0{}X}", m.id, m.extended ? 8 : 3); }
+std::string called(const Row& row) { return row.name.empty() ? id_of(row.message) : fmt::format("{} ({})", id_of(row.message), row.name); }
+
+std::string table_text(const Table& table, const plan::Analysis& a) {
+    std::string text = fmt::format("{:>8}  {:>6}  {:>5}  {:>10}  {:>10}  {:>10}  {:>6}\n", "id", "bytes", "bits", "period ms", "deadline",
+                                   "worst", "used");
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+        const plan::Message& m = table.rows[i].message;
+        const plan::Response& r = a.responses[i];
+        const std::string used =
+            r.worst < 0 ? "-" : fmt::format("{:.0f} %", 100.0 * static_cast<double>(r.worst) / static_cast<double>(m.limit()));
+        const std::string bytes = m.remote ? "R" : fmt::format("{}{}", m.bytes, m.bit_rate_switch ? "brs" : m.fd ? "fd" : "");
+        std::string line = fmt::format("{:>8}  {:>6}  {:>5}  {:>10}  {:>10}  {:>10}  {:>6}  {}{}", id_of(m), bytes, r.bits, ms(m.period),
+                                       ms(m.limit()), ms(r.worst), used, r.in_time ? "" : "LATE ", table.rows[i].name);
+        while (line.back() == ' ') line.pop_back();
+        text += line + "\n";
+    }
+    return text + table.per_sync +
+           fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits\n", table.rows.size(), table.bus.bit_rate, 100 * a.load);
+}
+
+/// The arithmetic of one that is late.
+std::string why_late(const Table& table, const std::vector<plan::Message>& messages, const plan::Analysis& a, std::size_t i) {
+    const plan::Response& r = a.responses[i];
+    const Row& row = table.rows[i];
+    if (r.worst < 0) {
+        double use = 0;
+        for (std::size_t k = 0; k < messages.size(); ++k)
+            if (k == i || plan::before(messages[k], messages[i]))
+                use += static_cast<double>(a.responses[k].frame) / static_cast<double>(messages[k].period);
+        return fmt::format("{} may wait for ever: with what goes before it it needs {:.1f} % of the bus's time", called(row), 100 * use);
+    }
+    std::string text = fmt::format("{} needs {} ms and has {} ms:", called(row), ms(r.worst), ms(row.message.limit()));
+    if (r.blocker) text += fmt::format(" {} for {} already on the wire +", ms(r.blocking), id_of(messages[*r.blocker]));
+    if (r.instance > 0) text += fmt::format(" {} for {} of its own before it +", ms(r.instance * r.frame), r.instance);
+    for (std::size_t k = 0; k < messages.size(); ++k) {
+        if (k == i || !plan::before(messages[k], messages[i])) continue;
+        const std::int64_t times = plan::times_before(messages[k], r.queued, table.bus);
+        text += fmt::format(" {} x {} for {} +", times, ms(a.responses[k].frame), id_of(messages[k]));
+    }
+    text += fmt::format(" {} for itself", ms(r.frame));
+    if (row.message.jitter > 0) text += fmt::format(" + {} jitter", ms(row.message.jitter));
+    if (r.instance > 0) text += fmt::format(" - {} since it was due", ms(r.instance * row.message.period));
+    return text;
+}
+
+/// What to change, best first.
+std::string help_text(const Table& table, const std::vector<plan::Message>& messages) {
+    std::string text;
+    if (const auto rate = plan::sufficient_bit_rate(messages, table.bus))
+        text += fmt::format("  = help: with bitrate = {} everything is in time\n",
+                            *rate == 1'000'000 ? "1M" : fmt::format("{}k", *rate / 1000));
+    if (const auto order = plan::sufficient_order(messages, table.bus); !order.empty()) {
+        text += "  = help: in this order of identifiers, lowest first, everything is in time:";
+        for (const std::size_t i : order) text += fmt::format(" {}", id_of(messages[i]));
+        text += "\n";
+    }
+    for (std::int64_t percent = 110; percent <= 1000; percent += 10) {
+        std::vector<plan::Message> slower = messages;
+        for (plan::Message& m : slower) m.deadline = m.limit(), m.period = m.period * percent / 100;
+        if (!plan::analyse(slower, table.bus).fits) continue;
+        return text +
+               fmt::format("  = help: with every period {} % longer and the deadlines as they are, everything is in time\n", percent - 100);
+    }
+    return text + "  = help: put several values into one message, take messages away, or use a second bus\n";
+}
+
+std::string json_text(const Table& table, const plan::Analysis& a) {
+    std::string text = fmt::format(R"({{"bitrate":{},"load":{:.6f},"fits":{},"messages":[)", table.bus.bit_rate, a.load, a.fits);
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+        const plan::Response& r = a.responses[i];
+        const plan::Message& m = table.rows[i].message;
+        text += fmt::format(
+            R"({}{{"id":{},"extended":{},"bits":{},"frame_ns":{},"period_ns":{},"deadline_ns":{},"blocking_ns":{},"worst_ns":{},"in_time":{}}})",
+            i == 0 ? "\n " : ",\n ", m.id, m.extended, r.bits, r.frame, m.period, m.limit(), r.blocking,
+            r.worst < 0 ? "null" : fmt::format("{}", r.worst), r.in_time);
+    }
+    return text + "]}\n";
+}
+
+/// The configuration, its errors and warnings said. 0: it can be used.
+int read_configuration(const Options& options, const std::string& file, config::Reading& reading) {
+    std::string text;
+    if (!config::read_from_disk(file, text)) return fail(options, fmt::format("cannot read '{}': {}", file, text));
+    reading = config::read(text, file);
+    Sources sources;
+    const std::uint32_t source = sources.add(file, text);
+    Diagnostics found;
+    for (const config::Message& m : reading.messages) {
+        const Severity severities[] = {Severity::note, Severity::warning, Severity::error};
+        Diagnostic d{severities[static_cast<std::size_t>(m.severity)], Code::named(config::code_of(m.topic)).value_or(Code("canopen-line")),
+                     m.sentence};
+        d.labels.push_back({Span{source, m.at.offset, m.at.offset + m.at.length}, m.label});
+        if (!m.help.empty()) d.help.push_back(m.help);
+        found.add(std::move(d));
+    }
+    write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
+    return found.failed() ? 1 : 0;
+}
+
+const char* word(config::PinType type) {
+    constexpr const char* words[] = {"s32", "bit", "s32", "u32", "s64", "u64", "float"};
+    return words[static_cast<std::size_t>(type)];
+}
+
+std::string pin_text(const config::Node& node, const config::Object& object, bool to_node) {
+    std::string text;
+    const auto line = [&](const std::string& name, const char* type, const std::string& about) {
+        text += fmt::format("    {:<5} {} {}.{}  {}\n", type, to_node ? "in " : "out", node.name, name, about);
+    };
+    std::string about =
+        fmt::format("{:04X}", object.index) + (object.sub != 0 ? fmt::format(":{}", object.sub) : "") + " " + printable(object.about);
+    if (object.scale != 1.0 || object.offset != 0.0)
+        about += fmt::format(", {:g} to one{}{}", object.scale, object.unit.empty() ? "" : " ", object.unit);
+    else if (!object.unit.empty()) about += ", " + object.unit;
+    for (const config::BitPin& b : object.bit_pins) line(b.name, "bit", fmt::format("{}, bit {}", about, b.bit));
+    if (object.bit_pins.empty()) line(object.pin, word(object.as), about);
+    return text;
+}
+
+std::string transmission_text(const config::Pdo& pdo) {
+    if (pdo.multiplexed()) return "multiplexed: one object at a time, when it changes";
+    if (pdo.request != 0) return fmt::format("asked for every {} ms", pdo.request / canopen::millisecond);
+    if (pdo.transmission == 0) return "with the SYNC when changed";
+    if (pdo.transmission == 1) return "with every SYNC";
+    if (pdo.transmission <= 240) return fmt::format("with every SYNC number {}", pdo.transmission);
+    return pdo.event_ms != 0 ? fmt::format("when changed and every {} ms", pdo.event_ms) : "when changed";
+}
+
+std::string network_text(const std::string& file, const config::MasterConfig& c) {
+    std::string text = fmt::format("{}: {} at {} bit/s, master {}, {} node{}\n", file, c.link, c.bit_rate, c.node_id, c.nodes.size(),
+                                   c.nodes.size() == 1 ? "" : "s");
+    for (const config::Node& n : c.nodes) {
+        text += fmt::format("node {} {}, {}\n", n.setup.id, n.name, n.setup.mandatory ? "mandatory" : "optional");
+        for (const config::Pdo& p : n.pdos) {
+            if (p.safety)
+                text += fmt::format("  {}{} {:X} and {:X}, {} bytes and the same inverted, every {} ms; SCT {} ms, SRVT {} ms\n",
+                                    p.to_node ? "rsrdo" : "tsrdo", p.number, p.cob, p.cob + 1, p.bytes(),
+                                    p.safety->refresh / canopen::millisecond, p.safety->sct / canopen::millisecond,
+                                    p.safety->srvt / canopen::millisecond);
+            else
+                text += fmt::format("  {}{} {:X}, {} byte{}, {}\n", p.to_node ? "rpdo" : "tpdo", p.number, canopen::cob_id(p.cob), p.bytes(),
+                                    p.bytes() == 1 ? "" : "s", transmission_text(p));
+            for (const config::Object& o : p.objects)
+                if (!o.filler) text += pin_text(n, o, p.to_node);
+        }
+    }
+    return text;
+}
+
+}  // namespace
+
+int run_canopen_plan(const CanopenPlanOptions& options) {
+    if (options.words.size() != 1)
+        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help canopen plan", options.words[1]));
+    const std::string& file = options.words[0];
+    config::Reading reading;
+    if (const int status = read_configuration(options, file, reading); status != 0) return status;
+    if (const std::string& link = reading.config.link; !can::describe(link).has_bit_rate)
+        return fail(options, fmt::format("the frames of {} travel on Ethernet ({}), where no identifier waits for another; who sends when says: "
+                                         "hal tdma plan FILE.tdma", file, link));
+    const auto cycle = parse_duration_ns(options.cycle, false);
+    if (!cycle || *cycle < 1000) return fail(options, fmt::format("'{}' is no period of a thread; write --cycle 1ms", options.cycle));
+    const Table table = table_of(config::schedule_of(reading.config, *cycle));
+    std::vector<plan::Message> messages;
+    for (const Row& row : table.rows) messages.push_back(row.message);
+    const plan::Analysis a = plan::analyse(messages, table.bus);
+    if (!print(options.json ? json_text(table, a) : table_text(table, a))) return 1;
+    if (a.fits) return 0;
+    std::string said;
+    std::size_t late = 0;
+    for (std::size_t i = 0; i < messages.size(); ++i)
+        if (!a.responses[i].in_time && ++late <= 3)
+            said += fmt::format("{}:{}: {}\n", file, table.rows[i].line, why_late(table, messages, a, i));
+    if (late > 3) said += fmt::format("{}: {} more are late\n", file, late - 3);
+    if (reading.config.sync != config::SyncMode::none && reading.config.sync_period == 0)
+        said += fmt::format("  = help: the SYNC comes with each cycle of the thread, here taken as {}; for another period add: --cycle 2ms\n", options.cycle);
+    write_all(STDERR_FILENO, said + help_text(table, messages));
+    return 1;
+}
+
+int run_canopen_check(const CanopenCheckOptions& options) {
+    int status = 0;
+    for (const std::string& file : options.words) {
+        config::Reading reading;
+        if (const int one = read_configuration(options, file, reading); one != 0) status = one;
+        else if (!print(network_text(file, reading.config))) return 1;
+    }
+    return status;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "bus/can/bus_options.hpp"
+
+namespace hal::tools {
+
+struct CanopenPlanOptions : Options {
+    std::string cycle = "1ms";
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "the configuration of the network, NAME.canopen");
+        set.value("--cycle", cycle, "TIME", "the period of the master's thread, where the SYNC comes with every cycle (default 1ms)");
+        set.flag("--json", json, "as JSON");
+    }
+};
+
+struct CanopenCheckOptions : Options {
+    void declare(OptionSet& set) override {
+        set.words("FILE", "configurations, NAME.canopen");
+    }
+};
+
+/// `hal canopen plan`. Returns the exit code.
+int run_canopen_plan(const CanopenPlanOptions&);
+
+/// `hal canopen check`. Returns the exit code.
+int run_canopen_check(const CanopenCheckOptions&);
+
+}  // namespace hal::tools

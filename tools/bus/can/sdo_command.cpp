@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+// `hal can sdo read` and `hal can sdo write`: one object of a node, in its type.
+#include "bus/can/sdo_command.hpp"
+
+#include <fmt/core.h>
+#include <memory>
+
+#include "bus/can/objects.hpp"
+#include "bus/can/station.hpp"
+#include "cli/output.hpp"
+
+namespace hal::tools {
+
+using canopen::SdoMode;
+using canopen::SdoRequest;
+using canopen::Type;
+
+namespace {
+
+constexpr std::size_t most_bytes = 64 << 20;  // of one object; taken from the system only as far as it is filled
+
+struct Words {
+    std::uint8_t node = 0;
+    std::optional<Type> type;
+    ObjectNames names;
+    SdoMode mode = SdoMode::automatic;
+};
+
+/// What both commands take, before the bus is opened.
+bool read_words(const SdoOptions& options, Words& words) {
+    if (!node_of(options, options.words[1], words.node) || !words.names.load(options, options.eds)) return false;
+    if (!options.type.empty() && !(words.type = parse_type(options.type)))
+        return fail(options, fmt::format("'{}' is no data type; there are {}", options.type, type_words())), false;
+    if (options.block && options.segmented) return fail(options, "--block and --segmented exclude each other"), false;
+    words.mode = options.block ? SdoMode::block : options.segmented ? SdoMode::segmented : SdoMode::automatic;
+    return true;
+}
+
+bool save(const SdoReadOptions& options, std::span<const std::uint8_t> bytes) {
+    const std::string why = write_file(options.output, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    return why.empty() || (fail(options, why), false);
+}
+
+std::string json_line(std::uint8_t node, const ObjectName& object, Type type, std::span<const std::uint8_t> bytes) {
+    return fmt::format(R"({{"node":{},"index":{},"sub":{},"name":{},"type":{},"value":{},"bytes":{},"data":"{}"}})"
+                       "\n",
+                       node, object.index, object.sub, object.name.empty() ? "null" : json_text(object.name),
+                       type == Type::none ? "null" : json_text(type_word(type)), value_json(bytes, type), bytes.size(),
+                       hex_bytes(bytes, ""));
+}
+
+}  // namespace
+
+int run_can_sdo_read(const SdoReadOptions& options) {
+    if (options.words.size() < 3) return fail(options, "three words are needed; type: hal can sdo read ADDRESS NODE OBJECT");
+    Words words;
+    if (!read_words(options, words)) return 1;
+    std::vector<ObjectName> objects(options.words.size() - 2);
+    std::string problem;
+    for (std::size_t n = 0; n < objects.size(); ++n)
+        if (!words.names.find(options.words[n + 2], objects[n], problem)) return fail(options, problem);
+    if (!options.output.empty() && objects.size() != 1) return fail(options, "-o takes the bytes of one object; name only one");
+    Station station(options, options.timeout_ns);
+    if (!station.open(options.words[0])) return 1;
+    const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
+    for (const ObjectName& object : objects) {
+        SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .mode = words.mode, .room = {room.get(), most_bytes}};
+        if (!station.transfer(words.node, request)) return station.fail_transfer(words.node, request, object.label());
+        const std::span<const std::uint8_t> bytes(room.get(), request.size);
+        const Type type = words.type.value_or(object.type);
+        if (!options.output.empty()) return save(options, bytes) ? 0 : 1;
+        if (!print(options.json ? json_line(words.node, object, type, bytes)
+                                : fmt::format("{} = {}\n", object.label(), value_text(bytes, type))))
+            return 1;
+    }
+    return 0;
+}
+
+namespace {
+
+/// The type of an object nobody has described: as wide as what it holds now, signed for a negative value.
+bool width_of(Station& station, std::uint8_t node, const ObjectName& object, const std::string& value, Type& type, std::string& problem) {
+    std::uint8_t room[64];
+    SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .room = room};
+    const bool read = station.transfer(node, request), negative = value.starts_with('-');
+    switch (read ? request.size : 0) {
+    case 1: type = negative ? Type::integer8 : Type::unsigned8; return true;
+    case 2: type = negative ? Type::integer16 : Type::unsigned16; return true;
+    case 4: type = negative ? Type::integer32 : Type::unsigned32; return true;
+    case 8: type = negative ? Type::integer64 : Type::unsigned64; return true;
+    default: break;
+    }
+    problem = read ? fmt::format("it holds {} bytes now", request.size)
+                   : fmt::format("it could not be read to see ({})", canopen::word(request.abort));
+    problem =
+        fmt::format("the type of {} is not known: {}; add --type, such as u16 or visible_string, or --eds FILE", object.label(), problem);
+    return false;
+}
+
+}  // namespace
+
+int run_can_sdo_write(const SdoWriteOptions& options) {
+    const bool from_file = !options.input.empty();
+    if (options.words.size() != (from_file ? 3 : 4))
+        return fail(options,
+                    "the value is missing or too many; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE for the value");
+    Words words;
+    if (!read_words(options, words)) return 1;
+    ObjectName object;
+    std::string problem;
+    if (!words.names.find(options.words[2], object, problem)) return fail(options, problem);
+    Type type = words.type.value_or(object.type);
+    std::vector<std::uint8_t> bytes;
+    if (from_file) {
+        std::string text;
+        if (!read_file(options.input, text)) return fail(options, fmt::format("cannot read '{}': {}", options.input, text));
+        bytes.assign(text.begin(), text.end());
+    } else if (type != Type::none && !parse_value(options.words[3], type, bytes, problem)) {
+        return fail(options, problem);
+    }
+    Station station(options, options.timeout_ns);
+    if (!station.open(options.words[0])) return 1;
+    if (!from_file && type == Type::none) {
+        if (!width_of(station, words.node, object, options.words[3], type, problem)) return fail(options, problem);
+        if (!parse_value(options.words[3], type, bytes, problem)) return fail(options, problem);
+    }
+    SdoRequest request{.index = object.index, .sub = object.sub, .mode = words.mode, .data = bytes};
+    if (!station.transfer(words.node, request)) return station.fail_transfer(words.node, request, object.label());
+    return 0;
+}
+
+}  // namespace hal::tools

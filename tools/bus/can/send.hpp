@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "bus/can/bus_options.hpp"
+
+namespace hal::tools {
+
+struct SendOptions : Options {
+    std::int64_t every_ns = 0;  ///< 0: once
+    std::int64_t for_ns = -1;   ///< -1: not given
+    std::uint64_t count = 0;    ///< 0: without end
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS FRAME", "where to; then frames as candump writes them: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
+        set.duration("--every", every_ns, "send them again and again, this far apart", 1);
+        set.for_how_long(for_ns, "with --every: end after 2s, 500ms …; without it: until Ctrl-C");
+        set.value("-n,--count", count, "N", "with --every: end after so many rounds");
+    }
+};
+
+struct NmtOptions : Options {
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS COMMAND NODE", "the bus; start, stop, preop, reset or reset-comm; a node 1-127 (or 0x..), or all");
+    }
+};
+
+/// `hal can send`. Returns the exit code.
+int run_can_send(const SendOptions&);
+
+/// `hal can nmt`. Returns the exit code.
+int run_can_nmt(const NmtOptions&);
+
+}  // namespace hal::tools

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// A drive that stops when this program is gone: our heartbeat watched by the drive (1016h), or life guarding (100Ch, 100Dh).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bus/can/station.hpp"
+
+namespace hal::tools {
+
+struct SupervisionSettings {
+    std::int64_t limit_ns = 500'000'000;  ///< silence after which the drive reacts; 0: no supervision
+    std::uint8_t own_node = 0;            ///< node ID of our heartbeat; 0: one that is free
+};
+
+/// Set up before the first motion and taken back at the end. Heartbeats leave with Station::turn(), so a program that hangs
+/// loses its drive as well as one that was killed.
+class Supervision {
+public:
+    Supervision(const Options&, Station&, std::uint8_t node, const SupervisionSettings&);
+
+    /// Makes the drive stop this axis when our heartbeat ends; reports on stderr what it cannot. False: the bus failed, and it was reported.
+    bool arm(unsigned axis);
+    /// Writes back what arm() changed. True also when there was nothing to do.
+    bool release();
+    bool active() const { return way_ != Way::none; }
+    /// Another device sends heartbeats with our node ID: ours prove nothing any more.
+    bool collided() const { return collided_; }
+    std::uint8_t own_node() const { return own_; }
+
+private:
+    enum class Way : std::uint8_t { none, heartbeat, guarding };
+    enum class Read : std::uint8_t { value, missing, failed };
+    struct Changed {
+        std::uint16_t index;
+        std::uint8_t sub;
+        unsigned bytes;
+        std::uint32_t was;
+    };
+
+    Read read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value);
+    /// False: rejected by the drive, or the bus failed; `failed` tells which.
+    bool write(std::uint16_t index, std::uint8_t sub, unsigned bytes, std::uint32_t value, bool& failed);
+    bool change(std::uint16_t index, std::uint8_t sub, unsigned bytes, std::uint32_t was, std::uint32_t value, bool& failed);
+    bool set_up();
+    bool by_heartbeat(std::string& why_not);
+    bool by_guarding(std::string& why_not);
+    bool set_reaction(unsigned axis);
+    void beat(std::int64_t now);
+    void warn(const std::string& sentence) const;
+
+    const Options& options_;
+    Station& station_;
+    const std::uint8_t node_;
+    const SupervisionSettings settings_;
+    const std::int64_t began_;
+    std::array<bool, 128> heard_{};  // heartbeats of others
+    Way way_ = Way::none;
+    bool tried_ = false, collided_ = false;
+    std::uint8_t own_ = 0, axes_done_ = 0;  // a bit per axis
+    std::int64_t next_beat_ = 0;
+    std::vector<Changed> changed_;
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// What every command has of its command line. The options of a command stand in the command's own header, as a struct that derives from one of
+// these; `declare` gives them their names and help.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace hal::tools {
+
+class OptionSet;
+
+struct Options {
+    std::string program = "hal";         ///< how messages begin: "hal run", "halcmd"
+    std::vector<std::string> words;      ///< the positional arguments: files, a shell command, a component, a code
+    std::vector<std::string> arguments;  ///< behind `--`: $1 $2 … and NAME=VALUE of the netlists
+
+    Options() = default;
+    Options(const Options&) = default;
+    Options& operator=(const Options&) = default;
+    virtual ~Options() = default;
+    /// Declares the options in the order of the help, each with the member that it fills.
+    virtual void declare(OptionSet&) {}
+};
+
+enum class Loudness { nothing, errors, results };  ///< halcmd's -Q, -q (the default) and -v
+
+/// Of commands that execute lines of the command language: what halcmd's letters set.
+struct ExecutionOptions : Options {
+    std::string name;  ///< --name: of the instance; empty: not given
+    std::string ini;
+    bool keep_going = false, script = false, echo = false;
+    bool from_file = false;  ///< -f: the first word is a file of commands; without one, standard input
+    bool classic = false;    ///< under the name halrun or halcmd: as LinuxCNC does it
+    Loudness loudness = Loudness::errors;
+};
+
+}  // namespace hal::tools

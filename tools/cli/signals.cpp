@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+#include "cli/signals.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/signalfd.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace hal::tools {
+
+namespace {
+
+sigset_t ending_signals() {
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGPWR}) sigaddset(&set, number);
+    return set;
+}
+
+/// Nothing here uses these, and their default action ends the process. Programs that are started get the default action back.
+void ignore_unexpected() {
+    for (const int number : {SIGPIPE, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGSTKFLT, SIGXFSZ}) ::signal(number, SIG_IGN);
+    for (int number = SIGRTMIN; number <= SIGRTMAX; ++number) ::signal(number, SIG_IGN);
+}
+
+}  // namespace
+
+StopRequest::StopRequest() {
+    ignore_unexpected();
+    const sigset_t set = ending_signals();
+    ::pthread_sigmask(SIG_BLOCK, &set, nullptr);
+    event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+    if (event_ < 0 || done_ < 0 || signals_ < 0) throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
+}
+
+void StopRequest::listen() {
+    thread_ = std::thread([this] { serve(); });
+}
+
+void StopRequest::release() {
+    if (!thread_.joinable()) return;
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t n = ::write(done_, &one, sizeof one);
+    thread_.join();
+    signalfd_siginfo info{};
+    while (::read(signals_, &info, sizeof info) == sizeof info) {  // an impatient second Ctrl-C is no reason to skip the tidying up
+    }
+    sigset_t impatient;
+    sigemptyset(&impatient);
+    sigaddset(&impatient, SIGINT);
+    ::pthread_sigmask(SIG_UNBLOCK, &impatient, nullptr);
+}
+
+StopRequest::~StopRequest() {
+    release();
+    for (const int descriptor : {event_, done_, signals_}) ::close(descriptor);
+}
+
+void StopRequest::request() noexcept {
+    requested_.store(true, std::memory_order_release);
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t n = ::write(event_, &one, sizeof one);  // an eventfd can only be full, and then it is readable
+}
+
+void StopRequest::take_signals() {
+    signalfd_siginfo info{};
+    while (::read(signals_, &info, sizeof info) == sizeof info) {
+        if (!(info.ssi_signo == SIGINT && spare_)) {
+            int none = 0;
+            signal_.compare_exchange_strong(none, static_cast<int>(info.ssi_signo));
+            request();
+        }
+        if (on_signal) on_signal();
+    }
+}
+
+void StopRequest::spare(bool on) {
+    const std::lock_guard lock(mutex_);
+    take_signals();
+    spare_ = on;
+}
+
+void StopRequest::serve() {
+    for (;;) {
+        pollfd both[2] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}};
+        if (::poll(both, 2, -1) < 0) continue;
+        if (both[1].revents != 0) return;
+        const std::lock_guard lock(mutex_);
+        take_signals();
+    }
+}
+
+bool StopRequest::wait_ns(std::int64_t ns) const {
+    using namespace std::chrono;
+    const auto end = steady_clock::now() + nanoseconds(std::max<std::int64_t>(ns, 0));
+    while (!requested()) {
+        const std::int64_t left = ns < 0 ? 0 : nanoseconds(end - steady_clock::now()).count();
+        if (ns >= 0 && left <= 0) break;
+        const timespec patience{static_cast<time_t>(left / 1'000'000'000), static_cast<long>(left % 1'000'000'000)};
+        pollfd event{event_, POLLIN, 0};
+        ::ppoll(&event, 1, ns < 0 ? nullptr : &patience, nullptr);
+    }
+    return requested();
+}
+
+}  // namespace hal::tools

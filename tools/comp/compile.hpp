@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct CompileOptions : Options {
+    std::string output;  ///< the folder; empty: the user's
+    bool check_rt = false, keep = false;
+    std::vector<std::string> compile_args, link_args;  ///< halcompile: further words for the compiler
+    bool as_program = false;                           ///< halcompile --userspace
+    bool classic = false;                              ///< as halcompile: nothing is announced
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or .c (LinuxCNC's hal.h)");
+        set.value("-o,--output", output, "DIR", "install here; default: ~/.local/share/halcyon/components");
+        set.flag("--check-rt", check_rt, "run it 1000 cycles with random and extreme values; name what is not real time");
+        set.flag("--keep", keep, "of a .comp file: leave the C text that was made of it in this folder");
+    }
+};
+
+/// `hal compile`. Returns the exit code.
+int run_compile(const CompileOptions&);
+
+/// Builds one file and installs it in options.output. Returns the exit code.
+int compile_file(const CompileOptions& options, const std::string& path);
+
+}  // namespace hal::tools

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: MIT
+// `hal new component NAME`: a component that compiles and has a test, in a folder of its own outside of the tree.
+#include "comp/new.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fmt/core.h>
+#include <fstream>
+#include <sstream>
+
+#include "cli/output.hpp"
+#include "machine/plugins.hpp"
+#include "netlist/netlist.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// @NAME@ is the component's name, @TYPE@ the same as a type, @PACKAGE@ where find_package looks.
+constexpr std::string_view source = R"CPP(// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct @TYPE@ : hal::Component {
+    using Component::Component;
+
+    hal::In<double>    in{*this, "in", "where out is to go"};
+    hal::In<bool>      hold{*this, "hold", "TRUE keeps out where it is"};
+    hal::Out<double>   out{*this, "out", "follows in", {.finite = true}};
+    hal::Out<bool>     there{*this, "there", "TRUE while out is equal to in"};
+    hal::Param<double> max_speed{*this, "max-speed", "how fast out may move", {.initial = 1.0, .unit = "1/s"}};
+    hal::Function      run{*this, "", &@TYPE@::update, "one step"};
+
+    // Runs in every cycle: it must not allocate, lock, block, log or throw.
+    void update(hal::Cycle cycle) noexcept {
+        const double distance = in - out;
+        const double step = std::fabs(max_speed) * cycle.seconds();
+        if (!hold && std::isfinite(distance) && std::isfinite(step)) out = out + std::clamp(distance, -step, step);
+        there = out == in;
+    }
+};
+
+}  // namespace
+
+HAL_COMPONENT(@TYPE@, "@NAME@", "Follows its input at a limited speed", R"(
+In each cycle `out` moves towards `in`, by at most `max-speed` times the period. While `in` is not a number `out` stays.
+
+    loadrt @NAME@ names=slow
+    addf slow servo
+    setp slow.max-speed 5
+    net wanted => slow.in
+    net moved  <= slow.out
+)")
+)CPP";
+
+constexpr std::string_view project = R"CMAKE(# SPDX-License-Identifier: MIT
+cmake_minimum_required(VERSION 3.25)
+project(@NAME@ CXX)
+find_package(Halcyon REQUIRED@PACKAGE@)
+add_hal_component(@NAME@ @NAME@.cpp)
+)CMAKE";
+
+constexpr std::string_view netlist = R"HAL(# SPDX-License-Identifier: MIT
+# hal sim test.hal prints what is in `expected`.
+newthread servo 1000000
+loadrt    @NAME@ names=it
+
+setp it.max-speed 2
+setp it.in        1
+addf it servo
+start
+
+advance 100 cycles
+getp    it.out
+getp    it.there
+advance 1s
+getp    it.out
+getp    it.there
+
+setp    it.hold TRUE
+setp    it.in   -1
+advance 100 cycles
+getp    it.out
+)HAL";
+
+constexpr std::string_view expected = "0.2\nFALSE\n1\nTRUE\n1\n";
+
+constexpr std::string_view keywords[] = {
+    "alignas", "alignof", "and", "and_eq", "asm", "auto", "bitand", "bitor", "bool", "break", "case", "catch", "char", "class", "compl",
+    "concept", "const", "consteval", "constexpr", "constinit", "continue", "decltype", "default", "delete", "do", "double", "else", "enum",
+    "explicit", "export", "extern", "false", "float", "for", "friend", "goto", "if", "inline", "int", "long", "mutable", "namespace", "new",
+    "noexcept", "not", "not_eq", "nullptr", "operator", "or", "or_eq", "private", "protected", "public", "register", "requires", "return",
+    "short", "signed", "sizeof", "static", "struct", "switch", "template", "this", "throw", "true", "try", "typedef", "typeid", "typename",
+    "union", "unsigned", "using", "virtual", "void", "volatile", "while", "xor", "xor_eq"};
+
+bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+bool digit(char c) { return c >= '0' && c <= '9'; }
+
+/// The nearest name that would do.
+std::string repaired(const std::string& name) {
+    std::string good;
+    for (const char c : name) {
+        if (letter(c) || (digit(c) && !good.empty())) good += c;
+        else if (!good.empty() && good.back() != '-') good += c == '_' ? '_' : '-';
+    }
+    while (!good.empty() && !letter(good.back()) && !digit(good.back())) good.pop_back();
+    return good.empty() ? "my-part" : good;
+}
+
+std::string problem_of(const std::string& name) {
+    const bool plain = std::all_of(name.begin(), name.end(), [](char c) { return letter(c) || digit(c) || c == '-' || c == '_'; });
+    constexpr std::size_t longest = 40;
+    if (!plain || name.empty() || !letter(name.front()) || name.back() == '-' || name.back() == '_')
+        return fmt::format(
+            "'{}' cannot be a component's name: it begins with a letter, and letters, digits, - and _ follow; try: hal new component {}",
+            name, repaired(name));
+    if (name.size() > longest) return fmt::format("the name has {} characters; {} are enough for a component", name.size(), longest);
+    std::string underlined = name;
+    std::replace(underlined.begin(), underlined.end(), '-', '_');
+    if (std::find(std::begin(keywords), std::end(keywords), underlined) != std::end(keywords))
+        return fmt::format("'{0}' is a word of C++; try: hal new component my-{0}", name);
+    for (const std::string& there : Plugins().available()) {
+        std::string other = there;
+        std::replace(other.begin(), other.end(), '-', '_');
+        if (other == underlined) return fmt::format("there is a component '{0}' already (see: hal doc {0}); choose another name", there);
+    }
+    return {};
+}
+
+/// "my-part" as a type: MyPart.
+std::string type_of(const std::string& name) {
+    std::string type;
+    bool first = true;
+    for (const char c : name) {
+        if (c == '-' || c == '_') {
+            first = true;
+            continue;
+        }
+        type += first && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+        first = false;
+    }
+    return type == "Component" ? "TheComponent" : type;
+}
+
+std::string filled(std::string_view text, const std::string& name, const std::string& package) {
+    std::string result(text);
+    const std::array<std::pair<std::string_view, std::string>, 3> words{
+        {{"@NAME@", name}, {"@TYPE@", type_of(name)}, {"@PACKAGE@", package}}};
+    for (const auto& [word, value] : words)
+        for (std::size_t at = 0; (at = result.find(word, at)) != std::string::npos; at += value.size())
+            result.replace(at, word.size(), value);
+    return result;
+}
+
+/// As `hal fmt` has it: the columns depend on the name's length.
+std::string formatted(std::string text) {
+    Sources sources;
+    Diagnostics none;
+    const std::uint32_t made = sources.add("test.hal", std::move(text));
+    return format(sources, made, none);
+}
+
+bool has_package(const fs::path& prefix) {
+    std::error_code none;
+    if (fs::exists(prefix / "lib/cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
+    for (const auto& folder : fs::directory_iterator(prefix / "lib", none))  // lib/x86_64-linux-gnu
+        if (fs::exists(folder.path() / "cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
+    return false;
+}
+
+/// Where find_package has to be told to look: this program's installation or build tree, unless CMake finds one by itself
+/// (in the system's folders, and beside the folders of PATH).
+std::string package_hint() {
+    std::error_code none;
+    std::vector<fs::path> found_anyway{"/usr", "/usr/local"};
+    std::istringstream folders(std::getenv("PATH") ? std::getenv("PATH") : "");
+    for (std::string folder; std::getline(folders, folder, ':');)
+        if (const fs::path path(folder); path.filename() == "bin" || path.filename() == "sbin") found_anyway.push_back(path.parent_path());
+    if (std::any_of(found_anyway.begin(), found_anyway.end(), has_package)) return {};
+    const fs::path prefix = fs::read_symlink("/proc/self/exe", none).parent_path().parent_path();
+    return has_package(prefix) ? prefix.string() : "";
+}
+
+std::string shell_word(const std::string& word) {
+    const bool plain = std::all_of(word.begin(), word.end(), [](char c) { return letter(c) || digit(c) || std::strchr("-_./+,=:@%", c); });
+    if (plain) return word;
+    std::string quoted = "'";
+    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return quoted + "'";
+}
+
+}  // namespace
+
+int run_new(const NewOptions& options) {
+    const auto& words = options.words;
+    if (words.empty() || words[0] != "component") {
+        const std::string hint =
+            words.size() == 1 && problem_of(words[0]).empty() ? "hal new component " + words[0] : "hal new component NAME";
+        return fail(options, fmt::format("what is to be new? Components can be; type: {}", hint));
+    }
+    if (words.size() != 2)
+        return fail(options, words.size() < 2
+                                 ? "the component needs a name: hal new component NAME"
+                                 : fmt::format("one name is expected, not {}; blanks cannot be part of it: hal new component {}",
+                                               words.size() - 1, repaired(words[1] + "-" + words[2])));
+    const std::string& name = words[1];
+    if (const std::string why = problem_of(name); !why.empty()) return fail(options, why);
+
+    std::error_code problem;
+    const fs::path folder = options.folder.empty() ? fs::path(name) : fs::path(options.folder);
+    const bool there = fs::exists(fs::symlink_status(folder, problem));
+    if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem)))
+        return fail(options, fmt::format("'{}' exists already; give the new component another folder: hal new component {} --folder DIR",
+                                         folder.string(), name));
+    fs::create_directories(folder, problem);
+    if (problem) return fail(options, fmt::format("'{}' cannot be made: {}", folder.string(), problem.message()));
+
+    const std::string package = package_hint();
+    const std::array<std::pair<std::string, std::string_view>, 4> files{
+        {{name + ".cpp", source}, {"CMakeLists.txt", project}, {"test.hal", netlist}, {"expected", expected}}};
+    for (const auto& [file, text] : files) {
+        const std::string content = filled(text, name, package.empty() ? "" : fmt::format(" HINTS \"{}\"", package));
+        if (const std::string why = write_file((folder / file).string(), file == "test.hal" ? formatted(content) : content); !why.empty())
+            return fail(options, why);
+    }
+    const std::string path = shell_word(folder.string());
+    return print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and what it is expected to print\n"
+                             "  cd {0}\n"
+                             "  cmake -B build && cmake --build build && ctest --test-dir build\n"
+                             "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to have it for good: hal compile {1}.cpp\n",
+                             path, name))
+               ? 0
+               : 1;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct DocOptions : Options {
+    bool markdown = false, json = false, man = false, html = false;
+    bool all = false;
+    std::string output;  ///< a folder
+
+    void declare(OptionSet& set) override {
+        set.words("COMPONENT", "as loadrt takes it; without it: all there are", false);
+        set.flag("--markdown", markdown, "as Markdown");
+        set.flag("--json", json, "as JSON");
+        set.flag("--man", man, "as a troff page: hal doc pid --man | man -l -");
+        set.flag("--html", html, "as a web page");
+        set.flag("--all", all, "all components, into the folder of --output: web pages with an index, or what is chosen above");
+        set.value("-o,--output", output, "DIR", "a folder; each component gets a file");
+    }
+};
+
+/// `hal doc`. Returns the exit code.
+int run_doc(const DocOptions&);
+
+}  // namespace hal::tools

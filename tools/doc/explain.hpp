@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct ExplainOptions : Options {
+    void declare(OptionSet& set) override {
+        set.words("CODE", "what stands in [brackets] at the end of a message; without it: all", false);
+    }
+};
+
+/// `hal explain`. Returns the exit code.
+int run_explain(const ExplainOptions&);
+
+}  // namespace hal::tools

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// A component's page: what it declares about itself, in several forms.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "machine/declared.hpp"
+
+namespace hal::tools {
+
+using Page = Declared;
+
+/// The page of `threads`, which the runtime provides itself.
+Page threads_page();
+
+std::string as_text(const Page& page);
+std::string as_markdown(const Page& page);
+std::string as_json(const Page& page);
+std::string as_man(const Page& page);
+/// A whole page; `home` is the address of the index, or empty.
+std::string as_html(const Page& page, std::string_view home);
+/// The index: each group with its components, and a box to search them by name and summary.
+struct IndexGroup {
+    std::string name;
+    std::vector<const Page*> pages;
+};
+std::string as_html_index(const std::vector<IndexGroup>& groups);
+
+}  // namespace hal::tools

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: MIT
+// `hal doctor`: what on this machine spoils real time, what to type against it, and the wake-up jitter it has.
+#include "inspect/doctor.hpp"
+
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <fmt/core.h>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <sched.h>
+#include <set>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/utsname.h>
+#include <sys/xattr.h>
+#include <thread>
+#include <unistd.h>
+
+#include "base/types.hpp"
+#include "cli/output.hpp"
+#include "hal/privilege.hpp"
+#include "inspect/jitter.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+enum class Verdict { good, fair, poor };
+
+/// One thing that was looked at.
+struct Finding {
+    Verdict verdict;
+    std::string subject, sentence;
+    std::string remedy = {};  ///< what to type; empty when nothing is to be done
+    std::string other = {};   ///< what to type instead, where there is a choice
+};
+
+std::string first_line(const std::string& path) {
+    std::ifstream file(path);
+    std::string line;
+    std::getline(file, line);
+    return line;
+}
+
+std::string own_path() {
+    std::error_code problem;
+    const auto path = std::filesystem::read_symlink("/proc/self/exe", problem);
+    return problem ? "hal" : path.string();
+}
+
+/// The other way to what scheduling and memory locking need, without file capabilities: limits for a group of users.
+constexpr const char* limits_of_a_group =
+    "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; "
+    "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee /etc/security/limits.d/realtime.conf, then log in again";
+
+/// A capability in the effective set of this process.
+bool capable(int number) {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("CapEff:")) return (std::stoull(line.substr(7), nullptr, 16) >> number) & 1;
+    return false;
+}
+constexpr int cap_net_raw = 13, cap_ipc_lock = 14, cap_sys_nice = 23;
+
+Finding kernel() {
+    utsname about{};
+    ::uname(&about);
+    const std::string version = about.version;
+    const bool rt = first_line("/sys/kernel/realtime") == "1" || version.find("PREEMPT_RT") != std::string::npos;
+    if (rt) return {Verdict::good, "kernel", fmt::format("{} with PREEMPT_RT", about.release)};
+    const char* kind = version.find("PREEMPT_DYNAMIC") != std::string::npos ? "PREEMPT_DYNAMIC"
+                       : version.find("PREEMPT") != std::string::npos       ? "PREEMPT"
+                                                                            : "no preemption";
+    return {Verdict::fair, "kernel",
+            fmt::format("{} ({}), not PREEMPT_RT: wake-ups are late by milliseconds now and then", about.release, kind),
+            "sudo apt install linux-image-rt-amd64, then reboot into it"};
+}
+
+Finding machine() {
+    std::ifstream info("/proc/cpuinfo");
+    for (std::string line; std::getline(info, line);)
+        if (line.starts_with("flags") && line.find(" hypervisor") != std::string::npos) {
+            std::ifstream stat("/proc/stat");
+            std::string word;
+            long long value = 0, steal = 0;
+            stat >> word;
+            for (int i = 0; i < 8 && stat >> value; ++i) steal = value;
+            return {Verdict::fair, "machine",
+                    fmt::format("virtual: the host takes the processor away at will ({} s so far)",
+                                static_cast<double>(steal) / static_cast<double>(::sysconf(_SC_CLK_TCK))),
+                    "run on bare metal, or give the guest dedicated processors"};
+        }
+    return {Verdict::good, "machine", "not virtual"};
+}
+
+/// What the scheduler answers when a thread asks for SCHED_FIFO; limits and capabilities only hint at it.
+Finding scheduling() {
+    int problem = 0;
+    std::thread([&] {
+        sched_param wanted{};
+        wanted.sched_priority = 98;
+        problem = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &wanted);
+    }).join();
+    rlimit limit{};
+    ::getrlimit(RLIMIT_RTPRIO, &limit);
+    const std::string why = capable(cap_sys_nice) ? "cap_sys_nice" : fmt::format("limit rtprio {}", limit.rlim_cur);
+    if (problem == 0) return {Verdict::good, "SCHED_FIFO", fmt::format("allowed up to priority 98 ({})", why)};
+    return {Verdict::poor, "SCHED_FIFO", fmt::format("refused ({}): threads compete with every other program", why),
+            grant_command(), limits_of_a_group};
+}
+
+Finding memory() {
+    rlimit limit{};
+    ::getrlimit(RLIMIT_MEMLOCK, &limit);
+    if (capable(cap_ipc_lock)) return {Verdict::good, "memory locking", "allowed (cap_ipc_lock)"};
+    if (limit.rlim_cur == RLIM_INFINITY) return {Verdict::good, "memory locking", "allowed (limit memlock unlimited)"};
+    return {Verdict::poor, "memory locking",
+            fmt::format("limited to {} KiB: a page fault in a cycle costs 1 us to 10 ms", limit.rlim_cur / 1024),
+            grant_command(), limits_of_a_group};
+}
+
+Finding capabilities() {
+    const std::string path = own_path();
+    const bool on_file = ::getxattr(path.c_str(), "security.capability", nullptr, 0) > 0;
+    if (capable(cap_sys_nice) && capable(cap_ipc_lock) && capable(cap_net_raw))
+        return {Verdict::good, "capabilities", on_file ? "granted to the program file" : "all there (by user)"};
+    return {Verdict::fair, "capabilities",
+            on_file ? "granted to the program file, but not effective (a nosuid mount, or a container)"
+                    : "none granted to the program file: raw sockets and priorities need them",
+            grant_command()};
+}
+
+/// What the kernel answers; a container may refuse in spite of the capability.
+Finding raw_ethernet() {
+    const int socket = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);
+    const int problem = errno;
+    if (socket >= 0) ::close(socket);
+    if (socket >= 0) return {Verdict::good, "raw Ethernet", "allowed (cap_net_raw)"};
+    if (problem == EPERM || problem == EACCES)
+        return {Verdict::fair, "raw Ethernet", "refused: links of the kind eth:enp3s0 cannot be opened", grant_command()};
+    return {Verdict::fair, "raw Ethernet", fmt::format("no packet sockets in this kernel: {}", std::strerror(problem)),
+            "use a kernel with CONFIG_PACKET, as every distribution's is"};
+}
+
+Finding throttling() {
+    const std::string text = first_line("/proc/sys/kernel/sched_rt_runtime_us");
+    if (text.empty()) return {Verdict::good, "throttling", "none visible"};
+    if (text == "-1") return {Verdict::good, "throttling", "off (kernel.sched_rt_runtime_us = -1)"};
+    return {Verdict::good, "throttling",
+            fmt::format("real-time threads may use {} us of each {} us; a thread that stays below is not touched", text,
+                        first_line("/proc/sys/kernel/sched_rt_period_us"))};
+}
+
+Finding governor() {
+    std::set<std::string> governors;
+    for (unsigned cpu = 0; cpu < std::thread::hardware_concurrency(); ++cpu) {
+        const std::string text = first_line(fmt::format("/sys/devices/system/cpu/cpu{}/cpufreq/scaling_governor", cpu));
+        if (!text.empty()) governors.insert(text);
+    }
+    if (governors.empty()) return {Verdict::good, "frequency", "no scaling visible"};
+    std::string all;
+    for (const auto& g : governors) all += (all.empty() ? "" : ", ") + g;
+    if (governors == std::set<std::string>{"performance"}) return {Verdict::good, "frequency", "governor performance"};
+    return {Verdict::fair, "frequency", fmt::format("governor {}: a processor that slept starts slowly", all),
+            "sudo cpupower frequency-set -g performance"};
+}
+
+Finding isolation() {
+    const std::string isolated = first_line("/sys/devices/system/cpu/isolated"), full = first_line("/sys/devices/system/cpu/nohz_full");
+    const long cpus = ::sysconf(_SC_NPROCESSORS_ONLN);
+    if (!isolated.empty())
+        return {Verdict::good, "isolated cpus",
+                fmt::format("{} of {}{}", isolated, cpus, full.empty() || full == "(null)" ? "" : ", without ticks: " + full)};
+    if (cpus < 2) return {Verdict::fair, "isolated cpus", "one processor only: everything shares it"};
+    return {Verdict::fair, "isolated cpus", fmt::format("none of {}: other programs run beside the threads", cpus),
+            fmt::format("add isolcpus={0} nohz_full={0} rcu_nocbs={0} to the kernel command line (GRUB_CMDLINE_LINUX in /etc/default/grub)",
+                        cpus - 1)};
+}
+
+Finding clock_source() {
+    const std::string source = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+    const bool fast = source == "tsc" || source == "arch_sys_counter" || source == "kvm-clock" || source == "riscv_clocksource";
+    if (fast) return {Verdict::good, "clock source", source};
+    return {Verdict::fair, "clock source",
+            fmt::format("{}: reading the clock costs about a microsecond", source.empty() ? "unknown" : source),
+            "find out why the kernel left tsc: dmesg | grep -i clocksource"};
+}
+
+Finding idle_states() {
+    const int device = ::open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
+    if (device >= 0) ::close(device);
+    unsigned states = 0;
+    while (!first_line(fmt::format("/sys/devices/system/cpu/cpu0/cpuidle/state{}/name", states)).empty()) ++states;
+    if (states <= 1) return {Verdict::good, "idle states", "no deep ones visible"};
+    if (device >= 0)
+        return {Verdict::good, "idle states", fmt::format("{}, held shallow through /dev/cpu_dma_latency while threads run", states)};
+    return {Verdict::fair, "idle states",
+            fmt::format("{}, and /dev/cpu_dma_latency may not be written: a deep sleep ends up to 0.2 ms late", states),
+            "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; sudo chgrp realtime /dev/cpu_dma_latency; "
+            "sudo chmod 0660 /dev/cpu_dma_latency, then log in again; lost at reboot, unless the line KERNEL==\"cpu_dma_latency\", "
+            "GROUP=\"realtime\", MODE=\"0660\" is in /etc/udev/rules.d/99-cpu-dma-latency.rules"};
+}
+
+/// System-management interrupts stop all processors unseen; Intel counts them in a register.
+Finding management_interrupts() {
+    const int device = ::open("/dev/cpu/0/msr", O_RDONLY | O_CLOEXEC);
+    std::uint64_t count = 0;
+    const bool read = device >= 0 && ::pread(device, &count, sizeof count, 0x34) == sizeof count;
+    if (device >= 0) ::close(device);
+    if (!read) return {Verdict::good, "firmware", "system-management interrupts cannot be counted from here (as root: modprobe msr)"};
+    return {count == 0 ? Verdict::good : Verdict::fair, "firmware", fmt::format("{} system-management interrupts since power-on", count),
+            count == 0 ? "" : "in the firmware set-up switch off legacy USB, and power management of fans and memory"};
+}
+
+constexpr Finding (*checks[])() = {kernel,     machine,  scheduling, memory,       capabilities, raw_ethernet,
+                                   throttling, governor, isolation,  clock_source, idle_states,  management_interrupts};
+
+const char* word(Verdict verdict) {
+    static constexpr const char* words[] = {"good", "fair", "poor"};
+    return words[static_cast<std::size_t>(verdict)];
+}
+
+std::string described(const Finding& finding, bool colour) {
+    static constexpr const char* codes[] = {"\033[32m", "\033[33m", "\033[31m"};
+    const std::string verdict = colour ? fmt::format("{}{}\033[0m", codes[static_cast<std::size_t>(finding.verdict)], word(finding.verdict))
+                                       : word(finding.verdict);
+    std::string text = fmt::format("{}  {:15} {}\n", verdict, finding.subject, finding.sentence);
+    if (!finding.remedy.empty()) text += fmt::format("      {:15}   try: {}\n", "", finding.remedy);
+    if (!finding.other.empty()) text += fmt::format("      {:15}   or:  {}\n", "", finding.other);
+    return text;
+}
+
+}  // namespace
+
+int run_doctor(const DoctorOptions& options) {
+    const bool colour = colours(STDOUT_FILENO);
+    nlohmann::ordered_json report;
+    for (const auto& check : checks) {
+        const Finding finding = check();
+        if (options.json)
+            report["findings"].push_back({{"verdict", word(finding.verdict)},
+                                          {"subject", finding.subject},
+                                          {"sentence", finding.sentence},
+                                          {"remedy", finding.remedy},
+                                          {"other", finding.other}});
+        else if (!print(described(finding, colour))) return 1;
+    }
+    constexpr std::int64_t period_ns = 1'000'000, spin_ns = 200'000;
+    for (const std::int64_t spin : {std::int64_t{0}, spin_ns}) {
+        if (options.seconds <= 0.0) break;
+        const Jitter jitter = measure_jitter(period_ns, spin, static_cast<std::int64_t>(options.seconds * 1e9));
+        const std::string how = spin == 0 ? "sleeping to the deadline"
+                                          : fmt::format("sleeping, then spinning the last {}", format_duration(static_cast<double>(spin)));
+        if (options.json) {
+            report["wakeup"].push_back({{"period_ns", period_ns},
+                                        {"spin_ns", spin},
+                                        {"policy", jitter.policy},
+                                        {"cycles", jitter.cycles},
+                                        {"p50_ns", jitter.p50_ns},
+                                        {"p99_ns", jitter.p99_ns},
+                                        {"max_ns", jitter.max_ns}});
+            continue;
+        }
+        const std::string title = spin == 0 ? fmt::format("\nwake-up at 1 kHz, {}, how late:\n{:42} {:>10} {:>10} {:>10}\n", jitter.policy,
+                                                          "", "p50", "p99", "max")
+                                            : "";
+        if (!print(fmt::format("{}  {:40} {:>10} {:>10} {:>10}\n", title, how, format_duration(jitter.p50_ns),
+                               format_duration(jitter.p99_ns), format_duration(jitter.max_ns))))
+            return 1;
+    }
+    return !options.json || print(report.dump(2) + "\n") ? 0 : 1;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct DoctorOptions : Options {
+    double seconds = 2.0;  ///< of each measurement
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.value("--seconds", seconds, "S", "how long each measurement takes (default 2)").in(0.0, 3600.0);
+        set.flag("--json", json, "as JSON");
+    }
+};
+
+/// `hal doctor`. Returns the exit code.
+int run_doctor(const DoctorOptions&);
+
+}  // namespace hal::tools

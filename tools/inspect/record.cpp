@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// `hal record` and halsampler: what a sampler samples, as text.
+#include "inspect/record.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "cli/signals.hpp"
+#include "inspect/stream.hpp"
+#include "link/record_file.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using nlohmann::json;
+
+double real_of(const json& value) {
+    return value.is_string() ? std::strtod(value.get_ref<const std::string&>().c_str(), nullptr) : value.get<double>();
+}
+
+/// LinuxCNC's form: bits 0 and 1, floats with six decimals, a blank after each value.
+void append_plain(std::string& to, hal_type type, const json& value) {
+    if (type == HAL_TYPE_BIT) to += value.get<bool>() ? "1 " : "0 ";
+    else if (type == HAL_TYPE_FLOAT) to += fmt::format("{:f} ", real_of(value));
+    else to += value.dump() + " ";
+}
+
+/// Floats with as many digits as give the same value back.
+void append_csv(std::string& to, hal_type type, const json& value) {
+    if (type == HAL_TYPE_BIT) to += value.get<bool>() ? "1" : "0";
+    else if (type == HAL_TYPE_FLOAT) to += fmt::format("{}", real_of(value));
+    else to += value.dump();
+}
+
+std::string csv_field(const std::string& text) {
+    if (text.find_first_of(",\"\n") == std::string::npos) return text;
+    std::string quoted = "\"";
+    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return quoted + '"';
+}
+
+/// The signals linked to the columns, or the pins' own names.
+std::string csv_header(Stream& stream, bool tag) {
+    std::vector<std::string> names(stream.types.size());
+    for (std::size_t i = 0; i < names.size(); ++i) names[i] = fmt::format("{}.pin.{}", stream.name, i);
+    const json pins = stream.client->request({{"describe", "pin"}, {"patterns", json::array({stream.name + ".pin."})}});
+    for (const json& pin : pins.value("objects", json::array()))
+        if (const auto at = std::find(names.begin(), names.end(), pin.value("name", "")); at != names.end() && pin.contains("signal"))
+            *at = pin["signal"];
+    std::string line = tag ? "sample" : "";
+    if (stream.timed) line += line.empty() ? "time_s" : ",time_s";
+    for (const std::string& name : names) line += (line.empty() ? "" : ",") + csv_field(name);
+    return line + "\n";
+}
+
+class Lines {
+public:
+    Lines(const Stream& stream, const RecordOptions& options) : types_(stream.types), csv_(options.csv), tag_(options.tag), timed_(stream.timed) {}
+
+    /// The records of a reply as lines. A gap in the sample numbers is a line `overrun`; CSV shows it by the numbers only.
+    bool write(const json& reply, RecordFile& file) {
+        const json& records = reply.at("records");
+        for (std::size_t i = 0; i < records.size(); ++i) {
+            const auto number = reply.at("numbers").at(i).get<std::int64_t>();
+            std::string text;
+            if (!csv_ && known_ && number != next_) text += "overrun\n";
+            known_ = true;
+            next_ = number + 1;
+            if (tag_) text += fmt::format("{}{}", number, csv_ ? "" : " ");
+            if (csv_ && timed_) {
+                const auto ns = reply.at("times_ns").at(i).get<std::int64_t>();
+                text += fmt::format("{}{}.{:09}", tag_ ? "," : "", ns / 1'000'000'000, ns % 1'000'000'000);
+            }
+            for (std::size_t c = 0; c < types_.size(); ++c) {
+                if (csv_ && (tag_ || timed_ || c > 0)) text += ',';
+                (csv_ ? append_csv : append_plain)(text, types_[c], records[i].at(c));
+            }
+            text += '\n';
+            if (!file.put(text)) return false;
+        }
+        return file.flush();
+    }
+
+private:
+    const std::vector<hal_type>& types_;
+    bool csv_, tag_, timed_, known_ = false;
+    std::int64_t next_ = 0;
+};
+
+/// Takes records until there are enough, or somebody ends it. Returns the exit code.
+int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
+    StopRequest stop;
+    stop.listen();
+    const std::size_t headers = options.csv ? 1 : 0;
+    const auto lost = [&] {
+        if (file.error() == EPIPE) return 1;
+        const std::size_t records = file.records() - std::min(file.records(), headers);
+        return fail(options, fmt::format("cannot write{}: {}; what was written ends with a whole line, after {} record{}",
+                                         stream.file.empty() ? "" : " '" + stream.file + "'", std::strerror(file.error()), records,
+                                         records == 1 ? "" : "s"));
+    };
+    if (options.csv && !(file.put(csv_header(stream, options.tag)) && file.flush())) return lost();
+    Lines lines(stream, options);
+    std::uint64_t taken = 0;
+    while (!stop.requested() && (options.count == 0 || taken < options.count)) {
+        constexpr std::uint64_t at_once = 4096;
+        const std::uint64_t wanted = options.count == 0 ? at_once : std::min(at_once, options.count - taken);
+        const json reply = stream.client->request({{"stream", stream.name}, {"take", wanted}});
+        if (!reply.value("ok", false)) { return fail(options, stream.lost()); }
+        const std::size_t got = reply.at("records").size();
+        if (!lines.write(reply, file)) return lost();
+        taken += got;
+        if (got == 0) stop.wait_ns(poll_ns);
+    }
+    return file.close() ? 0 : lost();
+}
+
+}  // namespace
+
+int run_record(const RecordOptions& options) {
+    Stream stream;
+    if (!stream.open(options, "sampler")) return 1;
+    if (stream.file.empty()) {
+        RecordFile out(STDOUT_FILENO);
+        return follow(stream, options, out);
+    }
+    RecordFile file(stream.file);
+    if (file.error() != 0) return fail(options, fmt::format("cannot write '{}': {}", stream.file, std::strerror(file.error())));
+    return follow(stream, options, file);
+}
+
+}  // namespace hal::tools

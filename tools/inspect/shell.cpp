@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: MIT
+// `hal shell` and `halcmd`: the client of the control socket. One-shot commands must stay light: no session is made.
+#include "inspect/shell.hpp"
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fmt/core.h>
+#include <sys/signalfd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/editor.hpp"
+#include "cli/output.hpp"
+#include "cli/prompt_loop.hpp"
+#include "control/client.hpp"
+#include "netlist/netlist.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+/// Prints what a command printed. Returns its exit status.
+int show(const Client::Answer& answer) {
+    const bool good = print(answer.out);
+    write_all(STDERR_FILENO, answer.err);
+    return good ? answer.status : 1;
+}
+
+class RemoteShell final : public LineExecutor {
+public:
+    RemoteShell(Client& client, const char* name) : client_(client), name_(name) {}
+    int execute(std::string_view line) override { return execute(line, 1); }
+    int execute(std::string_view line, std::uint32_t number) {
+        last_ = client_.run(line, name_, number);
+        return show(last_);
+    }
+    Completion complete(std::string_view line, std::size_t cursor) override { return client_.complete(line, cursor); }
+    bool collecting() const override { return last_.collecting; }
+    bool over() const override { return last_.quit || !client_.connected(); }
+
+private:
+    Client& client_;
+    const char* name_;
+    Client::Answer last_{};
+};
+
+Client::Options client_options(const RemoteShellOptions& options) {
+    Client::Options how;
+    how.keep_going = options.keep_going;
+    how.echo = options.echo;
+    how.script = options.script;
+    how.json = options.json;
+    how.color = colours(STDERR_FILENO);
+    how.level = options.loudness == Loudness::nothing ? "nothing" : options.loudness == Loudness::results ? "results" : "errors";
+    std::error_code unknown;
+    how.directory = std::filesystem::current_path(unknown).string();
+    return how;
+}
+
+/// Commands on standard input that is no terminal: a file as a whole; from a pipe, each line when it comes, so that a
+/// program can wait for the answer.
+int follow_input(Client& client, const RemoteShellOptions& options) {
+    struct stat about{};
+    if (::fstat(STDIN_FILENO, &about) == 0 && S_ISREG(about.st_mode)) {
+        std::string text;
+        if (!read_file("-", text)) return fail(options, fmt::format("cannot read standard input: {}", text));
+        return show(client.run_text("<stdin>", text));
+    }
+    RemoteShell executor(client, "<stdin>");
+    LineReader input(STDIN_FILENO);
+    int status = 0;
+    std::uint32_t number = 1, first = 1, begin = 0;  // where the lines begin that are collected; 0: none are
+    for (std::string line, more; !executor.over() && (status == 0 || options.keep_going) && input.read(line); ++number) {
+        first = number;
+        for (; line.ends_with('\\') && input.read(more); ++number) line += '\n' + more;
+        const int done = executor.execute(line, first);
+        status = std::max(status, done);
+        if (executor.collecting() && begin == 0) begin = first;
+        if (!executor.collecting() && (done == 0 || options.keep_going)) begin = 0;
+    }
+    if (options.loudness == Loudness::nothing) return executor.collecting() ? 1 : status;
+    if (status != 0 && !options.keep_going && first > 1) {
+        const std::uint32_t last = (begin != 0 ? begin : first) - 1;  // that took effect
+        std::string sentence = "a pipe is read line by line: ";
+        if (last > 0)
+            sentence += fmt::format("{} carried out before the error in line {}", last == 1 ? "line 1 was" : fmt::format("lines 1 to {} were", last), first);
+        if (last > 0 && begin != 0) sentence += "; ";
+        if (begin != 0) sentence += fmt::format("what was collected from line {} on had no effect", begin);
+        fail(options, sentence);
+    } else if (executor.collecting()) {
+        return fail(options, fmt::format("'begin' in line {} without 'commit': what was collected had no effect", begin));
+    }
+    return status;
+}
+
+/// A connection that ends in a `begin` takes what was collected with it.
+int without_commit(const RemoteShellOptions& options, const Client::Answer& last, int status) {
+    if (!last.collecting || options.loudness == Loudness::nothing) return last.collecting ? 1 : status;
+    return fail(options, "'begin' without 'commit' had no effect; write all of it into a file, or type: hal shell");
+}
+
+/// Reads this user's INI file: the instance knows only its own. False after printing what is wrong with it.
+bool read_ini(const RemoteShellOptions& options, Client::Options& how) {
+    Sources sources;
+    Diagnostics diagnostics;
+    const Ini ini = Ini::read(sources, options.ini, diagnostics);
+    write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
+    for (const Ini::Entry& entry : ini.entries()) how.ini.push_back({entry.section, entry.key, entry.value});
+    return !diagnostics.failed();
+}
+
+/// While it lives, Ctrl-C is a message: it ends the command that is waited for, not this program.
+class Interrupts {
+public:
+    Interrupts() {
+        sigset_t interrupt;
+        sigemptyset(&interrupt);
+        sigaddset(&interrupt, SIGINT);
+        ::pthread_sigmask(SIG_BLOCK, &interrupt, &before_);
+        descriptor_ = ::signalfd(-1, &interrupt, SFD_CLOEXEC | SFD_NONBLOCK);
+    }
+    ~Interrupts() {
+        ::close(descriptor_);
+        ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+    }
+    Interrupts(const Interrupts&) = delete;
+    int descriptor() const { return descriptor_; }
+
+private:
+    sigset_t before_;
+    int descriptor_;
+};
+
+int follow_file(Client& client, const RemoteShellOptions& options) {
+    const std::string& path = options.words.front();
+    std::string text;
+    if (!read_file(path, text)) {
+        fail(options, fmt::format("cannot read '{}': {}", path, text));
+        return options.classic ? 255 : 1;
+    }
+    return show(client.run_text(path, text));
+}
+
+}  // namespace
+
+int run_shell(const RemoteShellOptions& options) {
+    if (options.from_file && !options.words.empty() && !options.classic && options.words.size() > 1)
+        return fail(options, fmt::format("nothing is expected behind the file at '{}'; options go before -f", options.words[1]));
+    std::string problem;
+    const auto client = Client::connect(instance_wanted(options.name), problem);
+    if (!client) return fail(options, problem);
+    client->on_notice([](std::string_view text) { write_all(STDERR_FILENO, text); });
+    Client::Options how = client_options(options);
+    if (!options.ini.empty() && !read_ini(options, how)) return 1;
+    if (!client->set_options(how) && !client->connected())
+        return fail(options, fmt::format("instance '{}' does not answer", client->instance()));
+    if (options.from_file && !options.words.empty()) return follow_file(*client, options);
+    if (!options.execute.empty()) {
+        int status = 0;
+        Client::Answer last{};
+        for (const std::string& command : options.execute)
+            if (status == 0 || options.keep_going) status = std::max(status, show(last = client->run(command, "<commandline>")));
+        return without_commit(options, last, status);
+    }
+    if (!options.words.empty() && !options.from_file) {
+        // A single word with blanks is a line that was typed between quotes.
+        const bool line = options.words.size() == 1 && options.words[0].find_first_of(" \t") != std::string::npos;
+        const Client::Answer answer = line ? client->run(options.words[0], "<commandline>") : client->run(options.words);
+        return without_commit(options, answer, show(answer));
+    }
+    if (!::isatty(STDIN_FILENO)) return follow_input(*client, options);
+    if (!options.classic)
+        print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n", client->instance(), client->pid()));
+    const Interrupts interrupts;
+    client->cancel_on(interrupts.descriptor());
+    RemoteShell executor(*client, "<shell>");
+    const Prompt prompt = options.script    ? Prompt{"%%\n", "%%\n"}
+                          : options.classic ? Prompt{"halcmd: ", "halcmd+: "}
+                                            : Prompt{"hal> ", "hal+> "};
+    const int status = run_prompt_loop(executor, prompt);
+    if (client->connected()) return status;
+    const std::string& why = client->closed_because();
+    return fail(options, why.empty() ? fmt::format("instance '{}' has ended", client->instance())
+                                     : fmt::format("instance '{}' closed the connection: {}", client->instance(), why));
+}
+
+}  // namespace hal::tools

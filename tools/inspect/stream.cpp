@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#include "inspect/stream.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "base/types.hpp"
+#include "cli/output.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+bool number(const std::string& word) {
+    return !word.empty() && std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+}  // namespace
+
+bool Stream::open(const StreamOptions& options, const char* component) {
+    std::vector<std::string> words = options.words;
+    std::string channel = options.channel;
+    if (!options.classic && !words.empty() && number(words.front()) && channel.empty()) {
+        channel = words.front();
+        words.erase(words.begin());
+    }
+    if (words.size() > 1) {
+        fail(options, fmt::format("nothing is expected at '{}'; a channel is a number, or --channel NAME",
+                                  words.size() == 2 ? words.front() : words.back()));
+        return false;
+    }
+    if (!words.empty()) file = words.front();
+    name = channel.empty() ? fmt::format("{}.0", component) : number(channel) ? fmt::format("{}.{}", component, channel) : channel;
+    std::string problem;
+    client = Client::connect(instance_wanted(options.name), problem);
+    if (!client) {
+        fail(options, problem);
+        return false;
+    }
+    const nlohmann::json about = client->request({{"stream", name}});
+    if (!about.value("ok", false)) {
+        fail(options, about.value("error", "no answer"));
+        return false;
+    }
+    timed = about.value("timed", false);
+    for (const char letter : about.value("types", ""))
+        for (const TypeRow& row : hal::types)
+            if (row.letter == letter) types.push_back(row.type);
+    return !options.classic || announce(options);
+}
+
+std::string Stream::lost() const {
+    return client->connected() ? fmt::format("'{}' is gone: it was unloaded, or its machine has ended", name)
+                               : fmt::format("instance '{}' has ended", client->instance());
+}
+
+bool Stream::announce(const StreamOptions& options) const {
+    const std::string component =
+        options.name_as_component.empty() ? fmt::format("{}{}", options.program, ::getpid()) : options.name_as_component;
+    const nlohmann::json reply = client->request({{"component", component}});
+    if (!reply.value("ok", false)) fail(options, reply.value("error", "no answer"));
+    return reply.value("ok", false);
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// The far end of a sampler's or streamer's FIFO, through the control socket.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "control/client.hpp"
+#include "hal/abi.h"
+#include "inspect/stream_options.hpp"
+
+namespace hal::tools {
+
+/// What `hal record` and `hal play` work on.
+struct Stream {
+    std::unique_ptr<Client> client;
+    std::string name;             ///< of the instance: "sampler.0"
+    std::vector<hal_type> types;  ///< of the columns
+    bool timed = false;           ///< its records carry the time of their cycle
+    std::string file;             ///< the words' file; empty: standard input or output
+
+    /// Reads CHANNEL and FILE from the words, connects, and asks for the columns. False after saying why.
+    /// `component`: "sampler" or "streamer"; a channel that is a number belongs to it.
+    bool open(const StreamOptions& options, const char* component);
+    /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME` sees that it is ready.
+    bool announce(const StreamOptions& options) const;
+    /// Why it does not answer any more, as a sentence.
+    std::string lost() const;
+};
+
+/// How long to wait when the FIFO was empty, or full, before asking again.
+constexpr std::int64_t poll_ns = 2'000'000;
+
+}  // namespace hal::tools

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// What `hal record` and `hal play` have in common.
+#pragma once
+
+#include <string>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct StreamOptions : Options {
+    std::string name;               ///< --name: of the instance; empty: not given
+    std::string channel;            ///< when it is not among the words: a number or the name of an instance
+    std::string name_as_component;  ///< halsampler -N
+    bool classic = false;           ///< as halsampler or halstreamer: no channel among the words
+};
+
+}  // namespace hal::tools

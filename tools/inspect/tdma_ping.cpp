@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+// `hal tdma ping`: whether a station of a segment answers, and how long that takes. The machine asks, in its own slot; this program writes
+// the wish into a pin and reads from others what came of it.
+#include "inspect/tdma_ping.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <fmt/core.h>
+#include <vector>
+
+#include "cli/output.hpp"
+#include "cli/signals.hpp"
+#include "inspect/tdma_stations.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::uint64_t usual_count = 4;
+constexpr std::int64_t pause_ns = 200'000'000, look_ns = 2'000'000;
+constexpr auto patience = std::chrono::seconds(30);  // the component gives up long before, unless its thread stands still
+
+enum class Outcome { none, answered, unanswered, no_room, no_address, not_running };  // of the pin ping-result
+
+std::string names_of(const StationPins& pins) {
+    std::string names;
+    constexpr std::string_view marker = ".online";
+    for (const auto& [name, value] : pins)
+        if (name.ends_with(marker)) names += (names.empty() ? "" : ", ") + name.substr(0, name.size() - marker.size());
+    return names;
+}
+
+class Pinger {
+public:
+    Pinger(Client& client, std::string instance, std::string station)
+        : client_(client), instance_(std::move(instance)), station_(std::move(station)), pin_(instance_ + "." + station_ + ".ping") {}
+
+    /// What a ping came to; none: `problem` says why no more can be sent.
+    Outcome ask(const StopRequest& stop, std::string& problem) {
+        if (!look(problem)) return Outcome::none;
+        const auto wish = static_cast<std::uint32_t>(number(pins_, "ping")) + 1;
+        if (const auto answer = client_.run({"setp", pin_, fmt::format("{}", wish)}); answer.status != 0) {
+            problem = answer.err;
+            while (!problem.empty() && problem.back() == '\n') problem.pop_back();
+            return Outcome::none;
+        }
+        const auto until = Clock::now() + patience;
+        while (Clock::now() < until) {
+            if (stop.wait_ns(look_ns)) return Outcome::none;
+            if (!look(problem)) return Outcome::none;
+            if (static_cast<std::uint32_t>(number(pins_, "ping-done")) == wish) {
+                if (!look(problem)) return Outcome::none;  // now all of them are of that ping
+                return static_cast<Outcome>(static_cast<int>(number(pins_, "ping-result")));
+            }
+            if (static_cast<std::uint32_t>(number(pins_, "ping")) != wish) {
+                problem = fmt::format("somebody else pings {} at the moment ({} was set); try again", station_, pin_);
+                return Outcome::none;
+            }
+        }
+        problem = fmt::format("{} did not take the wish: does the thread of {}.receive run?", instance_, instance_);
+        return Outcome::none;
+    }
+    double time() const { return number(pins_, "ping-time"); }
+    double held() const { return number(pins_, "ping-held"); }
+    double cycles() const { return number(pins_, "ping-cycles"); }
+
+private:
+    bool look(std::string& problem) {
+        const json reply = client_.request({{"describe", "pin"}, {"patterns", json::array({pin_ + "*"})}});
+        if (!reply.value("ok", false)) return problem = reply.value("error", "no answer"), false;
+        const std::string before = instance_ + "." + station_ + ".";
+        for (const json& pin : reply.value("objects", json::array()))
+            if (const std::string name = pin.value("name", ""); name.starts_with(before) && pin.contains("value"))
+                pins_[name.substr(before.size())] = pin["value"];
+        if (pins_.contains("ping")) return true;
+        problem = fmt::format("there is no pin {} any more", pin_);
+        return false;
+    }
+
+    Client& client_;
+    const std::string instance_, station_, pin_;
+    StationPins pins_;
+};
+
+/// Why nothing was answered at all.
+std::string explanation(Outcome last, const StationPins& pins, const std::string& instance, const std::string& station) {
+    switch (last) {
+    case Outcome::no_room:
+        return fmt::format("nothing left {}: other frames fill its slots, or it has none; give one a larger SIZE in the schedule",
+                           instance);
+    case Outcome::no_address:
+        return fmt::format("{} has not heard {} yet and does not know its address; write its mac into the schedule", instance, station);
+    case Outcome::not_running: return fmt::format("{} may not send: see hal tdma status", instance);
+    default: break;
+    }
+    if (is_on(pins, station + ".online"))
+        return fmt::format("{} is heard, but answers no ping: stations of an earlier Halcyon, and RTnet's, do not know it", station);
+    return fmt::format("{} is not heard either: is it switched on, its cable in?", station);
+}
+
+const char* word(Outcome outcome) {
+    switch (outcome) {
+    case Outcome::unanswered: return "no answer";
+    case Outcome::no_room: return "not sent, no room in the slots";
+    case Outcome::no_address: return "not sent, its address is not known";
+    case Outcome::not_running: return "not sent, this station may not";
+    default: return "?";
+    }
+}
+
+/// The instance that has the station among the others, and its pins; empty: `problem`.
+std::string instance_with(const std::map<std::string, StationPins>& instances, const TdmaPingOptions& options, std::string& problem) {
+    const std::string& station = options.words.front();
+    std::string known;
+    for (const auto& [instance, pins] : instances) {
+        if (!options.from.empty() && instance != options.from) continue;
+        if (pins.contains(station + ".ping")) return instance;
+        const std::string names = names_of(pins);
+        known += fmt::format("; {}{}", instance, names.empty() ? " knows no other station" : " knows " + names);
+    }
+    if (known.empty()) {
+        std::string all;
+        for (const auto& [instance, pins] : instances) all += (all.empty() ? "" : ", ") + instance;
+        problem = fmt::format("there is no '{}' to ask from; there is {}", options.from, all);
+    } else {
+        problem = fmt::format("there is no other station '{}'{}", station, known);
+    }
+    return {};
+}
+
+}  // namespace
+
+int run_tdma_ping(const TdmaPingOptions& options) {
+    if (options.words.size() != 1) return fail(options, "one station at a time: hal tdma ping STATION");
+    StopRequest stop;
+    std::string problem;
+    const auto client = Client::connect(instance_wanted(options.name), problem);
+    if (!client) return fail(options, problem);
+    const auto instances = stations_of(*client, problem);
+    if (!problem.empty()) return fail(options, problem);
+    if (instances.empty()) return fail(options, fmt::format("instance '{}' has no station of a segment (loadrt tdma)", client->instance()));
+    const std::string instance = instance_with(instances, options, problem);
+    if (instance.empty()) return fail(options, problem);
+    const std::string& station = options.words.front();
+    if (!is_on(instances.at(instance), "running"))
+        return fail(options, fmt::format("{} is not running and may not send: see hal tdma status", instance));
+
+    Pinger pinger(*client, instance, station);
+    std::vector<double> times;
+    std::uint64_t done = 0;
+    Outcome last = Outcome::none;
+    const std::uint64_t count = options.count == 0 ? usual_count : options.count;
+    while (done < count && !stop.requested()) {
+        if (done != 0 && stop.wait_ns(pause_ns)) break;
+        last = pinger.ask(stop, problem);
+        if (last == Outcome::none) break;
+        ++done;
+        std::string line = fmt::format("{} {}: {}\n", station, done, word(last));
+        if (last == Outcome::answered) {
+            times.push_back(pinger.time());
+            line = fmt::format("{} {}: {:.2f} us, {:.2f} cycles; {:.2f} us of it at {}, {:.2f} us each way\n", station, done, pinger.time(),
+                               pinger.cycles(), pinger.held(), station, (pinger.time() - pinger.held()) / 2);
+        }
+        if (!print(line)) return 1;
+    }
+    if (!problem.empty()) return fail(options, problem);
+    if (done == 0) return 1;  // Ctrl-C
+    const std::uint64_t lost = done - times.size();
+    std::string text = fmt::format("{} ping{} from {}, {} answered, {} lost ({:.0f} %)", done, done == 1 ? "" : "s", instance, times.size(),
+                                   lost, 100.0 * static_cast<double>(lost) / static_cast<double>(done));
+    if (!times.empty()) {
+        const auto [least, most] = std::minmax_element(times.begin(), times.end());
+        double sum = 0;
+        for (const double t : times) sum += t;
+        text += fmt::format("; min {:.2f}, mean {:.2f}, max {:.2f} us", *least, sum / static_cast<double>(times.size()), *most);
+    }
+    if (!print(text + "\n")) return 1;
+    if (!times.empty()) return 0;
+    const auto now = stations_of(*client, problem);
+    const auto pins = now.find(instance);
+    return fail(options, explanation(last, pins == now.end() ? instances.at(instance) : pins->second, instance, station));
+}
+
+}  // namespace hal::tools

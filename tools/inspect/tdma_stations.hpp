@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+// The stations of a segment as the pins of a running machine show them.
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "control/client.hpp"
+
+namespace hal::tools {
+
+using StationPins = std::map<std::string, nlohmann::json>;  ///< of one instance of `tdma`, by the rest of their names
+
+/// By the names of the instances: tdma.0 …; a `problem` where the machine did not say.
+std::map<std::string, StationPins> stations_of(Client&, std::string& problem);
+double number(const StationPins&, const std::string& name);  ///< 0 where there is none
+bool is_on(const StationPins&, const std::string& name);
+
+}  // namespace hal::tools

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct TdmaStatusOptions : Options {
+    std::string name;  ///< of the instance; empty: not given
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.value("-N,--name", name, "NAME", "of the instance; needed when several run");
+        set.flag("--json", json, "as JSON");
+    }
+};
+
+/// `hal tdma status`. Returns the exit code.
+int run_tdma_status(const TdmaStatusOptions&);
+
+}  // namespace hal::tools

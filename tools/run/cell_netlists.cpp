@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+#include "run/cell_netlists.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "machine/cycle_guard.hpp"
+#include "run/offline.hpp"
+#include "run/report.hpp"
+#include "run/sim_summary.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+int print_diagnostics(const ExecutionOptions& options, Diagnostics& diagnostics) {
+    if (options.loudness != Loudness::nothing) write_all(STDERR_FILENO, render(diagnostics, Sources{}, colours(STDERR_FILENO)));
+    return 1;
+}
+
+std::vector<std::string> names_of(const std::vector<NodeLine>& nodes) {
+    std::vector<std::string> names;
+    for (const NodeLine& node : nodes) names.push_back(node.name);
+    return names;
+}
+
+ShellOptions for_check() {
+    ShellOptions how;
+    how.check = how.keep_going = true;
+    how.color = colours(STDERR_FILENO);
+    return how;
+}
+
+/// Words KEY=VALUE that the components of DDS take. False after saying which is none.
+bool good_settings(const Options& options, const std::string& settings) {
+    static constexpr std::array<std::string_view, 7> keys{"domain",        "interfaces", "peers",   "server",
+                                                          "shared_memory", "profile",    "security"};
+    for (std::size_t at = settings.find_first_not_of(' '); at < settings.size(); at = settings.find_first_not_of(' ', at)) {
+        const std::size_t end = std::min(settings.find(' ', at), settings.size());
+        const std::string word = settings.substr(at, end - at);
+        const std::string key = word.substr(0, word.find('='));
+        at = end;
+        if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() &&
+            word.find_first_of("\"'#$[]{}\\\n") == word.npos)
+            continue;
+        fail(options, fmt::format("--dds: '{}' is no setting; write KEY=VALUE, the keys are: {}", word, fmt::join(keys, " ")));
+        return false;
+    }
+    return true;
+}
+
+/// "NODE: COMMAND" of --execute.
+int execute(const Options& options, Cell& cell, const std::string& command, Output& output) {
+    const auto colon = command.find(':');
+    const std::size_t node = colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
+    if (node == cell.size())
+        return fail(options, fmt::format("in which node? write --execute '{}: {}'", cell.nodes().front().name, command));
+    return cell.shell(node).execute(command.substr(colon + 1), output, "<commandline>");
+}
+
+}  // namespace
+
+std::optional<std::vector<NodeLine>> requested_nodes(const NetlistOptions& options) {
+    std::vector<NodeLine> nodes = nodes_of(options.words, options.ini);
+    const std::vector<std::string> names = names_of(nodes);
+    if (options.part.empty() || std::find(names.begin(), names.end(), options.part) != names.end()) return nodes;
+    Diagnostics found;
+    std::string files;
+    for (const std::string& word : options.words) files += (files.empty() ? "" : " ") + word;
+    found.error("no-such-node", {}, "'" + files + "' has no node '" + options.part + "'", did_you_mean(options.part, names),
+                names.empty() ? "it is for one machine: leave --node out" : "its nodes: " + listed(names, 100));
+    print_diagnostics(options, found);
+    return std::nullopt;
+}
+
+int check_cell(const NetlistOptions& options, std::vector<NodeLine> nodes) {
+    ShellOptions how = for_check();
+    how.notes = true;
+    Cell cell(cell_name(options.words), std::move(nodes), offline(), how);
+    ErrorsOnly output;
+    if (!cell.load(options.words, options.ini, output)) return 1;
+    for (const std::string& path : options.words) write_all(STDERR_FILENO, path + ": no errors\n");
+    write_all(STDERR_FILENO, fmt::format("nodes: {}\n", listed(names_of(cell.nodes()), 100)));
+    for (const NodeTopic& topic : cell.topics()) {
+        std::vector<std::string> readers;
+        for (std::size_t i = 0; i < cell.size(); ++i)
+            if (topic.read_by(i)) readers.push_back(cell.nodes()[i].name);
+        write_all(STDERR_FILENO, fmt::format("  {} -> {}: {}\n", cell.nodes()[topic.from].name, listed(readers, 100), topic.layout()));
+    }
+    return 0;
+}
+
+int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
+    if (options.cycles != 0) return fail(options, "--cycles counts the cycles of one machine; of several: --for 10s");
+    if (!options.name.empty()) return fail(options, "--name is of one machine; choose it: --node " + nodes.front().name);
+    export_variables(options, "sim");
+    StopRequest stop;
+    CycleGuard guard;
+    guard.begin(options.cycle_limit_ns);
+    stop.on_signal = [&guard] { guard.end_soon(); };
+    SessionOptions session;
+    session.name = fmt::format("sim-{}", ::getpid());
+    session.virtual_clock = true;
+    if (!options.show.empty()) return fail(options, "--show is of one machine; of several: --execute 'NODE: getp NAME'");
+    TrackedOutput output;
+    const auto begun = std::chrono::steady_clock::now();
+    Cell cell(cell_name(options.words), std::move(nodes), session, shell_options(options));
+    stop.listen();
+    int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
+    constexpr std::int64_t slice_ns = 100'000'000;
+    if (!options.part.empty()) cell.leave_alone(cell.find(options.part));
+    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested(); left -= slice_ns)
+        cell.advance(std::min(left, slice_ns));
+    const bool loaded = status == 0;
+    const auto wall = std::chrono::steady_clock::now() - begun;
+    for (const std::string& command : options.execute)
+        if (status == 0 && !stop.requested()) status = execute(options, cell, command, output);
+    if (loaded && !options.report && summary_wanted(options, output.printed) && cell.size() != 0) {
+        write_all(STDERR_FILENO, simulated_for(cell.session(0).now_ns(), wall) + "\n");
+        for (std::size_t i = 0; i < cell.size(); ++i)
+            write_all(STDERR_FILENO, simulated_summary(cell.session(i), fmt::format("node {}", cell.nodes()[i].name)));
+    }
+    for (std::size_t i = 0; i < cell.size(); ++i) {
+        const auto reports = cell.session(i).thread_reports();
+        if (std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted; })) status = 1;
+        if (options.report) write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell.nodes()[i].name, timing_report(cell.session(i))));
+    }
+    stop.release();
+    return stop.requested() ? 1 : status;
+}
+
+int load_node(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes) {
+    ProcessOutput output;
+    Cell cell(cell_name(options.words), std::move(nodes), offline(), for_check());
+    {
+        TextOutput said;  // what is no error the part itself says when it is loaded
+        if (!cell.load(options.words, options.ini, said)) {
+            write_all(STDERR_FILENO, said.err_text);
+            return 1;
+        }
+    }
+    const std::size_t own = cell.find(options.part);
+    const auto available = machine.session.available_components();
+    if (std::find(available.begin(), available.end(), "dds_publish") == available.end() && cell.size() > 1) {
+        Diagnostics found;
+        found.error("no-dds", {}, "the nodes of this netlist exchange signals over DDS, and this Halcyon was built without it", "",
+                    "sudo apt install libfastrtps-dev, and build again; hal sim runs all nodes in one process without it");
+        return print_diagnostics(options, found);
+    }
+    std::string participant = options.dds;
+    if (const char* const usual = std::getenv("HALCYON_DDS"); participant.empty() && usual) participant = usual;
+    if (!good_settings(options, participant)) return 1;
+    const NodeLinks links = cell.size() > 1 ? node_links(cell, own, participant.empty() ? "" : " " + participant) : NodeLinks{};
+    machine.session.note_latencies(node_latencies(cell, own, false));
+    const std::string name = fmt::format("<links of node {}>", options.part);
+    const auto plain = [](const std::string& path) {  // a word that means itself
+        return path.ends_with(".hal") && path.find_first_of(" \t'\"#$[]{}\\") == path.npos;
+    };
+    if (options.ini.empty() && std::all_of(options.words.begin(), options.words.end(), plain)) {  // all of it takes effect together
+        std::string text = links.before;
+        for (const std::string& path : options.words) text += "source " + path + "\n";
+        return machine.shell.run_text(name, text + links.behind, output);
+    }
+    int status = machine.shell.run_text(name, links.before, output);
+    if (status != 0) return status;
+    status = machine.load();
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    return std::max(status, machine.shell.run_text(name, links.behind, output));
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Faults on standard error at the moment they are raised, so that nobody has to ask for them while a machine runs.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "hal/message_log.hpp"
+#include "machine/session.hpp"
+
+namespace hal::tools {
+
+/// While it lives: "fault: SENTENCE [CODE]" for each fault of a machine with real-time threads, limited as every MessageLog. Its thread takes
+/// Session::mutex only after a fault was raised.
+class FaultLines {
+public:
+    /// `sink` gets the lines instead of standard error.
+    explicit FaultLines(Session& session, MessageLog::Sink sink = {});
+    ~FaultLines();  ///< prints what is still due
+    FaultLines(const FaultLines&) = delete;
+
+    /// Prints the faults that are new. [any] but under Session::mutex
+    void look(std::int64_t now_ns);
+
+private:
+    void work();
+
+    Session& session_;
+    MessageLog log_;
+    std::map<std::uint64_t, std::uint64_t> seen_;  // record number to its count, of the records in the session's log
+    std::uint64_t raised_ = 0;                      // fault_count() when it last changed
+    std::int64_t raised_ns_ = 0;                   // when the newest was seen: a storm queues its count up to a second later
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    bool ending_ = false;
+    std::thread thread_;
+};
+
+}  // namespace hal::tools

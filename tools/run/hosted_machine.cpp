@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+#include "run/hosted_machine.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "machine/address.hpp"
+#include "machine/source_tree.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+SessionOptions session_options(const std::string& name, bool virtual_clock) {
+    SessionOptions options;
+    options.name = name;
+    options.virtual_clock = virtual_clock;
+    return options;
+}
+
+}  // namespace
+
+ShellOptions shell_options(const NetlistOptions& options) {
+    ShellOptions how;
+    how.keep_going = options.keep_going;
+    how.echo = options.echo;
+    how.script = options.script;
+    how.color = colours(STDERR_FILENO);
+    how.node = options.part;
+    how.level = options.loudness == Loudness::nothing   ? Level::nothing
+                : options.loudness == Loudness::results ? Level::results
+                                                        : Level::errors;
+    return how;
+}
+
+/// What stands behind `--`: $1, $2 … of the netlists, and NAME=VALUE as $NAME. For the programs they start: which
+/// instance halcmd is to talk to, and first in PATH the folder of this very program.
+void export_variables(const Options& options, const std::string& instance) {
+    ::setenv("HALCYON_INSTANCE", instance.c_str(), 1);
+    std::error_code unknown;
+    const std::string folder = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
+    const char* path = std::getenv("PATH");
+    if (!unknown) ::setenv("PATH", (folder + ":" + (path && *path ? path : "/usr/local/bin:/usr/bin:/bin")).c_str(), 1);
+    for (std::size_t i = 0; i < options.arguments.size(); ++i) {
+        const std::string& argument = options.arguments[i];
+        ::setenv(std::to_string(i + 1).c_str(), argument.c_str(), 1);
+        if (const auto equals = argument.find('='); equals != std::string::npos && equals != 0)
+            ::setenv(argument.substr(0, equals).c_str(), argument.substr(equals + 1).c_str(), 1);
+    }
+}
+
+namespace {
+
+class OwnShell final : public LineExecutor {
+public:
+    OwnShell(Shell& shell, StopRequest& stop, Output& output) : shell_(shell), stop_(stop), output_(output) {}
+    int execute(std::string_view line) override {
+        shell_.cancel(false);
+        stop_.spare(true);  // Ctrl-C is for the command now
+        const int status = shell_.execute(line, output_);
+        stop_.spare(false);
+        return status;
+    }
+    Completion complete(std::string_view line, std::size_t cursor) override { return shell_.complete(line, cursor); }
+    bool collecting() const override { return shell_.collecting(); }
+    bool over() const override { return shell_.quit() || stop_.requested(); }
+
+private:
+    Shell& shell_;
+    StopRequest& stop_;
+    Output& output_;
+};
+
+}  // namespace
+
+std::string own_name(const NetlistOptions& options) {
+    if (!options.name.empty()) return options.name;
+    if (!options.part.empty()) return options.part;
+    const char* variable = std::getenv("HALCYON_INSTANCE");
+    return variable && *variable ? variable : "default";
+}
+
+HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock)
+    : session(session_options(name, virtual_clock)), shell(session, shell_options(options)), options_(options) {
+    export_variables(options, name);
+    stop.on_signal = [this, virtual_clock] {
+        shell.cancel();
+        if (virtual_clock) cycle_guard_.end_soon();
+        if (stop.requested()) setup_guard_.end_soon();
+    };
+    if (!virtual_clock)  // a machine that is stopped from the terminal would leave its outputs as they are
+        for (const int number : {SIGTSTP, SIGTTIN, SIGTTOU}) std::signal(number, SIG_IGN);
+    if (virtual_clock) cycle_guard_.begin(options.cycle_limit_ns);
+    stop.listen();
+}
+
+HostedMachine::~HostedMachine() {
+    shut_down();
+    stop.release();  // it calls the shell, which goes now
+    server_.reset();
+}
+
+bool HostedMachine::serve(bool needed) {
+    const std::string& name = session.options().name;
+    if (!good_instance_name(name)) {
+        fail(options_, fmt::format("'{}' is no name for an instance; use letters, digits, '-', '_' and '.', at most 64", name));
+        return false;
+    }
+    ServerOptions how;
+    how.stop = [this] {
+        stop.request();
+        shell.cancel();
+    };
+    server_ = std::make_unique<Server>(shell, std::move(how));
+    Diagnostics diagnostics;
+    if (server_->start(diagnostics)) return true;
+    server_.reset();
+    if (needed) write_all(STDERR_FILENO, render(diagnostics, session.sources, colours(STDERR_FILENO)));
+    return !needed;
+}
+
+int HostedMachine::load(Output* output) {
+    Output& to = output != nullptr ? *output : output_;
+    if (!options_.ini.empty() && shell.read_ini(options_.ini, to) != 0) return 1;
+    int status = 0;
+    for (const std::string& path : options_.words) {
+        if (stop.requested()) return 1;
+        status = std::max(status, shell.run_file(path, to));
+        if (status != 0 && !options_.keep_going) return status;
+    }
+    return status;
+}
+
+void HostedMachine::start_threads() {
+    forbid_builds();
+    const std::lock_guard lock(session.mutex);
+    if (!session.running() && !session.model().threads.empty()) session.start_threads();
+}
+
+int HostedMachine::converse(const Prompt& prompt) {
+    OwnShell executor(shell, stop, output_);
+    return run_prompt_loop(executor, prompt, stop.fd());
+}
+
+void HostedMachine::advance(std::int64_t ns, std::uint64_t cycles) {
+    constexpr std::int64_t slice_ns = 100'000'000;
+    constexpr std::uint64_t slice_cycles = 1000;
+    while (!stop.requested() && (ns > 0 || cycles > 0)) {
+        const std::lock_guard lock(session.mutex);
+        if (ns > 0) {
+            const std::int64_t slice = std::min(ns, slice_ns);
+            session.advance_ns(slice);
+            ns -= slice;
+        } else {
+            const std::uint64_t slice = std::min(cycles, slice_cycles);
+            session.advance_cycles(slice);
+            cycles -= slice;
+        }
+    }
+}
+
+void HostedMachine::shut_down() {
+    const std::lock_guard lock(session.mutex);
+    session.shut_down();
+}
+
+bool HostedMachine::faulted() {
+    const std::lock_guard lock(session.mutex);
+    const auto reports = session.thread_reports();
+    return std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted || r.hangs != 0; });
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// What commands that load netlists have in common.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct NetlistOptions : ExecutionOptions {
+    std::string part;                 ///< --node: whose part of the netlists
+    std::int64_t cycle_limit_ns = 0;  ///< sim --cycle-limit: of one cycle, in wall time; 0: not given
+
+protected:
+    void declare_netlists(OptionSet& set) {
+        set.value("-i,--ini", ini, "FILE", "where [SECTION]KEY is looked up");
+        set.flag("-k,--keep-going", keep_going, "go on after an error, command by command, as halcmd -k does");
+    }
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// The small live picture of `hal run`: what is seen of a machine whose signals have names we know.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "machine/session.hpp"
+
+namespace hal::tools {
+
+/// What a picture is drawn from, all of one moment.
+struct Scene {
+    std::vector<double> values;  ///< in the order of Motif::signals
+    double seconds = 0;          ///< since the start
+    ThreadReport thread;         ///< the slowest one
+    std::uint64_t missed = 0, faults = 0;
+};
+
+/// A machine that can be drawn: which signals it needs, and its lines of text.
+struct Motif {
+    std::vector<std::string> signals;
+    std::vector<std::string> (*draw)(const Scene&, bool unicode);
+};
+
+/// The motif whose signals the model has, or nullptr.
+const Motif* motif_for(const Model& model);
+
+/// Draws about 20 times a second on standard output, from a thread of its own, until destroyed; then the cursor stands
+/// below the last picture. Changes no mode of the terminal, so there is nothing to restore whatever happens.
+class Picture {
+public:
+    /// Nothing when standard output is no terminal, it is too small, or the netlist has no motif.
+    static std::unique_ptr<Picture> start(Session& session);
+    ~Picture();
+    /// Writes a line to standard error, in the terminal below the last picture; the next picture is drawn below it. [any]
+    void print_below(const std::string& line);
+
+private:
+    Picture(Session& session, const Motif& motif);
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// `hal run` and `halrun`: netlists in real-time threads until somebody ends it.
+#include "run/run.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "machine/address.hpp"
+#include "run/cell_netlists.hpp"
+#include "run/fault_lines.hpp"
+#include "run/hosted_machine.hpp"
+#include "run/picture.hpp"
+#include "run/report.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+/// LinuxCNC's halrun: only what the commands print; threads start when the netlist says so; ends after the files unless
+/// the user types.
+int run_classic(HostedMachine& machine, const RunOptions& options) {
+    const int status = machine.load();
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    const int said = options.interactive || options.words.empty() ? machine.converse({"halcmd: ", "halcmd+: "}) : 0;
+    return std::max({status, said, machine.faulted() ? 1 : 0});
+}
+
+/// Why the run ended, where that is not what the user typed here.
+std::string end_reason(int signal) {
+    const char* const name = signal == 0 || signal == SIGINT ? nullptr : ::sigabbrev_np(signal);
+    return name ? fmt::format("ended by SIG{}\n", name) : "";
+}
+
+/// --watchdog. False after saying why not.
+bool attach_watchdog(HostedMachine& machine, const RunOptions& options) {
+    if (options.watchdog.empty()) return true;
+    const std::lock_guard lock(machine.session.mutex);
+    std::string problem;
+    if (machine.session.model().threads.empty()) problem = "--watchdog: there is no thread whose progress could feed it";
+    if (problem.empty() && machine.session.attach_watchdog(options.watchdog, problem)) return true;
+    fail(options, problem);
+    return false;
+}
+
+int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes) {
+    int status = options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    if (!attach_watchdog(machine, options)) return 1;
+    machine.start_threads();
+    const std::string& name = machine.session.options().name;
+    print(loaded_summary(machine.session));
+    if (options.interactive) {
+        const FaultLines faults(machine.session);
+        status = std::max(status, machine.converse({"hal> ", "hal+> "}));
+    } else {
+        print(fmt::format("{}; in another terminal: hal shell{}\n", options.for_ns >= 0 ? "running" : "running until Ctrl-C",
+                          name == "default" ? "" : " --name " + name));
+        const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
+        const FaultLines faults(machine.session, [&picture](const std::string& line) {
+            if (picture) picture->print_below(line);
+            else write_all(STDERR_FILENO, line);
+        });
+        machine.stop.wait_ns(options.for_ns);
+    }
+    const bool faulted = machine.faulted();
+    const std::string report = timing_report(machine.session);  // the threads take their figures with them
+    machine.shut_down();
+    print("\n" + end_reason(machine.stop.signal()) + report);
+    if (!machine.session.watchdog_disarmed())
+        fail(options, options.watchdog + " was not disarmed, because a thread does not end: it resets this host after its timeout");
+    return faulted ? 1 : status;
+}
+
+}  // namespace
+
+int run_run(const RunOptions& options) {
+    if (options.words.empty() && !options.interactive && !options.classic)
+        return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
+    if (!options.dds.empty() && options.part.empty())
+        return fail(options,
+                    "--dds is about the nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take " +
+                        options.dds + " themselves");
+    if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
+    const auto nodes = requested_nodes(options);
+    if (!nodes) return 1;
+    HostedMachine machine(options, own_name(options), false);
+    if (!machine.serve(true)) return 1;
+    return options.classic ? run_classic(machine, options) : run_plain(machine, options, *nodes);
+}
+
+}  // namespace hal::tools

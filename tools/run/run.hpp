@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "run/netlist_options.hpp"
+
+namespace hal::tools {
+
+struct RunOptions : NetlistOptions {
+    std::int64_t for_ns = -1;  ///< -1: not given
+    std::string watchdog;      ///< a device of the Linux watchdog API
+    std::string dds;           ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
+    bool interactive = false, no_picture = false;
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "netlists (.hal), or an INI file whose [HAL]HALFILE names them", false);
+        set.flag("-I,--interactive", interactive, "open the shell after loading; leaving it ends the run");
+        set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; without it: until Ctrl-C");
+        set.value("-N,--name", name, "NAME", "of this instance, when several run on one machine (default: default)");
+        declare_netlists(set);
+        set.value("--watchdog", watchdog, "DEVICE", "write to this device (/dev/watchdog) while every thread makes progress");
+        set.flag("--no-picture", no_picture, "no live picture in the terminal");
+        set.value("--node", part, "NAME", "of a netlist for several machines: load the part of this one");
+        set.value("--dds", dds, "SETTINGS", "how nodes meet: interfaces=ADDRESS domain=N peers=… (default: on this machine only)");
+    }
+};
+
+/// `hal run`, and halrun. Returns the exit code.
+int run_run(const RunOptions&);
+
+}  // namespace hal::tools

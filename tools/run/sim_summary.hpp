@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// How `hal sim` ends, for one machine and for several.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "commands/shell.hpp"
+#include "machine/session.hpp"
+#include "run/sim.hpp"
+
+namespace hal::tools {
+
+/// The process's own output, noting whether anything was written to stdout.
+class TrackedOutput final : public Output {
+public:
+    void out(std::string_view text) override {
+        printed = printed || !text.empty();
+        process_.out(text);
+    }
+    void err(std::string_view text) override { process_.err(text); }
+    bool is_process() const override { return true; }
+    bool printed = false;
+
+private:
+    ProcessOutput process_;
+};
+
+/// Prints what --show names. Returns the exit status. Takes Session::mutex.
+int show_values(const SimOptions& options, Session& session);
+
+/// "simulated 2 s in 12 ms, 163 times as fast as real time"
+std::string simulated_for(std::int64_t virtual_ns, std::chrono::steady_clock::duration wall);
+
+/// In a terminal, and where nothing was printed otherwise, unless --quiet.
+bool summary_wanted(const SimOptions& options, bool printed);
+
+}  // namespace hal::tools
