@@ -82,22 +82,20 @@ public:
                  {.min = 0, .max = longest_ms}),
           participant(c) {}
 
-    /// Throws std::invalid_argument. [setup]
+    /// Throws hal::ArgumentError. [setup]
     Schema schema() const {
         if (!participant.loading() && fields_.get().empty() && ros_.get().empty()) return Schema::of_fields("value:float");
         if (topic_.get().empty()) throw std::invalid_argument("which topic? write topic=NAME");
         for (const auto& [argument, text] : {std::pair{"topic", &topic_.get()}, std::pair{"type", &type_.get()}})
             if (text->size() > longest_name)
-                throw std::invalid_argument(std::string(argument) + "= has more than " + std::to_string(longest_name) +
+                throw hal::ArgumentError(argument, std::string(argument) + "= has more than " + std::to_string(longest_name) +
                                             " letters; make it shorter");
         if (!ros_.get().empty() && (!fields_.get().empty() || !type_.get().empty()))
-            throw std::invalid_argument("ros= gives the fields and the type; leave fields= and type= out");
+            throw hal::ArgumentError("ros", "ros= gives the fields and the type; leave fields= and type= out");
         if (ros_.get().empty() && fields_.get().empty())
             throw std::invalid_argument("which pins? write fields=angle:float,ready:bit or ros=std_msgs/Float64");
-        try {
-            return ros_.get().empty() ? Schema::of_fields(fields_.get(), type_.get())
-                                      : Schema::of_ros(ros_.get(), list_of(joints_.get()), frame_.get(), encoding_.get());
-        } catch (const std::invalid_argument& problem) { throw std::invalid_argument(placed(problem.what())); }
+        return ros_.get().empty() ? Schema::of_fields(fields_.get(), type_.get())
+                                  : Schema::of_ros(ros_.get(), list_of(joints_.get()), frame_.get(), encoding_.get());
     }
     TopicType topic(const Schema& schema) const {
         std::string wire = topic_.get();
@@ -130,17 +128,6 @@ private:
     static constexpr std::size_t  longest_name = 250;  // 255 in DDS, of which ROS 2 takes some
     static constexpr std::int64_t longest_ms = 86'400'000;
 
-    /// "fields: 'a': why" as "fields=a,b: 'a': why": a refusal that begins so is shown at its argument.
-    std::string placed(const std::string& why) const {
-        for (const auto& [argument, text] : {std::pair{"fields", &fields_.get()}, std::pair{"joints", &joints_.get()}}) {
-            std::string all(argument);
-            if (!why.starts_with(all + ": ")) continue;
-            const std::string sentence = why.substr(all.size());
-            all.append("=").append(*text, 0, text->size() <= 40 ? 40 : 37).append(text->size() <= 40 ? "" : "...");
-            return all + sentence;
-        }
-        return why;
-    }
     static std::string name_of(hal::Component&) {
         const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
         return naming != nullptr ? naming->name(hal::detail::creating) : "dds";

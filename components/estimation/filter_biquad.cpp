@@ -20,11 +20,11 @@ struct FilterBiquad : hal::Component {
         std::size_t           found = 0;
         while (found < std::size(names) && type.get() != names[found]) ++found;
         if (found == std::size(names))
-            throw std::invalid_argument("type=" + type.get() + " is none of lowpass highpass bandpass notch peak");
+            throw hal::ArgumentError("type", "type=" + type.get() + " is none of lowpass highpass bandpass notch peak");
         shape_ = static_cast<Shape>(found);
         const bool passes = shape_ == Shape::low_pass || shape_ == Shape::high_pass;
         if (passes && order % 2 != 0)
-            throw std::invalid_argument("order=" + std::to_string(order) + " is odd; take " + std::to_string(order + 1));
+            throw hal::ArgumentError("order", "order=" + std::to_string(order) + " is odd; take " + std::to_string(order + 1));
         sections_.resize(static_cast<std::size_t>(passes ? order / 2 : static_cast<std::int64_t>(order)));
         coefficients_.resize(sections_.size());
     }

@@ -52,7 +52,7 @@ private:
         if (!taps.get().empty()) {
             std::size_t        at = 0;
             const std::string& text = taps.get();
-            const auto         wrong = [&text](const std::string& why) { return std::invalid_argument("taps=" + text + ": " + why); };
+            const auto         wrong = [&text](const std::string& why) { return hal::ArgumentError("taps", "taps=" + text + ": " + why); };
             while (at <= text.size()) {
                 const std::size_t end = std::min(text.find_first_of(",; ", at), text.size());
                 const std::string word = text.substr(at, end - at);
@@ -67,8 +67,7 @@ private:
             return;
         }
         if (!(corner > 0.0 && corner < 0.5))
-            throw std::invalid_argument(
-                "corner= is not between 0 and 0.5; it is a part of the thread's rate, 0.05 for 50 Hz in a thread of 1 ms");
+            throw hal::ArgumentError("corner", "corner= is not between 0 and 0.5; it is a part of the thread's rate, 0.05 for 50 Hz in a thread of 1 ms");
         const auto n = static_cast<std::size_t>(length > 0 ? static_cast<std::int64_t>(length) : 31);
         // the ideal low pass, cut off by Hamming's window, 1 at frequency 0 (A. Oppenheim, R. Schafer, *Discrete-Time Signal Processing*, 7.2)
         double sum = 0.0;

@@ -79,7 +79,7 @@ private:
     Linear read() {
         continuous_ = plant_.get() == "continuous";
         if (!continuous_ && plant_.get() != "discrete")
-            throw std::invalid_argument("plant=" + plant_.get() + " is neither continuous nor discrete");
+            throw hal::ArgumentError("plant", "plant=" + plant_.get() + " is neither continuous nor discrete");
         const Matrices given(*this, {{"A", "1,0.001;0,1", "n x n: how the states drive each other"},
                                      {"B", "0;0.001", "n x m: how the inputs drive the states; without it there are none"},
                                      {"C", "1,0", "p x n: how the states show in the measurements"},

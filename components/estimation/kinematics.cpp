@@ -112,7 +112,7 @@ private:
     Arm read() {
         if (machine_.get() == "mill") kind_ = Machine::mill;
         else if (machine_.get() == "drive") kind_ = Machine::drive;
-        else if (machine_.get() != "arm") throw std::invalid_argument("machine=" + machine_.get() + " is none of arm mill drive");
+        else if (machine_.get() != "arm") throw hal::ArgumentError("machine", "machine=" + machine_.get() + " is none of arm mill drive");
         const Matrices given(*this, {{"DH", "0.3,0,0,0;0.2,0,0,0",
                                       "a row per joint: a, alpha, d, theta and, for a joint that slides, a 1 behind; m and rad"}});
         Arm            arm;

@@ -163,10 +163,10 @@ private:
         if (plant_.get() == "discrete") p.plant = Plant::discrete;
         else if (plant_.get() == "sampled") p.plant = Plant::sampled;
         else if (plant_.get() != "continuous")
-            throw std::invalid_argument("plant=" + plant_.get() + " is not continuous, sampled or discrete");
+            throw hal::ArgumentError("plant", "plant=" + plant_.get() + " is not continuous, sampled or discrete");
         p.period = period_;
         if (!(p.period > 0.0 && p.period <= 3600.0))
-            throw std::invalid_argument("period= is not between 0 and 3600 s; write the thread's period in s, 0.001 for one of 1 ms");
+            throw hal::ArgumentError("period", "period= is not between 0 and 3600 s; write the thread's period in s, 0.001 for one of 1 ms");
         const Matrices given(*this, {{"A", "0,1;0,0", "n x n: how the states drive each other"},
                                      {"B", "0;1", "n x m: how the inputs drive the states"},
                                      {"Q", "1,0;0,1", "n x n: what states cost; symmetric, not negative"},

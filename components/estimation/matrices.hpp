@@ -22,7 +22,7 @@ struct Given {
     Eigen::MatrixXd value;
     bool            in_file = false;
     std::uint32_t   begin = 0, end = 0;  ///< its name in the file
-    std::string     argument;            ///< NAME=TEXT, when a load argument gave it: a refusal that begins so is shown at its place
+    std::string     argument;            ///< NAME=TEXT, shortened, when a load argument gave it
 };
 
 struct TextProblem {
@@ -206,7 +206,7 @@ public:
             std::string argument = lower(w->name);
             argument.append("=").append(text, 0, whole ? text.size() : 37).append(whole ? "" : "...");
             if (!reader.problems.empty())
-                throw std::invalid_argument(argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
+                throw hal::ArgumentError(lower(w->name), argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
             reader.found[0].argument = argument;
             given_[lower(w->name)] = std::move(reader.found[0]);
         }
@@ -249,7 +249,8 @@ public:
             texts_.say(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
             hal::Texts::refuse();
         }
-        throw std::invalid_argument((given.argument.empty() ? "" : given.argument + ": ") + sentence + "; " + help);
+        if (given.argument.empty()) throw std::invalid_argument(sentence + "; " + help);
+        throw hal::ArgumentError(lower(given.name), given.argument + ": " + sentence + "; " + help);
     }
     [[noreturn]] void refuse(const char* name, const std::string& sentence, const std::string& help) const {
         refuse(at(name), sentence, help);

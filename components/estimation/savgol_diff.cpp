@@ -13,9 +13,9 @@ struct SavgolDiff : hal::Component {
           window(*this, "window", 9, "samples that the polynomial is laid through; odd", {.min = 3, .max = 255}),
           order(*this, "order", 2, "degree of the polynomial", {.min = 1, .max = 6}) {
         if (window % 2 == 0)
-            throw std::invalid_argument("window=" + std::to_string(window) + " is even; take " + std::to_string(window + 1));
+            throw hal::ArgumentError("window", "window=" + std::to_string(window) + " is even; take " + std::to_string(window + 1));
         if (order >= window)
-            throw std::invalid_argument("order=" + std::to_string(order) + " needs a window of at least " +
+            throw hal::ArgumentError("order", "order=" + std::to_string(order) + " needs a window of at least " +
                                         std::to_string((order + 1) | 1));
         design();
         past_.assign(size(), 0.0);

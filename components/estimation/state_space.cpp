@@ -64,7 +64,7 @@ private:
     Model read() {
         const bool continuous = plant.get() == "continuous";
         if (!continuous && plant.get() != "discrete")
-            throw std::invalid_argument("plant=" + plant.get() + " is neither continuous nor discrete");
+            throw hal::ArgumentError("plant", "plant=" + plant.get() + " is neither continuous nor discrete");
         continuous_ = continuous;
         const Matrices given(*this, {{"A", "0,1;-1,-1", "n x n: how the states drive each other"},
                                      {"B", "0;1", "n x m: how the inputs drive the states"},

@@ -20,9 +20,9 @@ struct Config {
         scan = *end == 's' || *end == 'S';
         if (scan) ++end;
         if (*end != '\0' || rows < 1 || columns < 1 || rows > 32 || columns > 32)
-            throw std::invalid_argument("config=" + text + " is not ROWSxCOLUMNS, each 1 to 32, with an s at the end to scan");
+            throw hal::ArgumentError("config", "config=" + text + " is not ROWSxCOLUMNS, each 1 to 32, with an s at the end to scan");
         if (rows * static_cast<long>(std::bit_ceil(static_cast<unsigned long>(columns))) > 64)
-            throw std::invalid_argument("config=" + text + " has more than the 64 keys that a key code can name");
+            throw hal::ArgumentError("config", "config=" + text + " has more than the 64 keys that a key code can name");
     }
     long rows, columns;
     bool scan;

@@ -29,10 +29,10 @@ class Columns {
 public:
     /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too large. [setup]
     Columns(hal::Component& component, const std::string& cfg, std::int64_t depth, bool to_machine, const char* doc) {
-        if (cfg.empty()) throw std::invalid_argument("cfg= is empty: a letter per pin is needed, of b f s u l k");
+        if (cfg.empty()) throw hal::ArgumentError("cfg", "cfg= is empty: a letter per pin is needed, of b f s u l k");
         constexpr std::size_t most_values = std::size_t{1} << 26;  // half a gigabyte
         if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) 
-            throw std::invalid_argument("depth=" + std::to_string(depth) + " records of this cfg need more than 512 MB");
+            throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) + " records of this cfg need more than 512 MB");
         for (const char letter : cfg) add(component, letter, doc);
         values_.resize(static_cast<std::size_t>(depth) * (cfg.size() + 1));
         fifo_.size = sizeof fifo_;

@@ -16,7 +16,7 @@ struct Config {
     std::vector<Label> labels;
 
     explicit Config(const std::string& text) {
-        const auto refuse = [&](const char* why) { throw std::invalid_argument("enums=" + text + " " + why); };
+        const auto refuse = [&](const char* why) { throw hal::ArgumentError("enums", "enums=" + text + " " + why); };
         const char kind = text.empty() ? '\0' : text[0];
         if ((kind != 'D' && kind != 'E') || text.size() < 2 || text[1] != ';') refuse("does not begin with D; (decode) or E; (encode)");
         decode = kind == 'D';

@@ -17,7 +17,7 @@ struct Logic : hal::Component {
 
     explicit Logic(const hal_host* host) : Component(host) {
         if (in.size() < 1 || in.size() > 16)
-            throw std::invalid_argument("personality=" + std::to_string(personality) + " asks for " + std::to_string(in.size()) +
+            throw hal::ArgumentError("personality", "personality=" + std::to_string(personality) + " asks for " + std::to_string(in.size()) +
                                         " inputs; its low byte says 1 to 16");
     }
 

@@ -13,7 +13,7 @@ struct Config {
     std::int64_t ways = 0;
 
     explicit Config(const std::string& text) {
-        const auto refuse = [&](const char* why) { throw std::invalid_argument("config=" + text + " " + why); };
+        const auto refuse = [&](const char* why) { throw hal::ArgumentError("config", "config=" + text + " " + why); };
         std::string digits;
         for (const char c : text) {
             if (c >= '0' && c <= '9') digits += c;

@@ -12,7 +12,7 @@ Encoding encoding_of(const std::string& name) {
     constexpr const char* names[] = {"gray", "binary", "bcd", "single", "index", "edge", "counts"};
     for (std::size_t i = 0; i < std::size(names); ++i)
         if (name == names[i]) return static_cast<Encoding>(i);
-    throw std::invalid_argument("encoding=" + name + " is none of gray, binary, bcd, single, index, edge, counts");
+    throw hal::ArgumentError("encoding", "encoding=" + name + " is none of gray, binary, bcd, single, index, edge, counts");
 }
 
 struct Carousel : hal::Component {

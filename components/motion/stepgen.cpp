@@ -69,7 +69,7 @@ struct Stepgen : hal::Component {
     std::optional<hal::Param<std::uint32_t>> step_space, dir_hold, dir_setup, dir_delay;
 
     explicit Stepgen(const hal_host* host) : Component(host) {
-        if (control.get() != "p" && control.get() != "v") throw std::invalid_argument("ctrl_type=" + control.get() + " is neither p nor v");
+        if (control.get() != "p" && control.get() != "v") throw hal::ArgumentError("ctrl_type", "ctrl_type=" + control.get() + " is neither p nor v");
         const hal::PinOptions<bool> off{.safe = false};
         const hal::PinOptions<std::uint32_t> one{.initial = 1, .unit = "ns"};
         if (type == step_dir) {
@@ -208,12 +208,12 @@ private:
             char* end = nullptr;
             const long state = std::strtol(at, &end, 0);
             if (end == at || (*end != ',' && *end != '\0') || state < 0 || state > 31 || made.length == 10)
-                throw std::invalid_argument("user_step_type=" + user.get() + " is not a list of up to 10 numbers from 0 to 31");
+                throw hal::ArgumentError("user_step_type", "user_step_type=" + user.get() + " is not a list of up to 10 numbers from 0 to 31");
             made.states[static_cast<std::size_t>(made.length++)] = static_cast<std::uint8_t>(state);
             used |= static_cast<unsigned>(state);
             at = *end == ',' ? end + 1 : end;
         }
-        if (used == 0) throw std::invalid_argument("step_type=15 needs user_step_type=");
+        if (used == 0) throw hal::ArgumentError("step_type", "step_type=15 needs user_step_type=");
         while (used >> made.phases != 0) ++made.phases;
         return made;
     }

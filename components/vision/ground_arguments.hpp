@@ -22,10 +22,10 @@ public:
                 "file beside the netlist with points of the ground, u v x y with x forward and y to the left in mm, as of "
                 "vision_homography; in "
                 "place of focal, camera_height, pitch and forward") {
-        if (!(focal_ > 0.0)) throw std::invalid_argument("focal= is not above 0; it is in px, often about the width of the picture");
-        if (!(height_ > 0.0)) throw std::invalid_argument("camera_height= is not above 0; it is in m above the ground");
+        if (!(focal_ > 0.0)) throw hal::ArgumentError("focal", "focal= is not above 0; it is in px, often about the width of the picture");
+        if (!(height_ > 0.0)) throw hal::ArgumentError("camera_height", "camera_height= is not above 0; it is in m above the ground");
         if (!(pitch_ > 0.0 && pitch_ < 1.6))
-            throw std::invalid_argument("pitch= is not above 0 and below 1.6; it is in rad, and the camera looks down: 0 is straight ahead");
+            throw hal::ArgumentError("pitch", "pitch= is not above 0 and below 1.6; it is in rad, and the camera looks down: 0 is straight ahead");
         if (file_.get().empty()) return;
         const std::string text = texts.read("ground", file_.get());
         GroundText        read = read_ground(text);

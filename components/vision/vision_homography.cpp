@@ -29,7 +29,7 @@ private:
         if (!camera_.get().empty()) camera = camera_from(texts, camera_.get());
         const std::string &file = file_.get(), &points = points_.get();
         if (!file.empty() && !points.empty())
-            throw std::invalid_argument("file= and points= are both given; one of them says where the ground is");
+            throw hal::ArgumentError("file", "file= and points= are both given; one of them says where the ground is");
         // a bare loadrt: a ground of a millimetre per pixel, so that the component can be looked at
         const std::string text = !file.empty()    ? texts.read("file", file)
                                  : points.empty() ? "0 0 0 0; 1 0 1 0; 1 1 1 1; 0 1 0 1"
@@ -37,7 +37,7 @@ private:
         GroundText        read = read_ground(text);
         Ground            ground(read, camera);
         if (!read.problems.empty() && file.empty())
-            throw std::invalid_argument("points=" + points + ": " + read.problems.front().sentence + "; " + read.problems.front().help);
+            throw hal::ArgumentError("points", "points=" + points + ": " + read.problems.front().sentence + "; " + read.problems.front().help);
         refuse(texts, file, text, "camera-text", read.problems);
         return ground;
     }

@@ -23,9 +23,9 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     explicit VisionPendulum(const hal_host* host) : CameraComponent(host) {
         for (const auto& [name, value] :
              {std::pair{"focal", double{focal}}, std::pair{"arm_length", double{arm_length}}, std::pair{"rod_length", double{rod_length}}})
-            if (!(value > 0.0)) throw std::invalid_argument(std::string(name) + "= is not above 0");
+            if (!(value > 0.0)) throw hal::ArgumentError(name, std::string(name) + "= is not above 0");
         if (!(distance > arm_length + rod_length))
-            throw std::invalid_argument("distance= is not above arm_length + rod_length: the pendulum would hit the camera");
+            throw hal::ArgumentError("distance", "distance= is not above arm_length + rod_length: the pendulum would hit the camera");
     }
 
     hal::RealArgument focal{*this, "focal", 280.0, "focal length of the camera, px"};

@@ -66,7 +66,7 @@ private:
         if (what == "furuta") of.kind = Kind::furuta;
         else if (what == "floor") of.kind = Kind::floor;
         else if (what == "markers") of.kind = Kind::markers;
-        else throw std::invalid_argument("show=" + what + " is no scene; there are furuta, floor and markers");
+        else throw hal::ArgumentError("show", "show=" + what + " is no scene; there are furuta, floor and markers");
         name_ = camera_.get().empty() ? what : camera_.get();
         of.width = static_cast<int>(width_), of.height = static_cast<int>(height_);
         of.fps = within("fps", fps_, 0.1, 1000.0);
@@ -81,7 +81,7 @@ private:
     }
     static double within(const char* name, double value, double least, double most) {
         if (value >= least && value <= most) return value;
-        throw std::invalid_argument(std::string(name) + "=" + short_text(value) + " is outside " + short_text(least) + " to " +
+        throw hal::ArgumentError(name, std::string(name) + "=" + short_text(value) + " is outside " + short_text(least) + " to " +
                                     short_text(most));
     }
     static std::string short_text(double value) {

@@ -41,6 +41,14 @@ bool is_misspelled(const LoadedComponent& component, const LoadRequest& request,
     return false;
 }
 
+// The invalid bytes of an argument; the whole argument where its text is not NAME=VALUE as the constructor got it.
+Span span_of(const GivenArgument& given, const Failure& why, const Sources& sources) {
+    const std::size_t before = why.name.size() + 1;
+    if (why.begin >= why.end || why.end > given.value.size() || sources.text(given.at) != why.name + "=" + given.value) return given.at;
+    const auto first = static_cast<std::uint32_t>(given.at.begin + before);
+    return {given.at.source, first + why.begin, first + why.end};
+}
+
 // One instance: memory, constructor, declarations into the model.
 bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics,
                    std::unique_ptr<Instance> instance, Construction& c) {
@@ -55,16 +63,18 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     if (!create()) {
         if (c.no_memory) throw std::bad_alloc();
         if (c.said_why && c.failure.empty()) return false;
-        const std::string why = c.failure.empty() ? "it gave no reason" : c.failure;
-        for (const auto& [name, given] : request.arguments)
-            if (why.starts_with(name + "=")) {
-                diagnostics.error("bad-argument", given.at, "component '" + component.name + "': " + why, "",
-                                  "hal doc " + component.name + " lists its arguments");
-                return false;
-            }
+        const Failure& why = c.failure;
+        const auto given = why.subject == HAL_SUBJECT_ARGUMENT ? request.arguments.find(why.name) : request.arguments.end();
+        if (given != request.arguments.end()) {
+            diagnostics.error(Code::named(why.code).value_or(Code("bad-argument")), span_of(given->second, why, sources),
+                              "component '" + component.name + "': " + why.text, "",
+                              why.help.empty() ? "hal doc " + component.name + " lists its arguments" : why.help);
+            return false;
+        }
         if (is_misspelled(component, request, c.asked, diagnostics)) return false;
-        diagnostics.error("construct-failed", request.at,
-                          "component '" + component.name + "' cannot make '" + instance->name + "': " + why);
+        diagnostics.error(Code::named(why.code).value_or(Code("construct-failed")), request.at,
+                          "component '" + component.name + "' cannot make '" + instance->name + "': " +
+                              (why.empty() ? "it gave no reason" : why.text), "", why.help);
         return false;
     }
     instance->constructed = true;
@@ -76,7 +86,7 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     if (c.no_memory) throw std::bad_alloc();
     if (!c.failure.empty()) {
         diagnostics.error("construct-failed", request.at,
-                          "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure);
+                          "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure.text);
         return false;
     }
     std::vector<std::unique_ptr<LoadedFunction>> own;

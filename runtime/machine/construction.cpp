@@ -104,7 +104,17 @@ void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
     return memory;
 }
 void record_failure(const hal_host* host, const char* reason) {
-    guarded(construction_of(host), false, [&] { return refuse(construction_of(host), reason ? reason : ""); });
+    guarded(construction_of(host), false, [&] { return refuse(construction_of(host), std::string(reason ? reason : "")); });
+}
+void record_refusal(const hal_host* host, const hal_refusal* refusal) {
+    Construction& c = construction_of(host);
+    const auto text = [](const char* t) { return t ? t : ""; };
+    guarded(c, false, [&] {
+        if (refusal->size < sizeof *refusal)
+            return refuse(c, "unsupported hal_refusal of " + std::to_string(refusal->size) + " bytes; rebuild the component");
+        return refuse(c, Failure{text(refusal->text), text(refusal->name), text(refusal->code), text(refusal->help), refusal->subject,
+                                 refusal->begin, refusal->end});
+    });
 }
 
 // Names that LinuxCNC makes otherwise than COMPONENT.N.
@@ -119,14 +129,6 @@ void name_instance(const hal_host* host, const char* prefix, unsigned digits) {
         return true;
     });
 }
-constexpr hal_naming naming{sizeof naming, name_instance, [](const hal_host* host) { construction_of(host).whole_function_names = true; },
-                            [](const hal_host* host, const char* argument, uint64_t instances) {
-                                Construction& c = construction_of(host);
-                                guarded(c, false, [&] { return c.lists.insert(argument).second; });
-                                c.list_length = std::max(c.list_length, static_cast<std::size_t>(instances));
-                            },
-                            [](const hal_host* host) { return construction_of(host).instance.name.c_str(); }};
-
 const void* extension_of(const hal_host*, const char* id) {
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
     return std::strcmp(id, HAL_TEXTS) == 0 ? &texts_extension : nullptr;
@@ -134,8 +136,10 @@ const void* extension_of(const hal_host*, const char* id) {
 
 }  // namespace
 
-bool refuse(Construction& c, std::string why) {
-    if (c.failure.empty()) c.failure = std::move(why);
+bool refuse(Construction& c, std::string why) { return refuse(c, Failure{.text = std::move(why)}); }
+
+bool refuse(Construction& c, Failure failure) {
+    if (c.failure.empty()) c.failure = std::move(failure);
     return false;
 }
 
@@ -148,7 +152,7 @@ constexpr hal_naming naming_extension{sizeof naming_extension, name_instance, []
                             [](const hal_host* host) { return construction_of(host).instance.name.c_str(); }};
 
 hal_host host_for(Construction& c) {
-    return {sizeof(hal_host), &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of};
+    return {sizeof(hal_host), &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of, record_refusal};
 }
 
 }  // namespace hal

@@ -27,6 +27,14 @@ struct DeclaredFunction {
     bool shared;
 };
 
+/// Why a constructor fails: hal_refusal with its texts copied. Empty while nothing is known against the instance.
+struct Failure {
+    std::string text = {}, name = {}, code = {}, help = {};
+    hal_subject subject = HAL_SUBJECT_INSTANCE;
+    std::uint32_t begin = 0, end = 0;
+    bool empty() const { return text.empty(); }
+};
+
 /// What one constructor declares while it runs.
 struct Construction {
     Model& model;
@@ -39,7 +47,7 @@ struct Construction {
     std::set<std::string> asked, lists;  // arguments it asked for; those that are per instance
     std::size_t list_length = 0;
     std::vector<std::string> texts;      // keeps what argument() gave
-    std::string failure;
+    Failure failure;
     bool no_memory = false;
     std::string serial = {};             // of an instance that is named after its component
     bool whole_function_names = false;
@@ -59,6 +67,7 @@ hal_host host_for(Construction& construction);
 inline Construction& construction_of(const hal_host* host) { return *static_cast<Construction*>(host->data); }
 /// Notes why the constructor fails, unless it is known already. Returns false.
 bool refuse(Construction& construction, std::string why);
+bool refuse(Construction& construction, Failure failure);
 
 /// Runs an action for a plugin, which must not throw into it: its frames may be C. Without memory it returns `otherwise`.
 template <class Result, class Action>

@@ -19,8 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view other_library = "it was built with another version of ";
-
 /// The structure at `offset` of `content`, if all of it is there.
 template <class T>
 std::optional<T> at(std::string_view content, std::uint64_t offset) {
@@ -94,24 +92,23 @@ void load_own_libraries(const std::vector<std::string>& needed, const std::strin
     }
 }
 
-std::string reason_of_loader(const std::string& why) {
+PluginProblem explain_loader_error(std::string message, const std::string& path) {
+    if (message.starts_with(path + ": ")) message.erase(0, path.size() + 2);
     constexpr std::string_view missing = "undefined symbol: ", kind = "_interface_";  // cmake/HalcyonInterface.cmake
-    const auto symbol = why.find(missing), end = why.find(kind, symbol == why.npos ? 0 : symbol);
-    if (symbol == why.npos || end == why.npos || !std::string_view(why).substr(symbol + missing.size()).starts_with("halcyon_")) return why;
-    const auto name = symbol + missing.size();
-    return std::string(other_library) + "lib" + why.substr(name, end - name) + ".so";
-}
-
-std::string help_for_loader(const std::string& why) {
-    if (why.starts_with(other_library)) return "build it again with this version of Halcyon";
-    if (const auto colon = why.find(": cannot open shared object file"); colon != std::string::npos) {
-        const std::string library = why.substr(0, colon);
-        if (library.starts_with("libhalcyon_")) return "that library belongs to Halcyon and was not installed with it; install again: cmake --install BUILD";
-        return "install the Debian package that has " + library + "; ldd lists all libraries a component needs";
+    const auto symbol = message.find(missing), end = message.find(kind, symbol == message.npos ? 0 : symbol);
+    if (symbol != message.npos && end != message.npos && message.compare(symbol + missing.size(), 8, "halcyon_") == 0) {
+        const auto name = symbol + missing.size();
+        return {"it was built with another version of lib" + message.substr(name, end - name) + ".so",
+                "build it again with this version of Halcyon"};
     }
-    if (why.find("undefined symbol") != std::string::npos)
-        return "link the library that defines it, or rebuild the component and its libraries together";
-    return "rebuild it against this version's hal/component.hpp";
+    if (const auto colon = message.find(": cannot open shared object file"); colon != std::string::npos) {
+        const std::string library = message.substr(0, colon);
+        if (library.starts_with("libhalcyon_"))
+            return {message, "that library belongs to Halcyon and was not installed with it; install again: cmake --install BUILD"};
+        return {message, "install the Debian package that has " + library + "; ldd lists all libraries a component needs"};
+    }
+    if (symbol != message.npos) return {message, "link the library that defines it, or rebuild the component and its libraries together"};
+    return {message};
 }
 
 }  // namespace hal

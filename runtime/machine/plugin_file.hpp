@@ -21,10 +21,13 @@ PluginFile read_plugin_file(const std::string& path);
 /// ignores $ORIGIN in a program with file capabilities. One that is not found is left to the loader.
 void load_own_libraries(const std::vector<std::string>& needed, const std::string& plugin_folder);
 
-/// The loader's sentence, or what it means where it is about a symbol that ties a plugin to a library of its own build.
-std::string reason_of_loader(const std::string& why);
+/// Why a plugin is rejected, and what to do about it.
+struct PluginProblem {
+    std::string why;
+    std::string help = "rebuild it against this version's hal/component.hpp";
+};
 
-/// What to do about a plugin that was rejected with the sentence `why`.
-std::string help_for_loader(const std::string& why);
+/// Explains an error message of dlopen() about the plugin at `path`. The format of these messages is the C library's.
+PluginProblem explain_loader_error(std::string message, const std::string& path);
 
 }  // namespace hal

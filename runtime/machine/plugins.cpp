@@ -135,27 +135,23 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics&
         diagnostics.error("no-such-component", at, "there is no component '" + std::string(name) + "'", did_you_mean(name, available()), "hal doc lists all components");
         return {};
     }
-    const auto bad = [&](const std::string& why) {
-        diagnostics.error("bad-plugin", at, "'" + found + "' is not a usable component: " + why, "", help_for_loader(why));
+    const auto bad = [&](const PluginProblem& problem) {
+        diagnostics.error("bad-plugin", at, "'" + found + "' is not a usable component: " + problem.why, "", problem.help);
         return std::nullopt;
     };
     const PluginFile file = read_plugin_file(found);
-    if (!file.problem.empty()) return bad(file.problem);
+    if (!file.problem.empty()) return bad({file.problem});
     load_own_libraries(file.needed, fs::path(found).parent_path().string());
     std::shared_ptr<void> library = open_copy(found);
     if (!library) {
         void* const direct = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
-        if (!direct) {
-            std::string why = dlerror();
-            if (why.starts_with(found + ": ")) why.erase(0, found.size() + 2);
-            return bad(reason_of_loader(why));
-        }
+        if (!direct) return bad(explain_loader_error(dlerror(), found));
         library = {direct, [](void* handle) { dlclose(handle); }};
     }
     Plugin plugin{nullptr, library, found};
     plugin.component = static_cast<const hal_component*>(dlsym(library.get(), "hal_plugin"));
-    if (!plugin.component) return bad("it exports no symbol hal_plugin, which HAL_COMPONENT(Type, \"name\", \"summary\") makes");
-    if (const std::string why = problem_of(*plugin.component); !why.empty()) return bad(why);
+    if (!plugin.component) return bad({"it exports no symbol hal_plugin, which HAL_COMPONENT(Type, \"name\", \"summary\") makes"});
+    if (const std::string why = problem_of(*plugin.component); !why.empty()) return bad({why});
     return plugin;
 }
 

@@ -100,7 +100,8 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
             if (std::strcmp(id, HAL_WAY) == 0) return &way_host;
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
-        }};
+        },
+        [](const hal_host* h, const hal_refusal* refusal) { static_cast<Starting*>(h->data)->fail(refusal->text ? refusal->text : ""); }};
     {
         const SetupCall call(instance.name, instance.component->name, "start");
         instance.started = instance.component->plugin->start(instance.memory, &host);

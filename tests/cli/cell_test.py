@@ -285,7 +285,7 @@ class Top(Case):
     @unittest.skipUnless(HAVE_DDS, "built without Fast DDS")
     def test_settings_that_are_none_are_named(self):
         for words, said in (("domain=abc", "'domain=abc': write domain=NUMBER, 0 to 232"), ("domain", "'domain': write domain=NUMBER, 0 to 232"),
-                            ("domain=3x", "'domain=3x': write domain=NUMBER, 0 to 232"), ("domain=999", "domain=999 is outside 0 to 232"),
+                            ("domain=3x", "'domain=3x': write domain=NUMBER, 0 to 232"), ("domain=999", "domain=999 is outside 0..232"),
                             ("interface=lo", "'interface=lo' is no setting; the settings are domain= interfaces= "),
                             ("interfaces=nosuch0", "interfaces: this machine has no interface or address 'nosuch0'; it has lo "),
                             ("security=nowhere", "security: there is no folder ")):

@@ -31,7 +31,7 @@ struct CanBridge : hal::Component {
     hal::Function run{*this, "update", &CanBridge::update, "carries what came on each bus since the last cycle to the other"};
 
     void start() {
-        if (a.get() == b.get()) throw std::invalid_argument("a= and b= are one bus, " + a.get() + "; a bridge has two ends");
+        if (a.get() == b.get()) throw hal::ArgumentError("a", "a= and b= are one bus, " + a.get() + "; a bridge has two ends");
         open(ends_[0], a.get());
         open(ends_[1], b.get());
     }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <memory>
@@ -214,29 +215,30 @@ private:
         if (by_index() && file_argument_.get().empty()) {
             reading = config::read(config::ByIndex{inputs_.get(), outputs_.get(), eds_.get().empty() ? "" : texts.find(eds_.get()),
                                                    static_cast<unsigned>(slave_), static_cast<unsigned>(own_id_)});
-            if (!reading.good()) throw std::invalid_argument(first_error(reading));
+            if (!reading.good()) refuse(reading);
             if (reading.config.nodes.size() == 1 && reading.config.nodes[0].pdos.empty())
                 throw std::invalid_argument("no object is named; write inputs=24831 outputs=24675");
             if (const std::string& text = bit_rate_.get(); !text.empty()) {
                 const auto bits = config::rate(text);
-                if (!bits) throw std::invalid_argument("bitrate=" + text + ": '" + text + "' is no bit rate; write 1M, 500k or 125000");
+                if (!bits)
+                    throw hal::ArgumentError("bitrate", "bitrate=" + text + ": '" + text + "' is no bit rate; write 1M, 500k or 125000");
                 reading.config.bit_rate = *bits;
             }
         } else if (!file_argument_.get().empty()) {
             if (by_index())
-                throw std::invalid_argument("slavenodeid= and config= are both given; the configuration says which nodes there are");
+                throw hal::ArgumentError("slavenodeid", "slavenodeid= and config= are both given; the configuration says which nodes there are");
             for (const auto& [argument, name] :
                  {std::pair{&inputs_, "inputs"}, {&outputs_, "outputs"}, {&eds_, "eds"}, {&bit_rate_, "bitrate"}})
                 if (!argument->get().empty())
-                    throw std::invalid_argument(std::string(name) + "=" + argument->get() +
+                    throw hal::ArgumentError(name, std::string(name) + "=" + argument->get() +
                                                 ": the configuration says this; take the argument out, or config=");
             if (own_id_ != 127)
-                throw std::invalid_argument("masternodeid=" + std::to_string(static_cast<unsigned>(own_id_)) +
+                throw hal::ArgumentError("masternodeid", "masternodeid=" + std::to_string(static_cast<unsigned>(own_id_)) +
                                             ": the configuration says this, node-id in [bus]; take the argument out, or config=");
             file_ = texts.find(file_argument_.get());
             std::string text;
             if (!config::read_from_disk(file_, text))
-                throw std::invalid_argument("config=" + file_argument_.get() + ": the file '" + file_ + "' cannot be read: " + text);
+                throw hal::ArgumentError("config", "config=" + file_argument_.get() + ": the file '" + file_ + "' cannot be read: " + text);
             reading = config::read(text, file_);
             if (reading.good() && reading.config.sync != config::SyncMode::cycle) {
                 auto more = config::load_messages(reading.config,
@@ -258,10 +260,12 @@ private:
         config_ = std::move(reading.config);
         if (!link_argument_.get().empty()) config_.link = link_argument_.get();
     }
-    static std::string first_error(const config::Reading& reading) {
-        for (const config::Message& m : reading.messages)
-            if (m.severity == config::Severity::error) return m.sentence + (m.help.empty() ? "" : "; " + m.help);
-        return {};
+    [[noreturn]] static void refuse(const config::Reading& reading) {
+        const auto error = std::find_if(reading.messages.begin(), reading.messages.end(),
+                                        [](const config::Message& m) { return m.severity == config::Severity::error; });
+        const std::string text = error->sentence + (error->help.empty() ? "" : "; " + error->help);
+        if (error->argument.empty()) throw std::invalid_argument(text);
+        throw hal::ArgumentError(error->argument, text);
     }
 
     void follow(Time now) noexcept {

@@ -175,7 +175,7 @@ hal::MessageLog& engine_log() {
 }
 
 DomainParticipantQos participant_qos(const Settings& s) {
-    if (s.domain < 0 || s.domain > 232) refuse("domain=" + std::to_string(s.domain) + " is outside 0 to 232");
+    if (s.domain < 0 || s.domain > 232) refuse("domain=" + std::to_string(s.domain) + " is outside 0..232");
     DomainParticipantQos qos = fastdds::dds::PARTICIPANT_QOS_DEFAULT;
     if (s.profile.empty()) {
         transports(qos, s);

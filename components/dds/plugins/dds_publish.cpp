@@ -19,7 +19,7 @@ using namespace hal::dds;
 class DdsPublish : public hal::Component, private Listener, private Served {
 public:
     explicit DdsPublish(const hal_host* host) : Component(host) {
-        if (!(rate_ >= 0)) throw std::invalid_argument("rate= is below 0; write samples per second, or 0 for every cycle");
+        if (!(rate_ >= 0)) throw hal::ArgumentError("rate", "rate= is below 0; write samples per second, or 0 for every cycle");
     }
 
     void start() {

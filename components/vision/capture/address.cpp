@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "hal/refusal.hpp"
+
 namespace hal::vision {
 namespace {
 std::string plain(double value) {
@@ -19,7 +21,7 @@ std::string plain(double value) {
 Address::Address(std::string_view text) : text_(text) {
     const auto colon = text.find(':');
     if (colon == std::string_view::npos || colon == 0 || colon + 1 == text.size())
-        throw std::invalid_argument("source=" + text_ + " names no source; write v4l2:/dev/video0, frames:FOLDER or sim:SCENE");
+        throw hal::ArgumentError("source", "source=" + text_ + " names no source; write v4l2:/dev/video0, frames:FOLDER or sim:SCENE");
     driver_ = text.substr(0, colon);
     const auto question = text.find('?', colon);
     place_ = text.substr(colon + 1, question == std::string_view::npos ? question : question - colon - 1);
@@ -40,7 +42,7 @@ Address::Option* Address::find(const char* name) {
     Option* found = nullptr;
     for (Option& option : options_) {
         if (option.name != name) continue;
-        if (found) throw std::invalid_argument("source=" + text_ + " has '" + name + "' twice; delete one of them");
+        if (found) throw hal::ArgumentError("source", "source=" + text_ + " has '" + name + "' twice; delete one of them");
         option.asked = true;
         found = &option;
     }
@@ -57,9 +59,9 @@ double Address::number(const char* name, double fallback, double least, double m
     char*        end = nullptr;
     const double value = std::strtod(option->value.c_str(), &end);
     if (option->value.empty() || *end != '\0' || !std::isfinite(value))
-        throw std::invalid_argument("source=" + text_ + ": '" + option->value + "' is not a number; write " + name + "=" + plain(fallback));
+        throw hal::ArgumentError("source", "source=" + text_ + ": '" + option->value + "' is not a number; write " + name + "=" + plain(fallback));
     if (value < least || value > most)
-        throw std::invalid_argument("source=" + text_ + ": " + name + "=" + option->value + " is outside " + plain(least) + " to " +
+        throw hal::ArgumentError("source", "source=" + text_ + ": " + name + "=" + option->value + " is outside " + plain(least) + " to " +
                                     plain(most));
     return value;
 }
@@ -67,7 +69,7 @@ double Address::number(const char* name, double fallback, double least, double m
 int Address::whole(const char* name, int fallback, int least, int most) {
     const double value = number(name, fallback, least, most);
     if (value != std::floor(value))
-        throw std::invalid_argument("source=" + text_ + ": " + name + "=" + plain(value) + " is not a whole number; write " + name + "=" +
+        throw hal::ArgumentError("source", "source=" + text_ + ": " + name + "=" + plain(value) + " is not a whole number; write " + name + "=" +
                                     std::to_string(fallback));
     return static_cast<int>(value);
 }
@@ -76,7 +78,7 @@ bool Address::flag(const char* name) {
     const Option* const option = find(name);
     if (!option) return false;
     if (option->has_value && option->value != "0" && option->value != "1")
-        throw std::invalid_argument("source=" + text_ + ": '" + name + "=" + option->value + "' is neither 0 nor 1; write " + name +
+        throw hal::ArgumentError("source", "source=" + text_ + ": '" + name + "=" + option->value + "' is neither 0 nor 1; write " + name +
                                     " alone");
     return option->value != "0";
 }
@@ -91,7 +93,7 @@ void Address::finish() const {
         if (option.asked) continue;
         std::string names;
         for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-        throw std::invalid_argument("source=" + text_ + ": " + driver_ + ": has no option '" + option.name + "'; it has " +
+        throw hal::ArgumentError("source", "source=" + text_ + ": " + driver_ + ": has no option '" + option.name + "'; it has " +
                                     (names.empty() ? "none" : names));
     }
 }

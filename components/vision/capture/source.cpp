@@ -3,6 +3,8 @@
 
 #include <stdexcept>
 
+#include "hal/refusal.hpp"
+
 namespace hal::vision {
 
 void to_grey(Frame& frame) {
@@ -27,7 +29,7 @@ std::unique_ptr<Source> make_source(const std::string& address, const std::funct
     if (parsed.driver() == "v4l2") return v4l2_source(std::move(parsed));
     if (parsed.driver() == "frames") return frames_source(std::move(parsed), find);
     if (parsed.driver() == "sim") return sim_source(std::move(parsed));
-    throw std::invalid_argument("source=" + address + ": there is no source '" + parsed.driver() +
+    throw hal::ArgumentError("source", "source=" + address + ": there is no source '" + parsed.driver() +
                                 ":'; write v4l2:/dev/video0, frames:FOLDER or sim:SCENE");
 }
 

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "hal/refusal.hpp"
 #include "vision/capture/pnm.hpp"
 
 namespace hal::vision {
@@ -110,7 +111,7 @@ private:
 }  // namespace
 
 std::unique_ptr<Source> frames_source(Address address, const std::function<std::string(const std::string&)>& find) {
-    if (address.place().empty()) throw std::invalid_argument("source=" + address.text() + " names no folder; write frames:FOLDER");
+    if (address.place().empty()) throw hal::ArgumentError("source", "source=" + address.text() + " names no folder; write frames:FOLDER");
     return std::make_unique<Frames>(std::move(address), find);
 }
 

@@ -13,6 +13,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "hal/refusal.hpp"
 #include "vision/capture/v4l2.hpp"
 
 namespace hal::vision {
@@ -74,7 +75,7 @@ public:
         fps_ = given_fps_ = address.number("fps", 30.0, 0.1, 1000.0);
         grey_ = address.flag("grey");
         address.finish();
-        if (device_.empty()) throw std::invalid_argument("source=" + address.text() + " names no camera; write v4l2:/dev/video0");
+        if (device_.empty()) throw hal::ArgumentError("source", "source=" + address.text() + " names no camera; write v4l2:/dev/video0");
     }
     ~V4l2() override { close(); }
 

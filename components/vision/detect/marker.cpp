@@ -12,6 +12,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "hal/refusal.hpp"
+
 #if CV_VERSION_MAJOR != 4 || CV_VERSION_MINOR >= 7
 #error "from OpenCV 4.7 on markers are in objdetect, with another interface; this is for 4.5 and 4.6"
 #endif
@@ -38,7 +40,7 @@ int number_of(const std::string& name) {
         if (name == d.name) return d.number;
         names += std::string(names.empty() ? "" : ", ") + d.name;
     }
-    throw std::invalid_argument("dictionary=" + name + " is unknown; there are " + names);
+    throw hal::ArgumentError("dictionary", "dictionary=" + name + " is unknown; there are " + names);
 }
 
 double degrees(double radians) { return radians * 57.29577951308232; }

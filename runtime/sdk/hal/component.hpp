@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "hal/abi.h"
+#include "hal/refusal.hpp"
 
 namespace hal {
 
@@ -249,9 +250,9 @@ public:
         char* end = nullptr;
         errno = 0;
         value_ = std::strtoll(text.c_str(), &end, 0);
-        if (text.empty() || *end != '\0' || errno != 0) throw std::invalid_argument(std::string(name) + "=" + text + " is not a whole number");
+        if (text.empty() || *end != '\0' || errno != 0) throw ArgumentError(name, std::string(name) + "=" + text + " is not a whole number");
         if (value_ < options.min || value_ > options.max)
-            throw std::invalid_argument(std::string(name) + "=" + text + " is outside " + std::to_string(options.min) + " to " + std::to_string(options.max));
+            throw ArgumentError(name, std::string(name) + "=" + text + " is outside " + std::to_string(options.min) + ".." + std::to_string(options.max));
     }
     operator std::int64_t() const noexcept { return value_; }
 
@@ -285,7 +286,7 @@ public:
         const std::string text = Argument::ask(name, shortest, doc, options);
         char* end = nullptr;
         value_ = std::strtod(text.c_str(), &end);
-        if (text.empty() || *end != '\0' || !std::isfinite(value_)) throw std::invalid_argument(std::string(name) + "=" + text + " is not a number");
+        if (text.empty() || *end != '\0' || !std::isfinite(value_)) throw ArgumentError(name, std::string(name) + "=" + text + " is not a number");
     }
     operator double() const noexcept { return value_; }
 
@@ -383,7 +384,7 @@ public:
 
 private:
     void make(Component& component, const Function* function, const char* name, std::int64_t count, const char* doc, const PinOptions<T>& options, std::int64_t first) {
-        if (count < 0) throw std::invalid_argument(std::string("a negative number of pins ") + name);
+        if (count < 0) throw Refusal(HAL_SUBJECT_PIN, name, std::string("negative number of pins '") + name + "': " + std::to_string(count));
         size_ = static_cast<std::size_t>(count);
         pins_ = static_cast<P*>(detail::creating->allocate(detail::creating, size_ * sizeof(P), alignof(P)));
         if (size_ != 0 && pins_ == nullptr) throw std::bad_alloc();
@@ -424,6 +425,8 @@ bool guarded(const hal_host* host, Action action) noexcept {
     try {
         action();
         return true;
+    } catch (const Refusal& refusal) {
+        refusal.report(host);
     } catch (const std::exception& e) {
         if (*e.what() != '\0') host->fail(host, e.what());
     } catch (...) {

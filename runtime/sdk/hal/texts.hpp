@@ -26,10 +26,10 @@ public:
         const std::string path = find(file);
         std::string text;
         if (!read_regular_file(path, 16 * most, text))
-            throw std::invalid_argument(std::string(argument) + "=" + file + ": the file '" + path + "' cannot be read: " + text);
+            throw ArgumentError(argument, std::string(argument) + "=" + file + ": the file '" + path + "' cannot be read: " + text);
         if (text.size() > most)
-            throw std::invalid_argument(std::string(argument) + "=" + file + ": the file '" + path +
-                                        "' is longer than 64 KiB; is it the right one?");
+            throw ArgumentError(argument, std::string(argument) + "=" + file + ": the file '" + path +
+                                              "' is longer than 64 KiB; is it the right one?");
         return text;
     }
     /// The text the next messages are about. [setup]

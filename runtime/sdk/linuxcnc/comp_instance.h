@@ -61,6 +61,11 @@ typedef struct __comp_context {
 } __comp_context;
 
 static inline bool __comp_fail(const __comp_context *context, const char *reason) { return context->host->fail(context->host, reason), false; }
+static inline bool __comp_refuse(const __comp_context *context, const char *argument, const char *reason) {
+    const hal_refusal refusal = {sizeof refusal, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", reason, ""};
+    if (context->host->size <= HAL_HOST_SIZE_1_1 || !context->host->refuse) return __comp_fail(context, reason);
+    return context->host->refuse(context->host, &refusal), false;
+}
 
 /* A whole number from a load argument. */
 static inline bool __comp_number(const __comp_context *context, const char *name, const char *doc, const char *fallback, int *value) {
@@ -72,7 +77,7 @@ static inline bool __comp_number(const __comp_context *context, const char *name
     const long long read = strtoll(text, &end, 0);
     if (end != text && !*end && !errno && read >= -2147483647 - 1 && read <= 4294967295LL) return *value = (int)read, true;
     snprintf(reason, sizeof reason, "%s=%.100s is not a whole number of 32 bits", name, text);
-    return __comp_fail(context, reason);
+    return __comp_refuse(context, name, reason);
 }
 
 static inline bool __comp_personality(const __comp_context *context, const char *fallback, int *value) {

@@ -62,6 +62,15 @@ static bool refuse(const char *format, ...) {
     return false;
 }
 
+static bool refuse_value(const char *argument, const char *value, const char *why) {
+    char text[2600];
+    snprintf(text, sizeof text, "%s=%s %s", argument, value, why);
+    const hal_refusal refusal = {sizeof refusal, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", text, ""};
+    if (host->size > HAL_HOST_SIZE_1_1 && host->refuse) host->refuse(host, &refusal);
+    else host->fail(host, text);
+    return false;
+}
+
 static bool take_element(const struct halcyon_parameter *p, int index, const char *text) {
     if (p->type == 's') {
         char *const copy = host->allocate(host, strlen(text) + 1, 1);
@@ -73,7 +82,7 @@ static bool take_element(const struct halcyon_parameter *p, int index, const cha
     char *end;
     errno = 0;
     const long value = strtol(text, &end, 0);
-    if (errno != 0 || end == text || *end != '\0' || (p->type == 'i' && value != (int)value)) return refuse("%s=%s is not a whole number", p->name, text);
+    if (errno != 0 || end == text || *end != '\0' || (p->type == 'i' && value != (int)value)) return refuse_value(p->name, text, "is not a whole number");
     if (p->type == 'i') ((int *)p->place)[index] = (int)value;
     else ((long *)p->place)[index] = value;
     return true;
@@ -96,7 +105,11 @@ static bool take_parameter(const struct halcyon_parameter *p) {
     int index = 0;
     for (const char *at = given;; ++index) {
         const char *const comma = strchrnul(at, ',');
-        if (index >= p->most) return refuse("%s=%s has more than %d values", p->name, given, p->most);
+        if (index >= p->most) {
+            char why[40];
+            snprintf(why, sizeof why, "has more than %d values", p->most);
+            return refuse_value(p->name, given, why);
+        }
         char *const element = strndup(at, (size_t)(comma - at));
         const bool good = element ? take_element(p, index, element) : refuse("there is no memory for %s=", p->name);
         free(element);

@@ -26,8 +26,8 @@ void expect_refused(const std::string& component, const char* argument, const ch
 TEST(Catalogue, Refuses_load_arguments_that_make_no_sense) {
     expect_refused("logic", "personality", "0x100", "its low byte says 1 to 16");
     expect_refused("logic", "personality", "0x111", "its low byte says 1 to 16");
-    expect_refused("bitslice", "personality", "33", "outside 1 to 32");
-    expect_refused("lincurve", "personality", "0", "outside 1 to 16");
+    expect_refused("bitslice", "personality", "33", "outside 1..32");
+    expect_refused("lincurve", "personality", "0", "outside 1..16");
     for (const char* config : {"", "f", "ff", "8", "fx8", "ffb8", "ff0", "ff1025", "ff99999"}) expect_refused("mux_generic", "config", config, "config=");
     for (const char* enums : {"", "D", "X;a", "D;", "D;;;"}) expect_refused("enum", "enums", enums, "enums=");
 }

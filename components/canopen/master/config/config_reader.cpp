@@ -458,7 +458,8 @@ Reading read(const ByIndex& wish, const ReadFile& read_file) {
                                 {},
                                 "slavenodeid= and masternodeid= are both " + std::to_string(wish.slave),
                                 "",
-                                "every node on a bus has an id of its own"});
+                                "every node on a bus has an id of its own",
+                                "slavenodeid"});
     std::map<std::pair<std::uint16_t, std::uint8_t>, std::string> names;
     const Catalog                                                 drive("cia402", 1), lines("cia401", 1);
     const auto                                                    take = [&](const std::string& list, bool to_node) {
@@ -477,7 +478,8 @@ Reading read(const ByIndex& wish, const ReadFile& read_file) {
                                         {},
                                         std::string(to_node ? "inputs=" : "outputs=") + list + ": '" + word.text + "' is no object",
                                         "",
-                                        "write its index, INDEX:SUB, or with another length in bits INDEX/16"});
+                                        "write its index, INDEX:SUB, or with another length in bits INDEX/16",
+                                        to_node ? "inputs" : "outputs"});
                 continue;
             }
             const auto        i = static_cast<std::uint16_t>(*index);

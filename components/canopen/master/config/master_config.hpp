@@ -41,6 +41,7 @@ struct Message {
     std::string sentence;  ///< no final stop; names quoted '…'
     std::string label{};   ///< a word under the place; may be empty
     std::string help{};    ///< what to type; may be empty
+    std::string argument{};  ///< the load argument it is about, when no file was read
 };
 
 enum class PinType : std::uint8_t { none, bit, s32, u32, s64, u64, real };

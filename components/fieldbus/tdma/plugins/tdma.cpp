@@ -169,7 +169,7 @@ private:
             return look_at_tunnel();
         }
         if (!stage_2_argument_.get().empty())
-            throw std::invalid_argument("stage2= is of a station that gets its schedule from the master: station=auto");
+            throw hal::ArgumentError("stage2", "stage2= is of a station that gets its schedule from the master: station=auto");
         if (file_argument_.get().empty() && text.empty()) {
             if (!texts.offered()) return;
             throw std::invalid_argument(
@@ -177,12 +177,12 @@ private:
                 "the master sends it one");
         }
         if (!file_argument_.get().empty() && !text.empty())
-            throw std::invalid_argument("config= and schedule= are both given; one of them says who sends when");
+            throw hal::ArgumentError("config", "config= and schedule= are both given; one of them says who sends when");
         std::replace(text.begin(), text.end(), ';', '\n');  // of one that stands in the netlist; in a file it may be in a comment
         if (text.empty()) {
             file = texts.find(file_argument_.get());
             if (!config::read_from_disk(file, text))
-                throw std::invalid_argument("config=" + file_argument_.get() + ": the file '" + file + "' cannot be read: " + text);
+                throw hal::ArgumentError("config", "config=" + file_argument_.get() + ": the file '" + file + "' cannot be read: " + text);
         }
         config::Reading reading = config::read(text);
         if (!texts.offered() && !reading.good()) throw std::invalid_argument(config::to_string(reading, file));
@@ -241,9 +241,9 @@ private:
 
     void look_at_tunnel() const {
         if (tunnel_argument_.get().empty()) return;
-        if (auto problem = wrong_name(tunnel_argument_.get()); !problem.empty()) throw std::invalid_argument("tunnel=" + problem);
+        if (auto problem = wrong_name(tunnel_argument_.get()); !problem.empty()) throw hal::ArgumentError("tunnel", "tunnel=" + problem);
         if (!parse_prefix(netmask_argument_.get()))
-            throw std::invalid_argument("netmask=" + netmask_argument_.get() + " is none; write 24 or 255.255.255.0");
+            throw hal::ArgumentError("netmask", "netmask=" + netmask_argument_.get() + " is none; write 24 or 255.255.255.0");
     }
 
     /// What `tunnel=` asks of the schedule.
@@ -251,7 +251,7 @@ private:
         if (tunnel_argument_.get().empty()) return;
         const auto is_tunnels = [](const SlotSetup& s) { return s.id == tunnel_slot; };
         if (std::none_of(setup_.slots.begin(), setup_.slots.end(), is_tunnels))
-            throw std::invalid_argument("tunnel=" + tunnel_argument_.get() + ": ordinary packets leave in slot 1, and " + entry_->name +
+            throw hal::ArgumentError("tunnel", "tunnel=" + tunnel_argument_.get() + ": ordinary packets leave in slot 1, and " + entry_->name +
                                         " has none; write slot 1 OFFSET into its block of " + file +
                                         "; `hal tdma plan` shows what is free");
     }
