@@ -9,7 +9,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 
 namespace hal::dds {
 namespace {

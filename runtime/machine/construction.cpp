@@ -106,14 +106,14 @@ void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
 void record_failure(const hal_host* host, const char* reason) {
     guarded(construction_of(host), false, [&] { return refuse(construction_of(host), std::string(reason ? reason : "")); });
 }
-void record_refusal(const hal_host* host, const hal_refusal* refusal) {
+void record_rejection(const hal_host* host, const hal_rejection* rejection) {
     Construction& c = construction_of(host);
     const auto text = [](const char* t) { return t ? t : ""; };
     guarded(c, false, [&] {
-        if (refusal->size < sizeof *refusal)
-            return refuse(c, "unsupported hal_refusal of " + std::to_string(refusal->size) + " bytes; rebuild the component");
-        return refuse(c, Failure{text(refusal->text), text(refusal->name), text(refusal->code), text(refusal->help), refusal->subject,
-                                 refusal->begin, refusal->end});
+        if (rejection->size < sizeof *rejection)
+            return refuse(c, "unsupported hal_rejection of " + std::to_string(rejection->size) + " bytes; rebuild the component");
+        return refuse(c, Failure{text(rejection->text), text(rejection->name), text(rejection->code), text(rejection->help), rejection->subject,
+                                 rejection->begin, rejection->end});
     });
 }
 
@@ -152,7 +152,7 @@ constexpr hal_naming naming_extension{sizeof naming_extension, name_instance, []
                             [](const hal_host* host) { return construction_of(host).instance.name.c_str(); }};
 
 hal_host host_for(Construction& c) {
-    return {sizeof(hal_host), &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of, record_refusal};
+    return {sizeof(hal_host), &c, declare_pin, declare_function, give_argument, allocate, record_failure, extension_of, record_rejection};
 }
 
 }  // namespace hal

@@ -27,7 +27,7 @@ struct DeclaredFunction {
     bool shared;
 };
 
-/// Why a constructor fails: hal_refusal with its texts copied. Empty while nothing is known against the instance.
+/// Why a constructor fails: hal_rejection with its texts copied. Empty while nothing is known against the instance.
 struct Failure {
     std::string text = {}, name = {}, code = {}, help = {};
     hal_subject subject = HAL_SUBJECT_INSTANCE;

@@ -64,7 +64,7 @@ void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
 }
 
 void take_failure(const hal_host* host, const char* reason) { of(host).failure = text(reason); }
-void take_refusal(const hal_host* host, const hal_refusal* refusal) { take_failure(host, refusal->text); }
+void take_rejection(const hal_host* host, const hal_rejection* rejection) { take_failure(host, rejection->text); }
 const void* no_extension(const hal_host*, const char*) { return nullptr; }
 
 }  // namespace
@@ -85,7 +85,7 @@ bool gather(const hal_component& component, Declared& page, std::string& problem
     page.whole_names = component.flags & HAL_COMPONENT_WHOLE_NAMES;
     page.default_count = component.default_count;
     Gathering gathering{page, {}, {}, {}};
-    const hal_host host{sizeof host, &gathering, take_pin, take_function, take_argument, allocate, take_failure, no_extension, take_refusal};
+    const hal_host host{sizeof host, &gathering, take_pin, take_function, take_argument, allocate, take_failure, no_extension, take_rejection};
     const std::align_val_t align{component.instance_align};
     const auto release = [align](void* memory) { ::operator delete(memory, align); };
     const std::unique_ptr<void, decltype(release)> memory(::operator new(component.instance_size, align), release);

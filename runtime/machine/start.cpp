@@ -101,7 +101,7 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
         },
-        [](const hal_host* h, const hal_refusal* refusal) { static_cast<Starting*>(h->data)->fail(refusal->text ? refusal->text : ""); }};
+        [](const hal_host* h, const hal_rejection* rejection) { static_cast<Starting*>(h->data)->fail(rejection->text ? rejection->text : ""); }};
     {
         const SetupCall call(instance.name, instance.component->name, "start");
         instance.started = instance.component->plugin->start(instance.memory, &host);

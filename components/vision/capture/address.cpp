@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 
 namespace hal::vision {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 
 namespace hal::vision {
 

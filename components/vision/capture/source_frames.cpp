@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 #include "vision/capture/pnm.hpp"
 
 namespace hal::vision {

@@ -13,7 +13,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 #include "vision/capture/v4l2.hpp"
 
 namespace hal::vision {

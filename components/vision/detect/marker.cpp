@@ -12,7 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 
 #if CV_VERSION_MAJOR != 4 || CV_VERSION_MINOR >= 7
 #error "from OpenCV 4.7 on markers are in objdetect, with another interface; this is for 4.5 and 4.6"

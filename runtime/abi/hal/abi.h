@@ -128,11 +128,11 @@ typedef struct hal_argument_decl {
     const char *fallback; /* text of the default */
 } hal_argument_decl;
 
-/* What a refusal is about. */
+/* What a rejection is about. */
 typedef enum hal_subject { HAL_SUBJECT_INSTANCE, HAL_SUBJECT_ARGUMENT, HAL_SUBJECT_PIN } hal_subject;
 
 /* Since 1.2: why create or start returns false. The host copies all texts; it reads only as many bytes as `size` says. */
-typedef struct hal_refusal {
+typedef struct hal_rejection {
     uint32_t size;
     hal_subject subject;
     const char *name;    /* of the argument, or of the pin below the instance's name; "" for the instance */
@@ -140,7 +140,7 @@ typedef struct hal_refusal {
     const char *code;    /* a code that `hal explain` knows; "" leaves the choice to the host */
     const char *text;    /* one sentence without a final full stop that includes the invalid value */
     const char *help;    /* what to type, or "" */
-} hal_refusal;
+} hal_rejection;
 
 /* What the host offers while an instance is created and started: all [setup]. */
 typedef struct hal_host {
@@ -152,12 +152,12 @@ typedef struct hal_host {
     void *(*allocate)(const struct hal_host *, size_t bytes, size_t align); /* zeroed, lives as long as the instance */
     void (*fail)(const struct hal_host *, const char *reason);              /* why create or start will return false */
     const void *(*extension)(const struct hal_host *, const char *id);      /* NULL when the host has none */
-    /* Since 1.2: like fail(), with the cause typed. The first call of fail() or refuse() counts. A host that is older has a smaller `size`:
+    /* Since 1.2: like fail(), with the cause typed. The first call of fail() or reject() counts. A host that is older has a smaller `size`:
      * a plugin then passes the text to fail(). A plugin that is older calls fail() only: the host reports its reason for the instance. */
-    void (*refuse)(const struct hal_host *, const hal_refusal *);
+    void (*reject)(const struct hal_host *, const hal_rejection *);
 } hal_host;
 
-#define HAL_HOST_SIZE_1_1 offsetof(hal_host, refuse)
+#define HAL_HOST_SIZE_1_1 offsetof(hal_host, reject)
 
 enum {
     HAL_COMPONENT_SINGLETON = 1, /* one instance, named like the component without a number */

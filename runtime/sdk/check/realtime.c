@@ -194,7 +194,7 @@ static void take_failure(const hal_host *host, const char *reason) {
     (void)host;
     printf("%s: %s\n", strcmp(phase, "start()") == 0 ? "start fails" : "refused", reason);
 }
-static void take_refusal(const hal_host *host, const hal_refusal *refusal) { take_failure(host, refusal->text); }
+static void take_rejection(const hal_host *host, const hal_rejection *rejection) { take_failure(host, rejection->text); }
 static const void *no_extension(const hal_host *host, const char *id) { return (void)host, (void)id, NULL; }
 
 /* --- values ------------------------------------------------------------------------------------------------------------- */
@@ -280,7 +280,7 @@ int main(int argc, char **argv) {
     arguments_given = argv + 2;
     argument_count = argc - 2;
     for (int number = 0; number < 6; ++number) signal((const int[]){SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGALRM, SIGABRT}[number], ended);
-    const hal_host host = {sizeof host, NULL, take_pin, take_function, give_argument, allocate, take_failure, no_extension, take_refusal};
+    const hal_host host = {sizeof host, NULL, take_pin, take_function, give_argument, allocate, take_failure, no_extension, take_rejection};
     void *const instance = allocate(&host, component->instance_size, component->instance_align);
     alarm(10);
     if (!component->create(&host, instance)) return fflush(stdout), 3;

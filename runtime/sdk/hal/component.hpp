@@ -22,7 +22,7 @@
 #include <utility>
 
 #include "hal/abi.h"
-#include "hal/refusal.hpp"
+#include "hal/rejection.hpp"
 
 namespace hal {
 
@@ -384,7 +384,7 @@ public:
 
 private:
     void make(Component& component, const Function* function, const char* name, std::int64_t count, const char* doc, const PinOptions<T>& options, std::int64_t first) {
-        if (count < 0) throw Refusal(HAL_SUBJECT_PIN, name, std::string("negative number of pins '") + name + "': " + std::to_string(count));
+        if (count < 0) throw Rejection(HAL_SUBJECT_PIN, name, std::string("negative number of pins '") + name + "': " + std::to_string(count));
         size_ = static_cast<std::size_t>(count);
         pins_ = static_cast<P*>(detail::creating->allocate(detail::creating, size_ * sizeof(P), alignof(P)));
         if (size_ != 0 && pins_ == nullptr) throw std::bad_alloc();
@@ -425,8 +425,8 @@ bool guarded(const hal_host* host, Action action) noexcept {
     try {
         action();
         return true;
-    } catch (const Refusal& refusal) {
-        refusal.report(host);
+    } catch (const Rejection& rejection) {
+        rejection.report(host);
     } catch (const std::exception& e) {
         if (*e.what() != '\0') host->fail(host, e.what());
     } catch (...) {

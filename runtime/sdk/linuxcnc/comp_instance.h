@@ -62,9 +62,9 @@ typedef struct __comp_context {
 
 static inline bool __comp_fail(const __comp_context *context, const char *reason) { return context->host->fail(context->host, reason), false; }
 static inline bool __comp_refuse(const __comp_context *context, const char *argument, const char *reason) {
-    const hal_refusal refusal = {sizeof refusal, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", reason, ""};
-    if (context->host->size <= HAL_HOST_SIZE_1_1 || !context->host->refuse) return __comp_fail(context, reason);
-    return context->host->refuse(context->host, &refusal), false;
+    const hal_rejection rejection = {sizeof rejection, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", reason, ""};
+    if (context->host->size <= HAL_HOST_SIZE_1_1 || !context->host->reject) return __comp_fail(context, reason);
+    return context->host->reject(context->host, &rejection), false;
 }
 
 /* A whole number from a load argument. */

@@ -65,8 +65,8 @@ static bool refuse(const char *format, ...) {
 static bool refuse_value(const char *argument, const char *value, const char *why) {
     char text[2600];
     snprintf(text, sizeof text, "%s=%s %s", argument, value, why);
-    const hal_refusal refusal = {sizeof refusal, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", text, ""};
-    if (host->size > HAL_HOST_SIZE_1_1 && host->refuse) host->refuse(host, &refusal);
+    const hal_rejection rejection = {sizeof rejection, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", text, ""};
+    if (host->size > HAL_HOST_SIZE_1_1 && host->reject) host->reject(host, &rejection);
     else host->fail(host, text);
     return false;
 }
