@@ -93,7 +93,7 @@ private:
 
 [[noreturn]] void slave(const char* address) {
     Events events;
-    Device device(served(), {.node_id = node, .start_by_itself = true, .sdo = {.timeout = 5 * second}}, events);
+    Device device(served(), {.node_id = node, .auto_start = true, .sdo = {.timeout = 5 * second}}, events);
     Port port(address, {{0x080, 0x7ff, false}, {0x200U + node, 0x7ff, false}, {0x600U + node, 0x7ff, false}, {0x000, 0x7ff, false}});
     device.start(now());
     for (;;) {
@@ -122,7 +122,7 @@ struct Master {
             if (!r.done()) port.take(second, [&](const Frame& f, Time at) { network.handle(f, at); });
         }
         port.send(out, now());
-        if (!r.ok()) fail(word(r.abort));
+        if (!r.ok()) fail(to_string(r.abort));
     }
     void expedited(bool upload, unsigned count) {
         std::uint8_t bytes[4] = {1, 2, 3, 4};
@@ -153,7 +153,7 @@ struct Master {
 
 void synchronous(const char* address, unsigned count) {
     Arrivals events;
-    Device device(commanding(), {.node_id = 1, .start_by_itself = true, .obeys_nmt = false}, events);
+    Device device(commanding(), {.node_id = 1, .auto_start = true, .nmt_slave = false}, events);
     Port port(address, {{0x180U + node, 0x7ff, false}});
     device.start(now());
     device.poll(now());
@@ -181,7 +181,7 @@ void synchronous(const char* address, unsigned count) {
 
 void receive(const char* address, std::uint64_t count) {
     Arrivals events;
-    Device device(commanding(), {.node_id = 1, .start_by_itself = true, .obeys_nmt = false}, events);
+    Device device(commanding(), {.node_id = 1, .auto_start = true, .nmt_slave = false}, events);
     Port port(address, {{0x180U + node, 0x7ff, false}});
     device.start(now());
     const Time used = cpu();
@@ -224,7 +224,7 @@ void memory(unsigned part, bool on_bus) {
             device.poll(t);
             carry(device.out(), *there.link, *here.link, [&](const Frame& f) { network.handle(f, t); });
         }
-        if (!r.ok()) fail(word(r.abort));
+        if (!r.ok()) fail(to_string(r.abort));
     };
     const std::string kind = on_bus ? "sim_" : "memory_";
     const auto rate = [&](const char* name, std::size_t size, bool upload, SdoMode mode, unsigned count) {

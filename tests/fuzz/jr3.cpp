@@ -66,7 +66,7 @@ void node(std::span<const std::uint8_t> bytes) {
     Jr3Settings settings;
     settings.recording.assign(bytes.begin(), bytes.end());
     Jr3 jr3(std::move(settings));
-    auto& device = jr3.make({.node_id = 0x50, .queue = 64, .start_by_itself = true});
+    auto& device = jr3.make({.node_id = 0x50, .queue = 64, .auto_start = true});
     jr3.attach(device);
     jr3.boot(0);
     for (Time now = 0; now < 50 * millisecond; now += millisecond) {

@@ -97,7 +97,7 @@ int client(const char* address, std::uint8_t id) {
                 port.turn(out, [&](const Frame& f, Time now) { network.handle(f, now); });
             }
             if (r.abort != Abort::none) {
-                std::printf("abort %08x %s\n", static_cast<unsigned>(r.abort), word(r.abort));
+                std::printf("abort %08x %s\n", static_cast<unsigned>(r.abort), to_string(r.abort));
             } else {
                 std::printf("ok ");
                 for (std::size_t n = 0; r.upload && n < r.size; ++n) std::printf("%02x", room[n]);
@@ -112,7 +112,7 @@ int client(const char* address, std::uint8_t id) {
 struct Teller : MasterEvents {
     const NodeSetup* setup = nullptr;
     void on_step(const NodeStatus& s) noexcept override {
-        std::printf("%s %s\n", word(s.step), setup != nullptr ? sentence(*setup, s).c_str() : "");
+        std::printf("%s %s\n", to_string(s.step), setup != nullptr ? sentence(*setup, s).c_str() : "");
         std::fflush(stdout);
     }
 };

@@ -60,7 +60,7 @@ public:
         auto opened = can::open(address_.get());
         if (!opened) throw std::runtime_error(opened.problem);
         node_ = std::make_unique<Node>(program(), std::move(opened.link),
-                                       DeviceSettings{.node_id = static_cast<std::uint8_t>(id_), .start_by_itself = itself_ != 0});
+                                       DeviceSettings{.node_id = static_cast<std::uint8_t>(id_), .auto_start = itself_ != 0});
     }
     void stop() noexcept { node_.reset(); }
 

@@ -35,7 +35,7 @@ void Node::watch_bus(Time now) noexcept {
     if (off == bus_off_) return;
     bus_off_ = off;
     if (off) device_.bus_off(now);
-    else device_.bus_back();
+    else device_.bus_recovered();
 }
 
 void Node::turn(Time now, std::int64_t link_now) noexcept {

@@ -49,7 +49,7 @@ struct FaultWords {
         suspected = who + " sends more heartbeats than it should: two devices may have this node-id";
         for (char letter = 'A'; letter <= 'O'; ++letter)
             boot[static_cast<std::size_t>(letter - 'A')] =
-                who + " cannot be booted: " + word(static_cast<BootResult>(letter)) + " (result " + letter + ")";
+                who + " cannot be booted: " + to_string(static_cast<BootResult>(letter)) + " (result " + letter + ")";
     }
 };
 
@@ -360,7 +360,7 @@ private:
         if (f.begins && f.rpdo) raise("another device sends the RPDO {x} of a node of this master; the node obeys both", f.id);
         reporter_->foreign(f);
     }
-    void on_own_id_taken() noexcept override { raise(own_id_words_.c_str(), not_a_number); }
+    void on_own_id_collision() noexcept override { raise(own_id_words_.c_str(), not_a_number); }
     void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override { raise(safety_->words(place, fault), not_a_number); }
     void on_bus_state(hal::can::State state) noexcept override {
         if (state == hal::can::State::bus_off)

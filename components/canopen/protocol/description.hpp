@@ -68,7 +68,7 @@ constexpr std::uint32_t map_entry(std::uint16_t index, std::uint8_t sub, unsigne
 }
 
 /// What stands in the count of a mapping when the PDO is a multiplexed one: each frame names the object whose value it carries.
-enum class Multiplex : std::uint8_t { none = 0, from_source = 0xfe, to_destination = 0xff };
+enum class Multiplex : std::uint8_t { none = 0, source_address = 0xfe, destination_address = 0xff };
 
 /// Communication and mapping parameters of one PDO.
 struct PdoDescription {

@@ -70,7 +70,7 @@ void Device::reset_communication(Time now) noexcept {
     if (!usable(node_id_)) return;
     error_control_.boot(now);
     enter(NmtState::pre_operational, now);
-    if (settings_.start_by_itself) enter(NmtState::operational, now);
+    if (settings_.auto_start) enter(NmtState::operational, now);
 }
 
 void Device::configure_channel(std::uint16_t index) noexcept {
@@ -151,7 +151,7 @@ void Device::handle(const Frame& f, Time now) noexcept {
     if (!started_ || f.error || f.fd) return;
     now_ = now;
     if (f.id == 0 && !f.extended) {
-        if (f.remote || f.length != 2 || !settings_.obeys_nmt || !usable(node_id_)) return;
+        if (f.remote || f.length != 2 || !settings_.nmt_slave || !usable(node_id_)) return;
         if (f.data[1] == 0 || f.data[1] == node_id_) command(static_cast<NmtCommand>(f.data[0]), now);
         return;
     }

@@ -30,8 +30,8 @@ namespace hal::canopen {
 struct DeviceSettings {
     std::uint8_t node_id = unconfigured;  ///< 1–127; unconfigured: waits for an LSS master
     std::size_t queue = 1024;             ///< frames on their way out
-    bool start_by_itself = false;         ///< becomes operational after boot-up without being told
-    bool obeys_nmt = true;                ///< false: it is the NMT master
+    bool auto_start = false;         ///< becomes operational after boot-up without being told
+    bool nmt_slave = true;                ///< false: it is the NMT master
     bool lss = true;
     SdoServerSettings sdo{};
     SdoClientSettings sdo_client{};
@@ -54,7 +54,7 @@ public:
     void command(NmtCommand, Time now) noexcept;
     /// The bus went off: errors are handled as 1029h says. [realtime]
     void bus_off(Time now) noexcept { communication_error(0x8140, 0, now); }
-    void bus_back() noexcept { emcy_.clear(0x8140); }
+    void bus_recovered() noexcept { emcy_.clear(0x8140); }
     /// The master's thread produces the SYNC itself: as if one had come. False: not the producer, or no room. [realtime]
     bool produce_sync(Time now) noexcept;
 

@@ -97,7 +97,7 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
         Entry e;
         e.index = from->index, e.sub = from->sub, e.access = from->access, e.type = from->type;
         if (const auto standard = standard_type(e.index, e.sub); standard != Type::none && standard != e.type) {
-            complain(*from, (std::string("its type is ") + word(standard)).c_str());
+            complain(*from, (std::string("its type is ") + to_string(standard)).c_str());
             e.type = standard;
         }
         e.bits = static_cast<std::uint8_t>(bits_of(e.type));

@@ -7,7 +7,7 @@
 
 namespace hal::canopen {
 
-const char* emergency_word(std::uint16_t code) noexcept { return cia402::error_class_word(code); }
+const char* emergency_text(std::uint16_t code) noexcept { return cia402::error_class_word(code); }
 
 Emcy::Emcy(Dictionary& dictionary, FrameQueue& out) : dictionary_(dictionary), out_(out), history_(dictionary.object(0x1003)) {
     for (const int index : {0x1003, 0x1014, 0x1015}) dictionary.handle(static_cast<std::uint16_t>(index), *this);

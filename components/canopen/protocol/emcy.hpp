@@ -17,7 +17,7 @@ enum ErrorRegister : std::uint8_t {
     error_profile = 0x20, error_manufacturer = 0x80,
 };
 /// The error code in words: its class, or "error reset or no error". [any]
-const char* emergency_word(std::uint16_t code) noexcept;
+const char* emergency_text(std::uint16_t code) noexcept;
 
 class Emcy final : public Handler {
 public:

@@ -5,7 +5,7 @@
 
 namespace hal::canopen {
 
-const char* word(Type type) noexcept {
+const char* to_string(Type type) noexcept {
     switch (type) {
     case Type::none: return "";
     case Type::boolean: return "BOOLEAN";
@@ -37,7 +37,7 @@ const char* word(Type type) noexcept {
     return "";
 }
 
-const char* word(Abort code) noexcept {
+const char* to_string(Abort code) noexcept {
     switch (code) {
     case Abort::none: return "no error";
     case Abort::toggle: return "toggle bit not alternated";
@@ -75,7 +75,7 @@ const char* word(Abort code) noexcept {
     return "unknown abort code";
 }
 
-const char* word(NmtState state) noexcept {
+const char* to_string(NmtState state) noexcept {
     switch (state) {
     case NmtState::initialising: return "initialising";
     case NmtState::stopped: return "stopped";

@@ -52,7 +52,7 @@ constexpr bool is_signed(Type type) noexcept {
 }
 constexpr bool is_real(Type type) noexcept { return type == Type::real32 || type == Type::real64; }
 /// "UNSIGNED16", …, or "" for none that is known. [any]
-const char* word(Type) noexcept;
+const char* to_string(Type) noexcept;
 
 enum class Access : std::uint8_t { read_write, read_only, write_only, constant };
 constexpr bool readable(Access access) noexcept { return access != Access::write_only; }
@@ -71,10 +71,10 @@ enum class Abort : std::uint32_t {
     no_data = 0x08000024,
 };
 /// The abort in words; "unknown abort code" for one that is not in the table. [any]
-const char* word(Abort) noexcept;
+const char* to_string(Abort) noexcept;
 
 enum class NmtState : std::uint8_t { initialising = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7f };
-const char* word(NmtState) noexcept;
+const char* to_string(NmtState) noexcept;
 enum class NmtCommand : std::uint8_t {
     start = 0x01, stop = 0x02, enter_pre_operational = 0x80, reset_node = 0x81, reset_communication = 0x82,
 };

@@ -75,7 +75,7 @@ void Pdos::read_communication(Tpdo& p) noexcept {
 Abort Pdos::read_mapping(Pdo& p, bool received) noexcept {
     const auto index = static_cast<std::uint16_t>((received ? rpdo_base : tpdo_base) + mapping_offset + p.number - 1);
     const auto count = dictionary_.get<std::uint8_t>(index, 0, 0);
-    p.kind = count == 0xff ? Kind::to_destination : count == 0xfe ? Kind::from_source : Kind::plain;
+    p.kind = count == 0xff ? Kind::destination_address : count == 0xfe ? Kind::source_address : Kind::plain;
     p.mapping.clear();
     if (p.kind != Kind::plain) return Abort::none;
     std::array<std::uint32_t, 64> entries{};
@@ -280,7 +280,7 @@ bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
         return e != nullptr && e->rpdo && e->size <= 4 && dictionary_.write(to, to_sub, {f.data.data() + 4, e->size}) == Abort::none;
     };
     if (addressed) {
-        if (p.kind != Kind::to_destination) return false;
+        if (p.kind != Kind::destination_address) return false;
         if (node != 0 && node != node_id_) return true;
         if (!write(index, sub)) {
             emcy_.raise(0x8230, error_communication, {f.data[1], f.data[2], f.data[3]});
@@ -288,7 +288,7 @@ bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
         }
         emcy_.clear(0x8230);
     } else {
-        if (p.kind != Kind::from_source) return false;
+        if (p.kind != Kind::source_address) return false;
         // 1FD0h–1FFFh: block size, own object, and node and object of the producer, from the highest byte down.
         bool found = false;
         for (unsigned list = 0x1fd0; list <= 0x1fff && !found; ++list) {
@@ -412,7 +412,7 @@ void Pdos::poll(Time now) noexcept {
     if (!operational_) return;
     for (auto& p : tpdos_) {
         if (p.held) continue;
-        if (p.valid() && p.kind == Kind::from_source && event_driven(p.transmission)) scan(p, now);
+        if (p.valid() && p.kind == Kind::source_address && event_driven(p.transmission)) scan(p, now);
         if (!p.valid() || p.kind != Kind::plain) continue;
         if (p.again && synchronous(p.transmission)) {
             if (window_ != 0 && now - synced_ > window_) p.again = false;
@@ -435,7 +435,7 @@ void Pdos::poll(Time now) noexcept {
 
 bool Pdos::send_to(unsigned number, std::uint8_t destination, std::uint16_t index, std::uint8_t sub, std::uint32_t value) noexcept {
     auto* p = find_tpdo(number);
-    if (p == nullptr || !p->valid() || !operational_ || p->kind != Kind::to_destination) return false;
+    if (p == nullptr || !p->valid() || !operational_ || p->kind != Kind::destination_address) return false;
     Frame f = make_frame(p->cob, 8);
     f.data[0] = static_cast<std::uint8_t>(0x80 | (destination & 0x7f));
     store(f.data.data() + 1, index);
@@ -449,7 +449,7 @@ bool Pdos::send_to(unsigned number, std::uint8_t destination, std::uint16_t inde
 bool Pdos::send_from(unsigned number, std::uint16_t index, std::uint8_t sub) noexcept {
     auto* p = find_tpdo(number);
     const Entry* e = dictionary_.find(index, sub);
-    if (p == nullptr || e == nullptr || !p->valid() || !operational_ || p->kind != Kind::from_source || !e->tpdo || e->size > 4)
+    if (p == nullptr || e == nullptr || !p->valid() || !operational_ || p->kind != Kind::source_address || !e->tpdo || e->size > 4)
         return false;
     Frame f = make_frame(p->cob, 8);
     f.data[0] = node_id_;

@@ -65,7 +65,7 @@ public:
     void written(Entry&) noexcept override;
 
 private:
-    enum class Kind : std::uint8_t { plain, to_destination, from_source };
+    enum class Kind : std::uint8_t { plain, destination_address, source_address };
     struct Pdo {
         std::uint16_t number = 0;
         Kind kind = Kind::plain;

@@ -18,7 +18,7 @@ void SdoClient::configure(std::uint32_t request_cob, std::uint32_t answer_cob) n
 bool SdoClient::submit(SdoRequest& request) noexcept {
     if (request.status == SdoRequest::Status::waiting || request.status == SdoRequest::Status::active) return false;
     request.status = SdoRequest::Status::waiting;
-    request.abort = Abort::none, request.aborted_there = request.unsent = false;
+    request.abort = Abort::none, request.aborted_by_server = request.unsent = false;
     request.size = 0, request.retries = 0, request.next = nullptr;
     (first_ == nullptr ? first_ : last_->next) = &request;
     last_ = &request;
@@ -57,7 +57,7 @@ void SdoClient::finish(Abort why, bool there) noexcept {
     state_ = State::idle;
     pending_ = false;
     request.next = nullptr;
-    request.abort = why, request.aborted_there = there;
+    request.abort = why, request.aborted_by_server = there;
     request.size = offset_;
     request.status = SdoRequest::Status::done;
     if (request.on_done != nullptr) request.on_done(request, request.context);

@@ -36,7 +36,7 @@ struct SdoRequest {
     enum class Status : std::uint8_t { fresh, waiting, active, done };
     Status status = Status::fresh;
     Abort abort = Abort::none;     ///< none: it worked
-    bool aborted_there = false;    ///< the server refused; otherwise the client gave up
+    bool aborted_by_server = false;    ///< the server refused; otherwise the client gave up
     bool unsent = false;           ///< it gave up because there was no room to send for all of its patience: the bus takes no frames
     std::size_t size = 0;          ///< bytes through
     unsigned retries = 0;          ///< frames sent again and transfers begun again

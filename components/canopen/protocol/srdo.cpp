@@ -14,7 +14,7 @@ constexpr std::uint64_t ones(unsigned bits) noexcept { return bits >= 64 ? ~std:
 std::uint64_t data_of(const Frame& f) noexcept { return load<std::uint64_t>(f.data.data()); }
 }  // namespace
 
-const char* word(SrdoFault fault) noexcept {
+const char* to_string(SrdoFault fault) noexcept {
     switch (fault) {
     case SrdoFault::none: return "it is in order";
     case SrdoFault::late: return "it did not come within its SCT";
@@ -179,7 +179,7 @@ bool Srdos::trigger(unsigned number) noexcept {
     return s != nullptr && s->direction == SrdoDirection::sends && (s->now = true);
 }
 
-void Srdos::invert_here(unsigned number) noexcept {
+void Srdos::derive_inverted(unsigned number) noexcept {
     if (auto* s = find(number); s != nullptr) s->derived = true;
 }
 

@@ -34,7 +34,7 @@ enum class SrdoFault : std::uint8_t {
     own_data,    ///< a sender: the two objects of a pair are not complementary; nothing is sent
 };
 /// As a part of a sentence: "its second frame is not the first one inverted". [any]
-const char* word(SrdoFault) noexcept;
+const char* to_string(SrdoFault) noexcept;
 
 /// All calls come from poll() or handle(). [realtime]
 class SafetyEvents {
@@ -70,14 +70,14 @@ public:
     /// A sent SRDO goes out at once, not when it is next due. False: there is no such one. [realtime]
     bool trigger(unsigned number) noexcept;
     /// The second frame is made of the first one; the mapping has no inverted objects that mean something. [setup]
-    void invert_here(unsigned number) noexcept;
+    void derive_inverted(unsigned number) noexcept;
     /// The global fail-safe command, if 1300h allows it. [realtime]
     bool send_fail_safe() noexcept;
 
     struct Status {
         bool exists = false;
         bool active = false;    ///< the configuration is valid and the node operational
-        bool believed = false;  ///< received, no fault, and at least one came
+        bool valid = false;     ///< received, no fault, and at least one came
         SrdoDirection direction = SrdoDirection::none;
         SrdoFault fault = SrdoFault::none;
         std::uint64_t count = 0;  ///< sent, or received and believed

@@ -15,8 +15,8 @@ namespace hal::canopen::test {
 
 /// A device with a plug: without power it neither hears nor sends. What it sends can be changed, dropped or delayed.
 struct Station : Recorder {
-    Station(std::uint8_t id, const Description& d, bool start_by_itself = false)
-        : device(d, {.node_id = id, .queue = 256, .start_by_itself = start_by_itself}, *this) {}
+    Station(std::uint8_t id, const Description& d, bool auto_start = false)
+        : device(d, {.node_id = id, .queue = 256, .auto_start = auto_start}, *this) {}
 
     void plug(bool in, Time now) {
         if (in == powered) return;
@@ -73,7 +73,7 @@ struct Spoil : Handler {
 struct Bed : MasterEvents {
     explicit Bed(MasterSetup s) : setup(std::move(s)) {
         own = std::make_unique<Device>(basic_device({.vendor = 1, .heartbeat_ms = 50}),
-                                       DeviceSettings{.node_id = setup.id, .obeys_nmt = false}, own_events);
+                                       DeviceSettings{.node_id = setup.id, .nmt_slave = false}, own_events);
         master = std::make_unique<Master>(setup, own->out(), *this);
         bus.attach(own->out(), [this](const Frame& f, Time t) {
             if (!alive) return;
@@ -82,8 +82,8 @@ struct Bed : MasterEvents {
         });
         bus.logging = false;
     }
-    Station& add(std::uint8_t id, const Description& d, bool start_by_itself = false) {
-        stations.push_back(std::make_unique<Station>(id, d, start_by_itself));
+    Station& add(std::uint8_t id, const Description& d, bool auto_start = false) {
+        stations.push_back(std::make_unique<Station>(id, d, auto_start));
         auto& s = *stations.back();
         bus.attach(s.wire, [&s](const Frame& f, Time t) { s.take(f, t); });
         return s;
@@ -128,7 +128,7 @@ struct Bed : MasterEvents {
     std::string way(std::uint8_t id) const {
         std::string result;
         for (const auto& [node, step] : steps)
-            if (node == id) result += (result.empty() ? "" : ", ") + std::string(word(step));
+            if (node == id) result += (result.empty() ? "" : ", ") + std::string(to_string(step));
         return result;
     }
 

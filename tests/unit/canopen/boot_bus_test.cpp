@@ -16,7 +16,7 @@ namespace {
 
 struct OnBus : MasterEvents {
     OnBus(const std::string& bus, const MasterSetup& setup, const std::function<Description(std::uint8_t)>& device)
-        : own(basic_device({.heartbeat_ms = 100}), {.node_id = setup.id, .obeys_nmt = false}, own_events),
+        : own(basic_device({.heartbeat_ms = 100}), {.node_id = setup.id, .nmt_slave = false}, own_events),
           master(setup, own.out(), *this),
           link(open(bus)) {
         for (const auto& n : setup.nodes) {

@@ -6,13 +6,13 @@ namespace hal::canopen::test {
 namespace {
 
 struct Configured : Bed {
-    explicit Configured(const std::function<void(NodeSetup&)>& change = {}, Description d = example(), bool start_by_itself = false)
+    explicit Configured(const std::function<void(NodeSetup&)>& change = {}, Description d = example(), bool auto_start = false)
         : Bed([&] {
               auto n = example_node();
               if (change) change(n);
               return network_of({n});
           }()),
-          station(add(5, d, start_by_itself)) {
+          station(add(5, d, auto_start)) {
         bus.logging = true;
         power();
     }
@@ -371,14 +371,14 @@ TEST(Configure, Takes_a_concise_DCF) {
 
 TEST(Setup, Takes_the_objects_of_CiA_302) {
     MasterSetup s = network_of({example_node(5), example_node(6)});
-    take_assignment(s.nodes[0], 0x0064'0309 | 1U << 4 | 1U << 6 | 1U << 7);  // guarded at 100 ms, mandatory, not booted
+    apply_assignment(s.nodes[0], 0x0064'0309 | 1U << 4 | 1U << 6 | 1U << 7);  // guarded at 100 ms, mandatory, not booted
     EXPECT_TRUE(s.nodes[0].mandatory && s.nodes[0].keep_alive && s.nodes[0].program.update && s.nodes[0].restore);
     EXPECT_FALSE(s.nodes[0].configure || s.nodes[0].start);
     EXPECT_EQ(s.nodes[0].guard_ms, 100);
     EXPECT_EQ(s.nodes[0].guard_factor, 3);
-    take_assignment(s.nodes[1], 5);
+    apply_assignment(s.nodes[1], 5);
     EXPECT_TRUE(s.nodes[1].configure && s.nodes[1].start && !s.nodes[1].mandatory);
-    take_startup(s, 1U << 1 | 1U << 2 | 1U << 6);
+    apply_startup(s, 1U << 1 | 1U << 2 | 1U << 6);
     EXPECT_TRUE(s.start_all_at_once && !s.start_self);
     EXPECT_EQ(s.nodes[0].on_loss, Reaction::stop_all);
     EXPECT_EQ(s.nodes[1].on_loss, Reaction::restart);

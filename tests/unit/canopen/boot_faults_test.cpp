@@ -57,7 +57,7 @@ TEST_P(BootFaults, Never_leave_the_network_stuck) {
             down += b.dt;
             ASSERT_NE(network.node, 0) << "every " << n;
         }
-        EXPECT_LE(longest, 30 * second) << "every " << n << ": " << word(step);
+        EXPECT_LE(longest, 30 * second) << "every " << n << ": " << to_string(step);
         // Only where question or answer is always hit may it be down for long.
         EXPECT_LE(down, (n > 4 ? 30 : 3600) * second) << "every " << n << ": " << b.master->sentence();
         EXPECT_EQ(b.master->sentence().find("node ") == std::string::npos, b.master->status().state == NetworkState::operational);

@@ -498,7 +498,7 @@ TEST(MasterObjects, Say_what_the_master_was_told_and_take_commands) {
     EXPECT_EQ(dictionary.get<std::uint32_t>(0x1f88, 6), 4U);
     EXPECT_EQ(dictionary.get<std::uint32_t>(0x1f89, 0), 3000U);
     NodeSetup again;
-    take_assignment(again, assignment_of(b.setup.nodes[2]));
+    apply_assignment(again, assignment_of(b.setup.nodes[2]));
     EXPECT_EQ(assignment_of(again), assignment_of(b.setup.nodes[2]));
 
     const auto state = [&](std::uint8_t id) {

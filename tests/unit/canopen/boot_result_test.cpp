@@ -92,7 +92,7 @@ TEST(BootResult, A_for_a_node_that_is_not_listed) {
     EXPECT_EQ(b.status(9).result, BootResult::not_listed);
     EXPECT_EQ(b.master->sentence(9), "node 9 is not in the configuration");
     EXPECT_FALSE(b.master->restart(9, b.now));
-    EXPECT_STREQ(word(BootResult::not_listed), "not in the network list");
+    EXPECT_STREQ(to_string(BootResult::not_listed), "not in the network list");
 }
 
 TEST(BootResult, B_for_a_node_that_does_not_answer) {

@@ -375,8 +375,8 @@ TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
     const Pdo *in = find(n, false, 2), *out = find(n, true, 2);
     ASSERT_NE(in, nullptr);
     ASSERT_NE(out, nullptr);
-    EXPECT_EQ(in->multiplex, Multiplex::from_source);
-    EXPECT_EQ(out->multiplex, Multiplex::to_destination);
+    EXPECT_EQ(in->multiplex, Multiplex::source_address);
+    EXPECT_EQ(out->multiplex, Multiplex::destination_address);
     EXPECT_EQ(in->transmission, 255);
     EXPECT_EQ(in->bytes(), 8U);
     EXPECT_EQ(in->objects[0].bit_pins.size(), 8U);

@@ -85,7 +85,7 @@ struct DriveBench : testing::Test {
     }
 };
 
-inline std::ostream& operator<<(std::ostream& out, Abort abort) { return out << canopen::word(abort); }
+inline std::ostream& operator<<(std::ostream& out, Abort abort) { return out << canopen::to_string(abort); }
 
 }  // namespace hal::canopen::test
 

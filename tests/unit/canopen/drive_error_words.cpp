@@ -2,7 +2,7 @@
 // Codes of errors in words: those of drives are not those of other nodes.
 #include <gtest/gtest.h>
 
-#include "canopen/master/cycle/emergency_words.hpp"
+#include "canopen/master/cycle/emergency_text.hpp"
 #include "canopen/protocol/emcy.hpp"
 #include "cia402/drive_profile.hpp"
 #include "cia402/error_words.hpp"
@@ -20,10 +20,10 @@ TEST(DriveErrorWords, Codes_of_cia_402_have_their_own_words) {
 }
 
 TEST(DriveErrorWords, Other_codes_have_the_word_of_their_class) {
-    EXPECT_STREQ(cia402::error_word(0x8130), emergency_word(0x8130));
+    EXPECT_STREQ(cia402::error_word(0x8130), emergency_text(0x8130));
     EXPECT_STREQ(cia402::error_word(0x7399), "additional modules");
     EXPECT_STREQ(cia402::error_word(0xff42), "device specific");
-    EXPECT_STREQ(cia402::error_word(0), emergency_word(0));
+    EXPECT_STREQ(cia402::error_word(0), emergency_text(0));
 }
 
 TEST(DriveErrorWords, Master_says_them_of_drives_only) {
@@ -42,10 +42,10 @@ TEST(DriveErrorWords, Master_says_them_of_drives_only) {
         }
         config.nodes.push_back(n);
     }
-    EXPECT_STREQ(emergency_word(config, 5, 0x7305), "incremental sensor 1");
-    EXPECT_STREQ(emergency_word(config, 6, 0x7305), "incremental sensor 1");
-    EXPECT_STREQ(emergency_word(config, 7, 0x7305), "additional modules");
-    EXPECT_STREQ(emergency_word(config, 8, 0x7305), "additional modules") << "nobody knows that node";
+    EXPECT_STREQ(emergency_text(config, 5, 0x7305), "incremental sensor 1");
+    EXPECT_STREQ(emergency_text(config, 6, 0x7305), "incremental sensor 1");
+    EXPECT_STREQ(emergency_text(config, 7, 0x7305), "additional modules");
+    EXPECT_STREQ(emergency_text(config, 8, 0x7305), "additional modules") << "nobody knows that node";
 }
 
 }  // namespace

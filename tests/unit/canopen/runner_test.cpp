@@ -23,7 +23,7 @@ struct Wire : RunnerEvents {
     explicit Wire(const std::string& more = "", bool starts_itself = false, const std::string& axis = one_axis)
         : reading(config::read(axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
         EXPECT_TRUE(reading.good());
-        node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2, .start_by_itself = starts_itself});
+        node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2, .auto_start = starts_itself});
         runner.open(*link);
         for (Slot& s : runner.slots())
             if (s.to_node && s.object->bits == 32) target = &s;
@@ -64,7 +64,7 @@ struct Wire : RunnerEvents {
         }
     }
     void on_sync_overrun() noexcept override { ++overruns; }
-    void on_own_id_taken() noexcept override { ++own_id_taken; }
+    void on_own_id_collision() noexcept override { ++own_id_taken; }
     void on_short(std::size_t place, unsigned bytes) noexcept override { cut.emplace_back(place, bytes); }
 
     void on_foreign(const Foreign& f) noexcept override { foreign.push_back(f); }

@@ -61,9 +61,9 @@ TEST_P(Sizes, Transfer_goes_both_ways_on_a_good_wire) {
     std::vector<std::uint8_t> room(size + 3);
     SdoRequest down{.index = 0x2006, .mode = mode, .data = data}, up{.index = 0x2006, .upload = true, .mode = mode, .room = room};
     ASSERT_TRUE(p.run(down));
-    EXPECT_TRUE(down.ok()) << word(down.abort);
+    EXPECT_TRUE(down.ok()) << to_string(down.abort);
     ASSERT_TRUE(p.run(up));
-    EXPECT_TRUE(up.ok()) << word(up.abort);
+    EXPECT_TRUE(up.ok()) << to_string(up.abort);
     EXPECT_EQ(up.size, size);
     EXPECT_TRUE(std::equal(data.begin(), data.end(), room.begin()));
     EXPECT_EQ(down.retries + up.retries, 0U);
@@ -110,8 +110,8 @@ TEST_P(Disturbed, Transfer_is_right_or_says_that_it_failed) {
         // What the protocol can mend is mended: blocks, and segments when the server bears repeats.
         const bool mendable = n >= 5 && (fault != Fault::delay) && ((mode == SdoMode::block && size > 21) || tolerant);
         if (mendable) {
-            EXPECT_TRUE(down.ok()) << size << ": " << word(down.abort);
-            EXPECT_TRUE(up.ok()) << size << ": " << word(up.abort);
+            EXPECT_TRUE(down.ok()) << size << ": " << to_string(down.abort);
+            EXPECT_TRUE(up.ok()) << size << ": " << to_string(up.abort);
         }
     }
 }
@@ -341,7 +341,7 @@ TEST(SdoClient, Does_not_write_beyond_its_room) {
         SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .room = room};
         ASSERT_TRUE(p.run(up));
         EXPECT_EQ(up.abort, Abort::memory);
-        EXPECT_FALSE(up.aborted_there);
+        EXPECT_FALSE(up.aborted_by_server);
     }
 }
 
@@ -367,7 +367,7 @@ TEST(SdoClient, Gives_up_when_nothing_leaves_for_as_long_as_it_would_wait_for_an
         EXPECT_EQ(t, 32 * millisecond) << block;
         EXPECT_EQ(r.abort, Abort::timeout);
         EXPECT_TRUE(r.unsent);
-        EXPECT_FALSE(r.aborted_there);
+        EXPECT_FALSE(r.aborted_by_server);
         EXPECT_EQ(out.size(), waiting);  // no abort behind all that
         out.clear();
         std::uint8_t room[4];

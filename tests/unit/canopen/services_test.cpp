@@ -285,7 +285,7 @@ TEST_F(EmcyService, Consumer_hears_those_of_1028h) {
     send({0x087, {0x10, 0x81, 0x11, 1, 2, 3, 4, 5}});
     ASSERT_EQ(events.emergencies.size(), 1U);
     EXPECT_EQ(events.emergencies[0].second.code, 0x8110);
-    EXPECT_STREQ(emergency_word(0x8110), "CAN overrun (objects lost)");
+    EXPECT_STREQ(emergency_text(0x8110), "CAN overrun (objects lost)");
 }
 
 }  // namespace

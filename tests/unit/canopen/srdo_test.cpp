@@ -58,7 +58,7 @@ struct Srdo : Node {
         ASSERT_EQ(heard.faults.size(), 1U);
         EXPECT_EQ(heard.faults[0], std::pair(2U, fault));
         EXPECT_EQ(status().fault, fault);
-        EXPECT_FALSE(status().believed);
+        EXPECT_FALSE(status().valid);
         EXPECT_TRUE(device->emcy().active(0x8100, 2));
     }
 };
@@ -108,7 +108,7 @@ TEST_F(Srdo, Sender_whose_objects_do_not_match_sends_nothing_and_says_so) {
 }
 
 TEST_F(Srdo, Sender_can_make_the_inverted_frame_itself) {
-    device->srdos().invert_here(1);
+    device->srdos().derive_inverted(1);
     device->dictionary().set(0x2300, 0, std::uint8_t{0x0f});
     operational();
     run(1);
@@ -128,9 +128,9 @@ TEST_F(Srdo, Sender_that_is_triggered_does_not_wait_for_its_refresh_time) {
 
 TEST_F(Srdo, Receiver_believes_a_pair_in_order_and_writes_both_objects) {
     operational();
-    EXPECT_FALSE(status().believed);
+    EXPECT_FALSE(status().valid);
     good(0x21);
-    EXPECT_TRUE(status().believed);
+    EXPECT_TRUE(status().valid);
     EXPECT_EQ(value(), 0x21);
     EXPECT_EQ(device->dictionary().get<std::uint8_t>(0x2311, 0), 0xde);
     EXPECT_EQ(heard.good, std::vector<unsigned>{2});
@@ -236,7 +236,7 @@ TEST_F(Srdo, Global_fail_safe_command_is_not_heard_nor_sent_where_1300_says_so) 
     operational();
     good(1);
     send({0x001, {}});
-    EXPECT_TRUE(status().believed);
+    EXPECT_TRUE(status().valid);
     EXPECT_FALSE(device->srdos().send_fail_safe());
 }
 
@@ -252,13 +252,13 @@ TEST_F(Srdo, After_a_fault_nothing_is_believed_before_it_was_acknowledged) {
     operational();
     frame(received_id + 1, 0);
     good(7);
-    EXPECT_FALSE(status().believed);
+    EXPECT_FALSE(status().valid);
     EXPECT_EQ(value(), 0);
     device->srdos().acknowledge(2, now);
-    EXPECT_FALSE(status().believed) << "nor before a good one came";
+    EXPECT_FALSE(status().valid) << "nor before a good one came";
     EXPECT_FALSE(device->emcy().active(0x8100, 2));
     good(7);
-    EXPECT_TRUE(status().believed);
+    EXPECT_TRUE(status().valid);
     EXPECT_EQ(value(), 7);
     EXPECT_EQ(heard.faults.size(), 1U);
 }
@@ -267,7 +267,7 @@ TEST_F(Srdo, Leaving_the_operational_state_ends_belief) {
     operational();
     good(1);
     nmt(enter_pre_operational);
-    EXPECT_FALSE(status().believed);
+    EXPECT_FALSE(status().valid);
     EXPECT_FALSE(status().active);
     good(9);
     EXPECT_EQ(value(), 1);
@@ -364,9 +364,9 @@ TEST_F(Srdo, Every_lost_doubled_or_overtaken_frame_ends_belief_or_changes_nothin
             std::erase_if(da.entries, [](const auto& e) { return e.index >= 0x1300 && e.index < 0x1400; });
             std::erase_if(db.entries, [](const auto& e) { return e.index >= 0x1300 && e.index < 0x1400; });
             add_srdos(da, of_a), add_srdos(db, of_b);
-            Device a(da, {.node_id = 5, .start_by_itself = true}, a_events), b(db, {.node_id = 6, .start_by_itself = true}, b_events);
+            Device a(da, {.node_id = 5, .auto_start = true}, a_events), b(db, {.node_id = 6, .auto_start = true}, b_events);
             wire.attach(a), wire.attach(b);
-            a.srdos().invert_here(1);
+            a.srdos().derive_inverted(1);
             Heard told;
             b.srdos().listen(told);
             Time t = 0;

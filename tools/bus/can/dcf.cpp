@@ -50,7 +50,7 @@ Read read_object(Station& station, std::uint8_t node, std::uint16_t index, std::
     request = {.index = index, .sub = sub, .upload = true, .room = bytes};
     const bool read = station.transfer(node, request);
     bytes.resize(request.ok() ? request.size : 0);
-    return read ? Read::value : request.aborted_there ? Read::refused : Read::failed;
+    return read ? Read::value : request.aborted_by_server ? Read::refused : Read::failed;
 }
 
 void date(eds::DeviceDescription& description, const DcfReadOptions& options) {
@@ -88,7 +88,7 @@ int run_can_dcf_read(const DcfReadOptions& options) {
             case Read::failed: return station.fail_transfer(node, request, label);
             case Read::refused:
                 ++refused;
-                fail(options, fmt::format("left out: {}: {} (0x{:08X})", label, canopen::word(request.abort),
+                fail(options, fmt::format("left out: {}: {} (0x{:08X})", label, canopen::to_string(request.abort),
                                           static_cast<std::uint32_t>(request.abort)));
                 continue;
             case Read::value: break;

@@ -41,7 +41,7 @@ bool HandAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, 
     const std::uint16_t at = of_axis(index, axis_);
     SdoRequest request{.index = at, .sub = sub, .upload = true, .room = room};
     if (!station_.transfer(node_, request)) {
-        const bool none = request.aborted_there && (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
+        const bool none = request.aborted_by_server && (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
         if (missing && none) return *missing = true, false;
         return station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub)), false;
     }
@@ -271,7 +271,7 @@ bool HandAxis::choose_homing(int method) {
     SdoRequest request{.index = at, .data = std::span(&data, 1)};
     if (station_.transfer(node_, request)) return true;
     using canopen::Abort;
-    if (!request.aborted_there || (request.abort != Abort::value && request.abort != Abort::too_high && request.abort != Abort::too_low))
+    if (!request.aborted_by_server || (request.abort != Abort::value && request.abort != Abort::too_high && request.abort != Abort::too_low))
         return station_.fail_transfer(node_, request, fmt::format("{:04X}:0", at)), false;
     std::string known;
     std::int64_t count = 0, one = 0;

@@ -38,7 +38,7 @@ public:
         if (const Answer has = read(0x1f51, running); has == Answer::silent) return report(0x1f51);
         else if (has == Answer::refused)
             return fail(options_, fmt::format("node {} has no program control 1F51:{} ({}): its program is not changed over CANopen", node_, program_,
-                                              canopen::word(last_.abort)));
+                                              canopen::to_string(last_.abort)));
         if (!note("stopping the program") || !control(stop_program) || !settle("stop", any_error)) return 1;
         if (!note("erasing the flash") || !control(clear_program) || !settle("erase", no_valid_program)) return 1;
         if (!note(fmt::format("downloading {} bytes", image_.size())) || !download() || !settle("download", 0)) return 1;
@@ -58,12 +58,12 @@ private:
         last_ = {.index = index, .sub = sub, .upload = true, .room = room};
         const bool ok = station_.transfer(node_, last_);
         if (ok) std::memcpy(&value, room, sizeof value);
-        return ok ? Answer::value : last_.aborted_there ? Answer::refused : Answer::silent;
+        return ok ? Answer::value : last_.aborted_by_server ? Answer::refused : Answer::silent;
     }
     /// A node that restarts into its boot loader may not answer: settle() finds out.
     bool control(std::uint8_t value) {
         last_ = {.index = 0x1f51, .sub = program_, .data = std::span(&value, 1)};
-        if (station_.transfer(node_, last_) || (!last_.aborted_there && !station_.bus.stop.requested())) return true;
+        if (station_.transfer(node_, last_) || (!last_.aborted_by_server && !station_.bus.stop.requested())) return true;
         return report(0x1f51), false;
     }
     bool download() {

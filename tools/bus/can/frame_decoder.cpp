@@ -41,7 +41,7 @@ std::string segment(const Frame& f) {
 
 std::string abort_text(const Frame& f) {
     const std::uint32_t code = number(f, 4, 4);
-    return fmt::format("abort {}: {} (0x{:08X})", object(f), canopen::word(static_cast<canopen::Abort>(code)), code);
+    return fmt::format("abort {}: {} (0x{:08X})", object(f), canopen::to_string(static_cast<canopen::Abort>(code)), code);
 }
 
 std::string block_segment(const Frame& f) {
@@ -66,7 +66,7 @@ DecodedFrame emergency(unsigned node, const Frame& f) {
     if (f.remote || f.length != 8) return {FrameKind::emergency, fmt::format("EMCY of node {} with a wrong length: it has 8 bytes", node)};
     const auto code = static_cast<std::uint16_t>(number(f, 0, 2));
     return {FrameKind::emergency,
-            fmt::format("EMCY of node {}: {} (0x{:04X}), error register 0x{:02X}", node, canopen::emergency_word(code), code, f.data[2])};
+            fmt::format("EMCY of node {}: {} (0x{:04X}), error register 0x{:02X}", node, canopen::emergency_text(code), code, f.data[2])};
 }
 
 DecodedFrame time_stamp(const Frame& f) {
@@ -87,7 +87,7 @@ DecodedFrame heartbeat(unsigned node, const Frame& f) {
     if (f.length != 1) return {FrameKind::heartbeat, fmt::format("heartbeat of node {} with a wrong length: it has 1 byte", node)};
     if (f.data[0] == 0) return {FrameKind::heartbeat, fmt::format("boot-up of node {}", node)};
     return {FrameKind::heartbeat,
-            fmt::format("heartbeat of node {}: {}{}", node, canopen::word(static_cast<canopen::NmtState>(f.data[0] & 0x7f)),
+            fmt::format("heartbeat of node {}: {}{}", node, canopen::to_string(static_cast<canopen::NmtState>(f.data[0] & 0x7f)),
                         (f.data[0] & 0x80) != 0 ? ", toggle bit set" : "")};
 }
 

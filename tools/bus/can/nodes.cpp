@@ -61,11 +61,11 @@ bool silent(const Heard& n, std::int64_t now) { return n.longest > 0 && now - n.
 
 std::string state_of(const Heard& n) {
     if (!n.beats) return "no heartbeat";
-    return n.state == canopen::NmtState::initialising ? "boot-up" : canopen::word(n.state);
+    return n.state == canopen::NmtState::initialising ? "boot-up" : canopen::to_string(n.state);
 }
 
 std::string emergency_text(const Emergency& e, std::int64_t now) {
-    const std::string what = e.code == 0 ? "no error any more" : fmt::format("0x{:04X} {}", e.code, canopen::emergency_word(e.code));
+    const std::string what = e.code == 0 ? "no error any more" : fmt::format("0x{:04X} {}", e.code, canopen::emergency_text(e.code));
     return fmt::format("{}, {:.1f} s ago", what, seconds(now - e.at));
 }
 
@@ -87,7 +87,7 @@ std::string json(const Nodes& nodes, std::int64_t now) {
         std::string list;
         for (const Emergency& e : n.newest)
             list += fmt::format(R"({}{{"code":{},"text":{},"error_register":{},"age":{:.3f}}})", list.empty() ? "" : ",", e.code,
-                                json_text(e.code == 0 ? "no error any more" : canopen::emergency_word(e.code)), e.error_register, seconds(now - e.at));
+                                json_text(e.code == 0 ? "no error any more" : canopen::emergency_text(e.code)), e.error_register, seconds(now - e.at));
         text += fmt::format(R"({}{{"node":{},"state":"{}","age":{},"silent":{},"boot_ups":{},"emergencies":{},"newest":[{}]}})",
                             text.empty() ? "[" : ",\n ", id, state_of(n), n.beats ? fmt::format("{:.3f}", seconds(now - n.last)) : "null", silent(n, now),
                             n.boot_ups, n.emergencies, list);

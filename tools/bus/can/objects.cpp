@@ -39,7 +39,7 @@ bool hex_number(std::string_view text, unsigned most, unsigned& value) {
 }
 
 Type basic(std::uint16_t code) {
-    return code <= 0x1b && canopen::word(static_cast<Type>(code))[0] != '\0' ? static_cast<Type>(code) : Type::none;
+    return code <= 0x1b && canopen::to_string(static_cast<Type>(code))[0] != '\0' ? static_cast<Type>(code) : Type::none;
 }
 
 ObjectName object_of(const eds::Object& object, const eds::Entry& entry) {

@@ -129,7 +129,7 @@ bool parse_item(Station& station, std::uint8_t node, const ObjectNames& names, c
     SdoRequest request{.index = item.object.index, .sub = item.object.sub, .upload = true, .room = room};
     if (station.transfer(node, request) && request.size > 0) return item.bits = static_cast<unsigned>(request.size) * 8, true;
     return problem = fmt::format("how long {0} is cannot be read ({1}); write it in bits: {2:04X}:{3:X}/16", item.object.label(),
-                                 canopen::word(request.abort), item.object.index, item.object.sub),
+                                 canopen::to_string(request.abort), item.object.index, item.object.sub),
            false;
 }
 
@@ -161,7 +161,7 @@ bool present(Station& station, const Options& options, std::uint8_t node, const 
     const Abort why = read_pdo(station, node, names, p);
     if (why == Abort::none) return true;
     SdoRequest request{.index = p.communication_index(), .sub = 1};
-    request.abort = why, request.aborted_there = why != Abort::timeout;
+    request.abort = why, request.aborted_by_server = why != Abort::timeout;
     if (why == Abort::no_object || why == Abort::no_sub)
         return fail(options,
                     fmt::format("node {} has no {}; hal can pdo show {} {} shows those it has", node, p.name(), options.words[0], node)),

@@ -24,7 +24,7 @@ Source of_node(Station& station, std::uint8_t node) {
         station.transfer(node, request);
         value = canopen::load<std::uint32_t>(room);
         // Silence has to be told from a refusal.
-        return request.ok() || request.aborted_there ? request.abort : Abort::timeout;
+        return request.ok() || request.aborted_by_server ? request.abort : Abort::timeout;
     };
 }
 

@@ -26,7 +26,7 @@ struct ReadObject {
 
     std::string reason() const {
         if (!asked) return "write-only";
-        return abort == canopen::Abort::none ? "" : fmt::format("{} (0x{:08X})", canopen::word(abort), static_cast<std::uint32_t>(abort));
+        return abort == canopen::Abort::none ? "" : fmt::format("{} (0x{:08X})", canopen::to_string(abort), static_cast<std::uint32_t>(abort));
     }
     std::string table_line() const {
         const std::string why = reason();
@@ -83,7 +83,7 @@ int run_can_read_all(const ReadAllOptions& options) {
             if (one.asked) {
                 canopen::SdoRequest request{.index = object.index, .sub = entry.sub, .upload = true, .room = {room.get(), most_bytes}};
                 const bool good = station.transfer(node, request);
-                if (!good && !request.aborted_there) return station.fail_transfer(node, request, one.object.label());
+                if (!good && !request.aborted_by_server) return station.fail_transfer(node, request, one.object.label());
                 one.abort = request.abort;
                 if (good) one.bytes = {room.get(), request.size};
                 ++(good ? read : refused);

@@ -51,7 +51,7 @@ int run_can_scan(const ScanOptions& options) {
         if (!a.asked) ++n.unasked;
         else if (a.index == 0x1000) {
             if (a.abort == 0) n.type = a.value;
-            else n.refused = canopen::word(static_cast<canopen::Abort>(a.abort));
+            else n.refused = canopen::to_string(static_cast<canopen::Abort>(a.abort));
             for (std::uint8_t sub = 1; sub <= 4; ++sub) reads.ask(a.node, 0x1018, sub);
         } else if (a.abort == 0) {
             n.identity[a.sub - 1] = a.value;
@@ -78,7 +78,7 @@ int run_can_scan(const ScanOptions& options) {
     std::string text;
     for (const auto& [id, n] : nodes) {
         const char* state =
-            n.state ? n.booted && *n.state == canopen::NmtState::initialising ? "boot-up" : canopen::word(*n.state) : nullptr;
+            n.state ? n.booted && *n.state == canopen::NmtState::initialising ? "boot-up" : canopen::to_string(*n.state) : nullptr;
         if (options.json) {
             text += fmt::format(
                 R"({}{{"node":{},"state":{},"device_type":{},"vendor":{},"product":{},"revision":{},"serial":{},"remark":"{}"}})",

@@ -91,7 +91,7 @@ bool width_of(Station& station, std::uint8_t node, const ObjectName& object, con
     default: break;
     }
     problem = read ? fmt::format("it holds {} bytes now", request.size)
-                   : fmt::format("it could not be read to see ({})", canopen::word(request.abort));
+                   : fmt::format("it could not be read to see ({})", canopen::to_string(request.abort));
     problem =
         fmt::format("the type of {} is not known: {}; add --type, such as u16 or visible_string, or --eds FILE", object.label(), problem);
     return false;

@@ -114,9 +114,9 @@ std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16
 }  // namespace
 
 int Station::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request, const std::string& object) const {
-    if (bus.stop.requested() && !outlasts_stop && !request.aborted_there)
+    if (bus.stop.requested() && !outlasts_stop && !request.aborted_by_server)
         return fail(options_, fmt::format("ended while node {} was asked for {}", node, object));
-    if (request.abort == Abort::timeout && !request.aborted_there) {
+    if (request.abort == Abort::timeout && !request.aborted_by_server) {
         const can::Statistics s = bus.link->statistics();
         return fail(options_,
                     fmt::format("node {} did not answer within {:g} s (asked for {}); the bus is {}; hal can scan {} shows who is there",
@@ -125,7 +125,7 @@ int Station::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request
     }
     const std::string what = advice(request.abort, options_.words.front(), node, request.index);
     return fail(options_, fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object,
-                                      request.aborted_there ? "" : "gave up: ", canopen::word(request.abort),
+                                      request.aborted_by_server ? "" : "gave up: ", canopen::to_string(request.abort),
                                       static_cast<std::uint32_t>(request.abort), what.empty() ? "" : "; " + what));
 }
 

@@ -51,7 +51,7 @@ Supervision::Read Supervision::read(std::uint16_t index, std::uint8_t sub, std::
         std::memcpy(&value, room, sizeof value);
         return Read::value;
     }
-    if (request.aborted_there) return Read::missing;  // whatever the reason: it is of no use
+    if (request.aborted_by_server) return Read::missing;  // whatever the reason: it is of no use
     station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", index, sub));
     return Read::failed;
 }
@@ -61,7 +61,7 @@ bool Supervision::write(std::uint16_t index, std::uint8_t sub, unsigned bytes, s
     std::memcpy(data, &value, sizeof data);
     SdoRequest request{.index = index, .sub = sub, .data = std::span(data, bytes)};
     if (station_.transfer(node_, request)) return true;
-    if (!request.aborted_there) station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", index, sub)), failed = true;
+    if (!request.aborted_by_server) station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", index, sub)), failed = true;
     return false;
 }
 

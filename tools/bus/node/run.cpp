@@ -95,12 +95,12 @@ public:
         const auto say = [&](const std::string& what) { log_.print(what, timed(what, now), now); };
         if (device.state() != state_ || device.node_id() != id_) {
             state_ = device.state(), id_ = device.node_id();
-            say(id_ == canopen::unconfigured ? "waits for a node-id" : canopen::word(state_));
+            say(id_ == canopen::unconfigured ? "waits for a node-id" : canopen::to_string(state_));
         }
         if (const auto errors = device.emcy().error_register(); errors != errors_) {
             errors_ = errors;
             const auto code = static_cast<std::uint16_t>(device.dictionary().get<std::uint32_t>(0x1003, 1, 0));
-            say(errors == 0 ? "no error any more" : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_word(code)));
+            say(errors == 0 ? "no error any more" : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_text(code)));
         }
         if (now - news_at_ >= 1'000'000'000) {  // outputs can change with every SYNC: the newest of a second
             if (std::string news = program_.news(); news != news_) {
@@ -175,7 +175,7 @@ int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::
     if (!opened) return fail(options, opened.problem);
     const can::Description about = opened.link->description();
     if (const std::string why = out_of_reach(about); !why.empty()) return fail(options, why);
-    canopen::Node node(program, std::move(opened.link), {.node_id = id, .start_by_itself = options.starts_itself});
+    canopen::Node node(program, std::move(opened.link), {.node_id = id, .auto_start = options.starts_itself});
     for (const auto& [fault, setting] : faults) node.faults().set(fault, setting);
 
     const std::string who = id == canopen::unconfigured ? "without node-id" : fmt::format("node {}", id);

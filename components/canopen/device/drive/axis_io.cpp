@@ -186,7 +186,7 @@ std::vector<std::string> AxisIo::settable() const {
 
 std::string AxisIo::news() const {
     std::string text = word(state());
-    if (error_code_ != 0) text += std::string(", error ") + emergency_word(error_code_);
+    if (error_code_ != 0) text += std::string(", error ") + emergency_text(error_code_);
     text += ", outputs ";
     for (unsigned n = 4; n-- > 0;) text += output(n) ? '1' : '0';
     return text + (plant_->input() ? ", input closed" : ", input open");

@@ -87,7 +87,7 @@ std::string SafeIo::summary() const {
     };
     std::string text = "inputs " + bits(inputs_) + ", outputs " + bits(terminals_);
     if (!device_->srdos().configuration_valid()) text += ", SRDOs not configured";
-    if (fault_ != SrdoFault::none) text += std::string(", outputs off: ") + word(fault_);
+    if (fault_ != SrdoFault::none) text += std::string(", outputs off: ") + to_string(fault_);
     return text;
 }
 

@@ -132,7 +132,7 @@ void Master::Node::compared() noexcept {
     if (lacks() && o.optional) {
         if (o.kind == Own::date || o.kind == Own::time) status.notes |= note_no_date;
         o.absent = as_wished = true;
-    } else if (!ok() && request_.aborted_there) o.unreadable = true;
+    } else if (!ok() && request_.aborted_by_server) o.unreadable = true;
     if (as_wished) {
         if (o.kind == Own::producer) producer_ms_ = setup.heartbeat_ms;
         ++object_;
@@ -186,7 +186,7 @@ void Master::Node::next_verify() noexcept {
 void Master::Node::verified() noexcept {
     auto& o = objects_[object_];
     if (silent()) return fail_write(Cause::silent);
-    if (!ok() && request_.aborted_there) o.unreadable = true;
+    if (!ok() && request_.aborted_by_server) o.unreadable = true;
     else if (o.kind == Own::producer && ok() && number() != 0 &&
              (setup.heartbeat_limit == 0 || static_cast<Time>(number()) * millisecond < setup.heartbeat_limit))
         producer_ms_ = static_cast<std::uint16_t>(number());  // some only know certain periods

@@ -82,9 +82,9 @@ private:
     void write(Task, std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size) noexcept;
     void answered() noexcept;
     bool ok() const noexcept { return request_.abort == Abort::none; }
-    bool silent() const noexcept { return !ok() && !request_.aborted_there && request_.abort != Abort::memory; }
+    bool silent() const noexcept { return !ok() && !request_.aborted_by_server && request_.abort != Abort::memory; }
     bool lacks() const noexcept {
-        return request_.aborted_there && (request_.abort == Abort::no_object || request_.abort == Abort::no_sub);
+        return request_.aborted_by_server && (request_.abort == Abort::no_object || request_.abort == Abort::no_sub);
     }
     std::uint64_t number() const noexcept;
     void about(std::uint16_t index, std::uint8_t sub, std::uint64_t expected = 0, std::uint64_t found = 0) noexcept;

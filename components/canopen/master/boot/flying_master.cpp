@@ -11,7 +11,7 @@ constexpr std::uint32_t heartbeats = 0x700;
 
 }  // namespace
 
-const char* word(FlyingMaster::State s) noexcept {
+const char* to_string(FlyingMaster::State s) noexcept {
     switch (s) {
     case FlyingMaster::State::off: return "off";
     case FlyingMaster::State::waiting: return "waiting";

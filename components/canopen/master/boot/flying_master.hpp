@@ -89,6 +89,6 @@ private:
     std::uint64_t negotiations_ = 0, losses_ = 0;
 };
 
-const char* word(FlyingMaster::State) noexcept;
+const char* to_string(FlyingMaster::State) noexcept;
 
 }  // namespace hal::canopen

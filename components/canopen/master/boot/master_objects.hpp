@@ -13,7 +13,7 @@
 
 namespace hal::canopen {
 
-/// What take_startup() and take_assignment() understand, the other way round. [setup]
+/// What apply_startup() and apply_assignment() understand, the other way round. [setup]
 std::uint32_t startup_of(const MasterSetup&);
 std::uint32_t assignment_of(const NodeSetup&);
 

@@ -3,7 +3,7 @@
 // It owns no bus, no clock and no thread, and puts its frames into a queue that somebody else empties; usually that of the
 // master's own node:
 //
-//     Device own(description, {.node_id = setup.id, .obeys_nmt = false}, events);   // [setup]
+//     Device own(description, {.node_id = setup.id, .nmt_slave = false}, events);   // [setup]
 //     Master master(setup, own.out(), events);
 //     own.start(now), master.start(now);
 //     each cycle:

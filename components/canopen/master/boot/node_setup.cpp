@@ -7,7 +7,7 @@
 
 namespace hal::canopen {
 
-const char* word(Reaction r) noexcept {
+const char* to_string(Reaction r) noexcept {
     switch (r) {
     case Reaction::nothing: return "nothing";
     case Reaction::restart: return "restart";
@@ -17,7 +17,7 @@ const char* word(Reaction r) noexcept {
     return "?";
 }
 
-void take_startup(MasterSetup& setup, std::uint32_t object_1f80) {
+void apply_startup(MasterSetup& setup, std::uint32_t object_1f80) {
     const auto bit = [&](unsigned n) { return (object_1f80 >> n & 1) != 0; };
     setup.start_all_at_once = bit(1);
     setup.start_self = !bit(2);
@@ -29,7 +29,7 @@ void take_startup(MasterSetup& setup, std::uint32_t object_1f80) {
     }
 }
 
-void take_assignment(NodeSetup& node, std::uint32_t object_1f81) {
+void apply_assignment(NodeSetup& node, std::uint32_t object_1f81) {
     const auto bit = [&](unsigned n) { return (object_1f81 >> n & 1) != 0; };
     node.configure = node.start = bit(2);
     node.on_loss = bit(2) ? Reaction::restart : Reaction::nothing;

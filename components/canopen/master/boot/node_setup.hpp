@@ -18,7 +18,7 @@ enum class Reaction : std::uint8_t {
     stop_all,   ///< all nodes are stopped: the network has failed until start()
     reset_all,  ///< all nodes are reset and the network boots again; after MasterSetup::resets times: stop_all
 };
-const char* word(Reaction) noexcept;
+const char* to_string(Reaction) noexcept;
 
 /// The program of a node with a boot loader (CiA 302-3).
 struct NodeProgram {
@@ -78,8 +78,8 @@ struct MasterSetup {
 };
 
 /// What object 1F80h and, for one node, 1F81h of a master's DCF say. The nodes are there already. [setup]
-void take_startup(MasterSetup&, std::uint32_t object_1f80);
-void take_assignment(NodeSetup&, std::uint32_t object_1f81);
+void apply_startup(MasterSetup&, std::uint32_t object_1f80);
+void apply_assignment(NodeSetup&, std::uint32_t object_1f81);
 
 /// A sentence for each thing that cannot be: ids twice or out of range, our own id, writes without data …. [setup]
 std::vector<std::string> problems_of(const MasterSetup&);

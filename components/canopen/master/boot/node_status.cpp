@@ -10,7 +10,7 @@
 
 namespace hal::canopen {
 
-const char* word(Step s) noexcept {
+const char* to_string(Step s) noexcept {
     switch (s) {
     case Step::off: return "off";
     case Step::queued: return "queued";
@@ -33,7 +33,7 @@ const char* word(Step s) noexcept {
     return "?";
 }
 
-const char* word(BootResult r) noexcept {
+const char* to_string(BootResult r) noexcept {
     switch (r) {
     case BootResult::none: return "not booted yet";
     case BootResult::good: return "booted";
@@ -56,7 +56,7 @@ const char* word(BootResult r) noexcept {
     return "?";
 }
 
-const char* word(NetworkState s) noexcept {
+const char* to_string(NetworkState s) noexcept {
     switch (s) {
     case NetworkState::off: return "off";
     case NetworkState::booting: return "booting";
@@ -93,7 +93,7 @@ std::string object(const NodeSetup& n, const NodeStatus& s) {
     if (s.write == 0 || s.write > n.writes.size() || n.writes[s.write - 1U].name.empty()) return result;
     return result + " (" + n.writes[s.write - 1U].name + ')';
 }
-std::string refusal(const NodeStatus& s) { return std::string(word(s.abort)) + print(" (%08lXh)", static_cast<unsigned long>(s.abort)); }
+std::string refusal(const NodeStatus& s) { return std::string(to_string(s.abort)) + print(" (%08lXh)", static_cast<unsigned long>(s.abort)); }
 
 const char* identity(std::uint16_t index, std::uint8_t sub) {
     if (index == 0x1000) return "device type";
@@ -185,12 +185,12 @@ std::string what(const NodeSetup& n, const NodeStatus& s) {
                "look for two devices with this id";
     case Cause::boot_up: return "booted by itself: check its supply voltage, and who else commands this network";
     case Cause::left_operational: {
-        std::string result = "left operational by itself and is " + std::string(word(s.state));
+        std::string result = "left operational by itself and is " + std::string(to_string(s.state));
         if (s.emergency.code == 0) return result;
-        return result + print("; its last emergency was %04Xh, ", unsigned{s.emergency.code}) + emergency_word(s.emergency.code);
+        return result + print("; its last emergency was %04Xh, ", unsigned{s.emergency.code}) + emergency_text(s.emergency.code);
     }
     case Cause::not_started:
-        return "was told to start and is " + std::string(word(s.state)) +
+        return "was told to start and is " + std::string(to_string(s.state)) +
                print("; its error register is %02Xh", unsigned{s.error_register});
     case Cause::commanded: return "was stopped by command";
     case Cause::network: return "was stopped because of another node";
@@ -205,25 +205,25 @@ std::string sentence(const NodeSetup& n, const NodeStatus& s) {
     if (cause.empty()) return {};
     std::string result = node_name(n) + ' ' + cause;
     if (booted(s.result) || s.result == BootResult::none) return result;
-    return result + " [result " + static_cast<char>(s.result) + ", " + word(s.result) + ']';
+    return result + " [result " + static_cast<char>(s.result) + ", " + to_string(s.result) + ']';
 }
 
 std::string sentence(const MasterSetup& setup, const NetworkStatus& s, const NodeStatus& of_node) {
     const auto node = std::ranges::find(setup.nodes, s.node, &NodeSetup::id);
-    if (s.state == NetworkState::operational || s.state == NetworkState::off) return std::string("the network is ") + word(s.state);
-    std::string result = std::string("the network is ") + word(s.state) + ": ";
+    if (s.state == NetworkState::operational || s.state == NetworkState::off) return std::string("the network is ") + to_string(s.state);
+    std::string result = std::string("the network is ") + to_string(s.state) + ": ";
     if (s.state == NetworkState::stopped) return result + "by command; 'start' boots it";
     if (node == setup.nodes.end()) return result + "no node is known to be the cause";
     const auto of = sentence(*node, of_node);
     const bool idle = of_node.step == Step::running && !of_node.operational;
-    result += of.empty() ? node_name(*node) + " is " + (idle ? word(of_node.state) : word(of_node.step)) : of;
+    result += of.empty() ? node_name(*node) + " is " + (idle ? to_string(of_node.state) : to_string(of_node.step)) : of;
     if (s.state == NetworkState::failed) result += "; all nodes were stopped";
     else if (of_node.step == Step::waiting) result += "; it is tried again";
     return result;
 }
 
 std::string progress(const NetworkStatus& s) {
-    std::string result = std::string(word(s.state)) + ": " + std::to_string(s.operational) + " of " + std::to_string(s.nodes);
+    std::string result = std::string(to_string(s.state)) + ": " + std::to_string(s.operational) + " of " + std::to_string(s.nodes);
     result += " nodes operational";
     if (s.booting != 0) result += ", " + std::to_string(s.booting) + " booting";
     if (s.failed != 0) result += ", " + std::to_string(s.failed) + " failed or waited for";

@@ -31,7 +31,7 @@ enum class Step : std::uint8_t {
     failed,           ///< did not boot or was lost, and is left alone
     stopped,          ///< by command, or because the network was stopped
 };
-const char* word(Step) noexcept;
+const char* to_string(Step) noexcept;
 
 /// The result of a boot by the letters of CiA 302.
 enum class BootResult : char {
@@ -53,7 +53,7 @@ enum class BootResult : char {
     revision = 'N',
     serial = 'O',
 };
-const char* word(BootResult) noexcept;
+const char* to_string(BootResult) noexcept;
 constexpr bool booted(BootResult r) noexcept { return r == BootResult::good || r == BootResult::was_operational; }
 
 /// Why, in more detail than the letter.
@@ -132,7 +132,7 @@ enum class NetworkState : std::uint8_t {
     stopped,      ///< by command
     failed,       ///< stopped because of a node
 };
-const char* word(NetworkState) noexcept;
+const char* to_string(NetworkState) noexcept;
 
 struct NetworkStatus {
     NetworkState state = NetworkState::off;

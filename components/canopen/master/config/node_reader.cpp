@@ -257,7 +257,7 @@ void NodeReader::write_one(const Line& line) {
                       "the description has it as read only");
     const eds::Encoded value = eds::encode_strictly(line.value.text, static_cast<std::uint16_t>(*type), node_.setup.id);
     if (!value || value.bytes.empty()) {
-        const std::string wanted = word(*type), problem = value ? "there is no value to write" : value.error;
+        const std::string wanted = to_string(*type), problem = value ? "there is no value to write" : value.error;
         report_.error(Topic::value, line.value.at, problem,
                       problem.find(wanted) == std::string::npos ? "the object is of type " + wanted : "");
         return;
@@ -337,7 +337,7 @@ void NodeReader::pdo(const PdoWish& wish) {
         pdo.inhibit_100us = static_cast<std::uint16_t>(catalog_->number(base, 3, 0));
         pdo.event_ms = static_cast<std::uint16_t>(catalog_->number(base, 5, 0));
     } else if (word.starts_with("mpdo ")) {
-        pdo.multiplex = wish.to_node ? Multiplex::to_destination : Multiplex::from_source;
+        pdo.multiplex = wish.to_node ? Multiplex::destination_address : Multiplex::source_address;
         pdo.transmission = 255;
         Word rest = wish.objects->value;
         rest.text.erase(0, 5), rest.at.offset += 5, rest.at.column += 5, rest.at.length -= 5;
@@ -549,7 +549,7 @@ void NodeReader::scanner_list() {
     constexpr unsigned rows = 254;  // of one object
     unsigned           count = 0;
     for (const Pdo& pdo : node_.pdos) {
-        if (pdo.multiplex != Multiplex::from_source) continue;
+        if (pdo.multiplex != Multiplex::source_address) continue;
         for (const Object& o : pdo.objects) {
             const auto   list = static_cast<std::uint16_t>(0x1fa0 + count / rows);
             const auto   row = static_cast<std::uint8_t>(count++ % rows + 1);

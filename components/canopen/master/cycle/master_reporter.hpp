@@ -8,7 +8,7 @@
 #include "canopen/master/boot/flying_master.hpp"
 #include "canopen/master/boot/node_status.hpp"
 #include "canopen/master/config/bus_schedule.hpp"
-#include "emergency_words.hpp"
+#include "emergency_text.hpp"
 #include "hal/reporter.hpp"
 #include "link/can.hpp"
 #include "runner.hpp"
@@ -120,7 +120,7 @@ private:
             char       text[160];
             const auto code = e.of_emergency.code;
             std::snprintf(text, sizeof text, "%s: emergency 0x%04X (%s), error register 0x%02X", called(e.of_node.id).c_str(), code,
-                          emergency_word(config_, e.of_node.id, code), e.of_emergency.error_register);
+                          emergency_text(config_, e.of_node.id, code), e.of_emergency.error_register);
             return text;
         }
         case Event::bus: return bus_words(e.of_bus);

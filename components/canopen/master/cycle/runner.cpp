@@ -18,7 +18,7 @@ DeviceSettings device_settings(const config::MasterConfig& config) {
     DeviceSettings s;
     s.node_id = config.node_id;
     s.queue = 4096;
-    s.obeys_nmt = false;
+    s.nmt_slave = false;
     s.lss = false;
     return s;
 }
@@ -64,7 +64,7 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
         if (r.pdo->request != 0) asked_.push_back({r.number, r.node, r.pdo->request});
     device_.srdos().listen(*this);
     for (const OwnSrdo& s : own_.srdos)
-        if (s.pdo->to_node) device_.srdos().invert_here(s.number);
+        if (s.pdo->to_node) device_.srdos().derive_inverted(s.number);
     open_.assign(statuses_.size(), 0);
     was_operational_.assign(statuses_.size(), 0);
     ever_operational_.assign(statuses_.size(), 0);
@@ -146,7 +146,7 @@ void Runner::receive(Time now) noexcept {
     had_bus_ = had_bus_ || !out_of_order(statistics_.state);
     if (statistics_.state != bus_state_) {
         if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) device_.bus_off(now);
-        if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) device_.bus_back();
+        if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) device_.bus_recovered();
         bus_state_ = statistics_.state;
         events_.on_bus_state(bus_state_);
     }
@@ -234,7 +234,7 @@ void Runner::watch_srdos(Time now) noexcept {
     for (const OwnSrdo& s : own_.srdos) device_.srdos().expect(s.number, statuses_[s.node]->operational, now);
     device_.srdos().poll(now);
     for (const OwnSrdo& s : own_.srdos) {
-        if (s.pdo->to_node || device_.srdos().status(s.number).believed) continue;
+        if (s.pdo->to_node || device_.srdos().status(s.number).valid) continue;
         for (const std::size_t n : s.placed)
             if (slots_[n].has_safe) set_value(*slots_[n].entry, slots_[n].safe);
     }

@@ -63,7 +63,7 @@ public:
     };
     virtual void on_foreign(const Foreign&) noexcept {}
     /// Another device has the master's own node-id.
-    virtual void on_own_id_taken() noexcept {}
+    virtual void on_own_id_collision() noexcept {}
     /// An SRDO is not to be believed (any more); its objects have their safe values. `place` is that in OwnNode::srdos.
     virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
     virtual void on_bus_state(can::State) noexcept {}
@@ -167,7 +167,7 @@ private:
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
     void on_rpdo_late(unsigned number, Time) noexcept override { events_.on_late(number - 1); }
     void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override { events_.on_short(number - 1, bytes); }
-    void on_id_collision(Time) noexcept override { events_.on_own_id_taken(); }
+    void on_id_collision(Time) noexcept override { events_.on_own_id_collision(); }
     void on_srdo_fault(unsigned number, SrdoFault fault, Time) noexcept override { events_.on_srdo_fault(number - 1, fault); }
 
     const config::MasterConfig&    config_;

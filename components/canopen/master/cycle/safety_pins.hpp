@@ -27,7 +27,7 @@ public:
             Row& row = rows_.emplace_back(c, shows, name);
             if (!s.pdo->to_node) row.received.emplace(c, shows, name);
             for (std::size_t n = 0; n < row.words.size(); ++n)
-                row.words[n] = who + word(static_cast<SrdoFault>(n)) + (s.pdo->to_node ? "" : "; its pins have their safe values");
+                row.words[n] = who + to_string(static_cast<SrdoFault>(n)) + (s.pdo->to_node ? "" : "; its pins have their safe values");
         }
         fail_safe_.emplace(c, shows, "fail-safe",
                            "rising edge: sends the global fail-safe command; whoever hears it goes to its safe state");
@@ -40,7 +40,7 @@ public:
             const auto status = runner.srdo(n);
             row.count = static_cast<std::uint32_t>(status.count);
             if (!row.received) continue;
-            row.received->valid = status.believed && runner.operational(runner.own().srdos[n].node);
+            row.received->valid = status.valid && runner.operational(runner.own().srdos[n].node);
             row.received->fault = static_cast<std::uint32_t>(status.fault);
             if (row.received->reset && !row.was_reset) runner.acknowledge_srdo(n, now);
             row.was_reset = row.received->reset;

@@ -37,16 +37,16 @@ void Gateway::Net::on_node(std::uint8_t node, NodeEvent event, NmtState state, T
         if (boot_up) gateway.say(who + "BOOT_UP");
     } else if (event == NodeEvent::lost) {
         const Error what = network.node(node)->guarded() ? Error::lost_guarding : Error::lost_heartbeat;
-        gateway.say(who + "ERROR " + std::to_string(static_cast<unsigned>(what)) + " #" + word(what));
+        gateway.say(who + "ERROR " + std::to_string(static_cast<unsigned>(what)) + " #" + to_string(what));
     } else if (guarded) {
-        gateway.say(who + upper(canopen::word(state)));
+        gateway.say(who + upper(canopen::to_string(state)));
     }
 }
 
 void Gateway::Net::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
     std::string text = format_text("%u %u EMCY 0x%04X 0x%02X", number, node, e.code, e.error_register);
     for (const auto byte : e.manufacturer) text += " " + std::to_string(byte);
-    gateway.say(text + " #" + emergency_word(e.code));
+    gateway.say(text + " #" + emergency_text(e.code));
 }
 
 Gateway::Gateway(unsigned nets, Identity identity) : identity_(std::move(identity)) {
@@ -138,7 +138,7 @@ void Gateway::answer(int client, std::uint32_t sequence, const std::string& text
 }
 void Gateway::refuse(int client, std::uint32_t sequence, Error error, const std::string& why) {
     answer(client, sequence,
-           "ERROR:" + std::to_string(static_cast<unsigned>(error)) + " #" + word(error) + (why.empty() ? "" : ": " + why));
+           "ERROR:" + std::to_string(static_cast<unsigned>(error)) + " #" + to_string(error) + (why.empty() ? "" : ": " + why));
 }
 void Gateway::say(const std::string& event) {
     for (Client& c : clients_)

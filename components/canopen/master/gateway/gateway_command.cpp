@@ -228,7 +228,7 @@ bool Reader::command() {
 
 }  // namespace
 
-const char* word(Error error) {
+const char* to_string(Error error) {
     switch (error) {
     case Error::none: return "no error";
     case Error::not_supported: return "request not supported";

@@ -39,7 +39,7 @@ enum class Error : std::uint16_t {
     no_memory = 600,
 };
 /// "syntax error", …
-const char* word(Error);
+const char* to_string(Error);
 
 enum class Verb : std::uint8_t {
     none,  ///< an empty line or a comment

@@ -9,7 +9,7 @@ namespace hal::canopen::gateway {
 std::string abort_text(Abort abort) {
     char text[24];
     std::snprintf(text, sizeof text, "ERROR:0x%08X #", static_cast<unsigned>(abort));
-    return std::string(text) + canopen::word(abort);
+    return std::string(text) + canopen::to_string(abort);
 }
 
 /// Only objects that act or hold something: no PDO, SYNC or SDO parameters of a node whose object dictionary the bus does not reach.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "emergency_words.hpp"
+#include "emergency_text.hpp"
 
 #include <algorithm>
 
@@ -23,10 +23,10 @@ bool is_drive(const config::Node& node) noexcept {
 
 }  // namespace
 
-const char* emergency_word(const config::MasterConfig& config, std::uint8_t id, std::uint16_t code) noexcept {
+const char* emergency_text(const config::MasterConfig& config, std::uint8_t id, std::uint16_t code) noexcept {
     for (const config::Node& n : config.nodes)
         if (n.setup.id == id && is_drive(n)) return cia402::error_word(code);
-    return emergency_word(code);
+    return emergency_text(code);
 }
 
 }  // namespace hal::canopen
