@@ -5,7 +5,7 @@
 
 namespace {
 
-/// A parameter that the component sets, too.
+/// A parameter that the component sets as well.
 class Coefficient : public hal::Param<double> {
 public:
     using Param::Param;
@@ -19,21 +19,21 @@ public:
 //     both:     d1 = -2 cos w / a,              d2 = (1 - s) / a       with s = sin w / (2 Q), a = 1 + s
 struct Biquad : hal::Component {
     using Component::Component;
-    hal::In<double>        in{*this, "in", "the input"};
-    hal::Out<double>       out{*this, "out", "the filtered input"};
-    hal::In<bool>          enable{*this, "enable", "a rising edge makes the filter and clears it; FALSE: out is in"};
-    hal::Out<bool>         valid{*this, "valid", "TRUE: there is such a filter; FALSE: out is in"};
-    hal::In<std::uint32_t> type{*this, "type", "0: the parameters n0 to d2 as they are; 1: low pass; 2: notch"};
+    hal::In<double>        in{*this, "in", "input"};
+    hal::Out<double>       out{*this, "out", "filtered input"};
+    hal::In<bool>          enable{*this, "enable", "a rising edge designs and clears the filter; FALSE copies in to out"};
+    hal::Out<bool>         valid{*this, "valid", "TRUE: the parameters are valid; FALSE: in is copied to out"};
+    hal::In<std::uint32_t> type{*this, "type", "0: user-defined by n0 to d2; 1: low pass; 2: notch"};
     hal::In<double>        f0{*this, "f0", "corner or notch frequency, below half the rate of the thread",
                               {.initial = 250.0, .unit = "Hz"}};
     hal::In<double>        q{*this, "Q", "quality of the filter, 0.5 to 2", {.initial = 0.7071}};
-    hal::Out<double>       s1{*this, "s1", "memory, to be used in the next cycle"};
-    hal::Out<double>       s2{*this, "s2", "memory, to be used in the cycle after"};
-    Coefficient            n0{*this, "n0", "factor of the input", {.initial = 1.0}};
-    Coefficient            n1{*this, "n1", "factor of the input one cycle ago"};
-    Coefficient            n2{*this, "n2", "factor of the input two cycles ago"};
-    Coefficient            d1{*this, "d1", "minus the factor of the output one cycle ago"};
-    Coefficient            d2{*this, "d2", "minus the factor of the output two cycles ago"};
+    hal::Out<double>       s1{*this, "s1", "state for the next cycle"};
+    hal::Out<double>       s2{*this, "s2", "state for the cycle after next"};
+    Coefficient            n0{*this, "n0", "coefficient of the input", {.initial = 1.0}};
+    Coefficient            n1{*this, "n1", "coefficient of the input one cycle ago"};
+    Coefficient            n2{*this, "n2", "coefficient of the input two cycles ago"};
+    Coefficient            d1{*this, "d1", "negated coefficient of the output one cycle ago"};
+    Coefficient            d2{*this, "d2", "negated coefficient of the output two cycles ago"};
     hal::Function          run{*this, "", &Biquad::update, "filters"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -53,10 +53,10 @@ struct Biquad : hal::Component {
             s1 = next1;
             s2 = next2;
             out = y;
-        } else if (std::isfinite(x)) {  // the filter has run away
+        } else if (std::isfinite(x)) {  // the filter has diverged
             clear();
             out = x;
-        }  // not a number: the output stays
+        }  // NaN: the output keeps its value
     }
 
 private:
@@ -80,15 +80,15 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Biquad, "biquad", "Second-order filter: low pass, notch or of your own", R"(
+HAL_COMPONENT(Biquad, "biquad", "Second-order filter: low pass, notch or user-defined", R"(
     H(z) = (n0 + n1/z + n2/z²) / (1 + d1/z + d2/z²)
 
-A rising edge of `enable` makes the filter: of `type` 1 (low pass) or 2 (notch) from `f0` and `Q`, which the parameters then show,
-or of `type` 0 from the parameters. `f0` must be above 0 and below half the rate of the thread, `Q` from 0.5 to 2; otherwise
-`valid` is FALSE and `out` is `in`. LinuxCNC's manual page says "f0 > sampleRate / 2" and means this. In a cycle whose input is not a
-number `out` stays; a filter that runs away starts again.
+A rising edge of `enable` designs the filter: `type` 1 (low pass) and 2 (notch) compute the parameters from `f0` and `Q`; `type` 0 uses the parameters
+as they are. `f0` must be above 0 and below half the rate of the thread, `Q` in 0.5..2; otherwise
+`valid` is FALSE and `in` is copied to `out`. (LinuxCNC's manual page gives the limit as "f0 > sampleRate / 2".) While the input is NaN or infinite,
+`out` keeps its value; a filter that diverges is cleared.
 
-    # take the 50 Hz hum out of a force sensor
+    # remove the 50 Hz hum of a force sensor
     loadrt biquad names=no-hum
     addf no-hum servo
     setp no-hum.type 2

@@ -10,7 +10,7 @@
 
 namespace {
 
-/// What the letters of cfg= ask for.
+/// What the letters of cfg= select.
 struct Config {
     explicit Config(const std::string& text) {
         for (const char letter : text) {
@@ -44,14 +44,14 @@ struct Bldc : hal::Component {
     const Config has{cfg.get()};
 
     hal::Ins<bool> hall{*this, "hall#", has.hall ? 3 : 0, 1, "Hall sensor #"};
-    hal::Outs<bool> hall_error{*this, "hall-error", has.hall, "TRUE once the Hall sensors did not fit the pattern, until it is changed"};
+    hal::Outs<bool> hall_error{*this, "hall-error", has.hall, "TRUE after a Hall code outside of the pattern, until the pattern is changed"};
     std::array<std::optional<hal::In<bool>>, 4> gray;
-    hal::In<double> value{*this, "value", "amplitude; negative: the other way round"};
-    hal::Ins<double> lead_angle{*this, "lead-angle", has.encoder(), "how far the field leads the rotor", {.initial = 90.0, .unit = "deg"}};
-    hal::In<bool> rev{*this, "rev", "TRUE: the other way round"};
-    hal::Ins<double> frequency{*this, "frequency", has.free(), "turns of the field per second, without any feedback", {.unit = "Hz"}};
+    hal::In<double> value{*this, "value", "amplitude; a negative value reverses the direction"};
+    hal::Ins<double> lead_angle{*this, "lead-angle", has.encoder(), "angle by which the field leads the rotor", {.initial = 90.0, .unit = "deg"}};
+    hal::In<bool> rev{*this, "rev", "TRUE reverses the direction"};
+    hal::Ins<double> frequency{*this, "frequency", has.free(), "electrical turns of the field per second (open loop)", {.unit = "Hz"}};
     hal::Ins<double> init_value{*this, "initvalue", has.counting, "amplitude while aligning", {.initial = 0.2}};
-    hal::Ins<std::int32_t> raw_counts{*this, "rawcounts", has.encoder(), "counts of the encoder, which no index resets"};
+    hal::Ins<std::int32_t> raw_counts{*this, "rawcounts", has.encoder(), "encoder counts that the index does not reset"};
     hal::Ios<bool> index_enable{*this, "index-enable", has.index, "TRUE: waits for the encoder's index"};
     hal::Ins<bool> init{*this, "init", has.aligns(), "rising edge: aligns the motor"};
     hal::Outs<bool> init_done{*this, "init-done", has.aligns(), "TRUE: the motor is aligned"};
@@ -74,7 +74,7 @@ struct Bldc : hal::Component {
     hal::Params<std::int32_t> encoder_offset{*this, "encoder-offset", has.absolute || has.index,
                                              "counts at the motor's zero, from the encoder's zero or index"};
     hal::Outs<std::int32_t> offset_measured{*this, "offset-measured", has.counting, "counts at the motor's zero, as found"};
-    hal::Param<double> drive_offset{*this, "drive-offset", "what the drive adds to rotor-angle, heeded while aligning", {.unit = "deg"}};
+    hal::Param<double> drive_offset{*this, "drive-offset", "offset that the drive adds to rotor-angle; used while aligning", {.unit = "deg"}};
     hal::Params<std::uint32_t> output_pattern{*this, "output-pattern", has.hall_out, "Hall pattern to emulate, 0 to 47", {.initial = 25}};
     hal::Params<std::uint32_t> pattern{*this, "pattern", has.hall, "Hall pattern of the motor, 0 to 47", {.initial = 25}};
 
@@ -107,7 +107,7 @@ private:
     void count() noexcept {
         if (!has.encoder()) return;
         const std::int32_t raw = raw_counts[0];
-        // By its differences, so that a counter that overflows is no jump.
+        // By differences, so that an overflow of the counter causes no jump.
         moved_ = started_ ? static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(last_raw_)) : 0;
         counts_ = started_ ? counts_ + moved_ : raw;
         last_raw_ = raw;
@@ -137,7 +137,7 @@ private:
 
     double from_encoder() noexcept {
         source_ = 2;
-        // What is given now holds until the next cycle: the angle is that of the rotor half a period ahead.
+        // The outputs hold until the next cycle: use the rotor angle half a period ahead.
         const std::int64_t zero = has.absolute ? encoder_offset[0] : offset_;
         return (static_cast<double>(counts_ - zero) + 0.5 * static_cast<double>(moved_)) / per_turn();
     }
@@ -176,8 +176,8 @@ private:
         return free_angle_;
     }
 
-    // With an index: turns slowly until it comes. Without: lets the current grow at angle 0, then swings the field
-    // to both sides, less and less, so that a rotor that stood just opposite does not stay there.
+    // With an index: turns slowly until the index. Without: ramps up the current at angle 0, then swings the field to both
+    // sides with decreasing amplitude, so that a rotor exactly opposite does not stay there.
     double align(double dt) noexcept {
         const double current = std::fabs(init_value[0]) <= 1e300 ? init_value[0].get() : 0.0;
         source_ = state_ == State::aligning ? 4 : 5;
@@ -270,30 +270,30 @@ Bldc::Bldc(const hal_host* host) : Component(host) {
 }  // namespace
 
 HAL_COMPONENT(Bldc, "bldc", "Commutation of a three-phase motor: from its feedback to the drive", R"(
-`cfg=` has a group of letters per instance; lower case says what the motor has, upper case what the drive wants.
+`cfg=` has a group of letters per instance: lower case for the motor's feedback, upper case for the drive's inputs.
 
 | input | | output | |
 | --- | --- | --- | --- |
-| n | nothing: the field turns at `frequency` | (none) | A-value, B-value, C-value |
+| n | no feedback: the field turns at `frequency` | (none) | A-value, B-value, C-value |
 | h | Hall sensors | 6 | two numbers per phase, high and low side |
 | a | absolute encoder | B | a bit per phase |
-| q | counting encoder, has to find its zero | B6 | two bits per phase |
-| i | its index | H | emulated Hall sensors |
+| q | incremental encoder, has to find its zero | B6 | two bits per phase |
+| i | index of the encoder | H | emulated Hall sensors |
 | f | 4-bit Gray code of Fanuc "red cap" motors | F | emulated Gray code |
-| | | T | trapezoid, where sine would be possible |
+| | | T | trapezoid instead of sine |
 
-The angle of the field, `phase-angle`, leads `rotor-angle` by `lead-angle` (90 degrees where there is no such pin), or lags when `out`
-is negative. Motor zero is where a rotor stands with A positive, B and C negative. With sines A = cos(phase), B and C a third of a turn
-later and earlier; a trapezoid takes the two phases that fit best, each for a third of a turn. An encoder's angle is taken half a period
-ahead, as what is given holds for a period. With H and F there are no phase outputs.
+The angle of the field, `phase-angle`, leads `rotor-angle` by `lead-angle` (90 degrees without that pin), or lags it when `out`
+is negative. Motor zero is the rotor position with A positive, B and C negative. With sine outputs A = cos(phase), and B and C are a third of a turn
+later and earlier; a trapezoid drives the two phases nearest to the angle, each for a third of a turn. The angle of an encoder is extrapolated by
+half a period, because the outputs hold for a period. With H and F there are no phase outputs.
 
-**Finding zero.** *a*: known; `encoder-offset` counts. *qh*: trapezoid from the Hall sensors until their first edge. *qhi*: the same until
-the index, `encoder-offset` counts before zero. *qi*: the rising edge of `init` lets the field turn, one electrical turn per second, with
-`initvalue` until the index comes. *q*: `init` pulls the rotor to zero with `initvalue`, in three seconds. Until zero is
-found there is no output. `rawcounts` has to be the encoder's pin of that name.
+**Finding zero.** *a*: known, at `encoder-offset` counts. *qh*: trapezoid from the Hall sensors until their first edge. *qhi*: the same until
+the index, which is `encoder-offset` counts before zero. *qi*: a rising edge of `init` turns the field at one electrical turn per second with the amplitude
+`initvalue` until the index. *q*: `init` pulls the rotor to zero with the amplitude `initvalue`, in three seconds. Until zero is
+found, the outputs are 0. Link `rawcounts` to the encoder's pin of that name.
 
-**Hall patterns** 0 to 47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees). `hall-error` says that a code is not in the
-pattern, which also makes all outputs 0, or that a state was left out.
+**Hall patterns** 0..47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees). `hall-error` is TRUE after a code outside of the
+pattern, which also sets all outputs to 0, and after a skipped state.
 
     loadrt bldc cfg=qh names=spindle
     addf spindle servo
@@ -308,7 +308,7 @@ pattern, which also makes all outputs 0, or that a state was left out.
     net phase-v    <= spindle.B-value
     net phase-w    <= spindle.C-value
 
-Where LinuxCNC's own differs: there trapezoids and emulated Hall sensors from an encoder lead by 60 degrees more than `lead-angle` says,
+**Differences from LinuxCNC:** in LinuxCNC, trapezoids and emulated Hall sensors from an encoder lead by 60 degrees more than `lead-angle`,
 `phase-angle` from Hall sensors alone has the wrong sign, the bits of three outputs are not symmetrical, and a negative `value` does not
-turn a field without feedback round.
+reverse a field without feedback.
 )")

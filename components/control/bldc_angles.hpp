@@ -21,7 +21,7 @@ inline constexpr const char* patterns[48] = {
     "401376", "510267", "402375", "513264", "623154", "732045", "620157", "731046",
 };
 
-/// `angle` without whole turns; 0 when it is not a finite number. [realtime]
+/// Returns `angle` (turns) without its whole turns, 0..1; 0 for NaN and infinity. [realtime]
 inline double fraction(double angle) noexcept {
     const double rest = angle - std::floor(angle);
     return rest >= 0.0 && rest < 1.0 ? rest : 0.0;
@@ -29,26 +29,26 @@ inline double fraction(double angle) noexcept {
 
 inline const char* codes(std::uint32_t pattern) noexcept { return patterns[pattern < 48 ? pattern : 25]; }
 
-/// Number of the state with this code, 0 to 5; -1 when the pattern does not have it. [realtime]
+/// Returns the number of the state with this code, 0..5, or -1 if the pattern does not contain it. [realtime]
 inline int state_of(unsigned code, std::uint32_t pattern) noexcept {
     for (int i = 0; i < 6; ++i)
         if (static_cast<unsigned>(codes(pattern)[i] - '0') == code) return i;
     return -1;
 }
 
-/// The code that a motor with this pattern shows at `rotor`. [realtime]
+/// Returns the code of a motor with this pattern at the rotor angle `rotor` (turns). [realtime]
 inline unsigned code_of(double rotor, std::uint32_t pattern) noexcept {
     const auto state = static_cast<std::size_t>(fraction(rotor - 1.0 / 12.0) * 6.0) % 6;
     return static_cast<unsigned>(codes(pattern)[state] - '0');
 }
 
-/// A B C of a field at `phase`, amplitude 1. [realtime]
+/// Returns the phase values A B C of a field at `phase` (turns), amplitude 1. [realtime]
 inline std::array<double, 3> sine(double phase) noexcept {
     const double angle = 2.0 * std::numbers::pi * phase, third = 2.0 * std::numbers::pi / 3.0;
     return {std::cos(angle), std::cos(angle - third), std::cos(angle + third)};
 }
 
-/// The pair of phases whose field is nearest to `phase`. [realtime]
+/// Returns the pair of phases whose field is nearest to `phase` (turns). [realtime]
 inline std::array<double, 3> trapezoid(double phase) noexcept {
     constexpr std::array<double, 3> pairs[6] = {{1, 0, -1}, {0, 1, -1}, {-1, 1, 0}, {-1, 0, 1}, {0, -1, 1}, {1, -1, 0}};
     return pairs[static_cast<std::size_t>(fraction(phase) * 6.0) % 6];

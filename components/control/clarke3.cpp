@@ -12,7 +12,7 @@ struct Clarke3 : hal::Component {
     hal::In<double>  c{*this, "c", "third phase"};
     hal::Out<double> x{*this, "x", "component in the direction of phase a"};
     hal::Out<double> y{*this, "y", "component a quarter turn ahead of x"};
-    hal::Out<double> h{*this, "h", "homopolar component: what the phases have in common"};
+    hal::Out<double> h{*this, "h", "homopolar component: the part common to all phases"};
     hal::Function    run{*this, "", &Clarke3::update, "computes x, y and h"};
 
     void update(hal::Cycle) noexcept {
@@ -29,8 +29,8 @@ HAL_COMPONENT(Clarke3, "clarke3", "Clarke transform of three phases", R"(
     y = (b - c) / sqrt(3)
     h = (a + b + c) sqrt(2) / 3
 
-Amplitudes stay: three sines of amplitude 1, a third of a turn apart, give a vector of length 1. What is common to all phases is h,
-a share of h / sqrt(2) in each. See `clarke2` for phases whose sum is zero, `clarkeinv` for the way back.
+The transform preserves amplitudes: three sines of amplitude 1, a third of a turn apart, give a vector of length 1. The part common to all phases is
+h / sqrt(2) in each. See `clarke2` for phases whose sum is zero, `clarkeinv` for the inverse.
 
     loadrt clarke3 names=currents
     addf currents servo

@@ -9,15 +9,15 @@ struct ClarkeInv : hal::Component {
     using Component::Component;
     hal::In<double>  x{*this, "x", "component in the direction of phase a"};
     hal::In<double>  y{*this, "y", "component a quarter turn ahead of x"};
-    hal::In<double>  h{*this, "h", "homopolar component, as clarke3 gives it; usually 0"};
-    hal::In<double>  theta{*this, "theta", "the vector is turned by this before the transform", {.unit = "turn"}};
+    hal::In<double>  h{*this, "h", "homopolar component, as computed by clarke3; usually 0"};
+    hal::In<double>  theta{*this, "theta", "angle by which the vector is rotated before the transform", {.unit = "turn"}};
     hal::Out<double> a{*this, "a", "first phase"};
     hal::Out<double> b{*this, "b", "second phase"};
     hal::Out<double> c{*this, "c", "third phase"};
     hal::Function    run{*this, "", &ClarkeInv::update, "computes a, b and c"};
 
     void update(hal::Cycle) noexcept {
-        // Whole turns are taken off first: the sine of a large number of radians has lost its digits.
+        // Remove whole turns first: the sine of a large number of radians is inaccurate.
         const double angle = 2.0 * std::numbers::pi * (theta - std::floor(theta));
         const double sine = std::sin(angle), cosine = std::cos(angle);
         const double turned_x = x * cosine - y * sine, turned_y = x * sine + y * cosine;
@@ -31,13 +31,13 @@ struct ClarkeInv : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(ClarkeInv, "clarkeinv", "Inverse Clarke transform, with rotation", R"(
-Turns the vector (x, y) by `theta` turns (1.0 is 360 degrees) to (x', y') and gives the three phases:
+Rotates the vector (x, y) by `theta` turns (1.0 is 360 degrees) to (x', y') and computes the three phases:
 
     a = x' + h / sqrt(2)
     b = -x' / 2 + y' sqrt(3) / 2 + h / sqrt(2)
     c = -x' / 2 - y' sqrt(3) / 2 + h / sqrt(2)
 
-With `theta` 0 it undoes `clarke3`, and `clarke2` with h = 0. With `theta` following a rotor, x and y are the vector the rotor sees.
+With `theta` 0 it is the inverse of `clarke3`, and of `clarke2` with h = 0. With `theta` as the rotor angle, x and y are in the rotor's frame.
 
     loadrt clarkeinv names=drive
     addf drive servo

@@ -3,18 +3,18 @@
 
 namespace {
 
-// The Kalman filter of one value that is measured with the variance Rk and wanders by the variance Qk per cycle:
+// The Kalman filter of one value, measured with the variance Rk, whose true value changes with the variance Qk per cycle:
 //     p = p + Qk,  k = p / (p + Rk),  x = x + k (z - x),  p = (1 - k) p
 struct FilterKalman : hal::Component {
     using Component::Component;
     static constexpr double tiny = 1.17549e-38;
-    hal::In<bool>      debug{*this, "debug", "has no effect here: record zk and xk-out instead"};
-    hal::In<bool>      passthrough{*this, "passthrough", "TRUE: xk-out is zk"};
-    hal::In<bool>      reset{*this, "reset", "TRUE: the filter starts anew, xk-out is 0"};
-    hal::In<double>    zk{*this, "zk", "the measured value"};
-    hal::Out<double>   xk_out{*this, "xk-out", "the estimated value"};
+    hal::In<bool>      debug{*this, "debug", "no effect; record zk and xk-out instead"};
+    hal::In<bool>      passthrough{*this, "passthrough", "TRUE copies zk to xk-out"};
+    hal::In<bool>      reset{*this, "reset", "TRUE restarts the filter and sets xk-out to 0"};
+    hal::In<double>    zk{*this, "zk", "measured value"};
+    hal::Out<double>   xk_out{*this, "xk-out", "estimated value"};
     hal::Param<double> rk{*this, "Rk", "variance of the measurement", {.initial = tiny}};
-    hal::Param<double> qk{*this, "Qk", "variance by which the true value wanders in a cycle", {.initial = tiny}};
+    hal::Param<double> qk{*this, "Qk", "variance of the true value's change per cycle (process noise)", {.initial = tiny}};
     hal::Function      run{*this, "", &FilterKalman::update, "estimates"};
 
     void update(hal::Cycle) noexcept {
@@ -28,7 +28,7 @@ struct FilterKalman : hal::Component {
 
 private:
     void estimate(double z) noexcept {
-        const double before = p_ + std::fmax(qk, 0.0), noise = std::fmax(rk, 0.0);  // what is not a number counts as 0
+        const double before = p_ + std::fmax(qk, 0.0), noise = std::fmax(rk, 0.0);  // NaN counts as 0
         const double gain = before + noise > 0.0 ? before / (before + noise) : 1.0;
         const double x = x_ + gain * (z - x_), p = (1.0 - gain) * before;
         if (!std::isfinite(x) || !std::isfinite(p)) return;
@@ -43,9 +43,9 @@ private:
 
 HAL_COMPONENT(FilterKalman, "filter_kalman", "Kalman filter of one value", R"(
 Estimates a value from noisy measurements. `Rk` is the variance of the sensor: record it at rest and compute the variance of the
-samples. `Qk` is how much the true value may wander in a cycle: the smaller, the smoother and slower the estimate. Only their
-ratio matters once it has settled. Set both; the defaults say nothing about your sensor. Negative values count as 0. A
-measurement that is not a number is left out.
+samples. `Qk` is the variance of the true value's change per cycle: a smaller value gives a smoother and slower estimate. Only their
+ratio matters once the filter has settled. Set both; the defaults fit no real sensor. Negative values count as 0.
+Measurements that are NaN or infinite are ignored.
 
     loadrt filter_kalman names=coolant-filter
     addf coolant-filter servo

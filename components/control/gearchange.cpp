@@ -3,7 +3,7 @@
 
 namespace {
 
-/// The component may correct it.
+/// A parameter that the component may correct.
 class CorrectedParam : public hal::Param<double> {
 public:
     using Param::Param;
@@ -13,16 +13,16 @@ public:
 struct Gearchange : hal::Component {
     using Component::Component;
     hal::In<bool>      sel{*this, "sel", "TRUE: gear 2, FALSE: gear 1"};
-    hal::In<double>    speed_in{*this, "speed-in", "wanted spindle speed"};
-    hal::Out<double>   speed_out{*this, "speed-out", "speed for the drive, as if in gear 1"};
-    hal::In<bool>      dir_in{*this, "dir-in", "wanted direction"};
+    hal::In<double>    speed_in{*this, "speed-in", "commanded spindle speed"};
+    hal::Out<double>   speed_out{*this, "speed-out", "speed for the drive, scaled for gear 1"};
+    hal::In<bool>      dir_in{*this, "dir-in", "commanded direction"};
     hal::Out<bool>     dir_out{*this, "dir-out", "direction for the drive"};
     hal::Param<double> min1{*this, "min1", "lowest speed in gear 1"};
     hal::Param<double> max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
     hal::Param<double> min2{*this, "min2", "lowest speed in gear 2"};
     hal::Param<double> max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
-    CorrectedParam     scale2{*this, "scale2", "how many times faster gear 2 turns the spindle; at least 1", {.initial = 1.0}};
-    hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 turns the spindle the other way round"};
+    CorrectedParam     scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
+    hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 reverses the direction of the spindle"};
     hal::Function      run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};
 
     void update(hal::Cycle) noexcept {
@@ -50,9 +50,9 @@ HAL_COMPONENT(Gearchange, "gearchange", "Scales and limits a spindle speed for o
 | FALSE | speed-in between min1 and max1 | dir-in |
 | TRUE  | (speed-in between min2 and max2) / scale2 | dir-in, inverted while reverse is TRUE |
 
-Scale the drive for gear 1; `scale2` says how many times faster gear 2 turns the spindle at the same drive speed. Gear 2 is the high
-one: a `scale2` below 1 is set to 1. The limits are speeds of the spindle, in either direction: a negative `speed-in` is kept between
--max and -min. When a minimum is above its maximum, the maximum wins; while `speed-in` is not a number, the minimum counts.
+Scale the drive for gear 1; `scale2` is the ratio of the spindle speeds in gear 2 and gear 1 at the same drive speed. Gear 2 is the high
+gear: a `scale2` below 1 is set to 1. The limits are spindle speeds in either direction: a negative `speed-in` is limited to the range from
+-max to -min. If a minimum is above its maximum, the maximum applies; while `speed-in` is NaN, the minimum applies.
 
     loadrt gearchange names=gears
     addf gears servo

@@ -9,19 +9,19 @@ struct ModeSwitch : hal::Component {
     using Component::Component;
 
     hal::Argument              inputs{*this, "inputs", 3, "how many sources", {.min = 1, .max = 256}};
-    hal::In<std::uint32_t>     select{*this, "select", "which source goes to out, from 0"};
+    hal::In<std::uint32_t>     select{*this, "select", "number of the source for out, from 0"};
     hal::Ins<double>           in{*this, "in-##", inputs, "source ##"};
     hal::In<std::uint32_t>     transition{*this, "transition", "0 jump; 1 fade; 2 decay; 3 slew; 4 keep the offset", {.initial = fade}};
-    hal::In<double>            time{*this, "time", "fade: how long it takes; decay: time constant", {.initial = 0.1, .unit = "s"}};
-    hal::In<double>            rate{*this, "rate", "slew: by how much out comes nearer", {.initial = 1.0, .unit = "1/s"}};
-    hal::In<bool>              hold{*this, "hold", "TRUE: out stays, and the source is taken up from there without a jump afterwards"};
-    hal::In<bool>              clear{*this, "clear", "TRUE: the offset is 0 at once"};
-    hal::Out<double>           out{*this, "out", "the source, and on the way to it what is left of the offset", {.finite = true}};
+    hal::In<double>            time{*this, "time", "duration of a fade; time constant of a decay", {.initial = 0.1, .unit = "s"}};
+    hal::In<double>            rate{*this, "rate", "rate of change of the offset in a slew", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<bool>              hold{*this, "hold", "TRUE holds out; FALSE returns to the source with a transition"};
+    hal::In<bool>              clear{*this, "clear", "TRUE sets the offset to 0 immediately"};
+    hal::Out<double>           out{*this, "out", "selected source plus the remaining offset", {.finite = true}};
     hal::Out<double>           offset{*this, "offset", "out - source", {.finite = true}};
-    hal::Out<std::uint32_t>    selected{*this, "selected", "the source that goes to out"};
-    hal::Out<bool>             switching{*this, "switching", "TRUE: on the way from one source to another"};
-    hal::Out<bool>             bad_source{*this, "source-error", "TRUE: select is beyond the sources, or the source is not a number"};
-    hal::Outs<bool>            active{*this, "active-##", inputs, "TRUE: source ## goes to out"};
+    hal::Out<std::uint32_t>    selected{*this, "selected", "number of the source in use"};
+    hal::Out<bool>             switching{*this, "switching", "TRUE during a transition"};
+    hal::Out<bool>             bad_source{*this, "source-error", "TRUE: select is out of range, or the source is NaN or infinite"};
+    hal::Outs<bool>            active{*this, "active-##", inputs, "TRUE: source ## is in use"};
     hal::Function              run{*this, "", &ModeSwitch::update, "passes the selected source"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -84,7 +84,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(ModeSwitch, "mode_switch", "Switches between sources without a jump", R"(
-    out = source + offset,   offset = out before - new source at the moment of switching, then towards 0
+    out = source + offset,   offset = previous out - new source at the moment of switching, then towards 0
 
 | transition | offset |
 | --- | --- |
@@ -92,14 +92,14 @@ HAL_COMPONENT(ModeSwitch, "mode_switch", "Switches between sources without a jum
 | 1 fade | times 1 - 3 s^2 + 2 s^3, s from 0 to 1 in `time`: smooth at both ends |
 | 2 decay | exponentially with the time constant `time` |
 | 3 slew | by `rate` |
-| 4 keep | stays until the next switch or `clear` (a jog that takes up where the program left) |
+| 4 keep | constant until the next switch or `clear` (a jog that continues from the program's position) |
 
-The bumpless transfer of process control (K. Astroem, T. Haegglund, *Advanced PID Control*, ISA 2006). `out` follows the new source at
-once, with all its motion; only the gap fades. A source that can follow, an integrator or a trajectory, is better still loaded with `out`
-while its `active-##` is FALSE: then there is no gap.
+This is the bumpless transfer of process control (K. Astroem, T. Haegglund, *Advanced PID Control*, ISA 2006). `out` follows the motion of the new source
+immediately; only the gap fades. If a source can track (an integrator, a trajectory), load it with `out` while its `active-##` is FALSE; then
+there is no gap.
 
-While `select` is beyond the sources the last one stays; while the source is not a number `out` stays, and it is taken up again like a
-switch, and so after `hold`. The first cycle takes its source without a transition. A `transition` above 4 is a jump.
+While `select` is out of range, the last source remains in use. While the source is NaN or infinite, `out` keeps its value; the return to the source is a
+transition, as it is after `hold`. The first cycle has no transition. A `transition` above 4 is a jump.
 
     loadrt mode_switch names=effort-source inputs=2
     addf effort-source servo

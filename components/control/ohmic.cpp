@@ -9,16 +9,16 @@ struct Ohmic : hal::Component {
     hal::In<double>  full_frequency{*this, "thcad-max-volt-freq", "frequency of the card at full scale, from its label", {.unit = "Hz"}};
     hal::In<double>  divide{*this, "thcad-divide", "frequency divider set on the card: 1, 32, 64 or 128", {.initial = 32.0}};
     hal::In<double>  full_scale{*this, "thcad-fullscale", "full scale of the card: 5, 10 or 300", {.initial = 5.0, .unit = "V"}};
-    hal::In<double>  velocity_in{*this, "velocity-in", "divided frequency, as velocity of an encoder", {.unit = "Hz"}};
-    hal::In<double>  volt_divider{*this, "volt-divider", "sensed voltage per voltage at the card", {.initial = 4.9}};
-    hal::In<double>  threshold{*this, "ohmic-threshold", "at or above it the torch touches", {.initial = 18.0, .unit = "V"}};
-    hal::In<double>  low{*this, "ohmic-low", "at or below it the torch does not touch", {.initial = 5.0, .unit = "V"}};
-    hal::Out<bool>   arc_on{*this, "arc-on", "TRUE: full scale is reached, there is an arc"};
+    hal::In<double>  velocity_in{*this, "velocity-in", "divided frequency, as an encoder velocity", {.unit = "Hz"}};
+    hal::In<double>  volt_divider{*this, "volt-divider", "ratio of sensed voltage to voltage at the card", {.initial = 4.9}};
+    hal::In<double>  threshold{*this, "ohmic-threshold", "at or above this voltage the torch touches the material", {.initial = 18.0, .unit = "V"}};
+    hal::In<double>  low{*this, "ohmic-low", "at or below this voltage the torch does not touch the material", {.initial = 5.0, .unit = "V"}};
+    hal::Out<bool>   arc_on{*this, "arc-on", "TRUE while the card is at full scale: an arc is present"};
     hal::Out<double> thcad_volts{*this, "thcad-volts", "voltage at the card", {.unit = "V"}};
     hal::Out<double> ohmic_volts{*this, "ohmic-volts", "sensed voltage", {.unit = "V"}};
-    hal::Out<bool>   ohmic_on{*this, "ohmic-on", "TRUE: probing, and the torch touches"};
-    hal::In<bool>    is_probing{*this, "is-probing", "TRUE: the machine is probing"};
-    hal::Function    run{*this, "", &Ohmic::update, "computes voltages and switches"};
+    hal::Out<bool>   ohmic_on{*this, "ohmic-on", "TRUE while probing and the torch touches the material"};
+    hal::In<bool>    is_probing{*this, "is-probing", "TRUE while the machine is probing"};
+    hal::Function    run{*this, "", &Ohmic::update, "computes the voltages and the contact state"};
 
     void update(hal::Cycle) noexcept {
         const double span = full_frequency - zero_frequency;
@@ -36,8 +36,8 @@ HAL_COMPONENT(Ohmic, "ohmic", "Ohmic sensing of a plasma torch with a voltage-to
     thcad-volts = (velocity-in * thcad-divide - thcad-0-volt-freq) / (thcad-max-volt-freq - thcad-0-volt-freq) * thcad-fullscale
     ohmic-volts = thcad-volts * volt-divider
 
-`arc-on` says that the card is at full scale. `ohmic-on` becomes TRUE at `ohmic-threshold` and FALSE at `ohmic-low`, and is FALSE while
-`is-probing` is. While the two frequencies are equal, as they are before they are set, the voltages are 0.
+`arc-on` is TRUE while the card is at full scale. `ohmic-on` becomes TRUE at `ohmic-threshold` and FALSE at `ohmic-low`, and is FALSE while
+`is-probing` is FALSE. While the two frequencies are equal, as before they are set, the voltages are 0.
 
     loadrt ohmic names=touch
     addf touch servo

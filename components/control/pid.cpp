@@ -5,14 +5,14 @@
 
 namespace {
 
-/// `value` kept within ±|limit|; a limit of 0 is none.
+/// Clamps `value` to ±|limit|; a limit of 0 disables the clamp.
 double limited(double value, double limit) {
     const double bound = std::fabs(limit);
-    if (bound > 0.0) return value < -bound ? -bound : value > bound ? bound : value;  // not a number stays so
+    if (bound > 0.0) return value < -bound ? -bound : value > bound ? bound : value;  // NaN passes
     return value;
 }
 
-/// A gain that auto-tuning may set. It is an input: while a signal is linked, the signal has the say.
+/// A gain that auto-tuning may set. It is an input: a linked signal takes precedence.
 class Gain : public hal::In<double> {
 public:
     using In::In;
@@ -25,12 +25,12 @@ struct alignas(64) Pid : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.default_count = 3};
 
-    hal::In<double>  command{*this, "command", "the wanted value"};
-    hal::In<double>  feedback{*this, "feedback", "the measured value"};
+    hal::In<double>  command{*this, "command", "setpoint"};
+    hal::In<double>  feedback{*this, "feedback", "measured value"};
     hal::Out<double> error{*this, "error", "command - feedback", {.finite = true}};
-    hal::Out<double> output{*this, "output", "the control effort", {.safe = 0.0}};
+    hal::Out<double> output{*this, "output", "control effort", {.safe = 0.0}};
     hal::In<bool>    enable{*this, "enable", "TRUE closes the loop; FALSE clears the integral and forces output to 0"};
-    hal::In<bool>    index_enable{*this, "index-enable", "in the cycle it falls, command and feedback jump: derivatives are held"};
+    hal::In<bool>    index_enable{*this, "index-enable", "command and feedback jump in the cycle of its falling edge: derivatives are held"};
     hal::In<bool>    error_previous_target{*this, "error-previous-target", "error = command of the previous cycle - feedback", {.initial = true}};
     hal::In<bool>    tune_mode{*this, "tune-mode", "TRUE opens the loop for auto-tuning: output is bias until tune-start"};
     Gain             p_gain{*this, "Pgain", "proportional gain", {.initial = 1.0}};
@@ -41,34 +41,34 @@ struct alignas(64) Pid : hal::Component {
     hal::In<double>  ff2{*this, "FF2", "feed-forward of the second derivative of command"};
     hal::In<double>  ff3{*this, "FF3", "feed-forward of the third derivative of command"};
     hal::In<double>  bias{*this, "bias", "constant added to the output while enabled"};
-    hal::In<double>  deadband{*this, "deadband", "errors smaller than this count as 0; larger ones are reduced by it"};
-    hal::In<double>  max_error{*this, "maxerror", "limit on the error; 0 is none"};
-    hal::In<double>  max_error_i{*this, "maxerrorI", "limit on the integral of the error; 0 is none"};
-    hal::In<double>  max_error_d{*this, "maxerrorD", "limit on the derivative of the error; 0 is none"};
-    hal::In<double>  max_command_d{*this, "maxcmdD", "limit on the first derivative of command; 0 is none"};
-    hal::In<double>  max_command_dd{*this, "maxcmdDD", "limit on the second derivative of command; 0 is none"};
-    hal::In<double>  max_command_ddd{*this, "maxcmdDDD", "limit on the third derivative of command; 0 is none"};
-    hal::In<double>  max_output{*this, "maxoutput", "limit on the output; 0 is none"};
+    hal::In<double>  deadband{*this, "deadband", "smaller errors count as 0; larger ones are reduced by it"};
+    hal::In<double>  max_error{*this, "maxerror", "limit on the error; 0: no limit"};
+    hal::In<double>  max_error_i{*this, "maxerrorI", "limit on the integral of the error; 0: no limit"};
+    hal::In<double>  max_error_d{*this, "maxerrorD", "limit on the derivative of the error; 0: no limit"};
+    hal::In<double>  max_command_d{*this, "maxcmdD", "limit on the first derivative of command; 0: no limit"};
+    hal::In<double>  max_command_dd{*this, "maxcmdDD", "limit on the second derivative of command; 0: no limit"};
+    hal::In<double>  max_command_ddd{*this, "maxcmdDDD", "limit on the third derivative of command; 0: no limit"};
+    hal::In<double>  max_output{*this, "maxoutput", "limit on the output; 0: no limit"};
     hal::In<double>  command_deriv{*this, "command-deriv", "derivative of command; estimated while unlinked"};
     hal::In<double>  feedback_deriv{*this, "feedback-deriv", "derivative of feedback; estimated while unlinked"};
     hal::Out<bool>   saturated{*this, "saturated", "TRUE while maxoutput limits the output"};
-    hal::Out<double> saturated_s{*this, "saturated-s", "how long saturated has been TRUE", {.unit = "s"}};
-    hal::Out<std::int32_t> saturated_count{*this, "saturated-count", "for how many cycles saturated has been TRUE"};
+    hal::Out<double> saturated_s{*this, "saturated-s", "time for which saturated has been TRUE", {.unit = "s"}};
+    hal::Out<std::int32_t> saturated_count{*this, "saturated-count", "number of cycles for which saturated has been TRUE"};
 
     hal::Argument debug{*this, "debug", 0, "1 adds the pins errorI to ultimate-period", {.min = 0, .max = 1}};
 
 private:
-    // The memory of the loop stands beside the pins of every cycle, so that a cycle touches few cache lines.
+    // The state of the loop is beside the pins that every cycle uses, so that a cycle touches few cache lines.
     double integral_ = 0.0, pushing_ = 0.0;
     double last_command_ = 0.0, last_feedback_ = 0.0, slope_ = 0.0;
     double error_d_ = 0.0, feedback_d_ = 0.0, command_d_ = 0.0, command_dd_ = 0.0, command_ddd_ = 0.0;
     bool has_previous_ = false, was_index_enable_ = false, tuning_ = false;
 
 public:
-    hal::Io<bool>            tune_start{*this, "tune-start", "set: starts auto-tuning; cleared when it ends"};
+    hal::Io<bool>            tune_start{*this, "tune-start", "TRUE starts auto-tuning; cleared when it ends"};
     hal::Param<std::uint32_t> tune_type{*this, "tune-type", "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
     hal::Param<std::uint32_t> tune_cycles{*this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
-    hal::Param<double>       tune_effort{*this, "tune-effort", "output swings between bias + this and bias - this", {.initial = 0.5}};
+    hal::Param<double>       tune_effort{*this, "tune-effort", "amplitude of the output's oscillation around bias", {.initial = 0.5}};
 
     hal::Outs<double> error_i_out{*this, "errorI", debug, "integral of the error, limited by maxerrorI, before Igain; 0 while not enabled"};
     hal::Outs<double> error_d_out{*this, "errorD", debug, "derivative of the error"};
@@ -79,7 +79,7 @@ public:
     hal::Outs<double> ultimate_gain{*this, "ultimate-gain", debug, "gain at which the loop would oscillate, found by auto-tuning"};
     hal::Outs<double> ultimate_period{*this, "ultimate-period", debug, "period of that oscillation", {.unit = "s"}};
 
-    hal::Function run{*this, "do-pid-calcs", hal::step<&Pid::calculate>, "one step of the loop"};
+    hal::Function run{*this, "do-pid-calcs", hal::step<&Pid::calculate>, "runs one step of the control loop"};
 
     void calculate(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
@@ -109,11 +109,11 @@ public:
 private:
     double beyond_deadband(double e) const {
         const double band = std::fabs(deadband);
-        return e > band ? e - band : e < -band ? e + band : e * 0.0;  // 0, or still not a number
+        return e > band ? e - band : e < -band ? e + band : e * 0.0;  // 0, or NaN
     }
 
-    /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope of the error is that of
-    /// command less that of feedback as they are: it damps also where maxerror or deadband take the error away.
+    /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope of the error is the slope of
+    /// command minus the slope of feedback, unaffected by maxerror and deadband: it damps inside the deadband, too.
     void differentiate(bool at_index, double rate) {
         double slope = command_deriv.linked() ? command_deriv.get() : (command - last_command_) * rate;
         if (at_index & !command_deriv.linked()) slope = slope_;
@@ -131,7 +131,7 @@ private:
 
     void control(double e, double dt) {
         double integral = integral_;
-        if (e * pushing_ <= 0.0) integral = limited(integral + e * dt, max_error_i);  // while saturated, only what leads back out
+        if (e * pushing_ <= 0.0) integral = limited(integral + e * dt, max_error_i);  // while saturated, only away from the limit
         const double wanted = bias + p_gain * e + i_gain * integral + d_gain * error_d_ + ff0 * command + ff1 * command_d_ + ff2 * command_dd_ + ff3 * command_ddd_;
         const double given = limited(wanted, max_output);
         if (!std::isfinite(wanted)) {
@@ -142,7 +142,7 @@ private:
         finish(given, wanted > given ? 1.0 : wanted < given ? -1.0 : 0.0, dt);
     }
 
-    /// `pushing` is the direction in which the loop wants more than it may have: -1, 0 or 1.
+    /// `pushing` is the direction in which the output is limited: -1, 0 or 1.
     void finish(double effort, double pushing, double dt) {
         const bool limiting = pushing != 0.0;
         pushing_ = pushing;
@@ -152,7 +152,7 @@ private:
         saturated_count = limiting ? std::min(saturated_count.get(), INT32_MAX - 1) + 1 : 0;
     }
 
-    /// No control: a constant output and a clear memory.
+    /// Stops control: a constant output and a cleared integral.
     void shut(double effort) {
         integral_ = 0.0;
         finish(effort, 0.0, 0.0);
@@ -239,25 +239,25 @@ HAL_COMPONENT(Pid, "pid", "Proportional/integral/derivative controller with feed
     output    = bias + error * Pgain + errorI * Igain + errorD * Dgain
               + command * FF0 + commandD * FF1 + commandDD * FF2 + commandDDD * FF3, limited to ±maxoutput
 
-Here `error` is what is left behind `maxerror` and `deadband`; the pin `error` shows it before both. `errorI` to `feedbackD` are pins with `debug=1`
-only. `errorI` is the integral itself, in units of `error` times seconds and before Igain; it is 0 while `enable` is FALSE and while auto-tuning
-is on. A limit of 0 is no limit. With `error-previous-target` (the default) the error is taken against the target of the
-previous cycle, the one the feedback had time to follow. The slopes are `command-deriv` and `feedback-deriv` when those are
-linked, else differences of this cycle and the one before; `maxerror`, `deadband` and `error-previous-target` do not change
-them, so Dgain damps inside the deadband too. In the cycle in which `index-enable` falls, a slope that is a difference stays as
-it was. While an input is not a number `output` is 0; the integral and the derivatives survive.
+Here `error` is the error after `maxerror` and `deadband`; the pin `error` is the error before both. The pins `errorI` to `feedbackD` exist with
+`debug=1` only. `errorI` is the integral before Igain, in units of `error` times seconds; it is 0 while `enable` is FALSE and during
+auto-tuning. A limit of 0 disables it. With `error-previous-target` (the default) the error is computed from the target of the
+previous cycle, which the feedback had time to follow. The slopes are `command-deriv` and `feedback-deriv` if they are
+linked, else the difference from the previous cycle; `maxerror`, `deadband` and `error-previous-target` do not change
+them, so Dgain damps inside the deadband, too. In the cycle of the falling edge of `index-enable`, a slope computed as a difference
+keeps its value. While an input is NaN, `output` is 0 and the integral and the derivatives keep their values.
 
-**Otherwise than LinuxCNC's**, whose output is else the same to the last bits: the first cycle has no cycle before, so its slopes
-are 0 and its error is that of the present command (there everything jumps from 0, which kicks FF1 and Dgain). A `maxoutput` that
-is set to 0 while it limits ends the saturation (there `saturated` and the held integral stay). A negative limit or deadband counts
-as positive (there the output jumps between its ends). While an input is not a number there the output is none either.
-Auto-tuning leaves out the first two half cycles, which are the way to the oscillation (there they are averaged in).
+**Differences from LinuxCNC:** the output is bit-identical except in these cases. In the first cycle the slopes
+are 0 and the error is that of the current command (LinuxCNC starts from 0, which kicks FF1 and Dgain). Setting `maxoutput`
+to 0 ends the saturation (LinuxCNC: `saturated` and the held integral remain). A negative limit or deadband counts
+as positive (LinuxCNC: the output jumps between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN).
+Auto-tuning ignores the first two half cycles, before the oscillation is stable (LinuxCNC averages them in).
 
-**Auto-tuning** measures the loop by the relay method and sets the gains after Ziegler and Nichols. Hold `command`
-still near the middle of the travel; set `tune-effort` small, `enable`, `tune-mode`, then `tune-start`. If the loop
-does not oscillate visibly, increase `tune-effort`. When `tune-start` has gone FALSE the gains are in place (gains that
-are linked to a signal are left to it) and `output` stays at `bias` until `tune-mode` is FALSE. Clearing `enable`,
-`tune-mode` or `tune-start` aborts.
+**Auto-tuning** measures the loop by the relay method and sets the gains by the rules of Ziegler and Nichols. Hold `command`
+constant near the middle of the travel; set `tune-effort` to a small value, then set `enable`, `tune-mode` and `tune-start`. If the loop
+does not oscillate visibly, increase `tune-effort`. When `tune-start` becomes FALSE the gains are set (except gains
+linked to a signal), and `output` remains at `bias` until `tune-mode` is FALSE. Clearing `enable`,
+`tune-mode` or `tune-start` aborts the tuning.
 
     loadrt pid names=pid.x
     addf pid.x.do-pid-calcs servo

@@ -8,15 +8,15 @@ namespace {
 struct Siggen : hal::Component {
     using Component::Component;
     hal::Out<double> square{*this, "square", "square wave: positive while triangle and cosine rise"};
-    hal::Out<double> sine{*this, "sine", "sine wave: 90 degrees behind cosine"};
-    hal::Out<double> cosine{*this, "cosine", "cosine wave: 90 degrees ahead of sine"};
-    hal::Out<double> triangle{*this, "triangle", "triangle wave: its peaks are those of cosine"};
+    hal::Out<double> sine{*this, "sine", "sine wave: lags cosine by 90 degrees"};
+    hal::Out<double> cosine{*this, "cosine", "cosine wave: leads sine by 90 degrees"};
+    hal::Out<double> triangle{*this, "triangle", "triangle wave: peaks coincide with those of cosine"};
     hal::Out<double> sawtooth{*this, "sawtooth", "sawtooth wave: rises, and drops at the positive peak of cosine"};
     hal::Out<bool>   clock{*this, "clock", "TRUE while square is at its upper level"};
     hal::In<double>  frequency{*this, "frequency", "periods of the wave per second", {.initial = 1.0, .unit = "Hz"}};
-    hal::In<double>  amplitude{*this, "amplitude", "the waves swing from -amplitude to +amplitude about offset", {.initial = 1.0}};
+    hal::In<double>  amplitude{*this, "amplitude", "peak deviation of the waves from offset", {.initial = 1.0}};
     hal::In<double>  offset{*this, "offset", "added to all waves"};
-    hal::In<bool>    reset{*this, "reset", "while TRUE the waves stand in the middle of the period"};
+    hal::In<bool>    reset{*this, "reset", "TRUE holds the waves in the middle of the period"};
     hal::Function    run{*this, "update", &Siggen::update, "computes the next sample"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -50,7 +50,7 @@ With the phase p running from 0 to 1 in 1/frequency seconds:
     square   = offset - amplitude for p <= 0.5, else offset + amplitude
 
 The first sample has p = 0. While `reset` is TRUE p is 0.5: sine and sawtooth are at `offset`, the others at
-`offset - amplitude`. A frequency that is not a number holds the phase. Keep the frequency well below that of the thread.
+`offset - amplitude`. A frequency that is NaN holds the phase. Keep the frequency well below that of the thread.
 
     loadrt siggen names=test-signal
     addf test-signal.update servo

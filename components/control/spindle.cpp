@@ -5,35 +5,35 @@ namespace {
 
 struct Spindle : hal::Component {
     using Component::Component;
-    hal::Argument gears{*this, "numgears", 1, "how many gears", {.min = 1, .max = 16}};
+    hal::Argument gears{*this, "numgears", 1, "number of gears", {.min = 1, .max = 16}};
 
-    hal::In<std::uint32_t> select_gear{*this, "select-gear", "number of the gear, while no select.N from 1 on is TRUE"};
-    hal::In<double>  commanded_speed{*this, "commanded-speed", "wanted speed; negative: reverse", {.unit = "rpm"}};
+    hal::In<std::uint32_t> select_gear{*this, "select-gear", "number of the gear while select.1 and higher are FALSE"};
+    hal::In<double>  commanded_speed{*this, "commanded-speed", "commanded speed; negative: reverse", {.unit = "rpm"}};
     hal::In<double>  actual_speed{*this, "actual-speed", "speed measured by an encoder", {.unit = "turn/s"}};
-    hal::In<bool>    simulate_encoder{*this, "simulate-encoder", "TRUE: there is no encoder"};
-    hal::In<bool>    enable{*this, "enable", "FALSE: the spindle slows down to 0"};
-    hal::In<double>  lpf{*this, "spindle-lpf", "cycles over which spindle-rpm-abs is smoothed while at speed; 0: not at all"};
+    hal::In<bool>    simulate_encoder{*this, "simulate-encoder", "TRUE simulates the speed of a spindle without encoder"};
+    hal::In<bool>    enable{*this, "enable", "FALSE decelerates the spindle to 0"};
+    hal::In<double>  lpf{*this, "spindle-lpf", "cycles over which spindle-rpm-abs is smoothed while at speed; 0: no smoothing"};
     hal::Out<double> rpm{*this, "spindle-rpm", "speed, measured or simulated", {.unit = "rpm"}};
-    hal::Out<double> rpm_abs{*this, "spindle-rpm-abs", "its magnitude, for a display", {.unit = "rpm"}};
-    hal::Out<double> output{*this, "output", "for the drive: (speed + offset) * scale"};
+    hal::Out<double> rpm_abs{*this, "spindle-rpm-abs", "magnitude of spindle-rpm, for a display", {.unit = "rpm"}};
+    hal::Out<double> output{*this, "output", "command for the drive: (speed + offset) * scale"};
     hal::Out<std::uint32_t> current_gear{*this, "current-gear", "number of the gear in use"};
-    hal::Out<bool>   at_speed{*this, "at-speed", "TRUE while the speed is within speed-tolerance of the wanted one"};
+    hal::Out<bool>   at_speed{*this, "at-speed", "TRUE while the speed is within speed-tolerance of commanded-speed"};
     hal::Out<bool>   forward{*this, "forward", "TRUE: the drive turns forward", {.safe = false}};
     hal::Out<bool>   reverse{*this, "reverse", "TRUE: the drive turns backward", {.safe = false}};
-    hal::Out<bool>   brake{*this, "brake", "TRUE while the spindle has to slow down"};
+    hal::Out<bool>   brake{*this, "brake", "TRUE while the spindle must decelerate"};
     hal::Out<bool>   zero_speed{*this, "zero-speed", "TRUE while the speed is within zero-tolerance of 0"};
-    hal::Out<bool>   limited{*this, "limited", "TRUE while the wanted speed is above max, or not 0 and below min"};
+    hal::Out<bool>   limited{*this, "limited", "TRUE while commanded-speed is above max, or not 0 and below min"};
 
-    hal::Ins<double> scale{*this, "scale.#", gears, "scale of output in gear #; negative turns the output round", {.initial = 1.0}};
+    hal::Ins<double> scale{*this, "scale.#", gears, "scale of output in gear #; a negative scale inverts the output", {.initial = 1.0}};
     hal::Ins<double> min{*this, "min.#", gears, "lowest speed in gear #", {.unit = "rpm"}};
     hal::Ins<double> max{*this, "max.#", gears, "highest speed in gear #", {.unit = "rpm"}};
-    hal::Ins<double> accel{*this, "accel.#", gears, "rpm per second without encoder; with one, how far the output leads the speed"};
-    hal::Ins<double> decel{*this, "decel.#", gears, "the same for slowing down"};
+    hal::Ins<double> accel{*this, "accel.#", gears, "acceleration: rpm per second without encoder; with an encoder, lead of the output over the speed in rpm"};
+    hal::Ins<double> decel{*this, "decel.#", gears, "deceleration, like accel"};
     hal::Ins<double> speed_tolerance{*this, "speed-tolerance.#", gears, "tolerance of at-speed", {.initial = 20.0, .unit = "rpm"}};
     hal::Ins<double> zero_tolerance{*this, "zero-tolerance.#", gears, "tolerance of zero-speed", {.initial = 20.0, .unit = "rpm"}};
-    hal::Ins<double> offset{*this, "offset.#", gears, "added to the speed for output in gear #", {.unit = "rpm"}};
-    hal::In<bool>    select_first{*this, "select.0", "TRUE: gear 0, which is also the gear when no other is chosen", {.initial = true}};
-    hal::Pins<hal::In<bool>, bool> select{*this, "select.#", gears - 1, 1, "TRUE: gear #; the highest one counts"};
+    hal::Ins<double> offset{*this, "offset.#", gears, "offset added to the speed for output in gear #", {.unit = "rpm"}};
+    hal::In<bool>    select_first{*this, "select.0", "TRUE: gear 0, the default when no other is selected", {.initial = true}};
+    hal::Pins<hal::In<bool>, bool> select{*this, "select.#", gears - 1, 1, "TRUE: gear #; the highest selected gear takes precedence"};
 
     hal::Function run{*this, "", &Spindle::update, "computes the drive's speed and direction"};
 
@@ -80,22 +80,22 @@ private:
         const double from = std::fabs(speed), to = sign * wanted > 0.0 ? std::fabs(wanted) : 0.0;
         return std::copysign(from < to ? std::min(from + up, to) : std::max(from - down, to), sign);
     }
-    double drive_ = 0.0;  // speed asked of the drive
+    double drive_ = 0.0;  // speed commanded to the drive
     double shown_ = 0.0;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Spindle, "spindle", "Spindle with acceleration and deceleration, brake and up to 16 gears", R"(
-For a drive with inputs for speed and direction. The wanted speed is `commanded-speed`, its magnitude between `min` and `max` of the
-gear (min does not count at 0), and 0 while `enable` is FALSE. `output` is the magnitude of the speed asked of the drive, plus
-`offset`, times `scale`; `forward` and `reverse` are its direction, both FALSE at 0 and while not enabled. To change direction the
-spindle first slows down to 0.
+For a drive with inputs for speed and direction. The target is `commanded-speed` with its magnitude limited to `min` and `max` of the
+gear (`min` does not apply at 0), or 0 while `enable` is FALSE. `output` is the magnitude of the speed commanded to the drive, plus
+`offset`, times `scale`; `forward` and `reverse` are its direction, both FALSE at 0 and while disabled. To change direction the
+spindle first decelerates to 0.
 
-With `simulate-encoder` the speed asked changes by `accel` and `decel` rpm per second, and counts as the speed of the spindle. With an
-encoder it is the measured speed plus `accel`, or minus `decel`, up to the wanted speed, so a loaded spindle is given more time.
+With `simulate-encoder` the commanded speed changes by `accel` and `decel` rpm per second and counts as the speed of the spindle. With an
+encoder it is the measured speed plus `accel`, or minus `decel`, up to the target, so a loaded spindle gets more time.
 
-`brake` is TRUE while the spindle turns (more than `zero-tolerance`) and is too fast or goes the wrong way; LinuxCNC's own leaves it FALSE.
+`brake` is TRUE while the spindle turns (above `zero-tolerance`) too fast or in the wrong direction; LinuxCNC's always leaves it FALSE.
 `numgears=N` gives N gears with a pin of each kind; the highest `select.N` that is TRUE is the gear, else the number in `select-gear`.
 `spindle-rpm-abs` is smoothed by r += (speed - r) / (1 + spindle-lpf) while at speed.
 

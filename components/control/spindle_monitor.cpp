@@ -3,7 +3,7 @@
 
 namespace {
 
-/// The state, which a user may set.
+/// The state, which the user may set.
 class StateParam : public hal::Param<std::uint32_t> {
 public:
     using Param::Param;
@@ -12,21 +12,21 @@ public:
 
 struct SpindleMonitor : hal::Component {
     using Component::Component;
-    hal::In<bool>      is_on{*this, "spindle-is-on", "TRUE: the spindle has been told to run"};
-    hal::In<double>    command{*this, "spindle-command", "wanted speed"};
+    hal::In<bool>      is_on{*this, "spindle-is-on", "TRUE while the spindle is commanded to run"};
+    hal::In<double>    command{*this, "spindle-command", "commanded speed"};
     hal::In<double>    feedback{*this, "spindle-feedback", "measured speed"};
-    hal::Out<bool>     at_speed{*this, "spindle-at-speed", "TRUE once the wanted speed was reached, until the spindle is switched off"};
-    hal::Out<bool>     underspeed{*this, "spindle-underspeed", "TRUE once the speed has fallen again, until the spindle is switched off"};
-    StateParam         level{*this, "level", "state: 0 off, 1 gaining speed, 2 at speed, 3 fallen below"};
-    hal::Param<double> threshold{*this, "threshold", "how far the speed may be from the command"};
-    hal::Function      run{*this, "", &SpindleMonitor::update, "watches the speed"};
+    hal::Out<bool>     at_speed{*this, "spindle-at-speed", "TRUE after the commanded speed was reached, until the spindle is switched off"};
+    hal::Out<bool>     underspeed{*this, "spindle-underspeed", "TRUE after the speed has dropped again, until the spindle is switched off"};
+    StateParam         level{*this, "level", "state: 0 off, 1 accelerating, 2 at speed, 3 underspeed"};
+    hal::Param<double> threshold{*this, "threshold", "permitted deviation from the command"};
+    hal::Function      run{*this, "", &SpindleMonitor::update, "monitors the speed"};
 
     void update(hal::Cycle) noexcept {
         if (!is_on || level > fallen) level.enter(off);
         if (is_on && level == off) level.enter(gaining);
         const double wanted = std::fabs(command), speed = command < 0.0 ? -feedback : feedback.get();
         if (level == gaining && std::fabs(speed - wanted) < threshold) level.enter(reached);
-        if (level == reached && !(speed >= wanted - threshold)) level.enter(fallen);  // also when it is not a number
+        if (level == reached && !(speed >= wanted - threshold)) level.enter(fallen);  // also for NaN
         at_speed = level >= reached;
         underspeed = level == fallen;
     }
@@ -37,11 +37,11 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SpindleMonitor, "spindle_monitor", "Tells when a spindle has reached its speed, and when it has lost it", R"(
-With the spindle on, `spindle-at-speed` becomes TRUE when the speed is less than `threshold` away from the command. If the speed then
-falls more than `threshold` below it, or is not a number, `spindle-underspeed` becomes TRUE. Both stay until the spindle is off.
+HAL_COMPONENT(SpindleMonitor, "spindle_monitor", "Detects when a spindle reaches its speed and when it drops below it", R"(
+With the spindle on, `spindle-at-speed` becomes TRUE when the speed is within `threshold` of the command. If the speed then
+drops more than `threshold` below the command, or is NaN, `spindle-underspeed` becomes TRUE. Both remain TRUE until the spindle is off.
 
-Speeds count in the direction of the command: with a command of -100, a speed of -110 is no underspeed. LinuxCNC's own takes it for one.
+Speeds are compared in the direction of the command: with a command of -100, a speed of -110 is above it (LinuxCNC reports underspeed).
 
     loadrt spindle_monitor names=watch
     addf watch servo

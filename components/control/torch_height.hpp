@@ -1,35 +1,56 @@
 // SPDX-License-Identifier: MIT
-// What the torch height controls thc and thcud share: when a correction is allowed, and how it goes away again.
+// The torch height control of thc and thcud; they differ in what asks for a correction.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
-namespace torch {
+#include "hal/component.hpp"
 
-/// Within `percent` of the requested velocity: the torch is not in a corner, its voltage means height. [realtime]
-inline bool at_velocity(double current, double requested, double percent) noexcept {
-    return std::fabs(current - requested) <= std::fabs(requested) * percent / 100.0;
-}
+/// The pins that thc and thcud share, and the correction of Z.
+struct TorchHeight : hal::Component {
+    using Component::Component;
+    static constexpr hal::Traits traits{.singleton = true};
 
-/// The correction of Z.
-class Offset {
-public:
-    double value() const noexcept { return value_; }
-    void clear() noexcept { value_ = 0.0; }
-    /// Adds `step`; one that is not finite, or leaves a machine's range, counts nothing. [realtime]
-    void correct(double step) noexcept {
-        if (const double next = value_ + step; std::fabs(next) <= 1e9) value_ = next;
+    hal::In<double>    current_vel{*this, "current-vel", "current velocity (motion.current-vel)"};
+    hal::In<double>    requested_vel{*this, "requested-vel", "requested velocity (motion.requested-vel)"};
+    hal::In<bool>      torch_on{*this, "torch-on", "TRUE while the torch is switched on"};
+    hal::In<bool>      arc_ok{*this, "arc-ok", "TRUE while the arc is stable"};
+    hal::In<bool>      enable{*this, "enable", "enables the correction; FALSE clears it and passes Z through"};
+    hal::In<double>    z_pos_in{*this, "z-pos-in", "commanded Z position"};
+    hal::Out<double>   z_pos_out{*this, "z-pos-out", "commanded Z position with the correction"};
+    hal::Out<double>   z_fb_out{*this, "z-fb-out", "Z position feedback for motion, without the correction"};
+    hal::Out<bool>     vel_status{*this, "vel-status", "TRUE while enabled and at the requested velocity"};
+    hal::Param<double> velocity_tol{*this, "velocity-tol", "maximum deviation from the requested velocity for a correction", {.unit = "%"}};
+    hal::Param<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
+
+protected:
+    /// Updates the correction and the shared outputs. `direction()` returns above 0 to raise the torch, below 0 to lower it, 0 to
+    /// hold; it is asked only while a correction is allowed. Returns true while the torch is off and the correction is being
+    /// removed. [realtime]
+    template <class Direction>
+    bool control(Direction direction) noexcept {
+        const double z = z_pos_in, up = z - last_z_;
+        // In a corner the velocity drops, and the arc voltage no longer measures the height.
+        const bool steady = enable && std::fabs(current_vel - requested_vel) <= std::fabs(requested_vel) * velocity_tol / 100.0;
+        bool removing = false;
+        if (!enable) offset_ = 0.0;
+        else if (!torch_on) {
+            removing = offset_ != 0.0;
+            if (up > 0.0) offset_ -= std::clamp(offset_, -up, up);
+        } else if (arc_ok && steady) {
+            const int sign = direction();
+            const double next = offset_ + (sign > 0 ? correction_vel : sign < 0 ? -correction_vel : 0.0);
+            if (std::fabs(next) <= 1e9) offset_ = next;  // FALSE for NaN, too
+        }
+        last_z_ = z;
+        vel_status = steady;
+        z_pos_out = z + offset_;
+        z_fb_out = z;
+        return removing;
     }
-    /// Takes away what Z's own way up of this cycle covers; true while there is something left to take. [realtime]
-    bool remove(double way_up) noexcept {
-        if (value_ == 0.0) return false;
-        if (way_up > 0.0) value_ -= std::clamp(value_, -way_up, way_up);
-        return true;
-    }
+    double offset() const noexcept { return offset_; }
 
 private:
-    double value_ = 0.0;
+    double offset_ = 0.0, last_z_ = 0.0;
 };
-
-}  // namespace torch

@@ -5,10 +5,10 @@ namespace {
 
 struct Bitmerge : hal::Component {
     using Component::Component;
-    hal::Argument           count{*this, "personality", 32, "how many bits, from the lowest", {.min = 1, .max = 32}};
+    hal::Argument           count{*this, "personality", 32, "number of bits, from the least significant", {.min = 1, .max = 32}};
     hal::Ins<bool>          in{*this, "in-##", count, "bit # of out"};
-    hal::Out<std::uint32_t> out{*this, "out", "the word"};
-    hal::Function           run{*this, "", hal::step<&Bitmerge::update>, "puts the word together"};
+    hal::Out<std::uint32_t> out{*this, "out", "word"};
+    hal::Function           run{*this, "", hal::step<&Bitmerge::update>, "merges the bits"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t word = 0;
@@ -19,9 +19,8 @@ struct Bitmerge : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Bitmerge, "bitmerge", "Puts bits together into a word", R"(
-`personality` says how many bits have an input; without it all 32 have, and bits without an input are 0. `bitslice` is
-the way back.
+HAL_COMPONENT(Bitmerge, "bitmerge", "Merges bits into a word", R"(
+`personality` is the number of bits with an input, 32 by default; bits without an input are 0. `bitslice` is the inverse.
 
     loadrt bitmerge names=control personality=3
     addf control servo

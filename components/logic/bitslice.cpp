@@ -5,10 +5,10 @@ namespace {
 
 struct Bitslice : hal::Component {
     using Component::Component;
-    hal::Argument          personality{*this, "personality", 32, "how many bits, from the lowest", {.min = 1, .max = 32}};
-    hal::In<std::uint32_t> in{*this, "in", "the word"};
+    hal::Argument          personality{*this, "personality", 32, "number of bits, from the least significant", {.min = 1, .max = 32}};
+    hal::In<std::uint32_t> in{*this, "in", "word"};
     hal::Outs<bool>        out{*this, "out-##", personality, "bit # of in"};
-    hal::Function          run{*this, "", hal::step<&Bitslice::update>, "takes the word apart"};
+    hal::Function          run{*this, "", hal::step<&Bitslice::update>, "splits the word"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t rest = in;
@@ -21,8 +21,8 @@ struct Bitslice : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Bitslice, "bitslice", "Takes a word apart into bits", R"(
-`personality` says how many bits have an output; without it all 32 have. `bitmerge` is the way back.
+HAL_COMPONENT(Bitslice, "bitslice", "Splits a word into bits", R"(
+`personality` is the number of bits with an output, 32 by default. `bitmerge` is the inverse.
 
     loadrt bitslice names=status personality=4
     addf status servo

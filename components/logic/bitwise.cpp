@@ -8,7 +8,7 @@ struct Bitwise : hal::Component {
     hal::In<std::uint32_t>  in0{*this, "in0", "first word"};
     hal::In<std::uint32_t>  in1{*this, "in1", "second word"};
     hal::Out<std::uint32_t> out_and{*this, "out-and", "bits set in both words"};
-    hal::Out<std::uint32_t> out_or{*this, "out-or", "bits set in a word"};
+    hal::Out<std::uint32_t> out_or{*this, "out-or", "bits set in at least one word"};
     hal::Out<std::uint32_t> out_xor{*this, "out-xor", "bits in which the words differ"};
     hal::Out<std::uint32_t> out_nand{*this, "out-nand", "out-and, inverted"};
     hal::Out<std::uint32_t> out_nor{*this, "out-nor", "out-or, inverted"};
@@ -28,7 +28,7 @@ struct Bitwise : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Bitwise, "bitwise", "And, or, xor and their inverses, bit by bit, of two words", R"(
+HAL_COMPONENT(Bitwise, "bitwise", "Bitwise AND, OR, XOR, NAND, NOR and XNOR of two words", R"(
     # the faults that count, out of a drive's status word
     loadrt bitwise names=drive-faults
     addf drive-faults servo

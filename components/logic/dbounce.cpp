@@ -6,8 +6,8 @@ namespace {
 struct Dbounce : hal::Component {
     using Component::Component;
     hal::In<bool>          in{*this, "in", "noisy input"};
-    hal::Out<bool>         out{*this, "out", "the last stable input"};
-    hal::In<std::uint32_t> delay{*this, "delay", "cycles the input must hold after its change; 0: out is in", {.initial = 5}};
+    hal::Out<bool>         out{*this, "out", "debounced input"};
+    hal::In<std::uint32_t> delay{*this, "delay", "cycles for which the input must be stable after a change; 0 copies in to out", {.initial = 5}};
     hal::Function          run{*this, "", hal::step<&Dbounce::update>, "samples the input"};
 
     void update(hal::Cycle) noexcept {
@@ -19,14 +19,14 @@ struct Dbounce : hal::Component {
     }
 
 private:
-    std::uint32_t differs_ = 0;  // cycles in which in was not out, less those in which it was
+    std::uint32_t differs_ = 0;  // cycles in which in differed from out, minus those in which it did not
 };
 
 }  // namespace
 
 HAL_COMPONENT(Dbounce, "dbounce", "Filters a noisy digital input", R"(
-`out` follows `in` when it has held for `delay` cycles after the one in which it changed. While it bounces, cycles with the new state
-count up and those with the old one down. Unlike `debounce` it has a delay pin for each input.
+`out` follows `in` once it has been stable for `delay` cycles after the cycle of the change. While it bounces, cycles with the new state
+count up and cycles with the old state count down. Unlike `debounce` it has a delay pin for each input.
 
     loadrt dbounce names=home-filter
     addf home-filter servo

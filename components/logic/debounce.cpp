@@ -4,10 +4,10 @@
 namespace {
 
 struct Debounce : hal::Component {
-    hal::Argument             size{*this, "cfg", 4, "filters in each group, a number per group", {.per_instance = true, .min = 1, .max = 100'000}};
+    hal::Argument             size{*this, "cfg", 4, "number of filters, for each group", {.per_instance = true, .min = 1, .max = 100'000}};
     hal::Ins<bool>            in{*this, "#.in", size, "noisy input of filter #"};
-    hal::Outs<bool>           out{*this, "#.out", size, "the last stable input of filter #"};
-    hal::Param<std::int32_t>  delay{*this, "delay", "cycles an input must hold before its output follows; up to 1 does not filter", {.initial = 5}};
+    hal::Outs<bool>           out{*this, "#.out", size, "debounced input of filter #"};
+    hal::Param<std::int32_t>  delay{*this, "delay", "cycles for which an input must be stable before its output follows; 0 and 1 disable the filter", {.initial = 5}};
     hal::Function             run{*this, "", hal::step<&Debounce::update>, "samples all inputs of the group"};
 
     explicit Debounce(const hal_host* host)
@@ -33,7 +33,7 @@ private:
 
 HAL_COMPONENT(Debounce, "debounce", "Filters groups of noisy digital inputs", R"(
 A filter counts up while its input is TRUE and down while it is FALSE, between 0 and `delay`. At `delay` the output
-becomes TRUE, at 0 FALSE; between the two it keeps its state. `cfg=2,3` makes two groups, `debounce.0` with two filters
+becomes TRUE, at 0 FALSE; between the two it keeps its state. `cfg=2,3` creates two groups, `debounce.0` with two filters
 and `debounce.1` with three; a group has one function and one `delay`.
 
     loadrt debounce cfg=2

@@ -5,11 +5,11 @@ namespace {
 
 struct Demux : hal::Component {
     using Component::Component;
-    hal::Argument          count{*this, "personality", 32, "how many outputs", {.min = 1, .max = 32}};
-    hal::Ins<bool>         sel_bit{*this, "sel-bit-##", 5, "bit # of the choice"};
-    hal::In<std::uint32_t> sel{*this, "sel-u32", "added to the number made of the bits"};
-    hal::Outs<bool>        out{*this, "out-##", count, "TRUE while # is chosen; as a bar, while more than # is"};
-    hal::Param<bool>       bargraph{*this, "bargraph", "TRUE: as many outputs are TRUE as the choice says"};
+    hal::Argument          count{*this, "personality", 32, "number of outputs", {.min = 1, .max = 32}};
+    hal::Ins<bool>         sel_bit{*this, "sel-bit-##", 5, "bit # of the selection"};
+    hal::In<std::uint32_t> sel{*this, "sel-u32", "number added to that of the sel-bit pins"};
+    hal::Outs<bool>        out{*this, "out-##", count, "TRUE while # is selected; with bargraph, while the selection is above #"};
+    hal::Param<bool>       bargraph{*this, "bargraph", "TRUE: the selection is the number of outputs that are TRUE"};
     hal::Function          run{*this, "", hal::step<&Demux::update>, "sets the outputs"};
 
     void update(hal::Cycle) noexcept {
@@ -23,12 +23,12 @@ struct Demux : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Demux, "demux", "Makes one of several outputs TRUE, or a bar of them", R"(
-The choice is `sel-u32` plus the number made of the `sel-bit` inputs; mostly one of the two is used. That output is TRUE, of a choice
-beyond the last output the last one. With `bargraph` the choice is the length of the bar: 0 is none, 3 are the first three. `personality` is
-the number of outputs.
+HAL_COMPONENT(Demux, "demux", "Sets one of several outputs, or the first N of them", R"(
+The selection is `sel-u32` plus the binary number of the `sel-bit` inputs; usually only one of the two is used. The selected output is TRUE; a selection
+above the last output selects the last one. With `bargraph` the selection is the number of outputs that are TRUE: 0 sets none, 3 sets the first three.
+`personality` is the number of outputs.
 
-In LinuxCNC the last output of a bar is never TRUE; here it is, for a choice of that many or more.
+In LinuxCNC the last output of a bar is never TRUE; in Halcyon it is TRUE if the selection is at least the number of outputs.
 
     # a bar of four lamps
     loadrt demux names=load-bar personality=4

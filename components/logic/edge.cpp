@@ -6,14 +6,14 @@ namespace {
 struct Edge : hal::Component {
     using Component::Component;
     hal::In<bool>            in{*this, "in", "the input"};
-    hal::Out<bool>           out{*this, "out", "goes TRUE when the wanted edge is seen"};
-    hal::Out<bool>           out_invert{*this, "out-invert", "the inverse of out", {.initial = true}};
-    hal::Param<bool>         both{*this, "both", "TRUE: both edges count, whatever in-edge says"};
-    hal::Param<bool>         in_edge{*this, "in-edge", "the edge that counts: TRUE is falling, FALSE is rising", {.initial = true}};
-    hal::Param<std::int32_t> width_ns{*this, "out-width-ns", "length of the output pulse; 0 is one cycle", {.unit = "ns"}};
-    hal::Out<std::int32_t>   time_left_ns{*this, "time-left-ns", "what is left of the output pulse", {.unit = "ns"}};
-    hal::Out<bool>           last_in{*this, "last-in", "the input as last seen"};
-    hal::Function            run{*this, "", hal::step<&Edge::update>, "looks for an edge"};
+    hal::Out<bool>           out{*this, "out", "TRUE during the pulse after an edge"};
+    hal::Out<bool>           out_invert{*this, "out-invert", "inverse of out", {.initial = true}};
+    hal::Param<bool>         both{*this, "both", "TRUE detects both edges, regardless of in-edge"};
+    hal::Param<bool>         in_edge{*this, "in-edge", "edge to detect: TRUE is falling, FALSE is rising", {.initial = true}};
+    hal::Param<std::int32_t> width_ns{*this, "out-width-ns", "duration of the output pulse; 0 is one cycle", {.unit = "ns"}};
+    hal::Out<std::int32_t>   time_left_ns{*this, "time-left-ns", "remaining time of the output pulse", {.unit = "ns"}};
+    hal::Out<bool>           last_in{*this, "last-in", "input of the previous cycle"};
+    hal::Function            run{*this, "", hal::step<&Edge::update>, "detects edges"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool now = in;
@@ -41,8 +41,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Edge, "edge", "Turns an edge into a pulse", R"(
-`out` goes TRUE in the cycle that sees the wanted edge, for `out-width-ns` rounded up to whole cycles, at least one; a
-new edge in that time starts the pulse again. An input that is TRUE from the beginning is not an edge. The default,
+`out` becomes TRUE in the cycle of the edge, for `out-width-ns` rounded up to whole cycles, at least one; another
+edge during the pulse restarts it. An input that is TRUE from the start is not an edge. The default,
 `in-edge` TRUE, is the *falling* edge.
 
     loadrt edge names=button-down

@@ -6,7 +6,7 @@
 
 namespace {
 
-/// What `D;stop;;jog` says: decode, label "stop" for 0, none for 1, "jog" for 2.
+/// Parses `D;stop;;jog`: decode, label "stop" for 0, no label for 1, "jog" for 2.
 struct Config {
     struct Label {
         std::string name;
@@ -30,29 +30,29 @@ struct Config {
     }
 };
 
-/// A label's pins: its bit, and the value it stands for.
+/// The pins of a label: its bit and its value.
 template <class Bit>
 struct Entry {
     Entry(hal::Component& component, const Config::Label& label, const char* suffix, const char* doc)
         : bit(component, (label.name + suffix).c_str(), doc),
-          value(component, (label.name + "-val").c_str(), "the value of this label", {.initial = label.value}) {}
+          value(component, (label.name + "-val").c_str(), "value of this label", {.initial = label.value}) {}
     Bit bit;
     hal::In<std::uint32_t> value;
 };
 
 struct Enum : hal::Component {
-    hal::TextArgument        text{*this, "enums", "D;zero;one", "for each instance: D (decode) or E (encode), and a label per value, ; between",
+    hal::TextArgument        text{*this, "enums", "D;zero;one", "for each instance: D (decode) or E (encode), then a label per value, separated by ;",
                                   {.per_instance = true}};
     Config                   config{text.get()};
     hal::InstanceName        name{*this, config.decode ? "enum-decode" : "enum-encode", 2};
-    hal::Ins<std::uint32_t>  input{*this, "input", config.decode ? 1 : 0, "the value to decode"};
-    hal::Outs<std::uint32_t> output{*this, "output", config.decode ? 0 : 1, "value of the last label that is TRUE; 0 when none is"};
+    hal::Ins<std::uint32_t>  input{*this, "input", config.decode ? 1 : 0, "value to decode"};
+    hal::Outs<std::uint32_t> output{*this, "output", config.decode ? 0 : 1, "value of the last label whose input is TRUE; 0 if none is"};
     hal::Function            run{*this, "", hal::step<&Enum::update>, "decodes or encodes"};
 
     explicit Enum(const hal_host* host) : Component(host) {
         for (const Config::Label& label : config.labels) {
-            if (config.decode) outs.emplace_back(*this, label, "-out", "TRUE while input is the value of this label");
-            else ins.emplace_back(*this, label, "-in", "TRUE: output is the value of this label");
+            if (config.decode) outs.emplace_back(*this, label, "-out", "TRUE while input equals the value of this label");
+            else ins.emplace_back(*this, label, "-in", "TRUE sets output to the value of this label");
         }
     }
 
@@ -71,16 +71,16 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Enum, "enum", "Integer values to bits with names, and back", R"(
-For the status and control words of drives that say 0 stop, 1 forward, 2 backward instead of a bit for each. `enums` has
-for each instance `D` (decode: number to bits) or `E` (encode: bits to number) and the labels of 0, 1, 2 …; a value without a
-label is left empty:
+HAL_COMPONENT(Enum, "enum", "Converts between integers and named bits", R"(
+For the status and control words of drives with codes such as 0 stop, 1 forward, 2 backward instead of a bit for each state. For each instance,
+`enums` has `D` (decode: number to bits) or `E` (encode: bits to number) and the labels of 0, 1, 2 …; leave the label of an unused
+value empty:
 
     loadrt enum enums=E;stop;forward;;;jog,D;ready;running;;fault
 
 makes `enum-encode.00` with `stop-in` (0), `forward-in` (1), `jog-in` (4) and `output`, and `enum-decode.01` with `input`, `ready-out` (0),
-`running-out` (1) and `fault-out` (3). Each label's value stands in a pin, `jog-val`, and may be set. `names=` gives other names.
-While no input is TRUE `output` is 0, whether there is a label for 0 or not.
+`running-out` (1) and `fault-out` (3). The value of each label is a pin that may be set: `jog-val`. `names=` sets other instance names.
+While no input is TRUE `output` is 0, with or without a label for 0.
 
     loadrt enum enums=D;ready;running;;fault names=drive-state
     addf drive-state servo

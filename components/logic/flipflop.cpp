@@ -5,13 +5,13 @@ namespace {
 
 struct Flipflop : hal::Component {
     using Component::Component;
-    hal::In<bool> data{*this, "data", "goes to out at a rising edge of clk"};
+    hal::In<bool> data{*this, "data", "copied to out at a rising edge of clk"};
     hal::In<bool> clk{*this, "clk", "a rising edge writes data to out"};
-    hal::In<bool> set{*this, "set", "while TRUE out is TRUE"};
-    hal::In<bool> reset{*this, "reset", "while TRUE out is FALSE, whatever set is"};
-    hal::Io<bool> out{*this, "out", "the stored bit"};
-    hal::Io<bool> out_not{*this, "out-not", "the stored bit, inverted"};
-    hal::Function run{*this, "", hal::step<&Flipflop::update>, "stores"};
+    hal::In<bool> set{*this, "set", "TRUE sets out to TRUE"};
+    hal::In<bool> reset{*this, "reset", "TRUE sets out to FALSE; overrides set"};
+    hal::Io<bool> out{*this, "out", "stored bit"};
+    hal::Io<bool> out_not{*this, "out-not", "stored bit, inverted"};
+    hal::Function run{*this, "", hal::step<&Flipflop::update>, "stores the bit"};
 
     void update(hal::Cycle) noexcept {
         bool stored = out;
@@ -30,8 +30,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Flipflop, "flipflop", "D flip-flop with set and reset", R"(
-`reset` overrides `set`, and both override `clk`; a `clk` that is TRUE in the first cycle is an edge. The bit lives in `out` itself, which is an input/output pin, so
-another writer on the same signal can change it.
+`reset` overrides `set`, and both override `clk`; a `clk` that is TRUE in the first cycle is an edge. The bit is stored in `out` itself, which is an
+input/output pin, so another writer on the same signal can change it.
 
     # remember a short alarm until the operator acknowledges it
     loadrt flipflop names=alarm-memory

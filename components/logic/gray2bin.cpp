@@ -5,8 +5,8 @@ namespace {
 
 struct Gray2bin : hal::Component {
     using Component::Component;
-    hal::In<std::uint32_t>  in{*this, "in", "a number in Gray code"};
-    hal::Out<std::uint32_t> out{*this, "out", "the number"};
+    hal::In<std::uint32_t>  in{*this, "in", "Gray code"};
+    hal::Out<std::uint32_t> out{*this, "out", "binary number"};
     hal::Function           run{*this, "", hal::step<&Gray2bin::update>, "converts"};
 
     /// Each bit of the number is the parity of the code's bits from there up: a prefix sum in five doublings.
@@ -20,7 +20,7 @@ struct Gray2bin : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Gray2bin, "gray2bin", "Gray code to number", R"(
-For absolute encoders and code switches, in whose code neighbouring positions differ in one bit.
+For absolute encoders and code switches with a code whose adjacent positions differ in one bit.
 
     loadrt gray2bin names=from-gray
     addf from-gray servo

@@ -5,7 +5,7 @@ namespace {
 
 struct Logic : hal::Component {
     hal::Argument   personality{*this, "personality", 0x1f02,
-                                "how many inputs (1 to 16), plus 0x100 and, 0x200 or, 0x400 xor, 0x800 nand, 0x1000 nor",
+                                "number of inputs (1..16), plus 0x100 and, 0x200 or, 0x400 xor, 0x800 nand, 0x1000 nor",
                                 {.min = 0, .max = 0x1fff}};
     hal::Ins<bool>  in{*this, "in-##", personality & 0xff, "input #"};
     hal::Outs<bool> all{*this, "and", has(0x100), "TRUE while every input is TRUE"};
@@ -17,8 +17,8 @@ struct Logic : hal::Component {
 
     explicit Logic(const hal_host* host) : Component(host) {
         if (in.size() < 1 || in.size() > 16)
-            throw hal::ArgumentError("personality", "personality=" + std::to_string(personality) + " asks for " + std::to_string(in.size()) +
-                                        " inputs; its low byte says 1 to 16");
+            throw hal::ArgumentError("personality", "personality=" + std::to_string(personality) + " has " + std::to_string(in.size()) +
+                                        " inputs in its low byte; expected 1 to 16");
     }
 
     void update(hal::Cycle) noexcept {
@@ -39,7 +39,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Logic, "logic", "And, or, xor, nand, nor of up to 16 inputs", R"(
-`personality` is the number of inputs plus a bit for each output that is wanted:
+`personality` is the number of inputs plus a bit for each output:
 
 | output | bit    | TRUE while                        |
 | ------ | ------ | --------------------------------- |

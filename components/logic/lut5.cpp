@@ -5,9 +5,9 @@ namespace {
 
 struct Lut5 : hal::Component {
     using Component::Component;
-    hal::Ins<bool>            in{*this, "in-#", 5, "bit # of the row of the table"};
-    hal::Out<bool>            out{*this, "out", "the table's entry for the inputs"};
-    hal::Param<std::uint32_t> function{*this, "function", "the table: bit n is the output for row n"};
+    hal::Ins<bool>            in{*this, "in-#", 5, "bit # of the row number"};
+    hal::Out<bool>            out{*this, "out", "entry of the table for the inputs"};
+    hal::Param<std::uint32_t> function{*this, "function", "table: bit n is the output for row n"};
     hal::Function             run{*this, "", hal::step<&Lut5::update>, "looks up the output"};
 
     void update(hal::Cycle) noexcept {
@@ -20,8 +20,8 @@ struct Lut5 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Lut5, "lut5", "Any logic function of five inputs, from a table", R"(
-`in-4` to `in-0` read as a binary number are a row from 0 to 31; `out` is that bit of `function`. To find `function`, add
-up 2^row of all rows in which `out` shall be TRUE. Inputs that are not used stay FALSE.
+`in-4` to `in-0` are the binary number of a row, 0..31; `out` is that bit of `function`. `function` is the sum of
+2^row over all rows in which `out` is TRUE. Leave unused inputs unlinked.
 
 | function   | is                          |
 | ---------- | --------------------------- |

@@ -8,8 +8,8 @@ struct Maj3 : hal::Component {
     hal::In<bool>    in1{*this, "in1", "first voter"};
     hal::In<bool>    in2{*this, "in2", "second voter"};
     hal::In<bool>    in3{*this, "in3", "third voter"};
-    hal::Out<bool>   out{*this, "out", "what at least two of the inputs say"};
-    hal::Param<bool> invert{*this, "invert", "TRUE: out is what the minority says"};
+    hal::Out<bool>   out{*this, "out", "value of at least two inputs"};
+    hal::Param<bool> invert{*this, "invert", "TRUE inverts out"};
     hal::Function    run{*this, "", hal::step<&Maj3::update>, "counts the votes"};
 
     void update(hal::Cycle) noexcept {
@@ -21,7 +21,7 @@ struct Maj3 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Maj3, "maj3", "Majority of three inputs", R"(
-`out` is TRUE while two or three of the inputs are; with `invert`, while none or one is.
+`out` is TRUE while two or three inputs are TRUE; with `invert`, while none or one is TRUE.
 
     loadrt maj3 names=door
     addf door servo

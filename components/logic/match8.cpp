@@ -5,10 +5,10 @@ namespace {
 
 struct Match8 : hal::Component {
     using Component::Component;
-    hal::In<bool>  in{*this, "in", "from the match8 before this one; FALSE makes out FALSE", {.initial = true}};
+    hal::In<bool>  in{*this, "in", "output of the previous match8 in a chain; FALSE sets out to FALSE", {.initial = true}};
     hal::Ins<bool> a{*this, "a#", 8, "bit # of the first number"};
     hal::Ins<bool> b{*this, "b#", 8, "bit # of the second number"};
-    hal::Out<bool> out{*this, "out", "TRUE while in is and both numbers are equal"};
+    hal::Out<bool> out{*this, "out", "TRUE while in is TRUE and both numbers are equal"};
     hal::Function  run{*this, "", hal::step<&Match8::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
@@ -21,7 +21,7 @@ struct Match8 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Match8, "match8", "Compares eight bits with eight others", R"(
-`out` is TRUE while `a0` = `b0` … `a7` = `b7`. For more bits, connect `out` to the `in` of the next one.
+`out` is TRUE while `in` is TRUE and `a0` = `b0` … `a7` = `b7`. For more bits, link `out` to the `in` of another `match8`.
 
     # a code switch against a number set once
     loadrt match8 names=address

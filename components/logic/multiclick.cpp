@@ -5,21 +5,21 @@ namespace {
 
 struct Multiclick : hal::Component {
     using Component::Component;
-    hal::In<bool>  in{*this, "in", "the button"};
-    hal::Out<bool> single{*this, "single-click", "a pulse at the end of a first click"};
-    hal::Out<bool> single_only{*this, "single-click-only", "a pulse when no second click has followed"};
-    hal::Out<bool> twice{*this, "double-click", "a pulse at the end of a second click"};
-    hal::Out<bool> twice_only{*this, "double-click-only", "a pulse when no third click has followed"};
-    hal::Out<bool> triple{*this, "triple-click", "a pulse at the end of a third click"};
-    hal::Out<bool> triple_only{*this, "triple-click-only", "a pulse when no fourth click has followed"};
-    hal::Out<bool> quadruple{*this, "quadruple-click", "a pulse at the end of a fourth click"};
-    hal::Out<bool> quadruple_only{*this, "quadruple-click-only", "a pulse when no fifth click has followed"};
-    hal::Out<std::int32_t>    state{*this, "state", "0 idle; 1, 3, 5, 7 pressed; 2, 4, 6, 8 released; 9 waits for the release"};
-    hal::Param<bool>          invert{*this, "invert-input", "TRUE: clicks begin with falling edges"};
-    hal::Param<std::uint32_t> max_hold{*this, "max-hold-ns", "a longer press is no click", {.initial = 250'000'000, .unit = "ns"}};
-    hal::Param<std::uint32_t> max_space{*this, "max-space-ns", "a longer pause ends the row of clicks",
+    hal::In<bool>  in{*this, "in", "button"};
+    hal::Out<bool> single{*this, "single-click", "pulse at the end of the first click"};
+    hal::Out<bool> single_only{*this, "single-click-only", "pulse after a first click without a second one"};
+    hal::Out<bool> twice{*this, "double-click", "pulse at the end of the second click"};
+    hal::Out<bool> twice_only{*this, "double-click-only", "pulse after a second click without a third one"};
+    hal::Out<bool> triple{*this, "triple-click", "pulse at the end of the third click"};
+    hal::Out<bool> triple_only{*this, "triple-click-only", "pulse after a third click without a fourth one"};
+    hal::Out<bool> quadruple{*this, "quadruple-click", "pulse at the end of the fourth click"};
+    hal::Out<bool> quadruple_only{*this, "quadruple-click-only", "pulse after a fourth click without a fifth one"};
+    hal::Out<std::int32_t>    state{*this, "state", "0 idle; 1, 3, 5, 7 pressed; 2, 4, 6, 8 released; 9 waiting for the release"};
+    hal::Param<bool>          invert{*this, "invert-input", "TRUE: clicks start with a falling edge"};
+    hal::Param<std::uint32_t> max_hold{*this, "max-hold-ns", "maximum duration of a press that counts as a click", {.initial = 250'000'000, .unit = "ns"}};
+    hal::Param<std::uint32_t> max_space{*this, "max-space-ns", "maximum pause between two clicks of a series",
                                         {.initial = 250'000'000, .unit = "ns"}};
-    hal::Param<std::uint32_t> output_hold{*this, "output-hold-ns", "length of the output pulses", {.initial = 100'000'000, .unit = "ns"}};
+    hal::Param<std::uint32_t> output_hold{*this, "output-hold-ns", "duration of the output pulses", {.initial = 100'000'000, .unit = "ns"}};
     hal::Function run{*this, "", hal::step<&Multiclick::update>, "detects clicks"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -52,7 +52,7 @@ private:
                 enter(state_ + 1);
             } else if (in_state_ns_ > std::int64_t{max_hold}) enter(waiting);
         } else if (pressed) {
-            enter(state_ == last_release ? waiting : state_ + 1);  // a fifth click is nothing
+            enter(state_ == last_release ? waiting : state_ + 1);  // a fifth click is ignored
         } else if (state_ != idle && in_state_ns_ > std::int64_t{max_space}) {
             start(pulses_[state_ - 1]);
             enter(idle);
@@ -76,9 +76,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Multiclick, "multiclick", "Detects single, double, triple and quadruple clicks", R"(
-A click is a press of at most `max-hold-ns`. Clicks with pauses of at most `max-space-ns` between them are counted: the
-outputs without `only` are TRUE for `output-hold-ns` from the end of the click, those with `only` from the moment it is clear that no
-further click will come. A press that is too long ends the row without an `only` output. A noisy button needs a `debounce` before it.
+A click is a press of at most `max-hold-ns`. Clicks with pauses of at most `max-space-ns` between them form a series: the
+outputs without `only` are TRUE for `output-hold-ns` from the end of the click, those with `only` from the end of the series.
+A longer press ends the series without an `only` output. Debounce a noisy button first (`debounce`).
 
     loadrt multiclick names=pendant
     addf pendant servo

@@ -3,7 +3,7 @@
 
 namespace {
 
-/// A parameter that the component moves, too.
+/// A parameter that the component sets as well.
 class Position : public hal::Param<std::int32_t> {
 public:
     using Param::Param;
@@ -12,14 +12,14 @@ public:
 
 struct Multiswitch : hal::Component {
     using Component::Component;
-    hal::Argument             cfg{*this, "cfg", 4, "positions of each switch, a number per switch",
+    hal::Argument             cfg{*this, "cfg", 4, "number of positions, for each switch",
                                   {.per_instance = true, .min = 1, .max = 100}};
-    hal::In<bool>             up{*this, "up", "a rising edge goes to the next position"};
-    hal::In<bool>             down{*this, "down", "a rising edge goes to the position before"};
+    hal::In<bool>             up{*this, "up", "a rising edge selects the next position"};
+    hal::In<bool>             down{*this, "down", "a rising edge selects the previous position"};
     hal::Outs<bool>           bit{*this, "bit-##", cfg, "TRUE in position #"};
-    hal::Param<std::uint32_t> top{*this, "top-position", "the last position",
+    hal::Param<std::uint32_t> top{*this, "top-position", "highest position",
                                   {.initial = static_cast<std::uint32_t>(std::int64_t{cfg}) - 1}};
-    Position                  position{*this, "position", "the present position; may be set"};
+    Position                  position{*this, "position", "current position; may be set"};
     hal::Function             run{*this, "", hal::step<&Multiswitch::update>, "moves the switch"};
 
     void update(hal::Cycle) noexcept {
@@ -41,8 +41,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Multiswitch, "multiswitch", "A switch of several positions, moved by buttons", R"(
-Each press of `up` or `down` goes one position further; after `top-position` comes 0 and before 0 comes `top-position`.
-The bit of the present position is TRUE. `cfg=3,5` makes two switches, of three and of five positions.
+Each press of `up` or `down` moves by one position and wraps around between `top-position` and 0.
+The bit of the current position is TRUE. `cfg=3,5` creates two switches, with three and five positions.
 
     loadrt multiswitch names=jog-step cfg=3
     addf jog-step servo

@@ -11,7 +11,7 @@ struct Mux4 : hal::Component {
     hal::In<double>  in1{*this, "in1", "goes to out while sel1 sel0 are FALSE TRUE"};
     hal::In<double>  in2{*this, "in2", "goes to out while sel1 sel0 are TRUE FALSE"};
     hal::In<double>  in3{*this, "in3", "goes to out while sel1 sel0 are TRUE TRUE"};
-    hal::Out<double> out{*this, "out", "the chosen input"};
+    hal::Out<double> out{*this, "out", "selected input"};
     hal::Function    run{*this, "", hal::step<&Mux4::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {

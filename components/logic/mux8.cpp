@@ -5,9 +5,9 @@ namespace {
 
 struct Mux8 : hal::Component {
     using Component::Component;
-    hal::Ins<bool>   sel{*this, "sel#", 3, "bit # of the choice"};
-    hal::Out<double> out{*this, "out", "the chosen input"};
-    hal::Ins<double> in{*this, "in#", 8, "goes to out while # is chosen"};
+    hal::Ins<bool>   sel{*this, "sel#", 3, "bit # of the selection"};
+    hal::Out<double> out{*this, "out", "selected input"};
+    hal::Ins<double> in{*this, "in#", 8, "input for selection #"};
     hal::Function    run{*this, "", hal::step<&Mux8::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in[(sel[2] ? 4u : 0u) + (sel[1] ? 2u : 0u) + (sel[0] ? 1u : 0u)].get(); }
@@ -16,7 +16,7 @@ struct Mux8 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Mux8, "mux8", "Selects one of eight values", R"(
-The choice is the binary number `sel2 sel1 sel0`: with `sel2` and `sel0` TRUE and `sel1` FALSE `out` follows `in5`.
+The selection is the binary number `sel2 sel1 sel0`: with `sel2` and `sel0` TRUE and `sel1` FALSE, `out` is `in5`.
 
     loadrt mux8 names=feed-steps
     addf feed-steps servo

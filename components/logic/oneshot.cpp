@@ -5,15 +5,15 @@ namespace {
 
 struct Oneshot : hal::Component {
     using Component::Component;
-    hal::In<bool>    in{*this, "in", "its edges start the pulse"};
-    hal::In<bool>    reset{*this, "reset", "while TRUE there is no pulse and none starts"};
+    hal::In<bool>    in{*this, "in", "an edge starts the pulse"};
+    hal::In<bool>    reset{*this, "reset", "TRUE ends the pulse and prevents new ones"};
     hal::Out<bool>   out{*this, "out", "TRUE during the pulse"};
     hal::Out<bool>   out_not{*this, "out-not", "FALSE during the pulse", {.initial = true}};
-    hal::In<double>  width{*this, "width", "length of the pulse", {.unit = "s"}};
-    hal::Out<double> time_left{*this, "time-left", "what is left of the pulse", {.unit = "s"}};
-    hal::Param<bool> retriggerable{*this, "retriggerable", "an edge during the pulse starts it again", {.initial = true}};
-    hal::Param<bool> rising{*this, "rising", "rising edges start a pulse", {.initial = true}};
-    hal::Param<bool> falling{*this, "falling", "falling edges start a pulse"};
+    hal::In<double>  width{*this, "width", "duration of the pulse", {.unit = "s"}};
+    hal::Out<double> time_left{*this, "time-left", "remaining time of the pulse", {.unit = "s"}};
+    hal::Param<bool> retriggerable{*this, "retriggerable", "TRUE: an edge during the pulse restarts it", {.initial = true}};
+    hal::Param<bool> rising{*this, "rising", "TRUE: rising edges start a pulse", {.initial = true}};
+    hal::Param<bool> falling{*this, "falling", "TRUE: falling edges start a pulse"};
     hal::Function    run{*this, "", hal::step<&Oneshot::update>, "turns edges into pulses"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -33,7 +33,7 @@ struct Oneshot : hal::Component {
 private:
     std::int64_t width_ns() const {
         const double ns = width * 1e9;
-        return ns >= 9e18 ? INT64_MAX : ns > 0.0 ? std::llround(ns) : 0;  // not a number: no pulse
+        return ns >= 9e18 ? INT64_MAX : ns > 0.0 ? std::llround(ns) : 0;  // NaN: no pulse
     }
     std::int64_t left_ns_ = 0;
     bool started_ = false, was_in_ = false;
@@ -41,9 +41,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Oneshot, "oneshot", "Pulse of a given length after an edge", R"(
-An edge of `in` makes `out` TRUE for `width` seconds, rounded up to whole cycles. `rising` and `falling` choose the
-edges. An edge during a pulse starts it again, or, with `retriggerable` FALSE, is ignored.
+HAL_COMPONENT(Oneshot, "oneshot", "Pulse of fixed duration after an edge", R"(
+An edge of `in` sets `out` for `width` seconds, rounded up to whole cycles. `rising` and `falling` select the
+edges. An edge during a pulse restarts it, or, with `retriggerable` FALSE, is ignored.
 
     loadrt oneshot names=lube
     addf lube servo

@@ -5,8 +5,8 @@ namespace {
 
 struct OutputBuffer : hal::Component {
     using Component::Component;
-    hal::Argument   count{*this, "personality", 8, "how many bits", {.min = 1, .max = 64}};
-    hal::In<bool>   enable{*this, "enable", "FALSE: all outputs are FALSE"};
+    hal::Argument   count{*this, "personality", 8, "number of bits", {.min = 1, .max = 64}};
+    hal::In<bool>   enable{*this, "enable", "FALSE sets all outputs to FALSE"};
     hal::Ins<bool>  in{*this, "in-#", count, "input #"};
     hal::Outs<bool> out{*this, "out-#", count, "input # while enable is TRUE", {.safe = false}};
     hal::Function   run{*this, "", hal::step<&OutputBuffer::update>, "copies the bits"};
@@ -19,8 +19,8 @@ struct OutputBuffer : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(OutputBuffer, "output_buffer", "Passes several bits on while enabled", R"(
-While `enable` is TRUE every output is its input; otherwise all are FALSE. `personality` is the number of bits.
+HAL_COMPONENT(OutputBuffer, "output_buffer", "Passes several bits while enabled", R"(
+While `enable` is TRUE each output equals its input; otherwise all outputs are FALSE. `personality` is the number of bits.
 
     loadrt output_buffer names=valves personality=2
     addf valves servo

@@ -5,9 +5,9 @@ namespace {
 
 struct Radiobutton : hal::Component {
     using Component::Component;
-    hal::Argument   count{*this, "personality", 4, "how many buttons", {.min = 1, .max = 32}};
+    hal::Argument   count{*this, "personality", 4, "number of buttons", {.min = 1, .max = 32}};
     hal::Ins<bool>  in{*this, "in-##", count, "button #"};
-    hal::Outs<bool> out{*this, "out-##", count, "TRUE from a press of button # until another one is pressed"};
+    hal::Outs<bool> out{*this, "out-##", count, "TRUE after a press of button # until another button is pressed"};
     hal::Function   run{*this, "", hal::step<&Radiobutton::update>, "reads the buttons"};
 
     void update(hal::Cycle) noexcept {
@@ -27,9 +27,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Radiobutton, "radiobutton", "Buttons of which the last one pressed stays on", R"(
-A rising edge of a button makes its output TRUE and all others FALSE. At the start no output is TRUE. Of several buttons
-pressed in the same cycle the one with the lowest number counts. `personality` is the number of buttons.
+HAL_COMPONENT(Radiobutton, "radiobutton", "Radio buttons: the last button pressed stays on", R"(
+A rising edge of a button sets its output and clears all others. At the start no output is TRUE. If several buttons are
+pressed in the same cycle, the lowest number takes precedence. `personality` is the number of buttons.
 
     loadrt radiobutton names=axis-choice personality=3
     addf axis-choice servo

@@ -5,9 +5,9 @@ namespace {
 
 struct SampleHold : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t>  in{*this, "in", "the value"};
-    hal::In<bool>          hold{*this, "hold", "TRUE: out stays as it is"};
-    hal::Out<std::int32_t> out{*this, "out", "in, or what it was when hold became TRUE"};
+    hal::In<std::int32_t>  in{*this, "in", "value"};
+    hal::In<bool>          hold{*this, "hold", "TRUE holds out"};
+    hal::Out<std::int32_t> out{*this, "out", "in, or its value when hold became TRUE"};
     hal::Function          run{*this, "", hal::step<&SampleHold::update>, "copies in"};
 
     void update(hal::Cycle) noexcept {
@@ -17,7 +17,7 @@ struct SampleHold : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(SampleHold, "sample_hold", "Follows an integer, or holds it", R"(
+HAL_COMPONENT(SampleHold, "sample_hold", "Passes an integer, or holds it", R"(
     loadrt sample_hold names=jog-counts
     addf jog-counts servo
     net wheel-counts => jog-counts.in

@@ -5,9 +5,9 @@ namespace {
 
 struct Select8 : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t> sel{*this, "sel", "which output is TRUE; none below 0 and above 7"};
+    hal::In<std::int32_t> sel{*this, "sel", "number of the output to set, 0..7; other values set none"};
     hal::Outs<bool>       out{*this, "out#", 8, "TRUE while sel is #"};
-    hal::In<bool>         enable{*this, "enable", "FALSE: all outputs are FALSE", {.initial = true}};
+    hal::In<bool>         enable{*this, "enable", "FALSE sets all outputs to FALSE", {.initial = true}};
     hal::Function         run{*this, "", hal::step<&Select8::update>, "sets one output"};
 
     void update(hal::Cycle) noexcept {
@@ -18,8 +18,8 @@ struct Select8 : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Select8, "select8", "Makes one of eight outputs TRUE", R"(
-While `enable` is TRUE and `sel` is from 0 to 7, output number `sel` is TRUE. All others are FALSE.
+HAL_COMPONENT(Select8, "select8", "Sets one of eight outputs", R"(
+While `enable` is TRUE and `sel` is in 0..7, output `sel` is TRUE. All others are FALSE.
 
     loadrt select8 names=gear-lamp
     addf gear-lamp servo

@@ -6,9 +6,9 @@ namespace {
 struct Tof : hal::Component {
     using Component::Component;
     hal::In<bool>      in{*this, "in", "the input"};
-    hal::Out<bool>     q{*this, "q", "TRUE until in has been FALSE for pt"};
+    hal::Out<bool>     q{*this, "q", "TRUE with in, and until in has been FALSE for pt"};
     hal::Out<double>   et{*this, "et", "time since the falling edge, up to pt", {.unit = "s"}};
-    hal::Param<double> pt{*this, "pt", "the delay", {.unit = "s"}};
+    hal::Param<double> pt{*this, "pt", "delay", {.unit = "s"}};
     hal::Function      run{*this, "", hal::step<&Tof::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -28,7 +28,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Tof, "tof", "IEC timer: off-delay", R"(
-`q` becomes TRUE with `in`, and FALSE when `in` has been FALSE for `pt` seconds.
+`q` becomes TRUE with `in`, and FALSE after `in` has been FALSE for `pt` seconds.
 
     loadrt tof names=run-on
     addf run-on servo

@@ -5,11 +5,11 @@ namespace {
 
 struct Toggle : hal::Component {
     using Component::Component;
-    hal::In<bool>             in{*this, "in", "the button"};
-    hal::Io<bool>             out{*this, "out", "turns over with each press; others may write it, too"};
-    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles the button must hold its new state; 0 and 1: it counts at once",
+    hal::In<bool>             in{*this, "in", "button"};
+    hal::Io<bool>             out{*this, "out", "inverted by each press; other components may write it, too"};
+    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles for which a new state of the button must be stable; 0 and 1: immediate",
                                        {.initial = 2}};
-    hal::Function             run{*this, "", hal::step<&Toggle::update>, "reads the button"};
+    hal::Function             run{*this, "", hal::step<&Toggle::update>, "reads the button and toggles out"};
 
     void update(hal::Cycle) noexcept {
         if (in == pressed_) {
@@ -22,15 +22,15 @@ struct Toggle : hal::Component {
     }
 
 private:
-    bool pressed_ = false;    // the button without its bouncing
-    std::uint32_t held_ = 0;  // cycles it has been other than that
+    bool pressed_ = false;    // debounced state of the button
+    std::uint32_t held_ = 0;  // cycles for which in has differed from it
 };
 
 }  // namespace
 
 HAL_COMPONENT(Toggle, "toggle", "Push on, push off", R"(
-A press that outlasts its bouncing by `debounce` cycles turns `out` over; so must the release before the next press counts. `out` is an
-io pin: what others write into the signal is where the next press starts.
+A press that is stable for `debounce` cycles inverts `out`; the release must be stable as long before the next press counts. `out` is an
+io pin: the next press inverts the value of the signal, even if another component wrote it.
 
     loadrt toggle names=lamp-button
     addf lamp-button servo

@@ -5,30 +5,30 @@ namespace {
 
 struct Toggle2nist : hal::Component {
     using Component::Component;
-    hal::In<bool>          in{*this, "in", "the button: every change counts"};
-    hal::In<bool>          is_on{*this, "is-on", "the device says that it is on"};
-    hal::Out<bool>         on{*this, "on", "TRUE until is-on is, after a request to switch on"};
-    hal::Out<bool>         off{*this, "off", "TRUE until is-on is FALSE, after a request to switch off"};
-    hal::In<std::uint32_t> debounce{*this, "debounce", "cycles in must hold before its change counts; 0 and 1: at once", {.initial = 2}};
-    hal::In<std::uint32_t> patience{*this, "max-pulse-length", "cycles after which on or off is given up; 0: never", {.initial = 1000}};
+    hal::In<bool>          in{*this, "in", "button; every change is a request"};
+    hal::In<bool>          is_on{*this, "is-on", "feedback of the device: TRUE while it is on"};
+    hal::Out<bool>         on{*this, "on", "request to switch on, until is-on is TRUE"};
+    hal::Out<bool>         off{*this, "off", "request to switch off, until is-on is FALSE"};
+    hal::In<std::uint32_t> debounce{*this, "debounce", "cycles for which a change of in must be stable; 0 and 1: immediate", {.initial = 2}};
+    hal::In<std::uint32_t> timeout{*this, "max-pulse-length", "timeout of a request in cycles; 0: no timeout", {.initial = 1000}};
     hal::Function          run{*this, "", hal::step<&Toggle2nist::update>, "reads the button and the device"};
 
     void update(hal::Cycle) noexcept {
         if (changed()) {
-            asking_ = true;
+            requesting_ = true;
             wanted_ = !is_on;
-            asked_ = 0;
-        } else if (asking_) {
-            const bool answered = is_on == wanted_, tired = patience != 0 && asked_ >= patience;
-            asking_ = !answered && !tired;
+            age_ = 0;
+        } else if (requesting_) {
+            const bool followed = is_on == wanted_, expired = timeout != 0 && age_ >= timeout;
+            requesting_ = !followed && !expired;
         }
-        if (asking_) ++asked_;
-        on = asking_ && wanted_;
-        off = asking_ && !wanted_;
+        if (requesting_) ++age_;
+        on = requesting_ && wanted_;
+        off = requesting_ && !wanted_;
     }
 
 private:
-    // True in the cycle in which the button has held another state long enough.
+    // True in the cycle in which a new state of the button has been stable for the debounce time.
     bool changed() noexcept {
         if (in == state_) {
             held_ = 0;
@@ -40,21 +40,21 @@ private:
         return true;
     }
 
-    bool state_ = false;                    // the button without its bouncing
-    bool asking_ = false, wanted_ = false;  // a request is out, and for what
-    std::uint32_t held_ = 0;                // cycles the button has been other than state_
-    std::uint64_t asked_ = 0;               // cycles the request has been out
+    bool state_ = false;                        // debounced state of the button
+    bool requesting_ = false, wanted_ = false;  // a request is pending; the requested state
+    std::uint32_t held_ = 0;                    // cycles for which the button has differed from state_
+    std::uint64_t age_ = 0;                     // cycles for which the request has been pending
 };
 
 }  // namespace
 
-HAL_COMPONENT(Toggle2nist, "toggle2nist", "A toggle button for a device with on, off and is-on", R"(
-Each change of `in`, in either direction, asks the device for its other state: `on` is TRUE until `is-on` is, or `off` is
-TRUE until `is-on` is FALSE. A device that does not answer within `max-pulse-length` cycles has the request taken back. A
-change while a request is out asks anew: for the other state of what `is-on` says then, and for the full time.
+HAL_COMPONENT(Toggle2nist, "toggle2nist", "Toggle button for a device with inputs to switch on and off", R"(
+Each change of `in`, in either direction, requests the other state of the device: `on` is TRUE until `is-on` is TRUE, or `off` is
+TRUE until `is-on` is FALSE. If the device does not follow within `max-pulse-length` cycles, the request ends. A
+change during a request starts a new one: for the inverse of `is-on`, and with the full timeout.
 
-LinuxCNC's manual page of version 2.9 says that rising edges count; what the component does there is this. For a button that
-is TRUE while it is pressed use `momentary2nist`.
+LinuxCNC's manual page (2.9) describes rising edges only; its component behaves as described here. For a button that
+is TRUE while pressed use `momentary2nist`.
 
     loadrt toggle2nist names=power
     addf power servo

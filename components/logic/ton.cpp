@@ -6,9 +6,9 @@ namespace {
 struct Ton : hal::Component {
     using Component::Component;
     hal::In<bool>      in{*this, "in", "the input"};
-    hal::Out<bool>     q{*this, "q", "TRUE once in has been TRUE for pt"};
+    hal::Out<bool>     q{*this, "q", "TRUE after in has been TRUE for pt"};
     hal::Out<double>   et{*this, "et", "time since the rising edge, up to pt", {.unit = "s"}};
-    hal::Param<double> pt{*this, "pt", "the delay", {.unit = "s"}};
+    hal::Param<double> pt{*this, "pt", "delay", {.unit = "s"}};
     hal::Function      run{*this, "", hal::step<&Ton::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -27,8 +27,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Ton, "ton", "IEC timer: on-delay", R"(
-`q` becomes TRUE when `in` has been TRUE for `pt` seconds, and FALSE with `in`. The time counts from the cycle of the rising edge, in which
-`et` is 0; `timedelay` counts that cycle too and is one cycle earlier.
+`q` becomes TRUE after `in` has been TRUE for `pt` seconds, and FALSE with `in`. The time starts in the cycle of the rising edge, in which
+`et` is 0; the time of `timedelay` includes that cycle, so it switches one cycle earlier.
 
     loadrt ton names=spin-up
     addf spin-up servo

@@ -8,7 +8,7 @@ struct Tp : hal::Component {
     hal::In<bool>      in{*this, "in", "a rising edge starts the pulse"};
     hal::Out<bool>     q{*this, "q", "TRUE during the pulse"};
     hal::Out<double>   et{*this, "et", "time since the start of the pulse, up to pt", {.unit = "s"}};
-    hal::Param<double> pt{*this, "pt", "length of the pulse", {.unit = "s"}};
+    hal::Param<double> pt{*this, "pt", "duration of the pulse", {.unit = "s"}};
     hal::Function      run{*this, "", hal::step<&Tp::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -28,7 +28,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Tp, "tp", "IEC timer: pulse", R"(
-A rising edge of `in` makes `q` TRUE for `pt` seconds, whatever `in` does meanwhile. `et` keeps `pt` after the pulse until
+A rising edge of `in` sets `q` for `pt` seconds, regardless of further changes of `in`. After the pulse `et` remains at `pt` until
 `in` is FALSE.
 
     loadrt tp names=lubricate

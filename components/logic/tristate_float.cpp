@@ -3,8 +3,8 @@
 
 using TristateFloat = Tristate<double>;
 
-HAL_COMPONENT(TristateFloat, "tristate_float", "Places a number on a shared signal while enabled", R"(
-Several of them may write to one signal; the one that runs last in a cycle wins. While no one is enabled the signal keeps
+HAL_COMPONENT(TristateFloat, "tristate_float", "Writes a number to a shared signal while enabled", R"(
+Several instances may write to one signal; the one that runs last in a cycle takes precedence. While none is enabled the signal keeps
 its value.
 
     loadrt tristate_float names=from-pendant,from-panel

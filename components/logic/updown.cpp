@@ -7,10 +7,10 @@ struct Updown : hal::Component {
     using Component::Component;
     hal::In<bool>            count_up{*this, "countup", "a rising edge counts up"};
     hal::In<bool>            count_down{*this, "countdown", "a rising edge counts down"};
-    hal::In<bool>            reset{*this, "reset", "while TRUE the count is 0"};
-    hal::Out<std::int32_t>   count{*this, "count", "the count"};
-    hal::Param<bool>         clamp{*this, "clamp", "TRUE: the count stays between min and max"};
-    hal::Param<bool>         wrap{*this, "wrap", "TRUE: after max comes min, and the other way round; clamp is not needed then"};
+    hal::In<bool>            reset{*this, "reset", "TRUE sets the count to 0"};
+    hal::Out<std::int32_t>   count{*this, "count", "count"};
+    hal::Param<bool>         clamp{*this, "clamp", "TRUE limits the count to min and max"};
+    hal::Param<bool>         wrap{*this, "wrap", "TRUE: the count wraps around between max and min; takes precedence over clamp"};
     hal::Param<std::int32_t> max{*this, "max", "largest count", {.initial = INT32_MAX}};
     hal::Param<std::int32_t> min{*this, "min", "smallest count"};
     hal::Function            run{*this, "", hal::step<&Updown::update>, "counts edges"};
@@ -33,10 +33,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Updown, "updown", "Counts up and down, with limits or wrapping around", R"(
+HAL_COMPONENT(Updown, "updown", "Counts up and down, with limits or wrap-around", R"(
 Rising edges of `countup` and `countdown` count; both in one cycle cancel, and the first cycle has no edges. While `reset` is TRUE the
-count is 0, or with `clamp` and `wrap` the end that is reached from 0. Without these two the count goes round at the ends of its type.
-When `min` is above `max`, `max` is looked at first.
+count is 0, or with `clamp` or `wrap` the limit nearest to 0 or the wrapped value. Without `clamp` and `wrap` the count wraps around at the limits of its type.
+If `min` is above `max`, `max` is checked first.
 
     loadrt updown names=parts
     addf parts servo
