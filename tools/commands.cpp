@@ -223,7 +223,7 @@ int no_such_command(const std::vector<std::string>& typed) {
         for (const Group& g : groups) names.emplace_back(g.name);
     }
     const std::string hint = did_you_mean(word, names);
-    return fail(options, fmt::format("there is no command '{}'; {}", word, hint.empty() ? "type: " + where : hint));
+    return fail(options, fmt::format("unknown command '{}'; {}", word, hint.empty() ? "type: " + where : hint));
 }
 
 int help(const std::vector<std::string>& about) {

@@ -111,7 +111,7 @@ void parse(const std::string& whole, std::vector<Field>& to) {
     }
     const auto type = std::find_if(types.begin(), types.end(), [rest](const TypeName& t) { return t.name == rest; });
     if (type == types.end())
-        refuse("fields", "fields: '" + whole + "': there is no type '" + std::string(rest) + "'; there are bit, float, s32, u32, s64, u64");
+        refuse("fields", "fields: '" + whole + "': unknown type '" + std::string(rest) + "'; there are bit, float, s32, u32, s64, u64");
     for (std::size_t i = 0; i < count; ++i) {
         std::string own(name);
         if (is_row) own += "-" + std::to_string(i);

@@ -229,7 +229,7 @@ private:
                         fail(begin, begin + name.size(), name + " takes two values with a comma between them", "as in " + name + "(y, x)");
                     return push({Kind::two, static_cast<std::uint16_t>(i), 0.0});
                 }
-                return fail(begin, begin + name.size(), "there is no function '" + name + "'",
+                return fail(begin, begin + name.size(), "unknown function '" + name + "'",
                             "functions are sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max");
             }
             if (name == "pi") return push({Kind::number, 0, std::numbers::pi});

@@ -68,7 +68,7 @@ void command_help(Context& context) {
         context.output.out(to_string(row->usage()) + "\n  " + row->summary + "\n" + (*row->help ? std::string(row->help) + "\n" : ""));
         return;
     }
-    context.diagnostics.error("unknown-command", context.span(0), "there is no command '" + name + "'", did_you_mean(name, command_names()),
+    context.diagnostics.error("unknown-command", context.span(0), "unknown command '" + name + "'", did_you_mean(name, command_names()),
                               "`help` lists all commands");
 }
 

@@ -47,8 +47,8 @@ void advance_ns(Context& context, std::int64_t ns) {
 void advance_cycles(Context& context, std::uint64_t cycles) {
     Session& session = context.session;
     if (session.model().threads.empty()) {
-        context.diagnostics.error("no-thread", context.span(0), "there is no thread whose cycles could be counted", "",
-                                  "make one with `newthread servo-thread 1000000`");
+        context.diagnostics.error("no-thread", context.span(0), "cannot advance: no thread exists", "",
+                                  "create one with `newthread servo-thread 1000000`");
         return;
     }
     if (session.options().virtual_clock) {
@@ -100,8 +100,8 @@ void command_advance(Context& context) {
     } else if (!whole_number(amount)) {
         if (const auto ns = parse_duration_ns(amount, false)) return advance_ns(context, *ns);
     }
-    context.diagnostics.error("bad-duration", context.span(0), "'" + amount + "' says neither how many cycles nor how long", "",
-                              "type `advance 10 cycles`, or a time with its unit: `advance 250ms`");
+    context.diagnostics.error("bad-duration", context.span(0), "'" + amount + "' has no valid unit", "",
+                              "write `advance 10 cycles`, or a time with its unit: `advance 250ms`");
 }
 
 void command_lock(Context& context) {
@@ -110,7 +110,7 @@ void command_lock(Context& context) {
     else if (level == "tune") *context.locks = static_cast<unsigned>(Lock::tune);
     else if (level == "all") *context.locks = static_cast<unsigned>(Lock::all);
     else
-        context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "'", "",
+        context.diagnostics.error("unknown-word", context.span(0), "unknown lock '" + std::string(level) + "'", "",
                                   "the locks are: none, tune, all");
 }
 
@@ -119,7 +119,7 @@ void command_unlock(Context& context) {
     if (level == "all") *context.locks = static_cast<unsigned>(Lock::none);
     else if (level == "tune") *context.locks &= ~static_cast<unsigned>(Lock::tune);
     else
-        context.diagnostics.error("unknown-word", context.span(0), "there is no lock '" + std::string(level) + "' to take off", "",
+        context.diagnostics.error("unknown-word", context.span(0), "unknown lock '" + std::string(level) + "'", "",
                                   "the choices are: all, tune");
 }
 

@@ -143,7 +143,7 @@ void Script::run_line(const Command& command) {
     if (!row) {
         const bool argument = command.name.text.find('=') != std::string::npos;
         lines_.push_back(command.span);
-        pending_.error("unknown-command", command.name.span, "there is no command '" + command.name.text + "'",
+        pending_.error("unknown-command", command.name.span, "unknown command '" + command.name.text + "'",
                        did_you_mean(command.name.text, command_names()),
                        argument ? "an assignment has blanks around the =: NAME = VALUE" : "`help` lists all commands");
         return;

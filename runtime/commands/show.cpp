@@ -209,7 +209,7 @@ bool read_patterns(Context& context, std::vector<std::string>& patterns, std::op
         const std::string wanted = apart ? std::string(context.argument_or(at, "")) : word.substr(2);
         type = type_named(wanted);
         if (!type) {
-            context.diagnostics.error("no-such-type", context.span(at), "there is no type '" + wanted + "'", "",
+            context.diagnostics.error("no-such-type", context.span(at), "unknown type '" + wanted + "'", "",
                                       "types: bit, float, s32, u32, s64, u64, port");
             return false;
         }

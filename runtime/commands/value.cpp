@@ -16,7 +16,7 @@ const Pin* pin_named(Context& context) {
     for (const auto& [key, pin] : context.session.model().pin) names.emplace_back(key);
     const bool signal = context.session.model().find_signal(name) != nullptr;
     const char* const other = context.command.name.text == "getp" ? "gets" : "stype";
-    context.diagnostics.error("no-such-pin", context.span(0), "there is no pin or parameter '" + name + "'", did_you_mean(name, names),
+    context.diagnostics.error("no-such-pin", context.span(0), "unknown pin or parameter '" + name + "'", did_you_mean(name, names),
                               signal ? "it is a signal: " + std::string(other) + " " + name : "");
     return nullptr;
 }
@@ -28,7 +28,7 @@ const Signal* signal_named(Context& context) {
     for (const auto& [key, signal] : context.session.model().signal) names.emplace_back(key);
     const bool pin = context.session.model().find_pin(name) != nullptr;
     const char* const other = context.command.name.text == "gets" ? "getp" : "ptype";
-    context.diagnostics.error("no-such-signal", context.span(0), "there is no signal '" + name + "'", did_you_mean(name, names),
+    context.diagnostics.error("no-such-signal", context.span(0), "unknown signal '" + name + "'", did_you_mean(name, names),
                               pin ? "it is a pin: " + std::string(other) + " " + name : "");
     return nullptr;
 }

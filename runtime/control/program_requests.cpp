@@ -273,7 +273,7 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
     const bool takes = !read.is_null() || !peek.is_null();
     const std::scoped_lock lock(by.session.mutex);
     Pin* const pin = by.session.model().find_pin(name);
-    if (!pin || !pin->instance) throw Refusal{"there is no pin '" + name.substr(0, 60) + "'"};
+    if (!pin || !pin->instance) throw Refusal{"unknown pin '" + name.substr(0, 60) + "'"};
     owned(by, pin->instance->component->name);
     if (pin->type != HAL_TYPE_PORT) throw Refusal{"pin '" + name + "' is no port"};
     if (takes && pin->dir != HAL_DIR_IN) throw Refusal{"port '" + name + "' is an output: it is written"};

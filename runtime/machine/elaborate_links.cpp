@@ -52,7 +52,7 @@ void edits::newsig(Elaboration& on, Args args) {
     if (!type) {
         std::vector<std::string> all;
         for (const TypeRow& row : types) all.emplace_back(row.name);
-        on.diagnostics.error("no-such-type", args[1].span, "there is no type " + quoted(args[1].text), did_you_mean(args[1].text, all),
+        on.diagnostics.error("no-such-type", args[1].span, "unknown type " + quoted(args[1].text), did_you_mean(args[1].text, all),
                              "types: " + listed(all));
         return;
     }

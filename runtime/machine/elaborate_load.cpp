@@ -140,8 +140,8 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
     if (component) return component;
     std::vector<std::string> loaded;
     for (const auto& one : on.model.components) loaded.push_back(one->name);
-    on.diagnostics.error("no-such-component", name.span, "there is no component " + quoted(name.text) + " here",
-                         did_you_mean(name.text, loaded), loaded.empty() ? "nothing is loaded" : "loaded: " + listed(loaded));
+    on.diagnostics.error("no-such-component", name.span, "component " + quoted(name.text) + " is not loaded",
+                         did_you_mean(name.text, loaded), loaded.empty() ? "no component is loaded" : "loaded: " + listed(loaded));
     return nullptr;
 }
 

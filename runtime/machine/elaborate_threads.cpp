@@ -38,7 +38,7 @@ void add_automatically(Elaboration& on, Args args) {
             for (const auto& function : component->functions)
                 if (!function->thread && on.edit.add_function({function->name, args[0].span}, word(args[0]), -1, {}, false))
                     order.functions.push_back(function.get());
-        if (order.functions.empty()) on.diagnostics.error("no-such-function", args[0].span, "there is no function that is in no thread");
+        if (order.functions.empty()) on.diagnostics.error("no-such-function", args[0].span, "every function is already in a thread");
     }
     if (!order.functions.empty()) on.auto_orders.push_back(std::move(order));
 }

@@ -132,7 +132,7 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics&
                               "sudo apt-get install " + package + ", then build again; ./hal does that by itself");
             return {};
         }
-        diagnostics.error("no-such-component", at, "there is no component '" + std::string(name) + "'", did_you_mean(name, available()), "hal doc lists all components");
+        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'", did_you_mean(name, available()), "hal doc lists all components");
         return {};
     }
     const auto bad = [&](const PluginProblem& problem) {

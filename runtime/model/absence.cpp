@@ -112,13 +112,13 @@ void Absences::report(Entry& entry, std::vector<Diagnostic>& all) const {
     made.labels.push_back({entry.first, entry.lines == 1 ? "" : "the first of them"});
     if (!entry.what.empty()) {
         made.message = lines + depend + entry.what + ", " + entry.why + "; " + unchecked;
-        if (entry.at.known()) made.labels.push_back({entry.at, "missing since here"});
+        if (entry.at.known()) made.labels.push_back({entry.at, "missing from here on"});
     } else {
-        made.message = lines + (entry.lines == 1 ? " names" : " name") + " what nothing loaded has; " + unchecked;
+        made.message = lines + (entry.lines == 1 ? " refers" : " refer") + " to names that no loaded component has; " + unchecked;
         std::vector<std::string> missing;
         for (const Entry& one : causes_)
             if (one.scope != Scope::names) missing.push_back(one.what);
-        made.help.push_back("possibly of " + listed(missing));
+        made.help.push_back("possibly from " + listed(missing));
     }
     all.push_back(std::move(made));
 }

@@ -25,10 +25,10 @@ void Edit::undo() {
 
 bool Edit::name_free(std::string_view name, Span at, const char* what) {
     if (model_.find_pin(name))
-        return fail("name-taken", at, "there is a pin " + quoted(name) + " already", what, "give the new instances other names: names=…");
+        return fail("name-taken", at, "pin " + quoted(name) + " already exists", what, "choose other names for the new instances: names=…");
     if (model_.find_signal(name))
-        return fail("name-taken", at, "there is a signal " + quoted(name) + " already", what,
-                    "signals and pins share their names; rename the signal or the instance");
+        return fail("name-taken", at, "signal " + quoted(name) + " already exists", what,
+                    "signals and pins share one set of names; rename the signal or the instance");
     return true;
 }
 LoadedComponent& Edit::add_component(std::string name, Span at) {
@@ -55,9 +55,9 @@ void Edit::add_time_pins(LoadedFunction& function) {
     function.pins.push_back(
         own_pin(model_, function.name + ".time", HAL_TYPE_S32, HAL_DIR_OUT, times.time, "duration of the last sampled call", "ns"));
     function.pins.push_back(own_pin(model_, function.name + ".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, times.tmax,
-                                    "longest sampled call; set it to 0 to start again", "ns"));
+                                    "longest sampled call; set to 0 to reset", "ns"));
     function.pins.push_back(own_pin(model_, function.name + ".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, times.tmax_increased,
-                                    "the last sample was the longest so far", ""));
+                                    "TRUE when the last sample was the longest so far", ""));
     for (const auto& pin : function.pins) pin->function = &function;
 }
 
@@ -88,11 +88,11 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
     if (const Instance* const there = model_.find_instance(made->name)) {
         Diagnostic d{Severity::error,
                      "name-taken",
-                     "there is an instance " + quoted(made->name) + " already (" + there->component->name + ")",
+                     "instance " + quoted(made->name) + " already exists (" + there->component->name + ")",
                      {{made->loaded, "second time"}},
                      {}};
         if (there->loaded.known()) d.labels.push_back({there->loaded, "loaded here"});
-        d.help.push_back("give the new one another name: names=…");
+        d.help.push_back("choose another name for the new instance: names=…");
         diagnostics->add(std::move(d));
         return false;
     }
@@ -100,8 +100,8 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
         if (!name_free(pin->name, made->loaded, "its pin")) return false;
     for (const auto& function : functions)
         if (model_.find_function(function->name))
-            return fail("name-taken", made->loaded, "there is a function " + quoted(function->name) + " already", "its function",
-                        "give the new instance another name: names=…");
+            return fail("name-taken", made->loaded, "function " + quoted(function->name) + " already exists", "its function",
+                        "choose another name for the new instance: names=…");
     for (const auto& function : functions)
         for (const auto& pin : function->pins)
             if (!name_free(pin->name, made->loaded, "a pin of its function")) return false;

@@ -29,7 +29,7 @@ std::string pins_of_instance(const Model& model, std::string_view name) {
     return {};
 }
 
-std::string nothing_yet(std::string_view kind) { return "there is no " + std::string(kind) + " yet"; }
+std::string nothing_yet(std::string_view kind) { return "no " + std::string(kind) + "s exist yet"; }
 
 }  // namespace
 
@@ -51,8 +51,8 @@ Pin* Edit::pin(Word name) {
     std::string help = pins_of_instance(model_, name.text);
     if (model_.find_signal(name.text))
         help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
-    if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt makes instances with pins";
-    fail("no-such-pin", name.span, "there is no pin " + quoted(name.text), did_you_mean(name.text, names(model_.pin)), help);
+    if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt creates instances with pins";
+    fail("no-such-pin", name.span, "unknown pin " + quoted(name.text), did_you_mean(name.text, names(model_.pin)), help);
     return nullptr;
 }
 
@@ -60,9 +60,9 @@ Signal* Edit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::signal)) return nullptr;
     const std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
-                             : model_.signal.empty()    ? nothing_yet("signal") + "; net makes signals"
+                             : model_.signal.empty()    ? nothing_yet("signal") + "; net creates signals"
                                                         : "";
-    fail("no-such-signal", name.span, "there is no signal " + quoted(name.text), did_you_mean(name.text, names(model_.signal)), help);
+    fail("no-such-signal", name.span, "unknown signal " + quoted(name.text), did_you_mean(name.text, names(model_.signal)), help);
     return nullptr;
 }
 
@@ -75,24 +75,24 @@ LoadedFunction* Edit::function(Word name) {
         for (const LoadedFunction* function : instance->functions) own.push_back(function->name);
         if (!own.empty()) help = "functions of " + instance->name + ": " + listed(own);
     }
-    fail("no-such-function", name.span, "there is no function " + quoted(name.text), did_you_mean(name.text, names(model_.function)), help);
+    fail("no-such-function", name.span, "unknown function " + quoted(name.text), did_you_mean(name.text, names(model_.function)), help);
     return nullptr;
 }
 
 Thread* Edit::thread(Word name) {
     if (Thread* const found = model_.find_thread(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::thread)) return nullptr;
-    const std::string help = model_.threads.empty() ? "make one first: loadrt threads name1=servo-thread period1=1000000"
+    const std::string help = model_.threads.empty() ? "create one first: loadrt threads name1=servo-thread period1=1000000"
                                                      : "threads: " + listed(names(model_.thread));
-    fail("no-such-thread", name.span, "there is no thread " + quoted(name.text), did_you_mean(name.text, names(model_.thread)), help);
+    fail("no-such-thread", name.span, "unknown thread " + quoted(name.text), did_you_mean(name.text, names(model_.thread)), help);
     return nullptr;
 }
 
 Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     if (const Signal* const there = model_.find_signal(name.text)) {
         Diagnostic d{
-            Severity::error, "name-taken", "there is a signal " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
-        if (there->made.known()) d.labels.push_back({there->made, "made here"});
+            Severity::error, "name-taken", "signal " + quoted(name.text) + " already exists", {{name.span, "second time"}}, {}};
+        if (there->made.known()) d.labels.push_back({there->made, "created here"});
         diagnostics->add(std::move(d));
         return nullptr;
     }
@@ -163,8 +163,8 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
         return refuse("parameter-link", quoted(word.text) + " is a parameter and cannot be linked", "parameter", {}, "",
                       "set it: setp " + std::string(word.text) + " VALUE");
     if (pin.signal)
-        return refuse("pin-linked", "pin " + quoted(word.text) + " is linked to signal " + quoted(pin.signal->name) + " already",
-                      "second signal", pin.linked_at, "first signal", "take it off first: unlinkp " + std::string(word.text));
+        return refuse("pin-linked", "pin " + quoted(word.text) + " is already linked to signal " + quoted(pin.signal->name),
+                      "second signal", pin.linked_at, "first signal", "unlink it first: unlinkp " + std::string(word.text));
     if (pin.type != signal.type) {
         const bool writes = pin.dir == HAL_DIR_OUT;
         const std::string convert = writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
@@ -179,12 +179,12 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
                       "first output", "a signal has one output pin; join two sources with sum2, or2 or mux2");
     if (pin.dir == HAL_DIR_OUT && signal.ios != 0) {
         const auto io = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IO; });
-        return refuse("two-writers", "signal " + quoted(signal.name) + " has I/O pins already, so it can have no output", "output",
-                      (*io)->linked_at, "I/O pin", "I/O pins share a signal among themselves and with inputs only");
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has I/O pins, so it cannot have an output", "output",
+                      (*io)->linked_at, "I/O pin", "I/O pins can share a signal only with other I/O pins and inputs");
     }
     if (pin.dir == HAL_DIR_IO && signal.writer)
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it can have no I/O pin", "I/O pin",
-                      signal.writer->linked_at, "output", "I/O pins share a signal among themselves and with inputs only");
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it cannot have an I/O pin", "I/O pin",
+                      signal.writer->linked_at, "output", "I/O pins can share a signal only with other I/O pins and inputs");
     if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
         const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IN; });
         return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader", "second reader", (*reader)->linked_at,
@@ -282,7 +282,7 @@ bool Edit::set_pin(Word name, Word value) {
     }
     if (target->type == HAL_TYPE_PORT)
         return fail("bad-value", value.span, "a port pin has no value to set", "",
-                    "link it and give the signal a buffer: sets SIGNAL BYTES");
+                    "link it and allocate the buffer of the signal: sets SIGNAL BYTES");
     const Parsed parsed = parse_value(target->type, value.text);
     if (!parsed.problem.empty())
         return fail("bad-value", value.span, parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
@@ -304,7 +304,7 @@ bool Edit::set_signal(Word name, Word value) {
         if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30))
             return fail("bad-value", value.span, quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)", "port signal");
         if (target->port)
-            return fail("port-sized", name.span, "port signal " + quoted(name.text) + " has its buffer already", "",
+            return fail("port-sized", name.span, "port signal " + quoted(name.text) + " already has a buffer", "",
                         "its size is fixed once set");
         auto room = std::make_unique<std::uint8_t[]>(bytes.value.u32);
         auto made = std::make_unique<hal_port>(hal_port{bytes.value.u32, 0, 0, 0, room.get()});
@@ -326,7 +326,7 @@ bool Edit::set_signal(Word name, Word value) {
                      {{name.span, "has a writer"}},
                      {}};
         if (target->writer->linked_at.known()) d.labels.push_back({target->writer->linked_at, "linked here"});
-        d.help.push_back("to set it by hand, take the writer off first: unlinkp " + target->writer->name);
+        d.help.push_back("to set it by hand, unlink the writer first: unlinkp " + target->writer->name);
         diagnostics->add(std::move(d));
         return false;
     }
@@ -342,10 +342,10 @@ bool Edit::alias(Word name, Word second) {
     Pin* const target = pin(name);
     if (!target) return false;
     if (!target->alias.empty())
-        return fail("alias-taken", name.span, quoted(name.text) + " has the alias " + quoted(target->alias) + " already", "",
-                    std::string("take it off first: unalias ") + (target->dir == HAL_DIR_PARAM ? "param " : "pin ") + target->alias);
-    if (model_.find_pin(second.text)) return fail("name-taken", second.span, "there is a pin or alias " + quoted(second.text) + " already");
-    if (model_.find_signal(second.text)) return fail("name-taken", second.span, "there is a signal " + quoted(second.text) + " already");
+        return fail("alias-taken", name.span, quoted(name.text) + " already has the alias " + quoted(target->alias), "",
+                    std::string("remove it first: unalias ") + (target->dir == HAL_DIR_PARAM ? "param " : "pin ") + target->alias);
+    if (model_.find_pin(second.text)) return fail("name-taken", second.span, "pin or alias " + quoted(second.text) + " already exists");
+    if (model_.find_signal(second.text)) return fail("name-taken", second.span, "signal " + quoted(second.text) + " already exists");
     std::string name_too(second.text);
     on_undo([this, target] {
         model_.pin.erase(target->alias);

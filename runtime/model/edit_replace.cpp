@@ -168,14 +168,14 @@ struct Comparison {
     void vanished(Pin& pin, const char* why) const {
         r.gone_pins.push_back(&pin);
         if (pin.signal)
-            return conflict("pin " + quoted(pin.name) + " " + why + " in the new version, and it is on signal " + quoted(pin.signal->name),
-                            pin.linked_at, "linked here", "take it off first: unlinkp " + pin.name);
+            return conflict("pin " + quoted(pin.name) + " " + why + " in the new version, but is linked to signal " + quoted(pin.signal->name),
+                            pin.linked_at, "linked here", "unlink it first: unlinkp " + pin.name);
         const bool settable = pin.dir != HAL_DIR_OUT && !pin.read_only() && pin.type != HAL_TYPE_PORT && pin.instance;
         if (settable && __atomic_load_n(&edit.present(pin).slot->raw, __ATOMIC_RELAXED) != pin.initial.raw)
             edit.diagnostics->warning("reload-dropped", at,
                                       (pin.dir == HAL_DIR_PARAM ? "parameter " : "pin ") + quoted(pin.name) + " " + why +
-                                          " in the new version: the value it was set to is lost",
-                                      "", "a setp of it in the netlist needs a change, too");
+                                          " in the new version: its value is lost",
+                                      "", "change any setp of it in the netlist");
     }
     void compare_pins(const InstancePair& pair) const {
         std::vector<const Pin*> fresh_of(pair.kept->pins.size(), nullptr);
@@ -189,13 +189,13 @@ struct Comparison {
             if (fresh_of[i]) {
                 if (pin.signal && fresh_of[i]->dir != pin.dir)
                     conflict("pin " + quoted(pin.name) + " has direction " + name(fresh_of[i]->dir) + " in the new version, not " +
-                                 name(pin.dir) + ", and it is on signal " + quoted(pin.signal->name),
-                             pin.linked_at, "linked here", "take it off first: unlinkp " + pin.name);
+                                 name(pin.dir) + ", and is linked to signal " + quoted(pin.signal->name),
+                             pin.linked_at, "linked here", "unlink it first: unlinkp " + pin.name);
                 continue;
             }
             const auto other =
                 std::find_if(pair.fresh->pins.begin(), pair.fresh->pins.end(), [&](const auto& one) { return one->name == pin.name; });
-            vanished(pin, other == pair.fresh->pins.end() ? "is no more" : (std::string("has type ") + name((*other)->type)).c_str());
+            vanished(pin, other == pair.fresh->pins.end() ? "is missing" : (std::string("has type ") + name((*other)->type)).c_str());
         }
         for (std::size_t i = 0; i < is_new.size(); ++i)
             if (is_new[i]) r.new_pins.push_back(pair.fresh->pins[i].get());
@@ -211,10 +211,10 @@ struct Comparison {
             if (stays[i]) continue;
             r.gone_functions.push_back(&function);
             if (function.thread)
-                conflict("function " + quoted(function.name) + " is no more in the new version, and it is in thread " +
+                conflict("function " + quoted(function.name) + " is missing in the new version, but is in thread " +
                              quoted(function.thread->name),
-                         function.added, "added here", "take it out first: delf " + function.name + " " + function.thread->name);
-            for (const auto& pin : function.pins) vanished(*pin, "is no more");
+                         function.added, "added here", "remove it first: delf " + function.name + " " + function.thread->name);
+            for (const auto& pin : function.pins) vanished(*pin, "is missing");
         }
         for (std::size_t i = 0; i < is_new.size(); ++i) {
             LoadedFunction& function = *r.other.functions[i];
@@ -241,7 +241,7 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
     comparison.compare_functions();
     for (const LoadedFunction* const function : r->new_functions)
         if (model_.find_function(function->name))
-            fail("name-taken", at, "there is a function " + quoted(function->name) + " already", "its function");
+            fail("name-taken", at, "function " + quoted(function->name) + " already exists", "its function");
     for (const Pin* const pin : r->new_pins) {
         const Pin* const there = model_.find_pin(pin->name);
         const bool goes =

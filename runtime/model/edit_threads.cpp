@@ -13,13 +13,13 @@ namespace hal {
 Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
     if (const Thread* const there = model_.find_thread(name.text)) {
         Diagnostic d{
-            Severity::error, "name-taken", "there is a thread " + quoted(name.text) + " already", {{name.span, "second time"}}, {}};
-        if (there->made.known()) d.labels.push_back({there->made, "made here"});
+            Severity::error, "name-taken", "thread " + quoted(name.text) + " already exists", {{name.span, "second time"}}, {}};
+        if (there->made.known()) d.labels.push_back({there->made, "created here"});
         diagnostics->add(std::move(d));
         return nullptr;
     }
     for (const char* pin : {".time", ".tmax", ".tmax-increased", ".threadbeat", ".missed", ".wakeup"})
-        if (!name_free(std::string(name.text) + pin, name.span, "this thread's pin")) return nullptr;
+        if (!name_free(std::string(name.text) + pin, name.span, "pin of this thread")) return nullptr;
     auto owned = std::make_unique<Thread>();
     Thread* const made = owned.get();
     made->name = name.text;
@@ -31,11 +31,11 @@ Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
         made->pins.push_back(std::move(pin));
     };
     add(".time", HAL_TYPE_S32, HAL_DIR_OUT, made->time, "execution time of the last cycle", "ns");
-    add(".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, made->tmax, "longest execution time; set it to 0 to start again", "ns");
-    add(".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, made->tmax_increased, "the last cycle was the longest so far", "");
-    add(".threadbeat", HAL_TYPE_U32, HAL_DIR_OUT, made->beat, "counts cycles", "");
-    add(".missed", HAL_TYPE_U32, HAL_DIR_OUT, made->missed, "periods that passed unserved", "");
-    add(".wakeup", HAL_TYPE_S32, HAL_DIR_OUT, made->wakeup, "how late the last cycle began", "ns");
+    add(".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, made->tmax, "longest execution time; set to 0 to reset", "ns");
+    add(".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, made->tmax_increased, "TRUE when the last cycle was the longest so far", "");
+    add(".threadbeat", HAL_TYPE_U32, HAL_DIR_OUT, made->beat, "number of cycles", "");
+    add(".missed", HAL_TYPE_U32, HAL_DIR_OUT, made->missed, "missed periods", "");
+    add(".wakeup", HAL_TYPE_S32, HAL_DIR_OUT, made->wakeup, "wake-up latency of the last cycle", "ns");
     const auto place = std::upper_bound(model_.threads.begin(), model_.threads.end(), options.period_ns,
                                         [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
     const auto position = place - model_.threads.begin();
@@ -84,31 +84,31 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     if (target->thread) {
         Diagnostic d{Severity::error,
                      "function-in-thread",
-                     "function " + quoted(target->name) + " is in thread " + quoted(target->thread->name) + " already",
+                     "function " + quoted(target->name) + " is already in thread " + quoted(target->thread->name),
                      {{function_name.span, "second time"}},
                      {}};
         if (target->added.known()) d.labels.push_back({target->added, "added here"});
-        d.help.push_back("a function runs in one thread; take it out first: delf " + target->name + " " + target->thread->name);
+        d.help.push_back("a function runs in one thread; remove it first: delf " + target->name + " " + target->thread->name);
         diagnostics->add(std::move(d));
         return false;
     }
     if (init && to->init_done)
         return fail("init-done", function_name.span,
-                    "thread " + quoted(to->name) + " has made its first pass; functions of initf would never run", "too late",
+                    "thread " + quoted(to->name) + " has already made its first pass; the initf function would never run", "too late",
                     "add it before start, or with addf");
     auto& row = init ? to->init : to->functions;
     const auto size = static_cast<int>(row.size());
     if (position == 0)
-        return fail("bad-position", position_at, "position 0 means nothing: 1 is the first place, -1 the last", "",
-                    "leave it out to append");
+        return fail("bad-position", position_at, "invalid position 0: 1 is the first position, -1 the last", "",
+                    "omit it to append");
     const int index = position > 0 ? position - 1 : size + 1 + position;
     if (index < 0 || index > size)
         return fail(
             "bad-position", position_at,
             "thread " + quoted(to->name) + " has " + std::to_string(size) + (size == 1 ? " function" : " functions") +
-                ", so there is no position " + std::to_string(position),
+                ", position " + std::to_string(position) + " does not exist",
             "",
-            "positions 1 to " + std::to_string(size + 1) + " count from the front, -1 to -" + std::to_string(size + 1) + " from the end");
+            "positions 1 to " + std::to_string(size + 1) + " count from the beginning, -1 to -" + std::to_string(size + 1) + " from the end");
     make_room(row);
     on_undo([target, to, init, before = target->added, init_before = target->init] {
         auto& functions = init ? to->init : to->functions;

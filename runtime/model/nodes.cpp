@@ -55,20 +55,20 @@ private:
                               node(readers.empty() ? shared[0] : readers[0]) + "'",
                           {{place(writers[1], writers[1].signal->writer->linked_at), "output of " + node(writers[1])},
                            {place(writers[0], writer.linked_at), "output of " + node(writers[0])}},
-                          "a signal has one output pin; in a part of several nodes $(NODE) makes its name different: $(NODE)-" +
+                          "a signal has one output pin; in a part that belongs to several nodes, use $(NODE) for a unique name: $(NODE)-" +
                               writers[0].signal->name);
         if (!shared.empty())
             return refuse(
                 "node-crossing",
                 signal + " cannot pass from node '" + node(writers[0]) + "' to an I/O pin of node '" + node(shared[0]) + "'",
                 {{place(shared[0], shared[0].signal->pins[0]->linked_at), "I/O pin"}, {place(writers[0], writer.linked_at), "output"}},
-                "only outputs and inputs may stand on different nodes");
+                "only outputs and inputs may be on different nodes");
         if (writer.type == HAL_TYPE_PORT)
             return refuse(
                 "node-crossing",
                 signal + " is a byte stream and cannot pass from node '" + node(writers[0]) + "' to node '" + node(readers[0]) + "'",
                 {{place(readers[0], readers[0].signal->pins[0]->linked_at), "input"}, {place(writers[0], writer.linked_at), "output"}},
-                "port signals stay on one node");
+                "all pins of a port signal must be on one node");
         cross(writers[0], readers);
     }
 
@@ -103,7 +103,7 @@ private:
             return refuse(
                 "node-crossing",
                 "signal '" + written.name + "' passes from node '" + node(writer) + "' to node '" + node(readers[0]) +
-                    "', and its name cannot",
+                    "', but its name cannot be sent",
                 {{place(readers[0], readers[0].signal->pins[0]->linked_at), "input"}, {place(writer, written.writer->linked_at), "output"}},
                 "give it a name of letters, digits, -, _ and .");
         NodeField field{written.name, written.type, written.writer, {}};
@@ -140,8 +140,8 @@ private:
         if (said_.insert(on.node).second)
             diagnostics_.error(
                 "node-crossing", place(on, pin.linked_at),
-                "node '" + node(on) + "' has no thread to send and take signals in; '" + on.signal->name + "' is of another node", "",
-                "make one: newthread servo 1000000");
+                "node '" + node(on) + "' has no thread to send and receive signals; '" + on.signal->name + "' is shared with another node", "",
+                "create one: newthread servo 1000000");
         return false;
     }
 

@@ -278,7 +278,7 @@ class Lss(Node):
         self.can("lss", self.bus, "switch", "configuration")
         self.assertEqual("hal can lss: '300k' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k\n", self.bad_can("lss", self.bus, "bit-rate", "300k"))
         self.assertEqual("hal can lss: '128' is no node id; write 1 to 127, or none\n", self.bad_can("lss", self.bus, "node-id", "128"))
-        self.assertEqual("hal can lss: there is no command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
+        self.assertEqual("hal can lss: unknown command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
         self.assertEqual("hal can lss: select takes other words; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
         self.assertEqual("hal can lss: 'x' is no vendor id; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
 

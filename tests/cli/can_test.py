@@ -115,8 +115,8 @@ class Dump(Can):
         self.assertIn("hal can dump: 'more' is no address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
         self.assertEqual("hal can dump: --time: unknown form 'utc'; use relative, delta or absolute\n",
                          self.bad_can("dump", "replay:c.log", "--time", "utc"))
-        self.assertEqual("hal: there is no command 'can dmp'; did you mean 'can dump'?\n", self.bad_can("dmp"))
-        self.assertEqual("hal: there is no command 'can qqqqqqqq'; type: hal help can\n", self.bad_can("qqqqqqqq"))
+        self.assertEqual("hal: unknown command 'can dmp'; did you mean 'can dump'?\n", self.bad_can("dmp"))
+        self.assertEqual("hal: unknown command 'can qqqqqqqq'; type: hal help can\n", self.bad_can("qqqqqqqq"))
 
     def test_times_relative_delta_and_absolute(self):
         self.write("c.log", CAPTURE)
@@ -210,7 +210,7 @@ class Send(Can):
         for words in (("start", "all"), ("reset-comm", "5"), ("preop", "0x7f")):
             self.good("can", "nmt", self.bus, *words)
         self.assertEqual(["0100", "8205", "807F"], [json.loads(line).get("data") for line in self.result(dump)[0].splitlines()[:3]])
-        self.assertEqual("hal can nmt: there is no command 'strt'; did you mean 'start'?\n", self.bad_can("nmt", self.bus, "strt", "1"))
+        self.assertEqual("hal can nmt: unknown command 'strt'; did you mean 'start'?\n", self.bad_can("nmt", self.bus, "strt", "1"))
         self.assertEqual("hal can nmt: '128' is no node; write 1 to 127, or all\n", self.bad_can("nmt", self.bus, "start", "128"))
         self.assertEqual("hal can nmt: three words are needed; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all\n",
                          self.bad_can("nmt", self.bus, "start"))

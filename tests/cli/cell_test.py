@@ -54,9 +54,9 @@ class Language(Case):
         path = self.write("cell.hal", CELL.replace("period1=1000000\n", "period1=1000000\nsetp nowhere 1\n", 1)
                           .replace("net doubled twice.out", "net doubled twice.outt").replace("addf back  servo", "addf bakc  servo"))
         said = self.bad("check", path)
-        self.assertEqual(1, said.count("there is no pin 'nowhere'"), said)
+        self.assertEqual(1, said.count("unknown pin 'nowhere'"), said)
         self.assertIn("did you mean 'twice.out'?", said)
-        self.assertIn("there is no function 'bakc'", said)
+        self.assertIn("unknown function 'bakc'", said)
 
     def test_sim_passes_the_signals_and_comes_out_the_same(self):
         path = self.write("cell.hal", CELL)

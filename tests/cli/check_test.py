@@ -59,8 +59,8 @@ class Check(Case):
     def test_one_cause_one_error(self):
         said = self.bad("check", "machine.ini")
         self.assertEqual(["trivkins", "motmod", "hal_card"], [line.split("'")[1] for line in self.errors(said)], said)
-        self.assertIn("9 lines name what nothing loaded has; they were not checked", said)
-        self.assertIn("possibly of component 'trivkins', component 'motmod', component 'hal_card'", said)
+        self.assertIn("9 lines refer to names that no loaded component has; they were not checked", said)
+        self.assertIn("possibly from component 'trivkins', component 'motmod', component 'hal_card'", said)
         self.assertIn("depends on program 'pyvcp', which is not started here; it was not checked", said)
         self.assertIn("depends on program 'io', which is not started here", said)
 
@@ -68,7 +68,7 @@ class Check(Case):
         self.write("a.hal", "loadrt motmod\nloadrt pid names=pid.x\nnet c joint.0.pos-cmd => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n")
         self.write("b.hal", "net d joint.0.pos-fb pid.x.feedback\nsetp pid.x.Pgain 1\n")
         said = self.bad("check", "a.hal", "b.hal")
-        self.assertEqual(["a.hal:1:8: error: there is no component 'motmod' [no-such-component]"], self.errors(said), said)
+        self.assertEqual(["a.hal:1:8: error: unknown component 'motmod' [no-such-component]"], self.errors(said), said)
         self.assertIn("= help: 2 lines depend on it; they were not checked", said)
         self.assertIn("b.hal:1:1: warning: 1 line depends on component 'motmod', which is missing; it was not checked [unchecked-lines]", said)
 

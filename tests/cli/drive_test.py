@@ -439,8 +439,8 @@ I on
 A
 """)
         self.assertEqual(1, done.returncode)
-        self.assertEqual("""there is no command 'foo'; type: help
-there is no command 'st'; did you mean 'set'?
+        self.assertEqual("""unknown command 'foo'; type: help
+unknown command 'st'; did you mean 'set'?
 'x' is no number; type: A go POSITION [relative] [nowait]
 A: 1e+12 is 1e+12 of the drive's counts; its positions go from -2147483648 to 2147483647
 type: A go POSITION [relative] [nowait]

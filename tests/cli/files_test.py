@@ -189,7 +189,7 @@ class Doc(Case):
 
     def test_unknown_component_gets_a_suggestion(self):
         error = self.bad("doc", "adn2")
-        self.assertIn("there is no component 'adn2'; did you mean 'and2'", error)
+        self.assertIn("unknown component 'adn2'; did you mean 'and2'", error)
         self.assertEqual(1, error.count("\n"))
 
     def test_broken_plugin_is_a_sentence(self):

@@ -43,7 +43,7 @@ class BusProgram(Case):
 
 class WrongWords(Case):
     def test_unknown_command_gets_a_suggestion(self):
-        self.assertEqual("hal: there is no command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
+        self.assertEqual("hal: unknown command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
 
     def test_commands_with_a_common_beginning(self):
         self.assertEqual("usage: hal can eds COMMAND …\n\n  can eds check    what is wrong with a device description, and what it holds\n\n"
@@ -52,7 +52,7 @@ class WrongWords(Case):
             self.assertIn(last, self.good("help", *words))
 
     def test_unknown_command_without_likeness_points_to_help(self):
-        self.assertEqual("hal: there is no command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
+        self.assertEqual("hal: unknown command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
 
     def test_a_netlist_as_command_says_how_to_run_it(self):
         self.assertEqual("hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal"))

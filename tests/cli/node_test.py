@@ -230,7 +230,7 @@ class WrongWords(Node):
         for words, said in cases.items():
             self.assertEqual(f"hal node {words[0]}: {said}\n", self.bad("node", *words))
         self.assertIn("--axes: Value 9 not in range 1 to 8", self.bad("node", "drive", "--axes", "9"))
-        self.assertEqual("hal: there is no command 'node drve'; did you mean 'node drive'?\n", self.bad("node", "drve"))
+        self.assertEqual("hal: unknown command 'node drve'; did you mean 'node drive'?\n", self.bad("node", "drve"))
         self.assertIn("there is no fault 'lat-sdo'; there are mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
 
     def test_faults_are_listed(self):

@@ -199,9 +199,9 @@ class Reload(Case):
 
     def test_what_is_linked_or_in_a_thread_must_stay(self):
         self.machine()
-        for version, words in {"retyped": "pin 'p.out' has type s32 in the new version, and it is on signal 'result'",
+        for version, words in {"retyped": "pin 'p.out' has type s32 in the new version, but is linked to signal 'result'",
                                "turned": "pin 'p.out' has direction IN in the new version, not OUT",
-                               "renamed": "function 'p' is no more in the new version, and it is in thread 'servo'",
+                               "renamed": "function 'p' is missing in the new version, but is in thread 'servo'",
                                "stubborn": "cannot make 'p': not today",
                                "unasked": "component 'part' has no argument 'offset'",
                                "other": "it was built for version 2 of the component interface, this runtime has 1"}.items():
@@ -219,7 +219,7 @@ class Reload(Case):
         self.install("second")
         done = self.shell("reload", "part")
         self.assertEqual(0, done.returncode)
-        self.assertIn("warning: parameter 'p.old' is no more in the new version: the value it was set to is lost [reload-dropped]", done.stderr)
+        self.assertIn("warning: parameter 'p.old' is missing in the new version: its value is lost [reload-dropped]", done.stderr)
 
     def test_who_owns_something_gives_it_back_first(self):
         owned = self.folder / "owned"
@@ -236,8 +236,8 @@ class Reload(Case):
     def test_names_that_are_not_components(self):
         self.machine()
         self.assertIn("an instance; a component is reloaded with all its instances", self.refused("reload", "p"))
-        self.assertIn("there is no component 'prat' here; did you mean 'part'?".split(";")[0], self.refused("reload", "prat"))
-        self.assertIn("belongs to the runtime" if "threads" in self.say("list", "comp") else "there is no component", self.refused("reload", "threads"))
+        self.assertIn("component 'prat' is not loaded; did you mean 'part'?".split(";")[0], self.refused("reload", "prat"))
+        self.assertIn("belongs to the runtime" if "threads" in self.say("list", "comp") else "is not loaded", self.refused("reload", "threads"))
 
     def test_completion_knows_what_can_be_reloaded_and_which_arguments_there_are(self):
         self.machine()

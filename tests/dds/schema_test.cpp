@@ -94,7 +94,7 @@ TEST(Schema, groups_that_differ_have_types_that_differ) {
 
 TEST(Schema, says_what_is_wrong_with_fields) {
     EXPECT_EQ("fields: 'angle' has no type; write NAME:TYPE, as in angle:float,ready:bit", refusal("angle"));
-    EXPECT_EQ("fields: 'angle:real': there is no type 'real'; there are bit, float, s32, u32, s64, u64", refusal("angle:real"));
+    EXPECT_EQ("fields: 'angle:real': unknown type 'real'; there are bit, float, s32, u32, s64, u64", refusal("angle:real"));
     EXPECT_EQ("fields: 'a:float*0': after * stands how many, 1 to 1024", refusal("a:float*0"));
     EXPECT_EQ("fields: 'a:float*5000': after * stands how many, 1 to 1024", refusal("a:float*5000"));
     EXPECT_EQ("fields: 'a:s32=1.5': '1.5' is not a s32", refusal("a:s32=1.5"));

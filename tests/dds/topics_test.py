@@ -201,7 +201,7 @@ class Topics(DdsCase):
     def test_what_cannot_be_loaded_is_refused_with_the_reason(self):
         for arguments, reason in (("fields=a:float", "which topic? write topic=NAME"),
                                   ("topic=t", "which pins? write fields=angle:float,ready:bit or ros=std_msgs/Float64"),
-                                  ("topic=t fields=a:real", "fields: 'a:real': there is no type 'real'; there are bit, float, s32, u32, s64, u64 [bad-argument]"),
+                                  ("topic=t fields=a:real", "fields: 'a:real': unknown type 'real'; there are bit, float, s32, u32, s64, u64 [bad-argument]"),
                                   ("topic=t ros=sensor_msgs/JointState joints=a,b,a", "joints: there are two joints 'a' [bad-argument]"),
                                   ("topic=t ros=std_msgs/Float64 fields=a:bit", "ros= gives the fields and the type; leave fields= and type= out"),
                                   ("topic=t ros=sensor_msgs/JointState", "ros=sensor_msgs/JointState needs the names of its joints: joints=shoulder,elbow [bad-argument]"),

@@ -282,7 +282,7 @@ INSTANTIATE_TEST_SUITE_P(Built, BadPlugin,
                                          Bad{"test-function-below", "construct-failed", "pin 'in' uses a function that is declared below it"},
                                          Bad{"test-other-version", "bad-plugin", "version 2 of the component interface, this runtime has 1"},
                                          Bad{"test-short", "bad-plugin", "at least"}, Bad{"test-no-symbol", "bad-plugin", "it exports no symbol hal_plugin"},
-                                         Bad{"../plugins/test-counter", "no-such-component", "there is no component"}));
+                                         Bad{"../plugins/test-counter", "no-such-component", "unknown component"}));
 
 struct BadFile : testing::Test {
     BadFile() : folder(fs::temp_directory_path() / ("halcyon-bad-" + std::to_string(getpid()))) {

@@ -11,8 +11,8 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 TEST(Script, a_file_with_an_error_changes_nothing_and_tells_all_errors) {
     ShellMachine machine;
     EXPECT_EQ(machine.file("loadrt and2 names=a\nnet s a.out => a.nothing\nfrobnicate\nsetp a.in0 maybe\n"), 1);
-    EXPECT_TRUE(has(machine.err, "test.hal:2:16: error: there is no pin 'a.nothing'")) << machine.err;
-    EXPECT_TRUE(has(machine.err, "test.hal:3:1: error: there is no command 'frobnicate'")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "test.hal:2:16: error: unknown pin 'a.nothing'")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "test.hal:3:1: error: unknown command 'frobnicate'")) << machine.err;
     EXPECT_TRUE(has(machine.err, "[bad-value]")) << machine.err;
     EXPECT_TRUE(machine.err.ends_with("\n3 errors; nothing was changed\n")) << machine.err;
     EXPECT_TRUE(machine.session.model().components.empty());

@@ -96,7 +96,7 @@ the code
 TEST_F(Comp, reports_every_mistake_at_its_place) {
     EXPECT_EQ(mistakes("component x;\npin inn float a;\npin in flot b;\nparam w bit c;\npni in bit d;\npin in bit e\npin in bit f;\nlicense \"MIT\";\n" + code),
               "2:5 a pin is in, out or io | pin in float angle \"what it is\";\n"
-              "3:8 there is no type 'flot' | did you mean 'float'?\n"
+              "3:8 unknown type 'flot' | did you mean 'float'?\n"
               "4:7 a parameter is r (the component sets it) or rw | param rw float gain = 1.0 \"what it is\";\n"
               "5:1 no declaration is called 'pni' | did you mean 'pin'?\n"
               "6:13 the declaration does not end here\n");

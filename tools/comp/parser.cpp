@@ -140,7 +140,7 @@ bool Parser::type(Item& item) {
         if (!word.given()) return fail("here a type is missing", "types: " + listed(type_names(), type_names().size()));
         std::string help = did_you_mean(word.text, type_names());
         if (help.empty()) help = "types: " + listed(type_names(), type_names().size());
-        return in_.error(word.span, "there is no type '" + word.text + "'", "", help), false;
+        return in_.error(word.span, "unknown type '" + word.text + "'", "", help), false;
     }
     item.type = *type;
     item.settable = word == row(*type).newer;

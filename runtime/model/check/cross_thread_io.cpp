@@ -14,7 +14,7 @@ void check_cross_thread_io(const Model& model, Diagnostics& diagnostics) {
             Diagnostic d{Severity::note,
                          "cross-thread-io",
                          "I/O pins of '" + signal->name + "' are in threads '" + thread_of(*first)->name + "' and '" + thread->name +
-                             "': not coherent with its neighbours",
+                             "': its value may change within a cycle",
                          {{pin->linked_at, "in " + thread->name}, {first->linked_at, "in " + thread_of(*first)->name}},
                          {}};
             diagnostics.add(std::move(d));

@@ -95,7 +95,7 @@ void check_stale_reads(const Model& model, Diagnostics& diagnostics) {
                          ? "signal '" + names.front() + "' is read one cycle late: its reader runs before its writer"
                          : std::to_string(names.size()) +
                                " signals are read one cycle late, their readers run before their writers: " + listed(names, 6),
-                     names.size() == 1 ? "" : "the first", "show latency tells it of every link; addf --auto chooses the order");
+                     names.size() == 1 ? "" : "the first", "`show latency` shows the delay of every link; `addf --auto` chooses the order");
 }
 
 }  // namespace hal

@@ -16,7 +16,7 @@ void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics) {
             if (!linked) continue;
             const std::string thread = model.threads.empty() ? "THREAD" : model.threads.back()->name;
             diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
-                                "function '" + function->name + "' is in no thread, so its linked pins stand still", "",
+                                "function '" + function->name + "' is in no thread, so its linked pins never change", "",
                                 "addf " + function->name + " " + thread);
         }
 }

@@ -107,7 +107,7 @@ TEST_F(Gate, Aborts_and_errors_have_their_numbers) {
     EXPECT_EQ(ask("[6] 200 r 0x1000 0"), "[6] ERROR:107 #unsupported node");
     EXPECT_EQ(ask("[7] 5 r 0x1000"), "[7] ERROR:101 #syntax error: the sub-index is missing");
     EXPECT_EQ(ask("[8] 5 w 0x2000 0 u8 256"), "[8] ERROR:101 #syntax error: this is no value of type u8");
-    EXPECT_EQ(ask("[9] fly"), "[9] ERROR:100 #request not supported: there is no command 'fly'; see: help");
+    EXPECT_EQ(ask("[9] fly"), "[9] ERROR:100 #request not supported: unknown command 'fly'; see: help");
     EXPECT_EQ(ask("[10] set speed 5"), "[10] ERROR:100 #request not supported: what to set is not 'speed'; see: help");
     EXPECT_EQ(ask("[x] start"), "[0] ERROR:101 #syntax error: a line begins with [NUMBER]");
     EXPECT_EQ(ask("[11] set network 7"), "[11] ERROR:106 #unsupported net");

@@ -157,7 +157,7 @@ bool DriveShell::run(Words words) {
         Words names;
         for (const Verb& v : verbs) names.emplace_back(v.name);
         const std::string hint = did_you_mean(verb, names);
-        return wrong(fmt::format("there is no command '{}'; {}", verb, hint.empty() ? "type: help" : hint));
+        return wrong(fmt::format("unknown command '{}'; {}", verb, hint.empty() ? "type: help" : hint));
     }
     return command(a, verb, std::move(words));
 }

@@ -196,7 +196,7 @@ int run_can_lss(const LssOptions& options) {
     }
     if (!command) {
         const std::string hint = did_you_mean(word, names);
-        return fail(options, fmt::format("there is no command '{}'; {}", word, hint.empty() ? "see: hal help can lss" : hint));
+        return fail(options, fmt::format("unknown command '{}'; {}", word, hint.empty() ? "see: hal help can lss" : hint));
     }
     std::vector<std::string> arguments(options.words.begin() + 2, options.words.end());
     if (arguments.size() < command->least || arguments.size() > command->most)

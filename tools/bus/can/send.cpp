@@ -69,7 +69,7 @@ int run_can_nmt(const NmtOptions& options) {
     }
     if (!command) {
         const std::string hint = did_you_mean(word, names);
-        return fail(options, fmt::format("there is no command '{}'; {}", word,
+        return fail(options, fmt::format("unknown command '{}'; {}", word,
                                          hint.empty() ? "there are start, stop, preop, reset and reset-comm" : hint));
     }
     unsigned node = 0;

@@ -419,7 +419,7 @@ def disconnect(pin):
 def pin_has_writer(name):
     about = _objects("pin", name)
     if about is None:
-        raise error(f"there is no pin '{name}'")
+        raise error(f"unknown pin '{name}'")
     return "signal" in about and "writer" in _objects("sig", about["signal"])
 
 

@@ -362,7 +362,7 @@ private:
                 std::vector<std::string> names;
                 for (const auto& t : types_) names.push_back(t.first);
                 const std::string near = did_you_mean(type->value.text, names);
-                report_.error(Topic::line, type->value.at, "there is no type '" + type->value.text + "'",
+                report_.error(Topic::line, type->value.at, "unknown type '" + type->value.text + "'",
                               !near.empty()   ? near
                               : names.empty() ? "write [type " + type->value.text + "]"
                                               : "there are " + listed(names));

@@ -223,7 +223,7 @@ bool Reader::command() {
     if (known)
         return fail("what to " + first + (more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing") + "; see: help",
                     Error::not_supported);
-    return fail("there is no command '" + first.substr(0, 40) + "'; see: help", Error::not_supported);
+    return fail("unknown command '" + first.substr(0, 40) + "'; see: help", Error::not_supported);
 }
 
 }  // namespace
