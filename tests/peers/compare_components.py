@@ -1,322 +1,33 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Halcyon's pid, limit3, encoder, stepgen and pwmgen against LinuxCNC's own: compare_components.py SOURCE_FOLDER [NAME...]
+"""Compares Halcyon's pid, limit3, encoder, stepgen and pwmgen with LinuxCNC's own: compare_components.py SOURCE_FOLDER [NAME...]
 
-SOURCE_FOLDER is `src/hal/components` of a LinuxCNC source tree the user has; nothing of it is part of this project. Each
-component is compiled unmodified with `hal compile` and run in `hal sim` in the same netlist and with the same inputs, cycle by
-cycle, as ours. Every output of every cycle is compared to 1e-12 relative. A row is one feature with its verdict: `equal`, or
-`differs` with the reason and, for each pin, in how many cycles and by how much at most. Which rows differ, on which pins and
-how far is written down here: a row that is not as expected says UNEXPECTED, and the exit status is 1. NAME is a component.
-HAL_BIN is the program; HALCYON_PLUGIN_PATH leads to our components, if it does not find them.
+SOURCE_FOLDER is `src/hal/components` of a LinuxCNC source tree that the user provides; it is not part of this project. Each component
+is compiled unmodified with `hal compile` and runs in `hal sim` in the same netlist and with the same inputs as ours. Every output of
+every cycle is compared to 1e-12 relative. Each line is one feature with its verdict: `equal`, or `differs` with the reason and, for each
+pin, the number of cycles and the maximum difference. component_cases.py holds the expected differences: any other result is printed as
+UNEXPECTED, and the exit status is 1. NAME is a component. HAL_BIN is the program; HALCYON_PLUGIN_PATH is the path of our components
+where the program does not find them.
 """
 import math
 import os
 import pathlib
-import random
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, field
+
+from component_cases import CASES, N
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HAL = os.environ.get("HAL_BIN", str(ROOT / "build/release/bin/hal"))
 OURS = os.environ.get("HALCYON_PLUGIN_PATH", "")
 TOLERANCE = 1e-12
-N = 3000
-
-
-@dataclass
-class Row:
-    """A comparison. Pin names are short: the instance is put in front. Outputs carry their type: `f:output`."""
-    component: str
-    name: str
-    settings: dict
-    inputs: dict                     # pin: a list of N values, all of one type
-    outputs: list
-    reason: str = ""                 # why it differs; empty: it must be equal
-    bounds: dict = field(default_factory=dict)  # pin that differs: (in at most so many cycles, by at most so much)
-    arguments: str = ""
-    later: int = 0                   # ours is compared so many cycles later
-    slow: bool = False               # all but the fast function run in every tenth cycle
-    extra: tuple = ()                # more lines of the netlist
-    in_order: bool = False           # the states of the outputs after each other are compared, not when each comes
-
 
 INSTANCE = {"pid": "pid.0", "limit3": "limit3.0", "encoder": "encoder.0", "stepgen": "stepgen.0", "pwmgen": "pwmgen.0"}
 FUNCTIONS = {"pid": ["pid.0.do-pid-calcs"], "limit3": ["limit3.0"], "encoder": ["encoder.update-counters", "encoder.capture-position"],
              "stepgen": ["stepgen.make-pulses", "stepgen.update-freq", "stepgen.capture-position"],
              "pwmgen": ["pwmgen.make-pulses", "pwmgen.update"]}
 
-
-def sine(amplitude, period, phase=0.0):
-    return [amplitude * math.sin(2 * math.pi * i / period + phase) for i in range(N)]
-
-
-def triangle(amplitude, period):
-    return [amplitude * (4 * abs((i / period) % 1 - 0.5) - 1) for i in range(N)]
-
-
-def steps(amplitude, cycles):
-    return [amplitude * float((i // cycles) % 3 - 1) for i in range(N)]
-
-
-def noise(amplitude, seed):
-    numbers = random.Random(seed)
-    return [numbers.uniform(-amplitude, amplitude) for _ in range(N)]
-
-
-def flag(cycles, of, low):
-    """TRUE but for the last `low` of each `of` pieces."""
-    return [(i // cycles) % of < of - low for i in range(N)]
-
-
-def from_zero(values):
-    return [type(values[0])(0)] + values[1:]
-
-
-# --- pid
-
-def pid_rows():
-    command, feedback = from_zero(sine(3, 300, 0.7)), from_zero(triangle(1.5, 360))
-    jump = [7.5 * (i >= 46) - 9.0 * (i >= 230) for i in range(N)]
-    index, on = flag(23, 2, 1), flag(37, 4, 1)
-    outputs = ["b:saturated", "s:saturated-count", "f:saturated-s", "f:output", "f:error", "f:errorI", "f:errorD", "f:commandD",
-               "f:commandDD", "f:commandDDD"]
-    every = dict(Pgain=5, Igain=3, Dgain=.1, FF0=.5, FF1=.2, FF2=.01, FF3=1e-5, bias=.1, deadband=.05, maxerror=2, maxerrorI=.5,
-                 maxerrorD=20, maxcmdD=30, maxcmdDD=300, maxcmdDDD=3000, maxoutput=8)
-    features = [
-        ("Pgain", dict(Pgain=2), {}), ("Igain", dict(Igain=2), {}), ("Dgain", dict(Dgain=.2), {}),
-        ("FF0", dict(FF0=.3), {}), ("FF1", dict(FF1=.3), {}), ("FF2", dict(FF2=.3), {}), ("FF3", dict(FF3=.3), {}),
-        ("bias", dict(bias=.3), {}),
-        ("negative gains", dict(Pgain=-2, Igain=5, FF1=-.1, maxoutput=1.5, deadband=.5), {"command": from_zero(steps(1, 70))}),
-        ("deadband", dict(Pgain=2, Igain=3, Dgain=.1, deadband=.3), {}), ("maxerror", dict(Pgain=2, Igain=3, Dgain=.1, maxerror=.5), {}),
-        ("maxerrorI", dict(Igain=2, maxerrorI=.2), {}), ("maxerrorD", dict(Dgain=2, maxerrorD=10), {}),
-        ("maxcmdD", dict(FF1=2, Dgain=.1, maxcmdD=10), {}), ("maxcmdDD", dict(FF2=2, maxcmdDD=100), {}),
-        ("maxcmdDDD", dict(FF3=2, maxcmdDDD=1000), {}), ("maxoutput, P", dict(Pgain=2, maxoutput=1.5), {}),
-        ("maxoutput, PI: integral, saturated pins", dict(Pgain=2, Igain=5, maxoutput=1.5), {}),
-        ("maxoutput below bias", dict(Pgain=.2, Igain=5, bias=3, maxoutput=1.5), {}),
-        ("enable", dict(Pgain=2, Igain=5, Dgain=.1, bias=.4, FF1=.2, FF2=.01), {"enable": on}),
-        ("enable while saturated", dict(Pgain=2, Igain=5, maxoutput=1.5), {"enable": on}),
-        ("index-enable", dict(Pgain=2, Igain=5, Dgain=.1, FF1=.2, FF2=.01, FF3=.001), {"index-enable": index}),
-        ("index-enable, with a jump", dict(Pgain=2, Igain=5, Dgain=.1, FF1=.2, FF2=.01, FF3=.001, maxerrorD=50),
-         {"index-enable": index, "command": [a + b for a, b in zip(command, jump)], "feedback": [a + b for a, b in zip(feedback, jump)]}),
-        ("command-deriv", dict(Dgain=.1, FF1=1), {"command-deriv": from_zero(noise(1, 1))}),
-        ("feedback-deriv", dict(Dgain=.1, FF1=1), {"feedback-deriv": from_zero(noise(1, 2))}),
-        ("both derivatives", dict(Dgain=.1, FF1=1), {"command-deriv": from_zero(noise(1, 1)), "feedback-deriv": from_zero(noise(1, 2))}),
-        ("command-deriv at the index", dict(Dgain=.1, FF1=1, maxcmdD=.5), {"command-deriv": from_zero(noise(1, 1)), "index-enable": index}),
-        ("feedback-deriv at the index", dict(Dgain=.1, FF1=1, maxcmdD=10),
-         {"feedback-deriv": from_zero(noise(1, 2)), "index-enable": index}),
-        ("all gains and limits", every, {}), ("all, with enable and index-enable", every, {"enable": on, "index-enable": index}),
-        ("all, noise and steps", every, {"command": from_zero(steps(3, 70)), "feedback": from_zero(noise(3, 3))}),
-    ]
-    for previous in (0, 1):
-        for name, settings, inputs in features:
-            yield Row("pid", f"{name}{', error-previous-target' if previous else ''}",
-                      {"Pgain": 0, "enable": 1, "error-previous-target": previous, **settings},
-                      {"command": command, "feedback": feedback, **inputs}, outputs, arguments="num_chan=1 debug=1")
-
-    def odd(name, reason, bounds, settings, inputs=None):
-        return Row("pid", name, {"Pgain": 0, "enable": 1, "error-previous-target": 0, **settings},
-                   {"command": command, "feedback": feedback, **(inputs or {})}, outputs, reason, bounds, arguments="num_chan=1 debug=1")
-
-    big = math.inf
-    yield odd("first cycle", "there is no cycle before it: here slopes of 0, there the jump from 0",
-              {"output": (1, 600), "errorD": (1, 450), "commandD": (1, 2e3), "commandDD": (2, 2e6), "commandDDD": (3, 4e9)}, dict(FF1=.3),
-              {"command": sine(3, 300, 0.7), "feedback": triangle(1.5, 360)})
-    yield odd("first cycle, error-previous-target", "the target before it: here the present one, there 0",
-              {"output": (1, 4), "error": (1, 2), "errorI": (N, .002), "errorD": (1, 450), "commandD": (1, 2e3), "commandDD": (2, 2e6),
-               "commandDDD": (3, 4e9)}, {"Pgain": 2, "error-previous-target": 1},
-               {"command": sine(3, 300, 0.7), "feedback": triangle(1.5, 360)})
-    yield odd("maxoutput set to 0 while it limits", "here the saturation ends, there it stays and holds the integral",
-              {"saturated": (N, 1), "saturated-count": (N, N), "saturated-s": (N, 3), "output": (N, 6), "errorI": (N, 1)},
-              dict(Pgain=2, Igain=5),
-              {"maxoutput": [(1.5, 0.0, 2.0, 4.0)[(i // 90) % 4] for i in range(N)]})
-    for limit, settings, pins in (("maxerror", dict(Pgain=2, maxerror=-.5), {"output": (N, 2.01), "errorI": (N, .31)}),
-                                  ("maxerrorI", dict(Igain=2, maxerrorI=-.2), {"output": (N, 1), "errorI": (N, .4)}),
-                                  ("maxerrorD", dict(Dgain=.1, maxerrorD=-5), {"output": (N, 1), "errorD": (N, 10)}),
-                                  ("deadband", dict(Pgain=2, deadband=-.3), {"output": (N, 1.21), "errorI": (N, .3)})):
-        yield odd(f"negative {limit}", "here it counts as positive, there the value jumps between the ends", pins, settings)
-    yield odd("an input that is not a number", "here output is 0 in that cycle and the slopes survive, there it is not a number",
-              {"output": (2, big), "error": (1, big), "errorD": (2, big), "commandD": (2, 4), "commandDD": (3, 4e3), "commandDDD": (4, 4e6),
-               "errorI": (N, .01)}, dict(Pgain=2, Igain=1, Dgain=.1),
-              {"feedback": [math.nan if i == 500 else value for i, value in enumerate(feedback)]})
-    yield Row("pid", "auto-tuning of an integrator with dead time", {"error-previous-target": 1, "tune-effort": 1, "tune-cycles": 20,
-              "tune-mode": 1, "tune-start": 1, "enable": 1}, {"command": [0.05] * N}, ["f:output", "f:ultimate-gain", "f:ultimate-period"],
-              "here the first two half cycles, the way to the oscillation, are left out of the average",
-              {"output": (N, 2), "ultimate-gain": (N, 60), "ultimate-period": (N, .2)}, "num_chan=1 debug=1",
-              extra=("loadrt integ names=plant", "loadrt delay names=dead", "setp dead.cycles 20", "net effort pid.0.output => plant.in",
-                     "net moved plant.out => dead.in", "net seen dead.out => pid.0.feedback", "addf plant t", "addf dead t"))
-
-
-# --- limit3
-
-def limit3_rows():
-    wide, square = dict(min=-100, max=100), [1.5 if (i // 500) % 2 == 0 else -1.5 for i in range(N)]
-
-    def row(name, settings, inputs, reason="", cycles=0, most=0.0):
-        return Row("limit3", name, settings, inputs, ["f:out"], reason, {"out": (cycles, most)} if reason else {}, "count=1")
-
-    brakes = "the last cycles before a stop: here all of maxa and then exactly there, there half of what is left in each"
-    meets = "meeting a moving input: here without a lag, at its speed"
-    yield row("a step, no limit", {}, {"in": square})
-    yield row("a step, maxv", dict(maxv=12), {"in": square})
-    yield row("load from the first cycle on", dict(maxv=12, maxa=200, load=1), {"in": sine(3, 1000)})
-    yield row("a step, maxa", dict(maxa=200), {"in": square}, brakes, 100, 3e-4)
-    yield row("a step, maxv and maxa", dict(maxv=12, maxa=200, **wide), {"in": square})
-    yield row("a step beyond max", dict(maxv=12, maxa=200, min=-1, max=1), {"in": square}, brakes, 200, 2e-4)
-    yield row("a step, smooth-steps 10", {"maxv": 12, "maxa": 200, "smooth-steps": 10}, {"in": square}, "how acceleration fades out", 500,
-              .007)
-    yield row("a sine within the limits", dict(maxv=120, maxa=2000, **wide), {"in": sine(3, 1000)}, meets, 20, .005)
-    yield row("a sine beyond maxv and maxa", dict(maxv=12, maxa=200, **wide), {"in": sine(3, 1000)}, meets, N, .03)
-    yield row("a sine beyond max", dict(maxv=120, maxa=2000, min=-2, max=2), {"in": sine(3, 1000)},
-              "leaving a limit: here with the input, there some cycles before it comes back", 240, .03)
-    yield row("min and max only", dict(min=-1, max=1), {"in": sine(3, 1000)}, "without maxv and maxa LinuxCNC's goes beyond min and max",
-              N, 2.0)
-    yield row("enable", dict(maxv=12, maxa=200), {"in": sine(3, 1000), "enable": flag(200, 2, 1)},
-              "an input that comes nearer faster than maxv: here it is met as soon as can be, there the output turns round first", N, 1.25)
-    yield row("load in motion", dict(maxv=12, maxa=200), {"in": sine(3, 1000), "load": [not on for on in flag(200, 2, 1)]},
-              "leaving load: here with the speed at which it was carried, there within maxv at once", N, .18)
-
-
-# --- encoder
-
-def phases(places):
-    """Phases A and B of a shaft; at 0 both are FALSE."""
-    return {"phase-A": [((math.floor(p) + 1) & 2) != 0 for p in places], "phase-B": [(math.floor(p) & 2) != 0 for p in places]}
-
-
-def encoder_rows():
-    counted = ["s:counts", "f:position"]
-    latched = ["s:counts-latched", "f:position-latched"]
-    even, swing = [.3 + .0723 * i for i in range(N)], [.3 + p for p in sine(60, 1500)]
-
-    def row(name, inputs, outputs, settings=None, reason="", bounds=None, slow=False):
-        return Row("encoder", name, {"position-scale": 40, "min-speed-estimate": 1e-6, **(settings or {})}, inputs, outputs, reason,
-                   bounds or {},
-                   "num_chan=1", slow=slow)
-
-    def moving(places):
-        """Three edges at once first, which is where LinuxCNC's velocity begins."""
-        return phases([min(i, 3) + .3 + p for i, p in enumerate(places)])
-
-    second = "the first velocity: here at the second edge, there at the third"
-    for slow in (False, True):
-        way = ", capture-position in every tenth cycle" if slow else ""
-        yield row("counts, position: there and back" + way, phases(swing), counted, slow=slow)
-        yield row("velocity: one way" + way, phases(even), ["f:velocity", "f:velocity-rpm"], {}, second,
-                  {"velocity": (30, 4), "velocity-rpm": (30, 240)},
-                  slow)
-        yield row("velocity: slower to a stop" + way, moving([40 * (1 - math.exp(-i / 200)) for i in range(N)]), ["f:velocity"], {}, second,
-                  {"velocity": (30, 30)}, slow)
-    yield row("rawcounts", phases(swing), ["s:rawcounts"], {})
-    yield row("rawcounts, capture-position in every tenth cycle", phases(swing), ["s:rawcounts"], {},
-              "here what the cycle counted, there what the one before did", {"rawcounts": (N, 1)}, True)
-    yield row("velocity: there and back", phases(swing), ["f:velocity"], {}, "the first edge back: here the same place again, so 0",
-              {"velocity": (200, 7)})
-    yield row("velocity below min-speed-estimate", phases(swing), ["f:velocity"], {"min-speed-estimate": 3},
-              "here always 0 below it, there only while no edge comes; and as above", {"velocity": (N, 7)})
-    yield row("position-interpolated", phases(even), ["f:position-interpolated"], {}, "there a fast period further on",
-              {"position-interpolated": (N, .025)})
-    yield row("position-interpolated, backwards", phases([1.2 - p for p in even]), ["f:position-interpolated"], {},
-              "here the same at a place in both directions, there a count lower backwards", {"position-interpolated": (N, .0501)})
-    yield row("x4-mode FALSE", phases(even), counted, {"x4-mode": 0})
-    yield row("x4-mode FALSE, there and back", phases(swing), counted, {"x4-mode": 0})
-    yield row("counter-mode", phases(swing), counted, {"counter-mode": 1})
-    yield row("index", {**phases(even), "phase-Z": flag(137, 5, 4)}, counted, {"index-enable": 1})
-    yield row("reset", {**phases(even), "reset": flag(137, 5, 4)}, counted)
-    for edge, settings in (("both edges", {}), ("rising", {"latch-falling": 0}), ("falling", {"latch-rising": 0})):
-        yield row(f"latch-input, {edge}", {**phases(even), "latch-input": [not on for on in flag(137, 2, 1)]}, counted + latched, settings)
-    gap = "the first six teeth: here each counts one, there each counts as a gap, so all later counts are 12 more, or it is the index"
-    tooth = [i % 10 >= 5 and (i // 10) % 60 < 58 for i in range(N)]
-    yield row("missing-teeth", {"phase-A": tooth}, counted, {"counter-mode": 1, "missing-teeth": 2, "position-scale": 60}, gap,
-              {"counts": (N, 12), "position": (N, .2001)})
-    yield row("missing-teeth with index", {"phase-A": tooth}, counted, {"counter-mode": 1, "missing-teeth": 2, "position-scale": 60,
-                                                                        "index-enable": 1},
-              gap, {"counts": (N, 72), "position": (N, 1.2001)})
-    yield row("a phase that is TRUE in the first cycle", phases([p + 1 for p in even]), counted, {},
-              "here counting starts there, there it is an edge",
-              {"counts": (N, 1), "position": (N, .02501)})
-
-
-# --- stepgen
-
-def stepgen_rows():
-    outputs = ["b:step", "b:dir", "s:counts", "f:position-fb"]
-
-    def row(name, inputs, settings, reason, bounds, arguments=""):
-        return Row("stepgen", name, {"position-scale": 100, "enable": 1, **settings}, inputs, outputs, reason, bounds,
-                   "step_type=0" + arguments, slow=True)
-
-    fine = "position-fb is exact here, there in steps of its fixed point numbers"
-    even = "speed changes evenly within a fast period here, at its end there; "
-    yield row("disabled", {"position-cmd": [1.0] * N}, {"enable": 0}, "", {})
-    yield row("velocity, maxaccel", {"velocity-cmd": [1.0] * N}, dict(maxvel=4, maxaccel=60), even + fine,
-              {"step": (10, 1), "counts": (10, 1), "position-fb": (N, 6e-4)}, " ctrl_type=v")
-    yield row("velocity, no maxaccel", {"velocity-cmd": [1.0] * N}, dict(maxvel=4),
-              "at once here, within an update there, 0.08 of a step later; " + fine,
-              {"step": (600, 1), "counts": (600, 1), "position-fb": (N, 9e-4)}, " ctrl_type=v")
-    yield row("velocity, there and back", {"velocity-cmd": sine(3, 2000)}, dict(maxvel=4, maxaccel=60),
-              "dir changes with the first step back here, with the speed there; " + even + fine,
-              {"step": (600, 1), "dir": (60, 1), "counts": (500, 1), "position-fb": (N, 2e-3)}, " ctrl_type=v")
-    yield row("position, a move", {"position-cmd": [.5] * N}, dict(maxvel=4, maxaccel=60),
-              "the speed law: braking is spread otherwise; dir as above",
-              {"step": (100, 1), "dir": (N, 1), "counts": (100, 1), "position-fb": (N, .012)})
-    yield row("position, following", {"position-cmd": sine(.3, 2000)}, dict(maxvel=20, maxaccel=500),
-              "the speed law: here one update behind the command, there two and a half",
-              {"step": (400, 1), "dir": (200, 1), "counts": (N, 2), "position-fb": (N, .015)})
-
-    there_and_back = [1.0 if i < 900 else -1.5 for i in range(N)]
-    for kind in range(1, 15):
-        phases_of = 2 if kind == 2 else 3 if kind < 5 else 4 if kind < 11 else 5
-        pins = ["up", "down"] if kind == 1 else [f"phase-{name}" for name in "ABCDE"[:phases_of]]
-        yield Row("stepgen", f"step type {kind}: the states of its outputs in order",
-                  {"position-scale": 100, "enable": 1, "maxvel": 4, "maxaccel": 60},
-                  {"velocity-cmd": there_and_back}, [f"b:{pin}" for pin in pins], arguments=f"step_type={kind} ctrl_type=v", slow=True,
-                  in_order=True)
-
-
-# --- pwmgen
-
-def pwmgen_rows():
-    wave, still = sine(1.5, 1430), [.7] * N
-
-    def row(name, type_, inputs, settings, reason="", bounds=None, later=0):
-        pins = [["b:pwm"], ["b:pwm", "b:dir"], ["b:up", "b:down"]][type_]
-        return Row("pwmgen", name, {"scale": 2.5, "enable": 1, **settings}, inputs, pins + ["f:curr-dc"], reason, bounds or {},
-                   f"output_type={type_}",
-                   later=later)
-
-    start = "there the first period is blank"
-    taken = "a value is taken a cycle later here; " + start
-    for rate in (50, 60, 333):
-        for value in (.7, 0.0, 2.5):
-            yield row(f"PWM {rate} Hz, value {value:g}, one cycle later", 0, {"value": [value] * N}, {"pwm-freq": rate},
-                      start if value else "", {"pwm": (20, 1)} if value else {}, later=1)
-    yield row("PWM, a moving value", 0, {"value": wave}, {"pwm-freq": 50}, "periods begin one cycle later here; " + start,
-              {"pwm": (160, 1)})
-    yield row("PWM, a moving value, one cycle later", 0, {"value": wave}, {"pwm-freq": 50}, taken, {"pwm": (20, 1), "curr-dc": (N, .1)},
-              later=1)
-    yield row("PWM and direction", 1, {"value": wave}, {"pwm-freq": 50},
-              "dir changes with a period here; periods begin one cycle later here",
-              {"pwm": (300, 1), "dir": (40, 1)})
-    yield row("PWM up and down", 2, {"value": wave}, {"pwm-freq": 50}, "as above", {"up": (160, 1), "down": (160, 1)})
-    yield row("PWM dithered", 0, {"value": still}, {"pwm-freq": 60, "dither-pwm": 1}, "where the longer periods and pulses are; " + start,
-              {"pwm": (300, 1)})
-    yield row("PDM", 0, {"value": wave}, {}, "the first pulse: here when the duties add up to one", {"pwm": (1, 1)})
-    yield row("PDM, a constant value", 0, {"value": still}, {},
-              "rounding: which of two cycles has the pulse where the duties add up to one exactly",
-              {"pwm": (240, 1)})
-    yield row("PDM and direction", 1, {"value": wave}, {}, "dir goes with its pulse here, there a cycle earlier",
-              {"pwm": (1, 1), "dir": (4, 1)})
-    yield row("offset, min-dc, max-dc", 1, {"value": wave}, {"offset": .1, "min-dc": .1, "max-dc": .5}, "dir and the first pulse, as above",
-              {"pwm": (1, 1), "dir": (4, 1)})
-    yield row("enable", 1, {"value": wave, "enable": flag(130, 3, 1)}, {}, "dir is FALSE and curr-dc 0 here while disabled",
-              {"pwm": (20, 1), "dir": (N, 1), "curr-dc": (N, .6)})
-    yield row("scale 2 before the first cycle", 0, {"value": still}, {"scale": 2}, "LinuxCNC's takes it for unchanged and gives 0",
-              {"pwm": (N, 1), "curr-dc": (N, .35)})
-
-
-# --- running and judging
 
 def text(value):
     return str(int(value)) if isinstance(value, bool) else repr(value)
@@ -335,7 +46,7 @@ def netlist(row, data, csv):
     lines += [f"addf {function} t" for function in rest if not row.slow] + ["addf sampler.0 t"]
     lines += [f"addf {function} slow" for function in rest if row.slow] + list(row.extra)
     lines += [f"net in-{i} streamer.0.pin.{i} => {prefix}{pin}" for i, pin in enumerate(row.inputs)]
-    for i, pin in enumerate(row.outputs):  # a row with a plant has the signal of its output already
+    for i, pin in enumerate(row.outputs):  # a row with a plant already has the signal of its output
         signal = "effort" if row.extra and pin == "f:output" else f"out-{i}"
         lines.append(f"net {signal} {prefix}{pin[2:]} => sampler.0.pin.{i}")
     lines += [f"setp {prefix}{name} {value}" for name, value in row.settings.items() if name not in row.inputs]
@@ -344,7 +55,7 @@ def netlist(row, data, csv):
 
 
 def samples(row, first, folder, tag):
-    """Rows of numbers, or why there are none."""
+    """Returns rows of numbers, or an error message."""
     data, csv, file = (pathlib.Path(folder, tag + ending) for ending in (".in", ".csv", ".hal"))
     csv.unlink(missing_ok=True)
     data.write_text("".join(" ".join(text(column[i]) for column in row.inputs.values()) + "\n" for i in range(N)))
@@ -353,13 +64,13 @@ def samples(row, first, folder, tag):
     done = subprocess.run([HAL, "sim", str(file)], env=dict(os.environ, HALCYON_PLUGIN_PATH=path), stdin=subprocess.DEVNULL,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120, check=False)
     if done.returncode != 0 or not csv.exists():
-        return (done.stdout.strip().splitlines() or ["no word"])[0]
+        return (done.stdout.strip().splitlines() or ["no output"])[0]
     number = {"TRUE": 1.0, "FALSE": 0.0}
     return [[number.get(v) if v in number else float(v) for v in line.split(",")] for line in csv.read_text().splitlines()[1:]]
 
 
 def states(rows):
-    """What the outputs show after each other, from the first that is on."""
+    """Returns the sequence of output states, from the first with an active output."""
     changes = [row for row, before in zip(rows, [None] + rows) if row != before]
     return changes[next((i for i, row in enumerate(changes) if any(row)), 0):]
 
@@ -375,7 +86,7 @@ def distance(a, b):
 
 
 def compare(row, folder):
-    """Pin: (cycles that differ, largest difference, first cycle, ours and theirs in it); or why nothing was compared."""
+    """Returns {pin: (number of differing cycles, maximum difference, first cycle, our and their value in it)}, or an error message."""
     ours, theirs = samples(row, "", folder, "ours"), samples(row, folder, folder, "theirs")
     for who, rows in (("ours", ours), ("LinuxCNC's", theirs)):
         if isinstance(rows, str):
@@ -394,8 +105,8 @@ def compare(row, folder):
     return found
 
 
-def judge(row, found):
-    """The line to print, and whether it is as expected."""
+def verdict(row, found):
+    """Returns the line to print, and whether the result is as expected."""
     if isinstance(found, str):
         return f"UNEXPECTED  {row.name}: {found}", False
     measured = "; ".join(f"{pin} in {cycles} cycles, at most {most:.3g}" for pin, (cycles, most, *_) in found.items())
@@ -412,22 +123,21 @@ def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     source, wanted = pathlib.Path(sys.argv[1]), sys.argv[2:] or list(INSTANCE)
-    makers = {"pid": pid_rows, "limit3": limit3_rows, "encoder": encoder_rows, "stepgen": stepgen_rows, "pwmgen": pwmgen_rows}
     count = {"equal": 0, "differs": 0, "UNEXPECTED": 0}
     with tempfile.TemporaryDirectory() as folder:
         for name in wanted:
             file = next((f for f in (source / f"{name}.c", source / f"{name}.comp") if f.exists()), None)
-            if name not in makers:
-                sys.exit(f"{name}: not one of {', '.join(makers)}")
+            if name not in CASES:
+                sys.exit(f"unknown component '{name}'; use one of {', '.join(CASES)}")
             if file is None:
-                sys.exit(f"{name}: no {name}.c and no {name}.comp in {source}")
+                sys.exit(f"{source}: missing {name}.c or {name}.comp; pass src/hal/components of a LinuxCNC source tree")
             done = subprocess.run([HAL, "compile", "--output", folder, str(file)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                   text=True, check=False)
             if done.returncode != 0:
                 sys.exit(done.stdout)
             print(f"{name}:")
-            for row in makers[name]():
-                line, _ = judge(row, compare(row, folder))
+            for row in CASES[name]():
+                line, _ = verdict(row, compare(row, folder))
                 count[line.split()[0]] += 1
                 print("  " + line, flush=True)
     print(f"{count['equal']} equal, {count['differs']} differ as expected, {count['UNEXPECTED']} unexpected")

@@ -3,7 +3,7 @@
 
 namespace hal::tools {
 
-/// What capabilities the program file gave this process the program it becomes has, too: hal-bus then needs no `setcap` of its own.
+/// Makes the permitted capabilities of this process ambient, so that the next exec() keeps them: hal-bus needs no `setcap` of its own. [setup]
 void pass_on_capabilities();
 
 }  // namespace hal::tools

@@ -4,21 +4,23 @@
 
 #include <array>
 #include <cstdint>
-#include <fstream>
 #include <string>
 #include <string_view>
 
+#include <linux/capability.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 namespace hal {
 
 namespace privilege {
-/// The capabilities this process could use, as a set of bits.
+/// Returns the permitted capabilities of this process as a bit set. Calls the kernel directly: with libcap, every component would depend
+/// on it.
 inline std::uint64_t permitted() {
-    std::ifstream status("/proc/self/status");
-    for (std::string line; std::getline(status, line);)
-        if (line.starts_with("CapPrm:")) return std::stoull(line.substr(7), nullptr, 16);
-    return 0;
+    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+    std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> sets{};
+    if (syscall(SYS_capget, &header, sets.data()) != 0) return 0;
+    return std::uint64_t{sets[1].permitted} << 32 | sets[0].permitted;
 }
 
 inline std::string program() {
@@ -26,7 +28,7 @@ inline std::string program() {
     const ssize_t size = readlink("/proc/self/exe", path.data(), path.size());
     std::string name = size > 0 ? std::string(path.data(), static_cast<std::size_t>(size)) : "hal";
     constexpr std::string_view deleted = " (deleted)", helper = "/hal-bus";
-    if (name.ends_with(deleted)) name.resize(name.size() - deleted.size());  // built again since it was started
+    if (name.ends_with(deleted)) name.resize(name.size() - deleted.size());  // rebuilt since it was started
     if (name.ends_with(helper)) name.resize(name.size() - helper.size() + 4);  // `hal` passes its capabilities on to it
     return name;
 }
