@@ -2,6 +2,8 @@
 #include "commands/describe.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "machine/session.hpp"
 #include "machine/processes.hpp"
@@ -9,49 +11,27 @@
 namespace hal {
 namespace {
 
-/// Appends one JSON object member by member.
-class Object {
-public:
-    explicit Object(std::string& to) : to_(to) { to_ += '{'; }
-    ~Object() { to_ += '}'; }
-    Object(const Object&) = delete;
-    std::string& member(std::string_view key) {
-        if (!first_) to_ += ',';
-        first_ = false;
-        json_quote(to_, key);
-        return to_ += ':';
-    }
-    void text(std::string_view key, std::string_view value) { json_quote(member(key), value); }
-    void number(std::string_view key, std::int64_t value) { member(key) += std::to_string(value); }
-    void real(std::string_view key, double value) { json_value(member(key), HAL_TYPE_FLOAT, hal_value{.real = value}); }
-    void flag(std::string_view key, bool value) { member(key) += value ? "true" : "false"; }
-    template <class Range, class Name>
-    void names(std::string_view key, const Range& range, Name&& name) {
-        member(key) += '[';
-        for (const auto& each : range) {
-            if (to_.back() != '[') to_ += ',';
-            json_quote(to_, name(*each));
-        }
-        to_ += ']';
-    }
+using Object = nlohmann::ordered_json;
 
-private:
-    std::string& to_;
-    bool first_ = true;
-};
-
-/// Appends an array; the action is called per object and appends it.
-template <class Range, class Action>
-void array(std::string& to, const Range& range, Action&& action) {
+/// Appends an array of the objects that `row` returns, and writes each before the next is built: a hundred thousand at once would take
+/// several times the memory of their text.
+template <class Range, class Row>
+void array(std::string& to, const Range& range, Row&& row) {
     to += '[';
     bool first = true;
     std::size_t i = 0;
     for (const auto& each : range) {
-        if (!first) to += ',';
-        first = false;
-        action(each, i++);
+        if (!std::exchange(first, false)) to += ',';
+        to += json_text(row(each, i++));
     }
     to += ']';
+}
+
+template <class Range>
+Object names(const Range& range) {
+    Object all = Object::array();
+    for (const auto& each : range) all.push_back(each->name);
+    return all;
 }
 
 template <class T>
@@ -64,18 +44,19 @@ void describe_pins(std::string& to, Session& session, bool parameters, const Pat
     keep_type(pins, type);
     const auto values = session.read_pins(pins);
     array(to, pins, [&](const Pin* pin, std::size_t i) {
-        Object object(to);
-        object.text("name", pin->name);
-        if (!pin->alias.empty()) object.text("alias", pin->alias);
-        object.text("type", name(pin->type));
-        object.text("dir", direction_text(*pin));
-        json_value(object.member("value"), pin->type, values[i]);
-        if (pin->signal) object.text("signal", pin->signal->name);
-        if (const LoadedComponent* const component = owner(*pin)) object.text("component", component->name);
-        if (pin->instance) object.text("instance", pin->instance->name);
-        if (const Thread* const thread = thread_of(*pin)) object.text("thread", thread->name);
-        if (*pin->doc) object.text("doc", pin->doc);
-        if (*pin->unit) object.text("unit", pin->unit);
+        Object object;
+        object["name"] = pin->name;
+        if (!pin->alias.empty()) object["alias"] = pin->alias;
+        object["type"] = name(pin->type);
+        object["dir"] = direction_text(*pin);
+        object["value"] = to_json(pin->type, values[i]);
+        if (pin->signal) object["signal"] = pin->signal->name;
+        if (const LoadedComponent* const component = owner(*pin)) object["component"] = component->name;
+        if (pin->instance) object["instance"] = pin->instance->name;
+        if (const Thread* const thread = thread_of(*pin)) object["thread"] = thread->name;
+        if (*pin->doc) object["doc"] = pin->doc;
+        if (*pin->unit) object["unit"] = pin->unit;
+        return object;
     });
 }
 
@@ -84,46 +65,49 @@ void describe_signals(std::string& to, Session& session, const Patterns& pattern
     keep_type(signals, type);
     const auto values = session.read_signals(signals);
     array(to, signals, [&](const Signal* signal, std::size_t i) {
-        Object object(to);
-        object.text("name", signal->name);
-        object.text("type", name(signal->type));
-        json_value(object.member("value"), signal->type, values[i]);
-        if (signal->writer) object.text("writer", signal->writer->name);
-        object.names("pins", signal->pins, [](const Pin& pin) { return pin.name; });
+        Object object;
+        object["name"] = signal->name;
+        object["type"] = name(signal->type);
+        object["value"] = to_json(signal->type, values[i]);
+        if (signal->writer) object["writer"] = signal->writer->name;
+        object["pins"] = names(signal->pins);
+        return object;
     });
 }
 
 void describe_components(std::string& to, Session& session, Processes& processes, const Patterns& patterns) {
     array(to, components_newest_first(session.model(), patterns), [&](const LoadedComponent* component, std::size_t) {
-        Object object(to);
-        object.text("name", component->name);
+        Object object;
+        object["name"] = component->name;
         if (component->process) {
             const auto* const program = processes.find(component->name);
-            object.number("pid", component->process);
-            object.flag("ready", program && program->responds());
-            object.text("state", program ? program->state() : "initializing");
-            return;
+            object["pid"] = component->process;
+            object["ready"] = program && program->responds();
+            object["state"] = program ? program->state() : "initializing";
+            return object;
         }
         if (component->plugin) {
-            object.text("summary", component->plugin->summary);
-            object.text("file", component->path);
+            object["summary"] = component->plugin->summary;
+            object["file"] = component->path;
         }
-        object.names("instances", component->instances, [](const Instance& instance) { return instance.name; });
-        object.names("functions", component->functions, [](const LoadedFunction& function) { return function.name; });
-        array(object.member("loaded"), component->arguments, [&](const std::string& arguments, std::size_t) { json_quote(to, arguments); });
+        object["instances"] = names(component->instances);
+        object["functions"] = names(component->functions);
+        object["loaded"] = component->arguments;
+        return object;
     });
 }
 
 void describe_functions(std::string& to, Session& session, const Patterns& patterns) {
     array(to, functions_by_name(session.model(), patterns), [&](const LoadedFunction* function, std::size_t) {
-        Object object(to);
-        object.text("name", function->name);
-        object.text("component", function->component->name);
-        if (function->thread) object.text("thread", function->thread->name);
-        if (*function->doc) object.text("doc", function->doc);
+        Object object;
+        object["name"] = function->name;
+        object["component"] = function->component->name;
+        if (function->thread) object["thread"] = function->thread->name;
+        if (*function->doc) object["doc"] = function->doc;
         const auto samples = function->times->samples.load(std::memory_order_relaxed);
         const auto total = function->times->total_ns.load(std::memory_order_relaxed);
-        if (samples > 0) object.real("mean_ns", static_cast<double>(total) / static_cast<double>(samples));
+        if (samples > 0) object["mean_ns"] = static_cast<double>(total) / static_cast<double>(samples);
+        return object;
     });
 }
 
@@ -131,35 +115,36 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
     const auto clock = session.clock_report();
     array(to, threads_slowest_first(session.model(), patterns), [&](const Thread* thread, std::size_t) {
         const ThreadReport report = session.thread_report(*thread);
-        Object object(to);
-        object.text("name", thread->name);
-        object.number("period_ns", thread->options.period_ns);
-        object.text("policy", report.policy);
-        object.number("cpu", report.cpu);
-        object.number("cycles", static_cast<std::int64_t>(report.cycles));
-        object.number("missed", static_cast<std::int64_t>(report.missed));
-        object.number("overruns", static_cast<std::int64_t>(report.overruns));
-        object.number("page_faults", static_cast<std::int64_t>(report.page_faults));
-        object.flag("faulted", report.faulted);
-        object.flag("supervised", report.supervised);
+        Object object;
+        object["name"] = thread->name;
+        object["period_ns"] = thread->options.period_ns;
+        object["policy"] = report.policy;
+        object["cpu"] = report.cpu;
+        object["cycles"] = report.cycles;
+        object["missed"] = report.missed;
+        object["overruns"] = report.overruns;
+        object["page_faults"] = report.page_faults;
+        object["faulted"] = report.faulted;
+        object["supervised"] = report.supervised;
         if (report.hung) {
-            object.flag("hung", true);
-            object.number("silent_ns", report.silent_ns);
-            if (!report.function.empty()) object.text("function", report.function);
+            object["hung"] = true;
+            object["silent_ns"] = report.silent_ns;
+            if (!report.function.empty()) object["function"] = report.function;
         }
-        object.real("wakeup_p50_ns", report.wakeup_p50_ns);
-        object.real("wakeup_p99_ns", report.wakeup_p99_ns);
-        object.real("wakeup_max_ns", report.wakeup_max_ns);
-        object.real("busy_p50_ns", report.busy_p50_ns);
-        object.real("busy_p99_ns", report.busy_p99_ns);
-        object.real("busy_max_ns", report.busy_max_ns);
+        object["wakeup_p50_ns"] = report.wakeup_p50_ns;
+        object["wakeup_p99_ns"] = report.wakeup_p99_ns;
+        object["wakeup_max_ns"] = report.wakeup_max_ns;
+        object["busy_p50_ns"] = report.busy_p50_ns;
+        object["busy_p99_ns"] = report.busy_p99_ns;
+        object["busy_max_ns"] = report.busy_max_ns;
         if (clock) {
-            object.text("clock_leader", clock->leader);
-            object.number("clock_shift_ns", clock->shift_ns);
-            object.real("clock_rate_ppm", clock->rate * 1e6);
+            object["clock_leader"] = clock->leader;
+            object["clock_shift_ns"] = clock->shift_ns;
+            object["clock_rate_ppm"] = clock->rate * 1e6;
         }
-        object.names("functions", thread->functions, [](const LoadedFunction& function) { return function.name; });
-        object.names("init", thread->init, [](const LoadedFunction& function) { return function.name; });
+        object["functions"] = names(thread->functions);
+        object["init"] = names(thread->init);
+        return object;
     });
 }
 
@@ -169,9 +154,10 @@ void describe_aliases(std::string& to, Session& session, const Patterns& pattern
         for (const Pin* const pin : pins_by_name(session.model(), parameters, patterns))
             if (!pin->alias.empty()) aliased.push_back(pin);
     array(to, aliased, [&](const Pin* pin, std::size_t) {
-        Object object(to);
-        object.text("name", pin->name);
-        object.text("alias", pin->alias);
+        Object object;
+        object["name"] = pin->name;
+        object["alias"] = pin->alias;
+        return object;
     });
 }
 
@@ -231,8 +217,13 @@ void describe(std::string& to, Session& session, Processes& processes, Listed ki
     static constexpr std::pair<std::string_view, Listed> parts[] = {
         {"components", Listed::components}, {"pins", Listed::pins}, {"signals", Listed::signals},
         {"parameters", Listed::parameters}, {"functions", Listed::functions}, {"threads", Listed::threads}};
-    Object object(to);
-    for (const auto& [name, part] : parts) describe(object.member(name), session, processes, part, patterns, type);
+    std::string_view before = "{";
+    for (const auto& [name, part] : parts) {
+        json_quote(to += before, name);
+        describe(to += ':', session, processes, part, patterns, type);
+        before = ",";
+    }
+    to += '}';
 }
 
 }  // namespace hal

@@ -6,6 +6,25 @@
 
 namespace hal {
 
+std::string json_text(const nlohmann::ordered_json& document) {
+    return document.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+nlohmann::ordered_json to_json(hal_type type, const hal_value& value) {
+    switch (type) {
+    case HAL_TYPE_BIT: return value.bit;
+    case HAL_TYPE_FLOAT:
+        if (std::isfinite(value.real)) return value.real;
+        return std::isnan(value.real) ? "nan" : value.real > 0 ? "inf" : "-inf";
+    case HAL_TYPE_S32: return value.s32;
+    case HAL_TYPE_U32: return value.u32;
+    case HAL_TYPE_S64: return value.s64;
+    case HAL_TYPE_U64: return value.u64;
+    case HAL_TYPE_PORT: return value.port == nullptr ? 0 : value.port->capacity;
+    }
+    return nullptr;
+}
+
 void json_quote(std::string& to, std::string_view text) {
     to += nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands/table.hpp"
 #include "commands/json_text.hpp"
@@ -58,14 +59,11 @@ void memory_status(std::string& text, const Model& model) {
 
 std::string status_json(const Session& session) {
     const Counts c = count(session.model());
-    std::string text = "{\"instance\":";
-    json_quote(text, session.options().name);
-    return text +
-           fmt::format(
-               ",\"running\":{},\"lock\":{},\"faults\":{},\"components\":{},\"instances\":{},\"pins\":{},\"parameters\":{},\"aliases\":{},"
-               "\"signals\":{},\"functions\":{},\"threads\":{}}}\n",
-               session.running(), session.lock, session.fault_count(), c.components, c.instances, c.pins, c.parameters, c.aliases,
-               c.signals, c.functions, c.threads);
+    return json_text({{"instance", session.options().name}, {"running", session.running()}, {"lock", session.lock},
+                      {"faults", session.fault_count()}, {"components", c.components}, {"instances", c.instances}, {"pins", c.pins},
+                      {"parameters", c.parameters}, {"aliases", c.aliases}, {"signals", c.signals}, {"functions", c.functions},
+                      {"threads", c.threads}}) +
+           "\n";
 }
 
 /// Three figures of a distribution in one column each.
@@ -156,15 +154,11 @@ void show_faults(Context& context) {
     const auto records = context.session.faults();
     std::string text;
     if (context.options().json) {
-        for (const auto& record : records) {
-            text += fmt::format("{}{{\"number\":{},\"age_ns\":{},\"cycle\":{},\"count\":{},\"span_ns\":{},\"thread\":", text.empty() ? "" : ",",
-                                record.number, record.age_ns, record.cycle, record.count, record.span_ns);
-            json_quote(text, record.thread);
-            json_quote(text += ",\"code\":", record.code);
-            json_quote(text += ",\"sentence\":", record.sentence);
-            text += '}';
-        }
-        return context.output.out("[" + text + "]\n");
+        auto rows = nlohmann::ordered_json::array();
+        for (const auto& record : records)
+            rows.push_back({{"number", record.number}, {"age_ns", record.age_ns}, {"cycle", record.cycle}, {"count", record.count},
+                            {"span_ns", record.span_ns}, {"thread", record.thread}, {"code", record.code}, {"sentence", record.sentence}});
+        return context.output.out(json_text(rows) + "\n");
     }
     for (const auto& record : records)
         text += fmt::format("{:>4}  {} ago  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)), record.line());

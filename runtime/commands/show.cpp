@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands/table.hpp"
 #include "commands/describe.hpp"
@@ -244,12 +245,7 @@ void command_list(Context& context) {
     const auto names = names_of(context.session.model(), kind->listed, Patterns(std::move(patterns)));
     std::string text;
     if (context.options().json) {
-        text += '[';
-        for (const auto& name : names) {
-            if (text.size() > 1) text += ',';
-            json_quote(text, name);
-        }
-        text += ']';
+        text = json_text(names);
     } else {
         for (const auto& name : names) text += name + " ";
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // getp, gets, ptype, stype: one value or type.
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "commands/table.hpp"
 #include "commands/json_text.hpp"
@@ -35,18 +36,12 @@ const Signal* signal_named(Context& context) {
 
 void print_value(Context& context, hal_type type, const hal_value& value) {
     if (!context.options().json) return context.output.out(format_value(type, value) + "\n");
-    std::string text = "{\"name\":";
-    json_quote(text, context.argument(0));
-    text += ",\"type\":\"";
-    text += name(type);
-    text += "\",\"value\":";
-    json_value(text, type, value);
-    context.output.out(text + "}\n");
+    context.output.out(json_text({{"name", context.argument(0)}, {"type", name(type)}, {"value", to_json(type, value)}}) + "\n");
 }
 
 void print_type(Context& context, hal_type type) {
     if (!context.options().json) return context.output.out(std::string(name(type)) + "\n");
-    context.output.out(std::string("{\"type\":\"") + name(type) + "\"}\n");
+    context.output.out(json_text({{"type", name(type)}}) + "\n");
 }
 
 }  // namespace

@@ -20,9 +20,7 @@ public:
     void err(std::string_view text) override { err_text += text; }
     void notice(std::string_view text) override {
         if (!event_) return err(text);
-        std::string line = "{\"event\":\"notice\",\"text\":";
-        json_quote(line, text);
-        event_(line + "}\n");
+        event_(json_text({{"event", "notice"}, {"text", text}}) + "\n");
     }
     std::string out_text, err_text;
 
@@ -128,14 +126,12 @@ void Connection::State::complete(const Json& body, std::string& reply) {
     const auto at =
         cursor.is_null() ? line.size() : static_cast<std::size_t>(whole(cursor, "cursor", 0, std::numeric_limits<std::int32_t>::max()));
     const Completion completion = shell.complete(line, at);
-    reply += ",\"begin\":" + std::to_string(completion.begin) + ",\"candidates\":[";
+    auto candidates = nlohmann::ordered_json::array();
     for (const Candidate& candidate : completion.candidates) {
-        if (reply.back() != '[') reply += ',';
-        json_quote(reply += "{\"text\":", candidate.text);
-        if (!candidate.hint.empty()) json_quote(reply += ",\"hint\":", candidate.hint);
-        reply += '}';
+        auto& row = candidates.emplace_back(nlohmann::ordered_json{{"text", candidate.text}});
+        if (!candidate.hint.empty()) row["hint"] = candidate.hint;
     }
-    reply += ']';
+    reply += ",\"begin\":" + std::to_string(completion.begin) + ",\"candidates\":" + json_text(candidates);
 }
 
 }  // namespace hal

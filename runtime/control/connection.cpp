@@ -113,10 +113,7 @@ bool Connection::idle() const {
 }
 
 std::string Connection::hello() const {
-    std::string line = "{\"halcyon\":1,\"name\":";
-    json_quote(line, state_->session.options().name);
-    json_quote(line += ",\"version\":", paths::version);
-    return line + ",\"pid\":" + std::to_string(getpid()) + "}\n";
+    return json_text({{"halcyon", 1}, {"name", state_->session.options().name}, {"version", paths::version}, {"pid", getpid()}}) + "\n";
 }
 
 Connection::Handled Connection::handle(std::string_view line, std::string& replies, bool may_wait) {
