@@ -105,9 +105,9 @@ private:
     }
 
     bool add(Pattern& pattern, Part part, std::size_t begin, std::size_t end) {
-        if (pattern.parts.size() > most_parts) return fail(begin, end, "this word has too many ranges");
+        if (pattern.parts.size() > most_parts) return fail(begin, end, "too many ranges in one word");
         if (part.count > most_names || pattern.count * part.count > most_names)
-            return fail(begin, end, "this word stands for more than " + std::to_string(most_names) + " names");
+            return fail(begin, end, "this word expands to more than " + std::to_string(most_names) + " names");
         pattern.count *= part.count;
         std::size_t longest = std::max<std::size_t>(part.width, 20);
         for (const std::string_view element : part.elements) longest = std::max(longest, element.size());
@@ -124,8 +124,8 @@ private:
         for (int i = 0; i < 2; ++i) {
             const auto [stop, status] = std::from_chars(bounds[i].begin(), bounds[i].end(), *values[i]);
             if (bounds[i].empty() || stop != bounds[i].end() || status == std::errc::invalid_argument)
-                return fail(open, close + 1, "the bounds of a range are whole numbers",
-                            "write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}");
+                return fail(open, close + 1, "the bounds of a range must be whole numbers",
+                            "write [0..5], [00..11] or [5..0]; for a list of names write {x,y,z}");
             if (status != std::errc{} || bounds[i].size() > 18) return fail(open, close + 1, "the bounds of this range are too large");
             if (bounds[i].size() > 1 && bounds[i][0] == '0') part.width = std::max(bounds[0].size(), bounds[1].size());
         }
@@ -135,14 +135,14 @@ private:
     }
 
     bool parse_set(std::size_t open, std::size_t close, Part& part) {
-        if (close >= text_end_) return fail(open, open + 1, "this set has no }", "a set is written {x,y,z}, without blanks");
-        if (text_[close] == '{') return fail(open, close + 1, "a set cannot contain a set", "write all its names side by side: {x,y,z}");
+        if (close >= text_end_) return fail(open, open + 1, "missing } of this set", "write a set as {x,y,z}, without spaces");
+        if (text_[close] == '{') return fail(open, close + 1, "sets cannot be nested", "list all names in one set: {x,y,z}");
         const std::string_view inside = text_.substr(open + 1, close - open - 1);
         if (inside.find("..") != inside.npos)
-            return fail(open, close + 1, "a set does not contain a range", "write the range alone: [0..5]");
+            return fail(open, close + 1, "a set cannot contain a range", "write the range without the set: [0..5]");
         for (std::size_t at = 0; at <= inside.size();) {
             const std::size_t comma = std::min(inside.find(',', at), inside.size());
-            if (comma == at) return fail(open, close + 1, "a name of this set is empty", "a set is written {x,y,z}");
+            if (comma == at) return fail(open, close + 1, "empty name in this set", "write a set as {x,y,z}");
             part.elements.push_back(inside.substr(at, comma - at));
             at = comma + 1;
         }
@@ -256,7 +256,7 @@ private:
             word.patterns.push_back(std::move(pattern));
             at = stop + 1;
             if (word.count > most_names) {
-                diagnostics_.error("bad-range", token.span, "this word stands for more than " + std::to_string(most_names) + " names");
+                diagnostics_.error("bad-range", token.span, "this word expands to more than " + std::to_string(most_names) + " names");
                 return false;
             }
         }
@@ -309,16 +309,16 @@ private:
     std::vector<Command> mismatch(const Word& leader, const Word& word) {
         const auto names = [](const Word& w) { return std::to_string(w.count) + (w.count == 1 ? " name" : " names"); };
         Diagnostic made{.code = "range-length",
-                        .message = "'" + leader.token->text + "' stands for " + names(leader) + ", '" + word.token->text + "' for " +
+                        .message = "'" + leader.token->text + "' expands to " + names(leader) + ", '" + word.token->text + "' to " +
                                    std::to_string(word.count)};
         made.labels = {{word.token->span, names(word)}, {leader.token->span, names(leader)}};
-        made.help.push_back("ranges and sets of one command run along with each other, so they need the same number of names");
+        made.help.push_back("ranges and sets of one command are expanded in parallel, so they need the same number of names");
         diagnostics_.add(std::move(made));
         return {};
     }
 
     std::vector<Command> too_long() {
-        diagnostics_.error("bad-range", command_.span, "the ranges of this command stand for more names than a machine has", "",
+        diagnostics_.error("bad-range", command_.span, "the ranges of this command expand to too many names", "",
                            "at most " + std::to_string(most_names) + " names, and 256 MB of text");
         return {};
     }

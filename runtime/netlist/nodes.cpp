@@ -35,8 +35,8 @@ bool read_option(const Token& token, std::size_t equals, Line& line, Diagnostics
     }
     const auto ns = parse_duration_ns(value, false);
     if (!ns || *ns < shortest_ns || *ns > longest_ns) {
-        diagnostics.error("bad-argument", token.span, "'" + value + "' is not a time between two sendings", "",
-                          "write 5ms, 0.1s: from 100us to 60s");
+        diagnostics.error("bad-argument", token.span, "'" + value + "' is not a valid interval", "",
+                          "the range is 100us..60s; for example 5ms or 0.1s");
         return false;
     }
     (key == "rate" ? line.rate_ns : line.deadline_ns) = *ns;
@@ -50,8 +50,8 @@ bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
         if (const auto equals = token.text.find('='); equals != std::string::npos) {
             good = read_option(token, equals, line, diagnostics) && good;
         } else if (!good_name(token.text)) {
-            diagnostics.error("bad-node", token.span, "'" + token.text.substr(0, 100) + "' is no name of a node", "",
-                              "letters, digits, - and _, at most " + std::to_string(longest_name) + " of them");
+            diagnostics.error("bad-node", token.span, "'" + token.text.substr(0, 100) + "' is not a valid node name", "",
+                              "use letters, digits, - and _, at most " + std::to_string(longest_name) + " of them");
             good = false;
         } else {
             line.names.push_back(&token);
@@ -64,7 +64,7 @@ bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
     const bool all = std::any_of(line.names.begin(), line.names.end(), [](const Token* t) { return t->text == "all"; });
     if (all && (line.names.size() > 1 || line.options_at.known())) {
         diagnostics.error("bad-node", line.names.size() > 1 ? line.names[1]->span : line.options_at,
-                          "'all' stands alone: it means every node", "", "node all");
+                          "'all' cannot be combined with names or options: it means every node", "", "node all");
         return false;
     }
     return good;
@@ -77,11 +77,11 @@ void take_options(NodeLine& node, const Line& line, Diagnostics& diagnostics) {
     if (again) {
         Diagnostic d{Severity::error,
                      "bad-argument",
-                     "node '" + node.name + "' is given two different times",
+                     "node '" + node.name + "' has two different values of rate= or deadline=",
                      {{line.options_at, "second time"}},
                      {}};
         d.labels.push_back({node.options_at, "first time"});
-        d.help.emplace_back("say rate= and deadline= in one of its lines");
+        d.help.emplace_back("set rate= and deadline= in one of its lines only");
         diagnostics.add(std::move(d));
         return;
     }
@@ -105,7 +105,7 @@ void collect_nodes(const std::vector<Command>& commands, std::vector<NodeLine>& 
                 auto node = std::find_if(nodes.begin(), nodes.end(), [&](const NodeLine& n) { return n.name == token->text; });
                 if (node == nodes.end()) {
                     if (nodes.size() == most_nodes) {
-                        diagnostics.error("bad-node", token->span, "there are more than " + std::to_string(most_nodes) + " nodes here");
+                        diagnostics.error("bad-node", token->span, "more than " + std::to_string(most_nodes) + " nodes in this netlist");
                         return;
                     }
                     node = nodes.insert(nodes.end(), NodeLine{token->text, token->span, 0, 0, {}});
@@ -118,8 +118,8 @@ void collect_nodes(const std::vector<Command>& commands, std::vector<NodeLine>& 
         if (node.deadline() < 2 * node.rate())
             diagnostics.error("bad-argument", node.options_at,
                               "node '" + node.name + "' sends every " + format_duration(static_cast<double>(node.rate())) +
-                                  ", its readers wait only " + format_duration(static_cast<double>(node.deadline())),
-                              "", "a deadline is at least two sendings: one may be late");
+                                  ", but its readers wait only " + format_duration(static_cast<double>(node.deadline())),
+                              "", "use a deadline of at least twice the interval, so that one message may be late");
 }
 
 void keep_part(std::string_view name, std::vector<Command>& commands) {

@@ -35,8 +35,8 @@ public:
     std::vector<Command> run() {
         while (!given_up_ && reader_.next(line_)) parse_line();
         if (reader_.dos_ending() && environment_ != nullptr && !given_up_)
-            diagnostics_.warning("dos-line-endings", *reader_.dos_ending(), "the lines of this file end in CR LF, as on DOS", "",
-                                 "harmless here; `hal fmt` writes plain line ends");
+            diagnostics_.warning("dos-line-endings", *reader_.dos_ending(), "the lines of this file end in CR LF (DOS line endings)", "",
+                                 "harmless here; `hal fmt` converts them to LF");
         if (errors_ > most_errors)
             diagnostics_.error("too-many-errors", last_error_,
                                std::to_string(errors_ - most_errors) + " more errors in this file are not shown", "the last of them");
@@ -76,14 +76,14 @@ private:
     bool characters_good(std::size_t comment) {
         if (const auto at = reader_.control(); at && (*at < comment || line_.text()[*at] == '\0')) {
             error("binary-text", line_.span(*at, *at + 1), "this is not a text file", "a control character",
-                  "a netlist is plain text in UTF-8; nothing of this file was used");
+                  "a netlist is plain text in UTF-8; the whole file was ignored");
             given_up_ = true;
             return false;
         }
         if (const auto at = reader_.carriage_return()) {
             if (!carriage_return_said_)
-                error("lone-carriage-return", line_.span(*at, *at + 1), "a carriage return stands alone, without a line feed", "",
-                      "end lines with LF (or CR LF); `tr '\\r' '\\n'` converts a file from an old Macintosh");
+                error("lone-carriage-return", line_.span(*at, *at + 1), "carriage return without a line feed", "",
+                      "end lines with LF (or CR LF); `tr '\\r' '\\n'` converts a file with CR line endings");
             carriage_return_said_ = true;
             return false;
         }
@@ -96,7 +96,7 @@ private:
         error(
             "unterminated-quote", line.span(quote, quote + 1), "the quote " + sign + " is never closed",
             in_value ? "it comes from this value" : "opened here",
-            "close it with " + sign + " on the same line; there is no escape character, but one kind of quote may stand inside the other");
+            "close it with " + sign + " on the same line; there is no escape character, but one kind of quote may appear inside the other");
     }
 
     void warn_of_continued_comment(std::size_t comment) {
@@ -105,8 +105,8 @@ private:
         const Span whole = line_.span(comment, line_.text().size());
         if (line_.verbatim(comment, line_.text().size())) return;
         diagnostics_.warning("continued-comment", {source_, whole.begin, whole.begin + 1},
-                             "this comment ends in \\ and so goes on in the next line, which is not run", "",
-                             "take the \\ away, or put the comment at the end of the last line");
+                             "this comment ends in \\ and therefore includes the next line, which is not executed", "",
+                             "remove the \\, or move the comment to the end of the last line");
     }
 
     /// As scan_quotes, for text whose comment is gone: a `#` from a value is a character like any other.
@@ -141,7 +141,7 @@ private:
             if (good) {
                 substituted_ += value->size();
                 if (substituted_ > most_substituted) {
-                    error("substitution-too-long", span, "the values put in place of names in this file are longer than 32 MB together");
+                    error("substitution-too-long", span, "the values that replace references in this file exceed 32 MB in total");
                     return false;
                 }
                 expanded_.append(line_, done, at);
@@ -162,11 +162,11 @@ private:
         if (hidden(at)) return nullptr;
         rest = rest.substr(0, rest.find_first_of(" \t"));
         if (rest[0] == '$') {
-            error("bad-reference", at, "'$' is not followed by the name of an environment variable", "", "write $NAME or $(NAME)");
+            error("bad-reference", at, "missing name of an environment variable after '$'", "", "write $NAME or $(NAME)");
         } else if (rest.find("..") != rest.npos) {
-            error("bad-range", at, "this range has no ]", "", "a range is written [0..5], without blanks");
+            error("bad-range", at, "missing ] of this range", "", "write a range as [0..5], without spaces");
         } else {
-            error("bad-reference", at, "'[' starts no [SECTION]KEY", "",
+            error("bad-reference", at, "'[' does not begin a valid [SECTION]KEY", "",
                   "write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names");
         }
         return nullptr;
@@ -203,14 +203,14 @@ private:
             std::all_of(name.begin(), name.end(), [](char c) { return c == '_' || std::isalnum(static_cast<unsigned char>(c)); });
         error("unset-variable", at, "the environment variable '" + name + "' is not set",
               environment_->variable ? "" : did_you_mean(name, environment_names()),
-              "set it in front of the command: " + (plain ? name + "=…" : "env '" + name + "=…'") + " hal …");
+              "set it before the command: " + (plain ? name + "=…" : "env '" + name + "=…'") + " hal …");
     }
 
     void report_key(const Reference& reference, Span at) {
         const std::string name = bracketed(reference.section, reference.name);
         if (environment_->ini == nullptr || environment_->ini->empty())
             return error("unset-ini-key", at, "'" + name + "' has no value: no INI file was given", "",
-                         "give it with --ini FILE.ini (halcmd: -i FILE.ini)");
+                         "specify it with --ini FILE.ini (halcmd: -i FILE.ini)");
         const std::vector<std::string> names = environment_->ini->names();
         std::vector<std::string> section;
         for (const std::string& candidate : names)
@@ -218,7 +218,7 @@ private:
                 section.push_back(candidate.substr(reference.section.size() + 2));
         const std::string help =
             section.empty() || reference.section.empty() ? "" : "keys of [" + std::string(reference.section) + "]: " + listed(section);
-        error("unset-ini-key", at, "there is no '" + name + "' in the INI file", did_you_mean(name, names), help);
+        error("unset-ini-key", at, "unknown key '" + name + "': not in the INI file", did_you_mean(name, names), help);
     }
 
     void split(const Line& line, std::string_view text) {
@@ -241,7 +241,7 @@ private:
             if (++words_ > most_words) {
                 given_up_ = true;
                 return error("too-many-words", token.span, "this file has more than " + std::to_string(most_words) + " words", "",
-                             "that is no netlist; nothing of this file was used");
+                             "it is probably not a netlist; the whole file was ignored");
             }
             if (named) {
                 if (command.args.empty()) command.args.reserve(4);

@@ -59,7 +59,7 @@ class Halcmd(Case):
         self.assertEqual(1, done.returncode)
         said = done.stderr.splitlines()
         self.assertEqual(f"{path}:1: HALCMD MSG: one", said[0])
-        self.assertIn(f"{path}:2:7: error: there is no '[A]NONE' in the INI file", said[1])
+        self.assertIn(f"{path}:2:7: error: unknown key '[A]NONE': not in the INI file", said[1])
         self.assertIn(f"{path}:3: HALCMD MSG: 1", said)
         self.assertIn(f"{path}:4: HALCMD MSG: # not a comment", said)
         self.assertEqual(1, self.halcmd("-i", ini, "-f", path).returncode)

@@ -101,40 +101,40 @@ TEST_F(Expansion, points_at_the_word_a_name_came_from) {
 
 TEST_F(Expansion, refuses_different_numbers_of_names) {
     EXPECT_EQ(refused("net j[0..2] pid.[0..3].command"),
-              R"(test.hal:1:13: error: 'j[0..2]' stands for 3 names, 'pid.[0..3].command' for 4 [range-length]
+              R"(test.hal:1:13: error: 'j[0..2]' expands to 3 names, 'pid.[0..3].command' to 4 [range-length]
     1 | net j[0..2] pid.[0..3].command
       |     ------- ^^^^^^^^^^^^^^^^^^ 4 names
       |     3 names
-      = help: ranges and sets of one command run along with each other, so they need the same number of names
+      = help: ranges and sets of one command are expanded in parallel, so they need the same number of names
 )");
 }
 
 TEST_F(Expansion, refuses_malformed_ranges_and_sets) {
     EXPECT_EQ(refused("getp a[0..x]\ngetp a[..3]\ngetp a[0..]\ngetp a[1.5..2]\ngetp a[-1..1]\ngetp a[0..9999999999999999999]\n"),
-              R"(test.hal:1:7: error: the bounds of a range are whole numbers [bad-range]
+              R"(test.hal:1:7: error: the bounds of a range must be whole numbers [bad-range]
     1 | getp a[0..x]
       |       ^^^^^^
-      = help: write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}
+      = help: write [0..5], [00..11] or [5..0]; for a list of names write {x,y,z}
 
-test.hal:2:7: error: the bounds of a range are whole numbers [bad-range]
+test.hal:2:7: error: the bounds of a range must be whole numbers [bad-range]
     2 | getp a[..3]
       |       ^^^^^
-      = help: write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}
+      = help: write [0..5], [00..11] or [5..0]; for a list of names write {x,y,z}
 
-test.hal:3:7: error: the bounds of a range are whole numbers [bad-range]
+test.hal:3:7: error: the bounds of a range must be whole numbers [bad-range]
     3 | getp a[0..]
       |       ^^^^^
-      = help: write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}
+      = help: write [0..5], [00..11] or [5..0]; for a list of names write {x,y,z}
 
-test.hal:4:7: error: the bounds of a range are whole numbers [bad-range]
+test.hal:4:7: error: the bounds of a range must be whole numbers [bad-range]
     4 | getp a[1.5..2]
       |       ^^^^^^^^
-      = help: write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}
+      = help: write [0..5], [00..11] or [5..0]; for a list of names write {x,y,z}
 
-test.hal:5:7: error: the bounds of a range are whole numbers [bad-range]
+test.hal:5:7: error: the bounds of a range must be whole numbers [bad-range]
     5 | getp a[-1..1]
       |       ^^^^^^^
-      = help: write [0..5], [00..11] or [5..0]; names are listed as {x,y,z}
+      = help: write [0..5], [00..11] or [5..0]; for a list of names write {x,y,z}
 
 test.hal:6:7: error: the bounds of this range are too large [bad-range]
     6 | getp a[0..9999999999999999999]
@@ -142,30 +142,30 @@ test.hal:6:7: error: the bounds of this range are too large [bad-range]
 )");
     found.clear();
     EXPECT_EQ(refused("getp a{x\ngetp {}\ngetp {a,,b}\ngetp {a,{b,c}}\ngetp {a,[0..1]}\n"),
-              R"(test.hal:1:7: error: this set has no } [bad-range]
+              R"(test.hal:1:7: error: missing } of this set [bad-range]
     1 | getp a{x
       |       ^
-      = help: a set is written {x,y,z}, without blanks
+      = help: write a set as {x,y,z}, without spaces
 
-test.hal:2:6: error: a name of this set is empty [bad-range]
+test.hal:2:6: error: empty name in this set [bad-range]
     2 | getp {}
       |      ^^
-      = help: a set is written {x,y,z}
+      = help: write a set as {x,y,z}
 
-test.hal:3:6: error: a name of this set is empty [bad-range]
+test.hal:3:6: error: empty name in this set [bad-range]
     3 | getp {a,,b}
       |      ^^^^^^
-      = help: a set is written {x,y,z}
+      = help: write a set as {x,y,z}
 
-test.hal:4:6: error: a set cannot contain a set [bad-range]
+test.hal:4:6: error: sets cannot be nested [bad-range]
     4 | getp {a,{b,c}}
       |      ^^^^
-      = help: write all its names side by side: {x,y,z}
+      = help: list all names in one set: {x,y,z}
 
-test.hal:5:6: error: a set does not contain a range [bad-range]
+test.hal:5:6: error: a set cannot contain a range [bad-range]
     5 | getp {a,[0..1]}
       |      ^^^^^^^^^^
-      = help: write the range alone: [0..5]
+      = help: write the range without the set: [0..5]
 )");
 }
 
@@ -175,15 +175,15 @@ TEST_F(Expansion, of_a_million_names_works_and_of_one_more_is_refused) {
     EXPECT_EQ(hal::expand(commands[0], found).size(), 1'000'000u);
     EXPECT_EQ(found.errors(), 0u);
     for (std::size_t i = 1; i < 4; ++i) EXPECT_TRUE(hal::expand(commands[i], found).empty());
-    EXPECT_EQ(render(found, sources), R"(test.hal:2:7: error: this word stands for more than 1000000 names [bad-range]
+    EXPECT_EQ(render(found, sources), R"(test.hal:2:7: error: this word expands to more than 1000000 names [bad-range]
     2 | getp p[0..1000000]
       |       ^^^^^^^^^^^^
 
-test.hal:3:19: error: this word stands for more than 1000000 names [bad-range]
+test.hal:3:19: error: this word expands to more than 1000000 names [bad-range]
     3 | show pin [1..1000][1..1001]
       |                   ^^^^^^^^^
 
-test.hal:4:10: error: this word stands for more than 1000000 names [bad-range]
+test.hal:4:10: error: this word expands to more than 1000000 names [bad-range]
     4 | loadrt x names=[1..1000000],y
       |          ^^^^^^^^^^^^^^^^^^^^
 )");
@@ -195,7 +195,7 @@ TEST_F(Expansion, is_bounded_in_memory) {
     EXPECT_EQ(expanded("net s " + long_name + "[1..1000000]"), "");
     EXPECT_EQ(expanded("net s a[1..600000] b[1..600000]"), "");
     EXPECT_EQ(found.errors(), 3u);
-    for (const auto& error : found.all()) EXPECT_EQ(error.message, "the ranges of this command stand for more names than a machine has");
+    for (const auto& error : found.all()) EXPECT_EQ(error.message, "the ranges of this command expand to too many names");
 }
 
 }  // namespace

@@ -109,9 +109,9 @@ TEST_F(Formatter, leaves_a_faulty_text_as_it_is_and_says_why) {
     EXPECT_EQ(render(found, sources), R"(test.hal:2:7: error: the quote " is never closed [unterminated-quote]
     2 | print "
       |       ^ opened here
-      = help: close it with " on the same line; there is no escape character, but one kind of quote may stand inside the other
+      = help: close it with " on the same line; there is no escape character, but one kind of quote may appear inside the other
 
-test.hal:3:6: error: '[' starts no [SECTION]KEY [bad-reference]
+test.hal:3:6: error: '[' does not begin a valid [SECTION]KEY [bad-reference]
     3 | setp [X 1
       |      ^
       = help: write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names

@@ -105,12 +105,12 @@ TEST_F(Ini_file, suggests_keys_for_one_that_is_not_there) {
     const hal::Ini ini = read("[AXIS_X]\nMAX_VELOCITY = 2.5\nMAX_LIMIT = 1\n");
     environment.ini = &ini;
     EXPECT_EQ(said("setp a [AXIS_X]MAX_VELOCTY\nsetp b [NONE]NOTHING\n"),
-              R"(test.hal:1:8: error: there is no '[AXIS_X]MAX_VELOCTY' in the INI file [unset-ini-key]
+              R"(test.hal:1:8: error: unknown key '[AXIS_X]MAX_VELOCTY': not in the INI file [unset-ini-key]
     1 | setp a [AXIS_X]MAX_VELOCTY
       |        ^^^^^^^^^^^^^^^^^^^ did you mean '[AXIS_X]MAX_VELOCITY'?
       = help: keys of [AXIS_X]: MAX_VELOCITY, MAX_LIMIT
 
-test.hal:2:8: error: there is no '[NONE]NOTHING' in the INI file [unset-ini-key]
+test.hal:2:8: error: unknown key '[NONE]NOTHING': not in the INI file [unset-ini-key]
     2 | setp b [NONE]NOTHING
       |        ^^^^^^^^^^^^^
 )");
@@ -120,7 +120,7 @@ TEST_F(Ini_file, that_was_not_given_is_named_as_the_reason) {
     EXPECT_EQ(said("setp a [AXIS_X]MAX\n"), R"(test.hal:1:8: error: '[AXIS_X]MAX' has no value: no INI file was given [unset-ini-key]
     1 | setp a [AXIS_X]MAX
       |        ^^^^^^^^^^^
-      = help: give it with --ini FILE.ini (halcmd: -i FILE.ini)
+      = help: specify it with --ini FILE.ini (halcmd: -i FILE.ini)
 )");
 }
 

@@ -81,7 +81,7 @@ TEST_F(Parser, uses_the_process_environment_by_default) {
               R"(test.hal:1:8: error: the environment variable 'HALCYON_TEST_VALU' is not set [unset-variable]
     1 | setp a $HALCYON_TEST_VALU
       |        ^^^^^^^^^^^^^^^^^^ did you mean 'HALCYON_TEST_VALUE'?
-      = help: set it in front of the command: HALCYON_TEST_VALU=… hal …
+      = help: set it before the command: HALCYON_TEST_VALU=… hal …
 )");
 }
 
@@ -93,19 +93,19 @@ TEST_F(Parser, takes_a_bracket_in_show_and_list_as_part_of_a_pattern) {
 
 TEST_F(Parser, accepts_dos_line_ends_with_one_warning) {
     EXPECT_EQ(netlist_text::joined(parse("start\r\nnet a \\\r\n b\r\nstop\r\n")), "start\nnet a b\nstop\n");
-    EXPECT_EQ(render(found, sources), R"(test.hal:1:6: warning: the lines of this file end in CR LF, as on DOS [dos-line-endings]
+    EXPECT_EQ(render(found, sources), R"(test.hal:1:6: warning: the lines of this file end in CR LF (DOS line endings) [dos-line-endings]
     1 | start
       |      ^
-      = help: harmless here; `hal fmt` writes plain line ends
+      = help: harmless here; `hal fmt` converts them to LF
 )");
 }
 
 TEST_F(Parser, refuses_a_carriage_return_inside_a_line_once_per_file) {
     EXPECT_EQ(netlist_text::joined(parse("start\rstop\nnet a b\nshow\r")), "net a b\n");
-    EXPECT_EQ(render(found, sources), R"(test.hal:1:6: error: a carriage return stands alone, without a line feed [lone-carriage-return]
+    EXPECT_EQ(render(found, sources), R"(test.hal:1:6: error: carriage return without a line feed [lone-carriage-return]
     1 | start\x0dstop
       |      ^^^^
-      = help: end lines with LF (or CR LF); `tr '\r' '\n'` converts a file from an old Macintosh
+      = help: end lines with LF (or CR LF); `tr '\r' '\n'` converts a file with CR line endings
 )");
 }
 
@@ -114,12 +114,12 @@ TEST_F(Parser, refuses_an_open_quote_and_goes_on_with_the_next_line) {
     EXPECT_EQ(render(found, sources), R"(test.hal:1:7: error: the quote " is never closed [unterminated-quote]
     1 | print "it's
       |       ^ opened here
-      = help: close it with " on the same line; there is no escape character, but one kind of quote may stand inside the other
+      = help: close it with " on the same line; there is no escape character, but one kind of quote may appear inside the other
 
 test.hal:2:13: error: the quote ' is never closed [unterminated-quote]
     2 | setp x 'y' z'
       |             ^ opened here
-      = help: close it with ' on the same line; there is no escape character, but one kind of quote may stand inside the other
+      = help: close it with ' on the same line; there is no escape character, but one kind of quote may appear inside the other
 )");
 }
 
@@ -127,7 +127,7 @@ TEST_F(Parser, refuses_a_value_that_leaves_a_quote_open) {
     EXPECT_EQ(said("setp x $HALF"), R"(test.hal:1:8: error: the quote " is never closed [unterminated-quote]
     1 | setp x $HALF
       |        ^^^^^ it comes from this value
-      = help: close it with " on the same line; there is no escape character, but one kind of quote may stand inside the other
+      = help: close it with " on the same line; there is no escape character, but one kind of quote may appear inside the other
 )");
 }
 
@@ -135,51 +135,51 @@ TEST_F(Parser, refuses_unset_variables_all_at_once) {
     EXPECT_EQ(said("setp $X $A\nsetp a $Y b $(Z z)\n"), R"(test.hal:1:6: error: the environment variable 'X' is not set [unset-variable]
     1 | setp $X $A
       |      ^^
-      = help: set it in front of the command: X=… hal …
+      = help: set it before the command: X=… hal …
 
 test.hal:2:8: error: the environment variable 'Y' is not set [unset-variable]
     2 | setp a $Y b $(Z z)
       |        ^^
-      = help: set it in front of the command: Y=… hal …
+      = help: set it before the command: Y=… hal …
 
 test.hal:2:13: error: the environment variable 'Z z' is not set [unset-variable]
     2 | setp a $Y b $(Z z)
       |             ^^^^^^
-      = help: set it in front of the command: env 'Z z=…' hal …
+      = help: set it before the command: env 'Z z=…' hal …
 )");
 }
 
 TEST_F(Parser, refuses_references_without_a_name_or_an_end) {
     EXPECT_EQ(said("setp $ 1\nsetp $(A 1\nsetp [X 1\nsetp [X] 1\nsetp [X](Y 1\nsetp a[0..3 1\n"),
-              R"(test.hal:1:6: error: '$' is not followed by the name of an environment variable [bad-reference]
+              R"(test.hal:1:6: error: missing name of an environment variable after '$' [bad-reference]
     1 | setp $ 1
       |      ^
       = help: write $NAME or $(NAME)
 
-test.hal:2:6: error: '$' is not followed by the name of an environment variable [bad-reference]
+test.hal:2:6: error: missing name of an environment variable after '$' [bad-reference]
     2 | setp $(A 1
       |      ^^^^^
       = help: write $NAME or $(NAME)
 
-test.hal:3:6: error: '[' starts no [SECTION]KEY [bad-reference]
+test.hal:3:6: error: '[' does not begin a valid [SECTION]KEY [bad-reference]
     3 | setp [X 1
       |      ^
       = help: write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names
 
-test.hal:4:6: error: '[' starts no [SECTION]KEY [bad-reference]
+test.hal:4:6: error: '[' does not begin a valid [SECTION]KEY [bad-reference]
     4 | setp [X] 1
       |      ^^^
       = help: write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names
 
-test.hal:5:6: error: '[' starts no [SECTION]KEY [bad-reference]
+test.hal:5:6: error: '[' does not begin a valid [SECTION]KEY [bad-reference]
     5 | setp [X](Y 1
       |      ^^^^^^^
       = help: write [SECTION]KEY or [SECTION](KEY) for a value of the INI file, or [0..5] for a range of names
 
-test.hal:6:7: error: this range has no ] [bad-range]
+test.hal:6:7: error: missing ] of this range [bad-range]
     6 | setp a[0..3 1
       |       ^
-      = help: a range is written [0..5], without blanks
+      = help: write a range as [0..5], without spaces
 )");
 }
 
@@ -189,7 +189,7 @@ TEST_F(Parser, gives_up_on_a_binary_file_with_one_error) {
     EXPECT_EQ(render(found, sources), R"(test.hal:2:6: error: this is not a text file [binary-text]
     2 | net a\x00b
       |      ^^^^ a control character
-      = help: a netlist is plain text in UTF-8; nothing of this file was used
+      = help: a netlist is plain text in UTF-8; the whole file was ignored
 )");
     found.clear();
     EXPECT_EQ(netlist_text::joined(parse("start\nnet \x1b[1m\n")), "");
@@ -203,10 +203,10 @@ TEST_F(Parser, accepts_any_bytes_but_zero_in_comments_and_8_bit_names) {
 TEST_F(Parser, warns_of_a_comment_that_swallows_the_next_line) {
     EXPECT_EQ(netlist_text::joined(parse("start # C:\\\nstop\nshow\n")), "start\nshow\n");
     EXPECT_EQ(render(found, sources),
-              R"(test.hal:1:7: warning: this comment ends in \ and so goes on in the next line, which is not run [continued-comment]
+              R"(test.hal:1:7: warning: this comment ends in \ and therefore includes the next line, which is not executed [continued-comment]
     1 | start # C:\
       |       ^
-      = help: take the \ away, or put the comment at the end of the last line
+      = help: remove the \, or move the comment to the end of the last line
 )");
 }
 
@@ -226,7 +226,7 @@ TEST_F(Parser, bounds_what_references_become) {
     for (int i = 0; i < 33; ++i) text += " $LONG";
     EXPECT_EQ(netlist_text::joined(parse(text + "\nstart\n")), "start\n");
     ASSERT_EQ(found.errors(), 1u);
-    EXPECT_EQ(found.all()[0].message, "the values put in place of names in this file are longer than 32 MB together");
+    EXPECT_EQ(found.all()[0].message, "the values that replace references in this file exceed 32 MB in total");
 }
 
 TEST_F(Parser, has_no_small_limits) {
