@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What carries out the commands that change the model: the functions of the command table's edits. Step 2 of docs/design.md.
+// What carries out the commands that change the model: the functions of the command table's edits. Step 3 of docs/design.md.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From an edited model to threads that run it: steps 5 and 6 of docs/design.md.
+// From an edited model to threads that run it: steps 6 and 7 of docs/design.md.
 #include <algorithm>
 #include <stdexcept>
 
