@@ -243,11 +243,16 @@ TEST(A_cycle_of_many_periods, is_a_fault_that_names_the_function) {
     machine.must("newthread t 1000000\nloadrt test-faulty names=f\nloadrt test-counter names=c\naddf c t\naddf f.run t");
     machine.start();
     machine.must("setp f.slow 30000");
-    ASSERT_TRUE(eventually([&] { return machine.session.fault_count() != 0; }));
+    // The supervisor samples: on a busy host the first fault may name another function.
+    std::string sentence;
+    EXPECT_TRUE(eventually([&] {
+        for (const auto& fault : machine.session.faults())
+            if (sentence = fault.sentence; fault.code == "overrun" && sentence.find("periods), last seen in function 'f.run' (test-faulty)") != sentence.npos)
+                return true;
+        machine.session.clear_faults();
+        return false;
+    })) << sentence;
     machine.must("setp f.slow 0");
-    const auto fault = machine.session.faults()[0];
-    EXPECT_EQ(fault.code, "overrun");
-    EXPECT_NE(fault.sentence.find("periods), last seen in function 'f.run' (test-faulty)"), std::string::npos) << fault.sentence;
     EXPECT_FALSE(machine.session.thread_reports()[0].faulted) << "it goes on";
 }
 
