@@ -41,14 +41,14 @@ void take_words(Options& options, int argc, char** argv) { options.words.assign(
 constexpr const char* halcmd_usage =
     "usage: halcmd [OPTION…] [COMMAND…]\n"
     "       halcmd [OPTION…] -f [FILE]\n\n"
-    "  -f [FILE]   commands from a file, or from standard input\n"
-    "  -i INIFILE  where [SECTION]KEY is looked up, with -f\n"
-    "  -k          go on after an error\n"
+    "  -f [FILE]   read commands from a file, or from standard input\n"
+    "  -i INIFILE  INI file for [SECTION]KEY, with -f\n"
+    "  -k          continue after an error\n"
     "  -q -Q -v    print errors only (the default), nothing, every result\n"
     "  -s          output for scripts\n"
     "  -e          echo each line on stderr\n"
-    "  -R          nothing to do here: there is no lock to release\n"
-    "  -h [NAME]   this, or the help of a command; halcmd help lists them\n";
+    "  -R          accepted and ignored: no lock needs to be released\n"
+    "  -h [NAME]   this text, or the help of a command; halcmd help lists the commands\n";
 
 /// For bash's `complete -C halcmd`: what fits the word being typed, one per line.
 int complete_word() {
@@ -95,9 +95,9 @@ int halcmd(int argc, char** argv) {
 constexpr const char* halrun_usage =
     "usage: halrun [-I] [HALCMD-OPTION…] [FILE.hal | FILE.ini]\n"
     "       halrun -U\n\n"
-    "  -I          type commands after the file\n"
-    "  -U          end the instance that runs\n"
-    "Without a file: commands are typed, or read from standard input.\n";
+    "  -I          open the shell after the file\n"
+    "  -U          end the running instance\n"
+    "Without a file, commands are read from the terminal or from standard input.\n";
 
 int end_running(const Options& options) {
     std::string problem;
@@ -117,7 +117,7 @@ int halrun(int argc, char** argv) {
         switch (letter) {
         case 'I': options.interactive = true; break;
         case 'U': return end_running(options);
-        case 'T': return fail(options, "Tcl is not supported; write .hal files, or drive halcmd from any language");
+        case 'T': return fail(options, "Tcl is not supported; write .hal files, or call halcmd from any language");
         case 'h': return print(halrun_usage) ? 0 : 1;
         default: return 1;
         }
@@ -131,7 +131,7 @@ int halrun(int argc, char** argv) {
         const std::string& file = options.words.front();
         if (file.ends_with(".tcl")) return fail(options, fmt::format("'{}': Tcl is not supported; write a .hal file", file));
         if (!options.from_file && !file.ends_with(".hal") && !file.ends_with(".ini"))
-            return fail(options, fmt::format("'{}': the name of a netlist ends with .hal or .ini; or type: halrun -f {}", file, file));
+            return fail(options, fmt::format("'{}': the name of a netlist must end with .hal or .ini; or type: halrun -f {}", file, file));
     }
     return run_run(options);
 }
@@ -156,7 +156,7 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
         }
     }
     take_words(options, argc, argv);
-    if (options.words.size() > 1) return fail(options, fmt::format("one file only; '{}' is too much", options.words[1]));
+    if (options.words.size() > 1) return fail(options, fmt::format("unexpected second file '{}'", options.words[1]));
     return run(options);
 }
 

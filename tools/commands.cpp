@@ -77,7 +77,7 @@ constexpr Subcommand command(const char* name, const char* usage, const char* su
     return row;
 }
 
-// What talks to a bus needs a third of the code, and other libraries: it is in the program hal-bus, which `hal` becomes then.
+// The bus tools are a third of the code and need other libraries. They are in the program hal-bus, which `hal` replaces itself with.
 // This source is compiled for both.
 #ifdef HALCYON_BUS_PROGRAM
 #define ON_BUS(run) run
@@ -87,57 +87,57 @@ constexpr Subcommand command(const char* name, const char* usage, const char* su
 
 constexpr Subcommand table[] = {
     command<RunOptions, run_run>("run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads"),
-    command<SimOptions, run_sim>("sim", "FILE… [--for TIME] [-- ARG…]", "the same on a virtual clock: deterministic, as fast as it goes"),
-    command<RemoteShellOptions, run_shell>("shell", "[COMMAND…]", "talk to a running instance: one command, a file of them, or interactively", true),
-    command<CheckOptions, run_check>("check", "FILE… [--assume NAME]", "everything wrong with netlists that can be known without running them"),
+    command<SimOptions, run_sim>("sim", "FILE… [--for TIME] [-- ARG…]", "run netlists on a virtual clock: deterministic, as fast as possible"),
+    command<RemoteShellOptions, run_shell>("shell", "[COMMAND…]", "command a running instance: one command, a file of commands, or interactively", true),
+    command<CheckOptions, run_check>("check", "FILE… [--assume NAME]", "check netlists without running them"),
     command<FmtOptions, run_fmt>("fmt", "FILE…", "format netlists"),
     command<GraphOptions, run_graph>("graph", "FILE… [-o OUT]", "draw netlists"),
-    command<DocOptions, run_doc>("doc", "[COMPONENT…] [--all --output DIR]", "the manual page of a component"),
-    command<NewOptions, run_new>("new", "component NAME [--folder DIR]", "a component of your own to start from: source, CMakeLists.txt, test"),
+    command<DocOptions, run_doc>("doc", "[COMPONENT…] [--all --output DIR]", "print the manual page of a component"),
+    command<NewOptions, run_new>("new", "component NAME [--folder DIR]", "create a component to start from: source, CMakeLists.txt, test"),
     command<CompileOptions, run_compile>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
-    command<ExplainOptions, run_explain>("explain", "[CODE]", "what a diagnostic means and what to do"),
-    command<RecordOptions, run_record>("record", "[CHANNEL] [FILE]", "write what a sampler samples"),
+    command<ExplainOptions, run_explain>("explain", "[CODE]", "explain a diagnostic code and what to do about it"),
+    command<RecordOptions, run_record>("record", "[CHANNEL] [FILE]", "record the samples of a sampler"),
     command<PlayOptions, run_play>("play", "[CHANNEL] [FILE]", "feed a streamer"),
-    command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "the frames of a CAN bus, and what they mean"),
+    command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "print and decode the frames of a CAN bus"),
     command<SendOptions, ON_BUS(run_can_send)>("can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),
-    command<CanRecordOptions, ON_BUS(run_can_record)>("can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "write what is on a bus to a file"),
-    command<CanReplayOptions, ON_BUS(run_can_replay)>("can replay", "FILE ADDRESS [--speed FACTOR]", "send what was recorded, at its times"),
-    command<BusLoadOptions, ON_BUS(run_can_load)>("can load", "ADDRESS [--for TIME]", "which identifiers fill the bus"),
-    command<NodesOptions, ON_BUS(run_can_nodes)>("can nodes", "ADDRESS [--for TIME] [--json]", "who is alive, by listening: state, heartbeat age, newest emergencies"),
-    command<SniffOptions, ON_BUS(run_can_sniff)>("can sniff", "ADDRESS [--filter ID[/MASK]] [--for TIME]", "a line per identifier, changed bytes marked"),
+    command<CanRecordOptions, ON_BUS(run_can_record)>("can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "record the frames of a bus to a file"),
+    command<CanReplayOptions, ON_BUS(run_can_replay)>("can replay", "FILE ADDRESS [--speed FACTOR]", "replay a recording with its original timing"),
+    command<BusLoadOptions, ON_BUS(run_can_load)>("can load", "ADDRESS [--for TIME]", "measure the bus load per identifier"),
+    command<NodesOptions, ON_BUS(run_can_nodes)>("can nodes", "ADDRESS [--for TIME] [--json]", "list the live nodes by listening: state, heartbeat age, last emergencies"),
+    command<SniffOptions, ON_BUS(run_can_sniff)>("can sniff", "ADDRESS [--filter ID[/MASK]] [--for TIME]", "show one line per identifier, with changed bytes marked"),
     command<GenerateOptions, ON_BUS(run_can_generate)>("can generate", "ADDRESS [--every TIME] [--id ID[-ID]] [--count N]", "send random or counting frames"),
     command<ProduceOptions, ON_BUS(run_can_produce)>("can produce", "ADDRESS heartbeat NODE|sync|guarding NODE [--every TIME]", "send a heartbeat, SYNC or guarding requests periodically"),
-    command<FlashOptions, ON_BUS(run_can_flash)>("can flash", "ADDRESS NODE IMAGE [--program N]", "another program for a node: stop, erase, download, start"),
-    command<NmtOptions, ON_BUS(run_can_nmt)>("can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "tell CANopen nodes which state to take"),
-    command<ScanOptions, ON_BUS(run_can_scan)>("can scan", "ADDRESS [--for TIME] [--json]", "the CANopen nodes of a bus: state, device type, identity"),
+    command<FlashOptions, ON_BUS(run_can_flash)>("can flash", "ADDRESS NODE IMAGE [--program N]", "download a program to a node: stop, erase, download, start"),
+    command<NmtOptions, ON_BUS(run_can_nmt)>("can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "send an NMT command to CANopen nodes"),
+    command<ScanOptions, ON_BUS(run_can_scan)>("can scan", "ADDRESS [--for TIME] [--json]", "scan a bus for CANopen nodes: state, device type, identity"),
     command<SdoReadOptions, ON_BUS(run_can_sdo_read)>("can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node"),
     command<SdoWriteOptions, ON_BUS(run_can_sdo_write)>("can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node"),
-    command<ReadAllOptions, ON_BUS(run_can_read_all)>("can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]", "every object of a node that its EDS lists, read-only ones too"),
-    command<DcfReadOptions, ON_BUS(run_can_dcf_read)>("can dcf read", "ADDRESS NODE --eds FILE [-o FILE]", "the settings of a node into a DCF"),
-    command<DcfWriteOptions, ON_BUS(run_can_dcf_write)>("can dcf write", "ADDRESS NODE FILE [--check]", "the settings of a DCF into a node: what differs, verified"),
-    command<PdoShowOptions, ON_BUS(run_can_pdo_show)>("can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "the PDOs of a node and what they carry"),
-    command<PdoMapOptions, ON_BUS(run_can_pdo_map)>("can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "set up a PDO, in the order of CiA 301"),
-    command<PdoSwitchOptions, ON_BUS(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO", "switch a PDO on"),
-    command<PdoSwitchOptions, ON_BUS(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO", "switch a PDO off"),
-    command<PdoWatchOptions, ON_BUS(run_can_pdo_watch)>("can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "the values in the PDOs of a node as they pass"),
-    command<LssOptions, ON_BUS(run_can_lss)>("can lss", "ADDRESS COMMAND [ARG…]", "node ids and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify"),
-    command<GatewayOptions, ON_BUS(run_can_gateway)>("can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE] | --connect HOST:PORT|PATH [COMMAND…]", "a CiA 309-3 gateway, commanded by lines of text; or its client"),
-    command<DriveOptions, ON_BUS(run_can_drive)>("can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "a drive by hand: on, off, go, speed, stop, home, … or a shell of them", true),
-    command<EdsCheckOptions, ON_BUS(run_can_eds_check)>("can eds check", "FILE…", "what is wrong with a device description, and what it holds"),
-    command<CanopenCheckOptions, ON_BUS(run_canopen_check)>("canopen check", "FILE…", "what is wrong with a network's configuration, and the pins it makes"),
-    command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>("canopen plan", "FILE [--cycle TIME] [--json]", "whether every message of a bus arrives in time: worst-case response times"),
-    command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "the slots of an Ethernet segment as a timeline, its load and the latency from input to output"),
-    command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "the stations of a segment as a running machine hears them"),
-    command<TdmaPingOptions, run_tdma_ping>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "whether a station of a segment answers, and how long that takes"),
-    command<DriveNodeOptions, ON_BUS(run_node_drive)>("node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "a simulated drive of CiA 402, up to eight axes"),
-    command<IoNodeOptions, ON_BUS(run_node_io)>("node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "a simulated I/O node of CiA 401"),
-    command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>("node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "a simulated axis whose loop is closed over the bus"),
-    command<NodeOptions, ON_BUS(run_node_safe_io)>("node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "a simulated safety I/O node of EN 50325-5, for trying out"),
-    command<Jr3NodeOptions, ON_BUS(run_node_jr3)>("node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "a simulated force/torque node with a JR3 sensor"),
-    command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>("node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "a simulated device whose program is changed over the bus"),
-    command<Options, ON_BUS(run_node_faults)>("node faults", "", "what simulated devices can do wrong on purpose"),
-    command<TopOptions, run_top>("top", "", "all instances on this machine and the network, their threads and faults"),
-    command<DoctorOptions, run_doctor>("doctor", "", "what on this machine spoils real time"),
+    command<ReadAllOptions, ON_BUS(run_can_read_all)>("can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]", "read all objects of a node that its EDS lists, including read-only objects"),
+    command<DcfReadOptions, ON_BUS(run_can_dcf_read)>("can dcf read", "ADDRESS NODE --eds FILE [-o FILE]", "read the settings of a node into a DCF"),
+    command<DcfWriteOptions, ON_BUS(run_can_dcf_write)>("can dcf write", "ADDRESS NODE FILE [--check]", "write the settings of a DCF to a node: only differences, verified"),
+    command<PdoShowOptions, ON_BUS(run_can_pdo_show)>("can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "show the PDOs of a node and their mapping"),
+    command<PdoMapOptions, ON_BUS(run_can_pdo_map)>("can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "configure a PDO in the order of CiA 301"),
+    command<PdoSwitchOptions, ON_BUS(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO", "enable a PDO"),
+    command<PdoSwitchOptions, ON_BUS(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO", "disable a PDO"),
+    command<PdoWatchOptions, ON_BUS(run_can_pdo_watch)>("can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "print the values in the PDOs of a node as they are sent"),
+    command<LssOptions, ON_BUS(run_can_lss)>("can lss", "ADDRESS COMMAND [ARG…]", "LSS, node IDs and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify"),
+    command<GatewayOptions, ON_BUS(run_can_gateway)>("can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE] | --connect HOST:PORT|PATH [COMMAND…]", "run a CiA 309-3 gateway, controlled by lines of text, or its client"),
+    command<DriveOptions, ON_BUS(run_can_drive)>("can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "operate a drive: on, off, go, speed, stop, home, …, or an interactive shell", true),
+    command<EdsCheckOptions, ON_BUS(run_can_eds_check)>("can eds check", "FILE…", "check a device description and summarise it"),
+    command<CanopenCheckOptions, ON_BUS(run_canopen_check)>("canopen check", "FILE…", "check a network configuration and list its pins"),
+    command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>("canopen plan", "FILE [--cycle TIME] [--json]", "compute worst-case response times of all messages of a bus"),
+    command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
+    command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
+    command<TdmaPingOptions, run_tdma_ping>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "measure the round-trip time to a station of a segment"),
+    command<DriveNodeOptions, ON_BUS(run_node_drive)>("node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "simulate a CiA 402 drive with up to eight axes"),
+    command<IoNodeOptions, ON_BUS(run_node_io)>("node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "simulate a CiA 401 I/O node"),
+    command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>("node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "simulate an axis whose control loop is closed over the bus"),
+    command<NodeOptions, ON_BUS(run_node_safe_io)>("node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "simulate an EN 50325-5 safety I/O node (for experiments only)"),
+    command<Jr3NodeOptions, ON_BUS(run_node_jr3)>("node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "simulate a force/torque node with a JR3 sensor"),
+    command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>("node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "simulate a device with a boot loader"),
+    command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
+    command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
+    command<DoctorOptions, run_doctor>("doctor", "", "check whether this machine is fit for real time"),
     command<CompletionOptions, run_completion>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };
 
@@ -148,10 +148,10 @@ struct Group {
 };
 
 constexpr Group groups[] = {
-    {"can", "a CAN bus by hand: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
-    {"canopen", "checks and plans a CANopen network"},
+    {"can", "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
+    {"canopen", "check and plan a CANopen network"},
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
-    {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; what they can do wrong: faults"},
+    {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults"},
 };
 
 const Group* find_group(std::string_view name) {
@@ -188,14 +188,14 @@ std::string overview() {
         else if (group != last) text += fmt::format("  {:11} {}\n", group->name, group->summary);
         last = group;
     }
-    return text + "\nhal help COMMAND says more. A first try: hal run halfiles/furuta/hang.hal --for 10s\n";
+    return text + "\nFor details: hal help COMMAND. A first try: hal run halfiles/furuta/hang.hal --for 10s\n";
 }
 
 std::string help_of(const Group& group) {
     std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name, group.summary, group.name);
     for (const Subcommand& row : table)
         if (belongs(row, group)) text += fmt::format("  {:16} {}\n", row.name, row.summary);
-    return text + fmt::format("\nhal help {} COMMAND says more.\n", group.name);
+    return text + fmt::format("\nFor details: hal help {} COMMAND.\n", group.name);
 }
 
 std::string help_of(const Subcommand& row) {
@@ -207,7 +207,7 @@ std::string help_of(const Subcommand& row) {
 int no_such_command(const std::vector<std::string>& typed) {
     Options options;
     std::string word = typed.front();
-    if (!word.empty() && word[0] == '-') return fail(options, fmt::format("there is no option '{}'; type: hal help", word));
+    if (!word.empty() && word[0] == '-') return fail(options, fmt::format("unknown option '{}'; type: hal help", word));
     const auto ends = [&](std::string_view end) { return word.size() > end.size() && word.ends_with(end); };
     if (ends(".hal") || ends(".ini")) return fail(options, fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
     std::vector<std::string> names = {"help"};
@@ -235,11 +235,11 @@ int help(const std::vector<std::string>& about) {
     for (const std::string& word : about) start += word + " ";
     for (const Subcommand& row : table)
         if (std::string_view(row.name).starts_with(start)) text += fmt::format("  {:16} {}\n", row.name, row.summary);
-    if (!text.empty()) return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nhal help {}COMMAND says more.\n", start, text, start)) ? 0 : 1;
+    if (!text.empty()) return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nFor details: hal help {}COMMAND.\n", start, text, start)) ? 0 : 1;
     return no_such_command(about);
 }
 
-/// Reads `arguments` into `options`. Returns an exit code when that is the end of it.
+/// Reads `arguments` into `options`. Returns an exit code when the program must exit.
 std::optional<int> read(const Subcommand& row, std::vector<std::string> arguments, Options& options) {
     OptionSet set(options, row.name, row.summary);
     if (const auto dashes = std::find(arguments.begin(), arguments.end(), "--"); !row.verbatim && dashes != arguments.end()) {
@@ -250,33 +250,33 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     switch (reading.outcome) {
     case OptionSet::Outcome::good: break;
     case OptionSet::Outcome::help: return print(help_of(row)) ? 0 : 1;
-    case OptionSet::Outcome::missing: return fail(options, fmt::format("something is missing; type: hal {} {}", row.name, row.usage));
+    case OptionSet::Outcome::missing: return fail(options, fmt::format("missing argument; type: hal {} {}", row.name, row.usage));
     case OptionSet::Outcome::bad: return fail(options, fmt::format("{}; see: hal help {}", reading.problem, row.name));
     }
     const std::vector<std::string>& extra = reading.extra;
     if (row.verbatim) {
         if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' && !(extra.front() == "--")) {
             const std::string hint = did_you_mean(extra.front(), set.names());
-            return fail(options, fmt::format("there is no option '{}'; {}", extra.front(),
+            return fail(options, fmt::format("unknown option '{}'; {}", extra.front(),
                                              hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
         }
         options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"), extra.end());
     } else if (!extra.empty()) {
         const std::string hint = did_you_mean(extra.front(), set.names());
         const bool option = extra.front().starts_with('-');
-        return fail(options, fmt::format("{} '{}'; {}", option ? "there is no option" : "nothing is expected at", extra.front(),
+        return fail(options, fmt::format("{} '{}'; {}", option ? "unknown option" : "unexpected argument", extra.front(),
                                          option && !hint.empty() ? hint : fmt::format("see: hal help {}", row.name)));
     }
     return std::nullopt;
 }
 
-/// Does not return, unless there is no such program.
+/// Replaces this process with hal-bus. Returns only when hal-bus cannot be started.
 int become_bus_program(char** argv) {
     pass_on_capabilities();
     const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hal-bus");
     ::execv(program.c_str(), argv);
     if (errno == ENOENT && build_on_demand("bus")) ::execv(program.c_str(), argv);
-    return fail(Options{}, fmt::format("cannot start {}: {}; it belongs beside hal: type ./hal build bus in the source tree, or install Halcyon again",
+    return fail(Options{}, fmt::format("cannot start {}: {}; it must be in the folder of hal: type ./hal build bus in the source tree, or reinstall Halcyon",
                                        program.string(), std::strerror(errno)));
 }
 

@@ -43,7 +43,7 @@ void replace(std::string& text, std::string_view what, std::string_view by) { te
 }  // namespace
 
 int run_completion(const CompletionOptions& options) {
-    if (options.words != std::vector<std::string>{"bash"}) return fail(options, "only bash is known; type: hal completion bash");
+    if (options.words != std::vector<std::string>{"bash"}) return fail(options, "unsupported shell; type: hal completion bash");
     std::string commands = "help", cases, groups;
     for (const Completion& completion : completions()) {
         commands += " " + completion.name;

@@ -29,8 +29,8 @@ void end_with_machine() {
 int main(int argc, char** argv) {
     hal::tools::open_standard_streams();
     std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves is an error of that write, not the end of a machine
-    // With file capabilities the kernel leaves no core dump and gives /proc/PID to root. Whoever may start this program may load code into
-    // it, so there is nothing in it to keep from him; nobody without the same capabilities can trace it all the same.
+    // With file capabilities the kernel leaves no core dump and gives /proc/PID to root. Every user who can start this program can load code into
+    // it, so it holds no secrets; still, only a process with the same capabilities can trace it.
     if (::getauxval(AT_SECURE) != 0) ::prctl(PR_SET_DUMPABLE, 1UL);
     end_with_machine();
     std::string_view program = argc > 0 ? argv[0] : "hal";

@@ -31,11 +31,11 @@ REFUSED = {
     "a pin's name with a space": (IN + OUT.replace('"out"', '"the out"') + RUN + STEP,
                                   "mine.cpp:7: component 'mine' cannot make 'mine.0': it declares a pin with the invalid name 'the out': letters, digits and - _ . : are valid"),
     "no documentation": (IN + OUT.replace('"the output"', '""') + RUN + STEP,
-                         "mine.cpp:7: pin 'out' has no documentation; say what it is in a few words behind its name"),
+                         "mine.cpp:7: pin 'out' has no documentation; describe it in a few words after its name"),
     "a safe input": (IN.replace('"the input"', '"the input", {.safe = 1.0}') + OUT + RUN + STEP,
-                     "mine.cpp:6: pin 'in' is an input and has .safe, which is of outputs: they take that value when the machine stops"),
+                     "mine.cpp:6: pin 'in' is an input and has .safe, which applies to outputs only: the value they take when the machine stops"),
     "a finite bool": (IN + OUT + '    hal::Out<bool> on{*this, "on", "always", {.finite = true}};\n' + RUN + STEP,
-                      "mine.cpp:8: pin 'on' has .finite, which is of pins of type double: no other has NaN or infinity"),
+                      "mine.cpp:8: pin 'on' has .finite, which applies to pins of type double only"),
     "a function that throws": (IN + OUT + RUN + STEP.replace("out = in;", 'out = in; throw std::runtime_error("never");'),
                                "with the initial values of its pins function 'mine.0' (mine) threw an exception at cycle 0"),
     "a constructor that throws": (GOOD + '    bool made = [] { throw std::runtime_error("not today"); return true; }();\n',
@@ -66,7 +66,7 @@ class Author(Case):
                 self.assertNotIn("lacks the line", done.stderr)
                 self.assertRegex(done.stderr, r"mine\.cpp:\d+:\d+: error: ")
         self.write("mine.cpp", (HEAD + GOOD + TAIL).replace("    using Component::Component;\n", ""))
-        self.assertIn("the component lacks the line: using Component::Component;", self.run_program("compile", "mine.cpp").stderr)
+        self.assertIn("missing line in the component: using Component::Component;", self.run_program("compile", "mine.cpp").stderr)
 
     def test_the_compiler_alone_reports_a_missing_constructor_only_where_it_is_missing(self):
         """As in a CMake build, where nothing filters the compiler's messages."""
@@ -82,7 +82,7 @@ class Author(Case):
                 self.assertIn("mine.cpp:", error)
                 self.assertNotIn("lacks the line", error, body)
             missing = messages((HEAD + GOOD + rest + TAIL).replace("    using Component::Component;\n", ""))
-            self.assertIn("the component lacks the line: using Component::Component;", missing)
+            self.assertIn("missing line in the component: using Component::Component;", missing)
 
     def test_a_name_that_no_netlist_can_write_is_refused(self):
         for name in ("threads", "all", "x=y", "my own", "-w", "a{1,2}"):
@@ -96,7 +96,7 @@ class Author(Case):
     def test_a_start_that_fails_here_does_not_keep_it_from_being_installed(self):
         failing = GOOD + '    void start() { throw std::runtime_error("no device here"); }\n'
         done = self.compile(failing, "--check-rt")
-        self.assertEqual("hal compile: mine: start() fails here, so nothing is known of its functions: no device here\n"
+        self.assertEqual("hal compile: mine: start() failed, so its functions were not checked: no device here\n"
                          "hal compile: 'mine.cpp' was not installed\n", done.stderr)
         self.assertEqual(0, self.compile(failing).returncode)
         self.write("mine.hal", "loadrt mine\n")

@@ -233,7 +233,7 @@ class RecordAndReplay(Can):
         self.assertEqual("hal can record: 'c.txt' must end in .log (candump's form) or .pcapng (Wireshark)\n", self.bad_can("record", self.bus, "c.txt"))
         self.assertEqual("hal can replay: --speed is a factor above 0: 1 as recorded, 2 twice as fast\n",
                          self.bad_can("replay", "c.log", self.bus, "--speed", "0"))
-        self.assertEqual("hal can replay: --speed: 'fast' is no number; see: hal help can replay\n",
+        self.assertEqual("hal can replay: --speed: 'fast' is not a number; see: hal help can replay\n",
                          self.bad_can("replay", "c.log", self.bus, "--speed", "fast"))
         self.assertIn("text.log", self.bad_can("replay", "text.log", self.bus))
         self.assertIn("none.log", self.bad_can("replay", "none.log", self.bus))

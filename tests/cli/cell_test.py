@@ -102,7 +102,7 @@ class Language(Case):
         self.assertIn("write --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
 
     def test_dds_without_a_node_is_refused(self):
-        self.assertEqual("hal run: --dds is about the nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take "
+        self.assertEqual("hal run: --dds applies to nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take "
                          "domain=3 themselves\n", self.bad("run", self.write("cell.hal", CELL), "--dds", "domain=3"))
 
     @unittest.skipIf(HAVE_DDS, "DDS is there")
@@ -198,7 +198,7 @@ class Running(Case):
         self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
 
     def test_settings_that_are_none_are_named(self):
-        self.assertIn("--dds: 'foo' is no setting; write KEY=VALUE, the keys are: domain",
+        self.assertIn("--dds: invalid setting 'foo'; use KEY=VALUE with one of the keys: domain",
                       self.bad("run", self.path, "--node", "taker", "--dds", "domain=3 foo"))
 
     def test_a_node_runs_once(self):

@@ -54,19 +54,19 @@ class Compile(harness.Case):
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, r"lag\.cpp:8:\d+: error: (?s:.*)// must be: void NAME\(hal::Cycle\) noexcept")
         self.assertRegex(done.stderr, r"lag\.cpp:9:3\d: error: (?s:.*)// an input is only read; hal::Out and hal::Io can be written")
-        self.assertIn("the component lacks the line: using Component::Component;", done.stderr)
+        self.assertIn("missing line in the component: using Component::Component;", done.stderr)
         self.assertTrue(done.stderr.endswith("hal compile: 'lag.cpp' does not compile; nothing was installed\n"), done.stderr)
 
     def test_what_is_no_component_is_not_installed(self):
         self.write("none.cpp", "int x;\n")
         done = self.compile("none.cpp")
-        self.assertEqual(done.stderr, "hal compile: 'none.cpp' compiles, but is no component: it exports no symbol hal_plugin, "
+        self.assertEqual(done.stderr, "hal compile: 'none.cpp' compiles, but is not a component: it exports no symbol hal_plugin, "
                                       "which HAL_COMPONENT(Type, \"name\", \"summary\") makes; nothing was installed\n")
 
     def test_a_missing_compiler_is_said_in_one_sentence(self):
         self.write("lag.cpp", LAG)
         done = self.compile("lag.cpp", PATH="/nowhere")
-        self.assertEqual(done.stderr, "hal compile: there is no C++ compiler; install it: sudo apt install g++\n")
+        self.assertEqual(done.stderr, "hal compile: no C++ compiler found; install one: sudo apt install g++\n")
 
     def test_check_rt_names_the_call(self):
         self.write("lag.cpp", LAG.replace("BODY", "row.push_back(in); out = row.back();"))
@@ -97,7 +97,7 @@ HAL_COMPONENT(Bad, "bad", "Throws")
         self.assertIn("bad: function 'bad' throws int in a cycle\n", said(body="try { throw 3; } catch (int) {}"))
         self.assertIn("bad: function 'bad' aborts in a cycle\n", said(body="__builtin_abort();"))
         self.assertIn("bad: function 'bad' crashes in a cycle\n", said(body="*static_cast<volatile int*>(nullptr) = 1;"))
-        self.assertIn("bad: start() fails here, so nothing is known of its functions: no board\n", said(start=throw))
+        self.assertIn("bad: start() failed, so its functions were not checked: no board\n", said(start=throw))
         self.assertIn("bad: its stop() throws std::runtime_error, which nothing catches\n", said(stop=throw))
 
     def test_check_rt_of_a_good_one(self):

@@ -75,11 +75,11 @@ class Reference(Case):
         self.good("doc", "sum2", "--markdown", "-o", "some")
         self.assertEqual(["sum2.md"], os.listdir(self.folder / "some"))
         self.assertTrue(self.good("doc", "sum2", "--html").startswith("<!DOCTYPE html>"))
-        self.assertEqual("hal doc: so many pages go into a folder; type: hal doc --all --output DIR\n", self.bad("doc", "--all"))
+        self.assertEqual("hal doc: --all needs a folder; type: hal doc --all --output DIR\n", self.bad("doc", "--all"))
         self.assertIn("leave out their names, or --all", self.bad("doc", "--all", "sum2", "-o", "x"))
         self.assertIn("exclude each other", self.bad("doc", "sum2", "--html", "--man"))
         self.write("file", "")
-        self.assertEqual("hal doc: 'file/x' cannot be made: Not a directory\n", self.bad("doc", "--all", "-o", "file/x"))
+        self.assertEqual("hal doc: cannot create 'file/x': Not a directory\n", self.bad("doc", "--all", "-o", "file/x"))
 
 
 if __name__ == "__main__":

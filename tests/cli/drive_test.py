@@ -465,9 +465,9 @@ what shall axis A do? type: help
         self.assertEqual(f"hal can drive: which node? type: hal can drive {self.bus} --node 2\n", bad(self.bus))
         self.assertEqual("hal can drive: '200' is no node; write 1 to 127\n", bad(self.bus, "--node", 200))
         self.assertEqual("hal can drive: 'Z' is no axis; write A to H\n", bad(self.bus, "--node", 2, "--axis", "Z", "on"))
-        self.assertEqual("hal can drive: there is no option '--nod'; see: hal help can drive\n", bad(self.bus, "--nod", 2))
+        self.assertEqual("hal can drive: unknown option '--nod'; see: hal help can drive\n", bad(self.bus, "--nod", 2))
         self.assertEqual("hal can drive: something is missing behind --node\n", bad(self.bus, "--node"))
-        self.assertEqual("hal can drive: 'soon' is not a duration; write 200ms or 1s\n", bad(self.bus, "--node", 2, "--timeout", "soon"))
+        self.assertEqual("hal can drive: invalid duration 'soon'; use 200ms or 1s\n", bad(self.bus, "--node", 2, "--timeout", "soon"))
         self.assertIn("--node N", self.good("help", "can", "drive"))
         self.assertIn("hal can drive: 'bus:0'", bad("bus:0", "--node", 2, "A", "on"))
 

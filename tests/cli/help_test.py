@@ -37,7 +37,7 @@ class BusProgram(Case):
         shutil.copy(HAL, alone)
         done = subprocess.run([alone, "can", "dump", "can:can0"], capture_output=True, text=True,
                               env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")))
-        self.assertEqual((1, f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it belongs beside hal: type ./hal build bus in the source tree, or install Halcyon again\n"),
+        self.assertEqual((1, f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it must be in the folder of hal: type ./hal build bus in the source tree, or reinstall Halcyon\n"),
                          (done.returncode, done.stderr))
 
 
@@ -46,8 +46,8 @@ class WrongWords(Case):
         self.assertEqual("hal: unknown command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
 
     def test_commands_with_a_common_beginning(self):
-        self.assertEqual("usage: hal can eds COMMAND …\n\n  can eds check    what is wrong with a device description, and what it holds\n\n"
-                         "hal help can eds COMMAND says more.\n", self.good("help", "can", "eds"))
+        self.assertEqual("usage: hal can eds COMMAND …\n\n  can eds check    check a device description and summarise it\n\n"
+                         "For details: hal help can eds COMMAND.\n", self.good("help", "can", "eds"))
         for words, last in ((("can", "sdo"), "can sdo write"), (("can", "pdo"), "can pdo watch"), (("can", "dcf"), "can dcf write")):
             self.assertIn(last, self.good("help", *words))
 
@@ -58,14 +58,14 @@ class WrongWords(Case):
         self.assertEqual("hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal"))
 
     def test_unknown_option_gets_a_suggestion(self):
-        self.assertEqual("hal sim: there is no option '--cycle'; did you mean '--cycles'?\n", self.bad("sim", "x.hal", "--cycle", "3"))
+        self.assertEqual("hal sim: unknown option '--cycle'; did you mean '--cycles'?\n", self.bad("sim", "x.hal", "--cycle", "3"))
 
     def test_unknown_shell_option(self):
-        self.assertIn("there is no option '--jsn'; did you mean '--json'?", self.bad("shell", "--jsn", "show"))
+        self.assertIn("unknown option '--jsn'; did you mean '--json'?", self.bad("shell", "--jsn", "show"))
 
     def test_bad_duration(self):
         for text in ("soon", "10x", "-3s"):
-            self.assertIn("is not a duration; write 10s, 250ms or 2min", self.bad("sim", "x.hal", "--for=" + text))
+            self.assertIn(f"invalid duration '{text}'; use 10s, 250ms or 2min", self.bad("sim", "x.hal", "--for=" + text))
 
     def test_bad_number(self):
         error = self.bad("sim", "x.hal", "--cycles", "many")
@@ -94,7 +94,7 @@ class Explain(Case):
             self.assertIn("sum2", page)
 
     def test_unknown_code_gets_a_suggestion(self):
-        self.assertEqual("hal explain: there is no diagnostic 'two-writer'; did you mean 'two-writers'?\n", self.bad("explain", "two-writer"))
+        self.assertEqual("hal explain: unknown code 'two-writer'; did you mean 'two-writers'?\n", self.bad("explain", "two-writer"))
 
 
 class CompletionScript(Case):

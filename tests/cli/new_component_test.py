@@ -61,22 +61,22 @@ class NewComponent(Case):
         (self.folder / "there").mkdir()
         (self.folder / "there" / "file").touch()
         for words, why in {
-            ("my part",): "'my part' cannot be a component's name: it begins with a letter, and letters, digits, - and _ follow; try: hal new component my-part",
-            ("my", "part"): "one name is expected, not 2; blanks cannot be part of it: hal new component my-part",
-            ("9x",): "'9x' cannot be",
-            ("../x",): "'../x' cannot be",
-            ("class",): "'class' is a word of C++; try: hal new component my-class",
-            ("not_eq",): "'not_eq' is a word of C++",
-            ("threads",): "there is a component 'threads' already (see: hal doc threads); choose another name",
-            ("n" * 41,): "the name has 41 characters; 40 are enough for a component",
+            ("my part",): "invalid component name 'my part': use a letter, then letters, digits, - and _; try: hal new component my-part",
+            ("my", "part"): "expected one name, not 2; a name contains no blanks: hal new component my-part",
+            ("9x",): "invalid component name '9x'",
+            ("../x",): "invalid component name '../x'",
+            ("class",): "'class' is a C++ keyword; try: hal new component my-class",
+            ("not_eq",): "'not_eq' is a C++ keyword",
+            ("threads",): "component 'threads' already exists (see: hal doc threads); choose another name",
+            ("n" * 41,): "the name has 41 characters; the limit is 40",
             ("there",): "'there' exists already; give the new component another folder: hal new component there --folder DIR",
             ("ok", "--folder", "there"): "'there' exists already",
-            ("ok", "--folder", "there/file/x"): "'there/file/x' cannot be made: Not a directory",
-            (): "the component needs a name: hal new component NAME",
+            ("ok", "--folder", "there/file/x"): "cannot create 'there/file/x': Not a directory",
+            (): "missing name; type: hal new component NAME",
         }.items():
             with self.subTest(words):
                 self.assertIn(why, self.bad("new", "component", *words))
-        self.assertEqual("hal new: what is to be new? Components can be; type: hal new component thing\n", self.bad("new", "thing"))
+        self.assertEqual("hal new: missing kind: only components can be created; type: hal new component thing\n", self.bad("new", "thing"))
         self.assertEqual({"there"}, set(os.listdir(self.folder)) - {".ccache"})
 
     def test_a_folder_of_another_name(self):

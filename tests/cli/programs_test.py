@@ -114,7 +114,7 @@ class Programs(Case):
     def test_what_a_program_cannot_have(self):
         self.write("wrong.comp", 'component wrong;\noption userspace;\nfunction _;\npin out bit out;\nlicense "MIT";\n;;\nout = 1;\n')
         said = self.bad("compile", "wrong.comp")
-        self.assertIn("a program has no functions for threads", said)
+        self.assertIn("a program cannot have functions for threads", said)
         self.assertIn("the C code has no user_mainloop for this option", said)
 
     def test_a_comp_file_with_its_own_main(self):

@@ -128,7 +128,7 @@ class Instances(Case):
         path = self.write("a.hal", SERVO)
         for name in ("a/b", "..", "a b", "x" * 65):
             error = self.bad("run", path, "--name", name)
-            self.assertIn("is no name for an instance", error)
+            self.assertIn("invalid instance name ", error)
 
     def test_name_of_a_killed_one_is_free(self):
         path = self.write("a.hal", SERVO)

@@ -164,7 +164,7 @@ class Scripts(Case):
             self.assertEqual(1, pipe.returncode, text)
             self.assertTrue(pipe.stderr.endswith(said), pipe.stderr)
             self.assertEqual(before, self.value("adder.in0"))
-        self.assertEqual("hal shell: 'begin' without 'commit' had no effect; write all of it into a file, or type: hal shell\n", self.bad("shell", "begin"))
+        self.assertEqual("hal shell: 'begin' without 'commit' had no effect; write the transaction to a file, or type: hal shell\n", self.bad("shell", "begin"))
         pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input="begin\nsetp adder.in0 7\ncommit\nsetp nothing 1\n", text=True, capture_output=True)
         self.assertTrue(pipe.stderr.endswith("lines 1 to 3 were carried out before the error in line 4\n"), pipe.stderr)
         self.assertEqual("7", self.value("adder.in0"))

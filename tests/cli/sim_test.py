@@ -42,7 +42,7 @@ class Sim(Case):
     def test_show_prints_values_at_the_end(self):
         path = self.write("a.hal", SERVO)
         self.assertEqual("total      5\nadder.in0  2\nadder.in1  3\n", self.good("sim", path, "--for", "1s", "--show", "total,adder.in?"))
-        self.assertEqual("hal sim: --show: there is no pin, parameter or signal 'totl'; did you mean 'total'?\n",
+        self.assertEqual("hal sim: --show: unknown pin, parameter or signal 'totl'; did you mean 'total'?\n",
                          self.bad("sim", "-q", path, "--for", "1s", "--show", "totl"))
 
     def test_cycles_advance_the_clock(self):

@@ -316,7 +316,7 @@ class Supervisor(Case):
         self.assertRegex(err, r"^hal: servo: function 's' \(stall\) has not returned for [\d.]+ m?s of wall time \(cycle 0\); "
                               r"outputs were set to their safe values; the process ends \[hung-thread\]\n$")
         self.assertIn("safe", self.events())
-        self.assertIn("'soon' is not a duration", self.bad("sim", "x.hal", "--cycle-limit", "soon"))
+        self.assertIn("invalid duration 'soon'", self.bad("sim", "x.hal", "--cycle-limit", "soon"))
 
 
 if __name__ == "__main__":

@@ -93,15 +93,15 @@ class Tdma(Case):
         self.assertRegex(text, "^" + "".join(one.format(n) for n in range(1, 7)) +
                          r"6 pings from tdma\.0, 6 answered, 0 lost \(0 %\); min \d+\.\d\d, mean \d+\.\d\d, max \d+\.\d\d us\n$")
         self.assertRegex(self.good("tdma", "ping", "master", "-c", "1"), r"1 ping from tdma\.1, 1 answered, 0 lost")
-        self.assertEqual("hal tdma ping: there is no other station 'nobody'; tdma.0 knows away, x; tdma.1 knows away, master\n",
+        self.assertEqual("hal tdma ping: unknown station 'nobody'; tdma.0 knows away, x; tdma.1 knows away, master\n",
                          self.bad("tdma", "ping", "nobody"))
-        self.assertEqual("hal tdma ping: there is no other station 'x'; tdma.1 knows away, master\n",
+        self.assertEqual("hal tdma ping: unknown station 'x'; tdma.1 knows away, master\n",
                          self.bad("tdma", "ping", "x", "--from", "tdma.1"))
-        self.assertEqual("hal tdma ping: there is no 'tdma.7' to ask from; there is tdma.0, tdma.1\n",
+        self.assertEqual("hal tdma ping: unknown station 'tdma.7' in --from; use tdma.0, tdma.1\n",
                          self.bad("tdma", "ping", "x", "--from", "tdma.7"))
         done = self.run_program("tdma", "ping", "away", "-c", "1")
-        self.assertEqual((1, "away 1: not sent, its address is not known\n1 ping from tdma.0, 0 answered, 1 lost (100 %)\n",
-                          "hal tdma ping: tdma.0 has not heard away yet and does not know its address; write its mac into the schedule\n"),
+        self.assertEqual((1, "away 1: not sent, unknown address\n1 ping from tdma.0, 0 answered, 1 lost (100 %)\n",
+                          "hal tdma ping: tdma.0 has received no frame from away and does not know its address; add its mac to the schedule\n"),
                          (done.returncode, done.stdout, done.stderr))
         status = self.good("tdma", "status").split("tdma.1: ")[0]
         self.assertRegex(status, r"(?m)^station +state +since +frames +late +drift  slots$")
@@ -114,7 +114,7 @@ class Tdma(Case):
         wait_until(lambda: self.value("tdma.0.x.online") == "FALSE", "x is silent")
         done = self.run_program("tdma", "ping", "x", "-c", "2")
         self.assertEqual((1, "x 1: no answer\nx 2: no answer\n2 pings from tdma.0, 0 answered, 2 lost (100 %)\n",
-                          "hal tdma ping: x is not heard either: is it switched on, its cable in?\n"),
+                          "hal tdma ping: x is offline; check its power and its cable\n"),
                          (done.returncode, done.stdout, done.stderr))
 
     def test_ping_without_a_segment(self):

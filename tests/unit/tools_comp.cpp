@@ -95,36 +95,36 @@ the code
 
 TEST_F(Comp, reports_every_mistake_at_its_place) {
     EXPECT_EQ(mistakes("component x;\npin inn float a;\npin in flot b;\nparam w bit c;\npni in bit d;\npin in bit e\npin in bit f;\nlicense \"MIT\";\n" + code),
-              "2:5 a pin is in, out or io | pin in float angle \"what it is\";\n"
+              "2:5 invalid direction: a pin is in, out or io | pin in float angle \"what it is\";\n"
               "3:8 unknown type 'flot' | did you mean 'float'?\n"
-              "4:7 a parameter is r (the component sets it) or rw | param rw float gain = 1.0 \"what it is\";\n"
-              "5:1 no declaration is called 'pni' | did you mean 'pin'?\n"
-              "6:13 the declaration does not end here\n");
+              "4:7 invalid direction: a parameter is r (set by the component) or rw | param rw float gain = 1.0 \"what it is\";\n"
+              "5:1 unknown declaration 'pni' | did you mean 'pin'?\n"
+              "6:13 unexpected text in the declaration\n");
     EXPECT_EQ(mistakes("component x;\npin in bit a \"never\nended;\nlicense \"MIT\";\n" + code),
-              "2:14 this text has no end | put \" at its end; a text of several lines stands between \"\"\" and \"\"\"\n");
+              "2:14 unterminated string | end it with \"; text of several lines goes between \"\"\" and \"\"\"\n");
     EXPECT_FALSE(made_);
 }
 
-TEST_F(Comp, refuses_what_contradicts_itself) {
+TEST_F(Comp, rejects_contradicting_declarations) {
     EXPECT_EQ(mistakes("component y;\nfunction _;\n" + code),
-              "1:11 component 'y' stands in the file 'x.comp' | name the file y.comp, or the component x\n"
-              "1:11 the file gives no license | add: license \"GPL\";\n");
+              "1:11 component 'y' is declared in file 'x.comp' | name the file y.comp, or the component x\n"
+              "1:11 missing license declaration | add: license \"GPL\";\n");
     EXPECT_EQ(mistakes(head + "pin in bit x_y; pin in bit x_y_; pin in bit if; pin out bit a-#; pin out bit b[2]; pin out s32 tmax; function _;\n" + code),
-              "3:61 'a-#' has a place for a number but is no array | give its size: a-#[4]\n"
-              "3:78 the names of the array 'b' have no place for the number | write b-#\n"
-              "3:45 the C code cannot use the name 'if' | with a '_' behind it the netlist's name stays the same: if_\n"
-              "3:28 the name 'x-y' is there already | netlists see - for _, and no - or . at the end\n"
-              "3:111 the name 'tmax' is there already | netlists see - for _, and no - or . at the end\n");
+              "3:61 'a-#' has a placeholder for a number but is not an array | give its size: a-#[4]\n"
+              "3:78 the element names of array 'b' have no placeholder for the number | write b-#\n"
+              "3:45 invalid C name 'if' | append '_', which keeps the name in netlists: if_\n"
+              "3:28 duplicate name 'x-y' | in netlists _ becomes -, and a - or . at the end is dropped\n"
+              "3:111 duplicate name 'tmax' | in netlists _ becomes -, and a - or . at the end is dropped\n");
     EXPECT_EQ(mistakes(head + "pin in bit a if limit > 2; function one; function two; option extra_setup;\n;;\nFUNCTION(one) {} // FUNCTION(two)\n"),
-              "3:17 a condition knows numbers and the personality, not 'limit' | for instance: if personality & 0x100\n"
+              "3:17 a condition consists of numbers and 'personality'; unknown name 'limit' | for instance: if personality & 0x100\n"
               "3:51 the C code does not define function 'two' | write: FUNCTION(two) { … }\n"
               "3:63 the C code has no EXTRA_SETUP for this option | write: EXTRA_SETUP() { … return 0; }\n");
     EXPECT_EQ(mistakes(head + "function _;\noption tpmod;\n" + code),
-              "4:8 this is a part of LinuxCNC's motion controller, which is not here | only components that need nothing but HAL can be compiled\n");
+              "4:8 unsupported: this is part of LinuxCNC's motion controller | only components that depend on nothing but HAL can be compiled\n");
 }
 
-TEST_F(Comp, warns_of_options_that_mean_nothing) {
-    EXPECT_EQ(mistakes(head + "option singelton; function _;\n" + code), "3:8 the option 'singelton' means nothing here | did you mean 'singleton'?\n");
+TEST_F(Comp, warns_of_options_without_effect) {
+    EXPECT_EQ(mistakes(head + "option singelton; function _;\n" + code), "3:8 option 'singelton' has no effect here | did you mean 'singleton'?\n");
     EXPECT_TRUE(made_);
 }
 

@@ -51,12 +51,12 @@ TEST(TopTest, json_has_all_of_it_and_survives_broken_utf8) {
     EXPECT_EQ(top_json({}), "[]\n");
 }
 
-TEST(TopTest, nobody_and_the_silent_are_said) {
-    EXPECT_EQ(top_table({}), "no instance runs; start one: hal run FILE.hal\n");
+TEST(TopTest, reports_offline_instances_and_an_empty_list) {
+    EXPECT_EQ(top_table({}), "no instance is running; start one: hal run FILE.hal\n");
     SeenInstance gone;
     ASSERT_TRUE(read_status("instance a\nrunning 1\n", gone));
     gone.silent_s = 7;
-    EXPECT_NE(top_table({gone}).find("silent for 7 s"), std::string::npos);
+    EXPECT_NE(top_table({gone}).find("offline for 7 s"), std::string::npos);
 }
 
 }  // namespace

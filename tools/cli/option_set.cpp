@@ -18,7 +18,7 @@ OptionSet::OptionSet(Options& options, const char* name, const char* summary)
     : options_(options), app_(std::make_unique<CLI::App>(summary, fmt::format("hal {}", name))) {
     options.declare(*this);
     app_->set_help_flag("-h,--help", "print this");
-    app_->allow_extras();  // worded by the caller, not by the library
+    app_->allow_extras();  // the caller formats the message
 }
 
 OptionSet::~OptionSet() = default;
@@ -51,7 +51,7 @@ void OptionSet::values(const char* names, std::vector<std::string>& to, const ch
 void OptionSet::duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns, const char* examples) {
     const auto take = [name, &to, least_ns, examples](const std::string& text) {
         const auto ns = parse_duration_ns(text, false);
-        if (!ns || *ns < least_ns) throw CLI::ValidationError(name, fmt::format("'{}' is not a duration; write {}", text, examples));
+        if (!ns || *ns < least_ns) throw CLI::ValidationError(name, fmt::format("invalid duration '{}'; use {}", text, examples));
         to = *ns;
     };
     app_->add_option_function<std::string>(name, take, what)->type_name("TIME");
@@ -76,7 +76,7 @@ OptionSet::Reading OptionSet::read(std::vector<std::string> arguments) {
         std::string& what = reading.problem = error.what();
         constexpr std::string_view unread = "Could not convert: ";  // --speed = fast
         if (const auto equals = what.find(" = "); what.starts_with(unread) && equals != std::string::npos)
-            what = fmt::format("{}: '{}' is no number", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3));
+            what = fmt::format("{}: '{}' is not a number", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3));
         std::replace(what.begin(), what.end(), '\n', ' ');
     }
     return reading;

@@ -24,7 +24,7 @@ int run_prompt_loop(LineExecutor& executor, const Prompt& prompt, int stop) {
         worst = std::max(worst, executor.execute(line));
     }
     if (executor.collecting()) {
-        write_all(STDERR_FILENO, "'begin' without 'commit': what was collected had no effect\n");
+        write_all(STDERR_FILENO, "'begin' without 'commit': the collected edits had no effect\n");
         worst = 1;
     }
     return person ? 0 : worst;

@@ -15,7 +15,7 @@ namespace hal::tools {
 class LineExecutor {
 public:
     virtual ~LineExecutor() = default;
-    /// Returns the exit status of the line. `name` and `number` tell messages where it stood; number 0: nowhere.
+    /// Returns the exit status of the line. `name` and `number` give its position in messages; number 0: no position.
     virtual int execute(std::string_view line) = 0;
     virtual Completion complete(std::string_view line, std::size_t cursor) = 0;
     virtual bool collecting() const = 0;  ///< between begin and commit

@@ -51,7 +51,7 @@ void StopRequest::release() {
     [[maybe_unused]] const ssize_t n = ::write(done_, &one, sizeof one);
     thread_.join();
     signalfd_siginfo info{};
-    while (::read(signals_, &info, sizeof info) == sizeof info) {  // an impatient second Ctrl-C is no reason to skip the tidying up
+    while (::read(signals_, &info, sizeof info) == sizeof info) {  // a second Ctrl-C does not skip the clean-up
     }
     sigset_t impatient;
     sigemptyset(&impatient);

@@ -8,7 +8,7 @@ namespace hal::tools {
 /// standard output, and what is printed goes there.
 void open_standard_streams();
 
-/// True when print() has lost text that somebody would have read: its disk is full, for one.
+/// Returns true when print() has lost output with a live reader, on a full disk for instance.
 bool print_failed();
 
 }  // namespace hal::tools

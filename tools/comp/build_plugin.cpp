@@ -43,7 +43,7 @@ void add_from_environment(const char* variable, std::vector<std::string>& words)
         for (std::string& word : split_words(text)) words.push_back(std::move(word));
 }
 
-/// Whoever looks sees the old plugin or the new one, never a part; a running instance keeps the old file.
+/// Replaces the plugin atomically; a running instance keeps the old file.
 std::string install(const std::string& from, const std::string& folder, const std::string& file) {
     std::error_code error;
     fs::create_directories(folder, error);
@@ -115,13 +115,13 @@ std::string find_compiler(Language language, std::string& problem) {
         const auto words = split_words(wanted);
         if (!words.empty() && !in_path(words.front()).empty()) return wanted;
         problem =
-            fmt::format("{}={} is no program that can be run; unset it, or set it to a {} compiler", variable, wanted, cpp ? "C++20" : "C");
+            fmt::format("{}={} is not an executable program; unset it, or set it to a {} compiler", variable, wanted, cpp ? "C++20" : "C");
         return {};
     }
     const std::vector<const char*> cpp_names{"g++", "clang++", "c++"}, c_names{"gcc", "clang", "cc"};
     for (const char* name : cpp ? cpp_names : c_names)
         if (const std::string path = in_path(name); !path.empty()) return path;
-    problem = fmt::format("there is no {} compiler; install it: sudo apt install {}", cpp ? "C++" : "C", cpp ? "g++" : "gcc");
+    problem = fmt::format("no {} compiler found; install one: sudo apt install {}", cpp ? "C++" : "C", cpp ? "g++" : "gcc");
     return {};
 }
 
@@ -132,7 +132,7 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
         return built;
     };
     const std::string folder = options.folder.empty() ? user_folder(source.program ? "bin" : "components") : options.folder;
-    if (folder.empty()) return fail("neither XDG_DATA_HOME nor HOME is set, so there is no folder to install in; give one with --output");
+    if (folder.empty()) return fail("no folder to install in: neither XDG_DATA_HOME nor HOME is set; use --output DIR");
     const std::string compiler = find_compiler(source.language, built.problem);
     if (compiler.empty()) return built;
     const std::vector<std::string> headers = sdk_includes();
@@ -186,12 +186,12 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
     if (source.language == Language::cpp && status != 0) built.messages = without_false_hint(built.messages, source);
     if (status == -1) return fail(fmt::format("{} cannot be run: {}", words.front(), std::strerror(errno)));
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-        return fail(built.messages.empty() ? fmt::format("{} ended without a word, status {}", words.front(), status)
+        return fail(built.messages.empty() ? fmt::format("{} failed with status {} and no message", words.front(), status)
                                            : fmt::format("'{}' does not compile; nothing was installed", source.path));
     built.name = source.name;
     if (options.load && !source.program && !try_plugin(temporary.path(), source.name, source, built))
         return fail(built.loads ? fmt::format("{}; nothing was installed", built.problem)
-                                : fmt::format("'{}' compiles, but is no component: {}; nothing was installed", source.path, built.problem));
+                                : fmt::format("'{}' compiles, but is not a component: {}; nothing was installed", source.path, built.problem));
     if (built.name.empty() || built.name.find('/') != std::string::npos)
         return fail(
             fmt::format("'{}' names its component '{}', which cannot be a file's name; nothing was installed", source.path, built.name));

@@ -14,7 +14,7 @@ enum class Language { c, cpp };
 struct PluginSource {
     std::string name;                  ///< of the plugin: NAME.so, what loadrt takes
     std::string path;                  ///< the user's file, as typed; messages name it
-    std::optional<std::string> text;   ///< compiled in place of the file; its #line directives say where a line came from
+    std::optional<std::string> text;   ///< compiled in place of the file; its #line directives name the original lines
     Language language = Language::cpp;
     std::vector<std::string> includes; ///< folders searched before Halcyon's headers; the folder of `path` is always searched
     std::vector<std::string> options;  ///< further words for the compiler
@@ -29,7 +29,7 @@ struct BuildOptions {
     std::string folder;        ///< where NAME.so goes; empty: user_folder("components"), of a program user_folder("bin")
     std::string keep;          ///< where the compiled text is left for reading (a file); empty: nowhere
     bool load = true;          ///< open it as the runtime does before it is installed; a plugin that does not load is not installed
-    /// Asked about a plugin that loads, with its path for now; what it refuses is not installed, and it has said why.
+    /// Called for a plugin that loads, with its temporary path. Returns false, after printing the reason, to reject its installation.
     std::function<bool(const BuiltPlugin&)> fit = {};
 };
 
@@ -43,7 +43,7 @@ struct BuiltPlugin {
     std::string needs;         ///< why an instance without load arguments cannot be made; empty: it can
     std::string hint;          ///< for the author, of what is allowed and seldom meant; empty: nothing
     bool loads = false;        ///< of one that is not good: it is a component, and the problem is how it is written
-    std::string messages;      ///< what the compiler said, warnings too, as it said it; already names the user's file and lines
+    std::string messages;      ///< the compiler's output, including warnings; it names the user's file and lines
     std::string problem;       ///< our sentence when it is not good
 };
 
@@ -53,7 +53,7 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
 /// The folders of Halcyon's headers: those of the tree this program was built in, else the installed ones. Empty: none found.
 std::vector<std::string> sdk_includes();
 
-/// A compiler's path: $CXX or $CC, else g++, clang++, c++ (gcc, clang, cc) in $PATH. Empty: there is none, `problem` says what to install.
+/// Returns a compiler's path: $CXX or $CC, else g++, clang++, c++ (gcc, clang, cc) in $PATH. Empty: none found; sets `problem` to what to install.
 std::string find_compiler(Language language, std::string& problem);
 
 }  // namespace hal::tools

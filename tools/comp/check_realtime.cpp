@@ -24,7 +24,7 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
         if (std::error_code none; std::filesystem::is_regular_file(folder + "/check/realtime.c", none))
             source = folder + "/check/realtime.c";
     if (source.empty())
-        return fail(options, "what --check-rt runs (check/realtime.c) is not installed with Halcyon's headers; install it again");
+        return fail(options, "missing check/realtime.c beside Halcyon's headers; reinstall Halcyon");
     const TemporaryFolder temporary;
     if (!temporary.problem().empty()) return fail(options, temporary.problem());
     std::vector<std::string> words = split_words(compiler);
@@ -33,7 +33,7 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
     words.insert(words.end(), {source, "-o", temporary.file("realtime"), "-ldl", "-lm", "-pthread"});
     std::string said;
     if (run_program(words, said) != 0)
-        return write_all(STDERR_FILENO, said), fail(options, "the program that checks real time does not compile");
+        return write_all(STDERR_FILENO, said), fail(options, "the real-time check program does not compile");
 
     std::vector<std::string> run{temporary.file("realtime"), std::filesystem::absolute(built.path).string()};
     run.insert(run.end(), options.arguments.begin(), options.arguments.end());
@@ -43,13 +43,13 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
     std::string line, refused, start;
     int found = 0;
     for (; std::getline(lines, line);) {
-        if (line.starts_with("refused: ")) refused = line.substr(9);
+        if (line.starts_with("rejected: ")) refused = line.substr(10);
         else if (line.starts_with("start fails: ")) start = line.substr(13);
-        else if (line.starts_with("outside: ")) found += fail(options, fmt::format("{}: {}", built.name, line.substr(9)));
+        else if (line.starts_with("outside: ")) found += fail(options, fmt::format("{}: {}", built.name, line.substr(10)));
         else if (line.starts_with("function '")) found += fail(options, fmt::format("{}: {}", built.name, line));
         else if (line.ends_with("extreme values")) print(fmt::format("real time: {}, no violation\n", line));
     }
-    if (!start.empty()) return fail(options, fmt::format("{}: start() fails here, so nothing is known of its functions: {}", built.name, start));
+    if (!start.empty()) return fail(options, fmt::format("{}: start() failed, so its functions were not checked: {}", built.name, start));
     if (!refused.empty())
         return fail(options, fmt::format("{} cannot be checked: its constructor fails: {}; load arguments go behind --", built.name, refused));
     if (found == 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))

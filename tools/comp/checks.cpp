@@ -20,18 +20,18 @@ struct Checking {
 };
 
 void component_has_the_files_name(const Checking& c) {
-    if (!c.tree.name.given()) return c.error(c.first, "the file names no component", "", "begin it with: component NAME \"what it does\";");
+    if (!c.tree.name.given()) return c.error(c.first, "missing component declaration", "", "begin it with: component NAME \"what it does\";");
     std::string_view file = c.path.substr(c.path.rfind('/') + 1);
     file = file.substr(0, file.rfind(".comp"));
     if (!c.path.ends_with(".comp") || file == c.tree.name.text) return;
     const bool word = file.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789") == std::string_view::npos;
-    c.error(c.tree.name.span, "component '" + c.tree.name.text + "' stands in the file '" + std::string(file) + ".comp'", "",
+    c.error(c.tree.name.span, "component '" + c.tree.name.text + "' is declared in file '" + std::string(file) + ".comp'", "",
             "name the file " + c.tree.name.text + ".comp" + (word ? ", or the component " + std::string(file) : ""));
 }
 
 void license_is_given(const Checking& c) {
     if (c.tree.license.empty())
-        c.error(c.tree.name.given() ? c.tree.name.span : c.first, "the file gives no license", "", "add: license \"GPL\";");
+        c.error(c.tree.name.given() ? c.tree.name.span : c.first, "missing license declaration", "", "add: license \"GPL\";");
 }
 
 // The two name spaces of a netlist that a component's names go into.
@@ -42,9 +42,9 @@ void netlist_names_differ(const Checking& c) {
         if (added || other->second.begin == at.begin) return;
         c.found.add({Severity::error,
                      "bad-component-source",
-                     "the name '" + name + "' is there already",
+                     "duplicate name '" + name + "'",
                      {{at, "again"}, {other->second, "first"}},
-                     {"netlists see - for _, and no - or . at the end"}});
+                     {"in netlists _ becomes -, and a - or . at the end is dropped"}});
     };
     for (const Item& item : c.tree.items) {
         if (item.size == 0) claim(items, item.name.hal, item.name.span);
@@ -68,16 +68,16 @@ void c_names_differ(const Checking& c) {
     const auto claim = [&](const Name& name) {
         const bool keyword = std::find(std::begin(keywords), std::end(keywords), name.c) != std::end(keywords);
         if (keyword || name.c.starts_with("__comp_") || std::find(std::begin(reserved), std::end(reserved), name.c) != std::end(reserved))
-            return c.error(name.span, "the C code cannot use the name '" + name.c + "'",
-                           keyword ? "a word of C" : "taken by what hal compile adds",
-                           "with a '_' behind it the netlist's name stays the same: " + name.text + "_");
+            return c.error(name.span, "invalid C name '" + name.c + "'",
+                           keyword ? "a C keyword" : "reserved for code that hal compile adds",
+                           "append '_', which keeps the name in netlists: " + name.text + "_");
         if (name.c.empty() || (name.c[0] >= '0' && name.c[0] <= '9'))
-            return c.error(name.span, "the C code cannot use '" + name.text + "' as a name");
+            return c.error(name.span, "invalid C name '" + name.text + "'");
         const auto [other, added] = names.emplace(name.c, name.span);
         if (added) return;
         c.found.add({Severity::error,
                      "bad-component-source",
-                     "the C code would know two things as '" + name.c + "'",
+                     "duplicate C name '" + name.c + "'",
                      {{name.span, "second"}, {other->second, "first"}},
                      {}});
     };
@@ -90,13 +90,13 @@ void arrays_have_their_hash(const Checking& c) {
     for (const Item& item : c.tree.items) {
         const std::size_t first = item.name.text.find('#'), behind = item.name.text.find_first_not_of('#', first);
         if (first == std::string::npos && item.size != 0)
-            c.error(item.name.span, "the names of the array '" + item.name.text + "' have no place for the number", "",
+            c.error(item.name.span, "the element names of array '" + item.name.text + "' have no placeholder for the number", "",
                     "write " + item.name.text + "-#");
         else if (first != std::string::npos && item.size == 0)
-            c.error(item.name.span, "'" + item.name.text + "' has a place for a number but is no array", "",
+            c.error(item.name.span, "'" + item.name.text + "' has a placeholder for a number but is not an array", "",
                     "give its size: " + item.name.text + "[4]");
         else if (first != std::string::npos && behind != std::string::npos && item.name.text.find('#', behind) != std::string::npos)
-            c.error(item.name.span, "'" + item.name.text + "' has two places for one number");
+            c.error(item.name.span, "'" + item.name.text + "' has two placeholders for one number");
     }
 }
 
@@ -112,7 +112,7 @@ void expressions_know_the_personality_only(const Checking& c) {
             while (letter(end)) ++end;
             const std::string word = expression.text.substr(i, end - i);
             if (!std::isdigit(static_cast<unsigned char>(word[0])) && word != "personality")
-                return c.error(expression.span, "a condition knows numbers and the personality, not '" + word + "'", "",
+                return c.error(expression.span, "a condition consists of numbers and 'personality'; unknown name '" + word + "'", "",
                                "for instance: if personality & 0x100");
             i = end;
         }
@@ -124,20 +124,20 @@ void ports_have_no_start(const Checking& c) {
     for (const Item& item : c.tree.items)
         if (item.type == HAL_TYPE_PORT && (item.start.given() || item.parameter))
             c.error(item.start.given() ? item.start.span : item.name.span,
-                    item.parameter ? "a parameter cannot be a port" : "a port has no start value");
+                    item.parameter ? "a parameter cannot be a port" : "a port has no initial value");
 }
 
 void functions_are_there(const Checking& c) {
     if (c.tree.has("userspace") && !c.tree.functions.empty())
-        return c.error(c.tree.functions[0].name.span, "a program has no functions for threads", "",
-                       "its user_mainloop() does all, or leave out: option userspace");
+        return c.error(c.tree.functions[0].name.span, "a program cannot have functions for threads", "",
+                       "put the code into user_mainloop(), or remove: option userspace");
     const Option* const app = c.tree.option("rtapi_app");
     if (app && !app->on() && find_word(c.code, "rtapi_app_main") == std::string_view::npos)
-        c.error(app->name.span, "the C code has no rtapi_app_main() for this option", "",
+        c.error(app->name.span, "this option needs rtapi_app_main() in the C code", "",
                 "write: int rtapi_app_main(void) { … export(\"name\", 0) … }");
     if (!c.tree.code.known() && !c.tree.functions.empty())
-        return c.error(c.tree.functions[0].name.span, "the file has no C code for its functions", "",
-                       "write it behind a line that consists of ;;");
+        return c.error(c.tree.functions[0].name.span, "missing C code of the functions", "",
+                       "write it after a line that consists of ;;");
     if (implicit_function(c.tree, c.code)) return;
     for (const Function& function : c.tree.functions) {
         bool there = false;
@@ -172,7 +172,7 @@ void hooks_are_there(const Checking& c) {
         if (!c.tree.has(hook.option) && there && std::string_view(hook.option) != "count_function") {
             const auto begin = static_cast<std::uint32_t>(c.tree.code.begin + at);
             const Span span{c.tree.code.source, begin, begin + static_cast<std::uint32_t>(std::string_view(hook.word).size())};
-            c.found.warning("bad-component-source", span, "nothing calls this", "", "declare: option " + std::string(hook.option) + ";");
+            c.found.warning("bad-component-source", span, "unused function", "", "declare: option " + std::string(hook.option) + ";");
         }
     }
 }
@@ -200,7 +200,7 @@ void options_are_known(const Checking& c) {
     for (const Option& option : c.tree.options)
         if (std::find(known.begin(), known.end(), option.name.text) == known.end()) {
             std::string help = did_you_mean(option.name.text, known);
-            c.found.warning("bad-component-source", option.name.span, "the option '" + option.name.text + "' means nothing here", "",
+            c.found.warning("bad-component-source", option.name.span, "option '" + option.name.text + "' has no effect here", "",
                             help.empty() ? "options: " + listed(known, known.size()) : help);
         }
 }
@@ -219,15 +219,15 @@ void numbers_are_numbers(const Checking& c) {
     }
 }
 
-// What this program does not make; each says what to do instead.
-void it_can_be_made(const Checking& c) {
-    const auto refuse = [&](const char* option, bool asked, std::string why, std::string help) {
+// Unsupported options; the help of each names the alternative.
+void features_are_supported(const Checking& c) {
+    const auto reject = [&](const char* option, bool asked, std::string why, std::string help) {
         if (asked) c.found.error("unsupported-component", c.tree.option(option)->name.span, std::move(why), "", std::move(help));
     };
-    refuse("homemod", c.tree.has("homemod"), "this is a part of LinuxCNC's motion controller, which is not here",
-           "only components that need nothing but HAL can be compiled");
-    refuse("tpmod", c.tree.has("tpmod"), "this is a part of LinuxCNC's motion controller, which is not here",
-           "only components that need nothing but HAL can be compiled");
+    reject("homemod", c.tree.has("homemod"), "unsupported: this is part of LinuxCNC's motion controller",
+           "only components that depend on nothing but HAL can be compiled");
+    reject("tpmod", c.tree.has("tpmod"), "unsupported: this is part of LinuxCNC's motion controller",
+           "only components that depend on nothing but HAL can be compiled");
 }
 
 }  // namespace
@@ -236,7 +236,7 @@ void check(const Tree& tree, const Sources& sources, std::uint32_t source, Diagn
     const Checking c{
         tree, sources.get(source).name, tree.code.known() ? sources.text(tree.code) : std::string_view(), diagnostics, {source, 0, 0}};
     options_are_known(c);
-    it_can_be_made(c);
+    features_are_supported(c);
     if (diagnostics.failed()) return;
     component_has_the_files_name(c);
     license_is_given(c);

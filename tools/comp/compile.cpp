@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Fills in what is to be compiled. False after saying on stderr why it cannot be.
+/// Determines what to compile. Returns false after printing the error.
 using Prepare = bool (*)(const Options& options, const std::string& path, PluginSource& source);
 
 bool prepare_cpp(const Options&, const std::string&, PluginSource& source) {
@@ -105,7 +105,7 @@ int compile_file(const CompileOptions& options, const std::string& path) {
     const std::string extension = fs::path(path).extension().string();
     const Kind* kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& k) { return extension == k.extension; });
     if (kind == std::end(kinds))
-        return fail(options, fmt::format("'{}' is none of .cpp, .c and .comp, so what it is written in is not known", path));
+        return fail(options, fmt::format("unknown file type of '{}'; use .cpp, .c or .comp", path));
     if (::access(path.c_str(), R_OK) != 0) return fail(options, fmt::format("{}: {}", path, std::strerror(errno)));
     if (struct stat about{}; ::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode))  // a compiler would wait for the other end of a FIFO
         return fail(options, fmt::format("'{}' cannot be compiled: {}", path, special_kind(about.st_mode)));
@@ -120,7 +120,7 @@ int compile_file(const CompileOptions& options, const std::string& path) {
     build.folder = options.output;
     if (options.keep) build.keep = source.name + (source.language == Language::cpp ? ".cpp" : ".c");
     if (options.keep && !source.text)
-        return fail(options, fmt::format("--keep is for .comp files: nothing is made of '{}' but the plugin", path));
+        return fail(options, fmt::format("--keep applies to .comp files only; '{}' is compiled directly", path));
     bool printed = false;
     const auto print_messages = [&](const BuiltPlugin& built) {
         if (!std::exchange(printed, true)) write_all(STDERR_FILENO, built.messages);

@@ -18,8 +18,8 @@ struct CompileOptions : Options {
     void declare(OptionSet& set) override {
         set.words("FILE", "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or .c (LinuxCNC's hal.h)");
         set.value("-o,--output", output, "DIR", "install here; default: ~/.local/share/halcyon/components");
-        set.flag("--check-rt", check_rt, "run it 1000 cycles with random and extreme values; name what is not real time");
-        set.flag("--keep", keep, "of a .comp file: leave the C text that was made of it in this folder");
+        set.flag("--check-rt", check_rt, "run 1000 cycles with random and extreme values and report violations of real time");
+        set.flag("--keep", keep, "keep the C code generated from a .comp file in the current folder");
     }
 };
 

@@ -29,18 +29,18 @@ namespace fs = std::filesystem;
 constexpr const char* usage =
     "usage: halcompile [MODE] [OPTION…] FILE.comp|FILE.c…\n\n"
     "Modes:\n"
-    "  -p, --preprocess   write the C text of a .comp file, NAME.c (the default)\n"
+    "  -p, --preprocess   write the C code of a .comp file, NAME.c (the default)\n"
     "  -c, --compile      build NAME.so, or a program NAME, in the current folder\n"
-    "  -i, --install      build it and install it where halrun and halcmd look\n"
+    "  -i, --install      build it and install it for halrun and halcmd\n"
     "  -d, --document     write the manual page, NAME.9\n"
     "      --adoc         write it as AsciiDoc, NAME.adoc\n"
     "      --view-doc     show it, in a terminal with man\n"
     "Options:\n"
-    "  -o, --outfile FILE           where the C text or the page goes\n"
+    "  -o, --outfile FILE           output file of the C code or the page\n"
     "  -u, --userspace              FILE.c is a program\n"
-    "  -P, --personalities N        accepted: the number of personalities is not limited here\n"
-    "      --extra-compile-args=ARGS, --extra-link-args=ARGS   further words for the compiler\n"
-    "  -U, --unix                   accepted and without effect\n"
+    "  -P, --personalities N        accepted and ignored: the number of personalities is unlimited\n"
+    "      --extra-compile-args=ARGS, --extra-link-args=ARGS   further arguments for the compiler\n"
+    "  -U, --unix                   accepted and ignored\n"
     "  -h, --help                   this\n"
     "`hal compile` is the same compiler with other options; it also takes components in C++.\n";
 
@@ -157,7 +157,7 @@ int halcompile(int argc, char** argv) {
         }
     }
     options.words.assign(argv + ::optind, argv + argc);
-    if (options.words.empty()) return fail(options, "which file? type: halcompile --install FILE.comp; --help lists the options");
+    if (options.words.empty()) return fail(options, "missing file; type: halcompile --install FILE.comp; --help lists the options");
     if (!options.output.empty() && (mode == compile || mode == install || mode == view))
         return fail(options, "-o is for --preprocess, --document and --adoc; to build into another folder: hal compile --output DIR FILE");
     if (!options.output.empty() && options.words.size() > 1) return fail(options, "-o takes one file");

@@ -35,11 +35,11 @@ namespace {
 struct @TYPE@ : hal::Component {
     using Component::Component;
 
-    hal::In<double>    in{*this, "in", "where out is to go"};
-    hal::In<bool>      hold{*this, "hold", "TRUE keeps out where it is"};
+    hal::In<double>    in{*this, "in", "target position of out"};
+    hal::In<bool>      hold{*this, "hold", "TRUE holds out at its position"};
     hal::Out<double>   out{*this, "out", "follows in", {.finite = true}};
     hal::Out<bool>     there{*this, "there", "TRUE while out is equal to in"};
-    hal::Param<double> max_speed{*this, "max-speed", "how fast out may move", {.initial = 1.0, .unit = "1/s"}};
+    hal::Param<double> max_speed{*this, "max-speed", "maximum speed of out", {.initial = 1.0, .unit = "1/s"}};
     hal::Function      run{*this, "", &@TYPE@::update, "one step"};
 
     // Runs in every cycle: it must not allocate, lock, block, log or throw.
@@ -123,17 +123,17 @@ std::string problem_of(const std::string& name) {
     constexpr std::size_t longest = 40;
     if (!plain || name.empty() || !letter(name.front()) || name.back() == '-' || name.back() == '_')
         return fmt::format(
-            "'{}' cannot be a component's name: it begins with a letter, and letters, digits, - and _ follow; try: hal new component {}",
+            "invalid component name '{}': use a letter, then letters, digits, - and _; try: hal new component {}",
             name, repaired(name));
-    if (name.size() > longest) return fmt::format("the name has {} characters; {} are enough for a component", name.size(), longest);
+    if (name.size() > longest) return fmt::format("the name has {} characters; the limit is {}", name.size(), longest);
     std::string underlined = name;
     std::replace(underlined.begin(), underlined.end(), '-', '_');
     if (std::find(std::begin(keywords), std::end(keywords), underlined) != std::end(keywords))
-        return fmt::format("'{0}' is a word of C++; try: hal new component my-{0}", name);
+        return fmt::format("'{0}' is a C++ keyword; try: hal new component my-{0}", name);
     for (const std::string& there : Plugins().available()) {
         std::string other = there;
         std::replace(other.begin(), other.end(), '-', '_');
-        if (other == underlined) return fmt::format("there is a component '{0}' already (see: hal doc {0}); choose another name", there);
+        if (other == underlined) return fmt::format("component '{0}' already exists (see: hal doc {0}); choose another name", there);
     }
     return {};
 }
@@ -179,7 +179,7 @@ bool has_package(const fs::path& prefix) {
     return false;
 }
 
-/// Where find_package has to be told to look: this program's installation or build tree, unless CMake finds one by itself
+/// The path that find_package needs: this program's installation or build tree, unless CMake finds one by itself
 /// (in the system's folders, and beside the folders of PATH).
 std::string package_hint() {
     std::error_code none;
@@ -207,12 +207,12 @@ int run_new(const NewOptions& options) {
     if (words.empty() || words[0] != "component") {
         const std::string hint =
             words.size() == 1 && problem_of(words[0]).empty() ? "hal new component " + words[0] : "hal new component NAME";
-        return fail(options, fmt::format("what is to be new? Components can be; type: {}", hint));
+        return fail(options, fmt::format("missing kind: only components can be created; type: {}", hint));
     }
     if (words.size() != 2)
         return fail(options, words.size() < 2
-                                 ? "the component needs a name: hal new component NAME"
-                                 : fmt::format("one name is expected, not {}; blanks cannot be part of it: hal new component {}",
+                                 ? "missing name; type: hal new component NAME"
+                                 : fmt::format("expected one name, not {}; a name contains no blanks: hal new component {}",
                                                words.size() - 1, repaired(words[1] + "-" + words[2])));
     const std::string& name = words[1];
     if (const std::string why = problem_of(name); !why.empty()) return fail(options, why);
@@ -224,7 +224,7 @@ int run_new(const NewOptions& options) {
         return fail(options, fmt::format("'{}' exists already; give the new component another folder: hal new component {} --folder DIR",
                                          folder.string(), name));
     fs::create_directories(folder, problem);
-    if (problem) return fail(options, fmt::format("'{}' cannot be made: {}", folder.string(), problem.message()));
+    if (problem) return fail(options, fmt::format("cannot create '{}': {}", folder.string(), problem.message()));
 
     const std::string package = package_hint();
     const std::array<std::pair<std::string, std::string_view>, 4> files{
@@ -235,10 +235,10 @@ int run_new(const NewOptions& options) {
             return fail(options, why);
     }
     const std::string path = shell_word(folder.string());
-    return print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and what it is expected to print\n"
+    return print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and its expected output\n"
                              "  cd {0}\n"
                              "  cmake -B build && cmake --build build && ctest --test-dir build\n"
-                             "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to have it for good: hal compile {1}.cpp\n",
+                             "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: hal compile {1}.cpp\n",
                              path, name))
                ? 0
                : 1;

@@ -11,8 +11,8 @@ struct NewOptions : Options {
     std::string folder;  ///< of the new component; empty: its name
 
     void declare(OptionSet& set) override {
-        set.words("component NAME", "the name loadrt will know; letters, digits, - and _");
-        set.value("--folder", folder, "DIR", "made for it (default: NAME, here)");
+        set.words("component NAME", "name for loadrt: letters, digits, - and _");
+        set.value("--folder", folder, "DIR", "folder to create (default: NAME in the current folder)");
     }
 };
 

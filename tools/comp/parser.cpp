@@ -89,7 +89,7 @@ bool Parser::declaration() {
     if (in_.take(';')) return true;  // an empty one
     const Text keyword = in_.word();
     if (!keyword.given())
-        return fail("a declaration starts with a word: pin, param, function, …", "put C code behind a line that consists of ;;");
+        return fail("a declaration starts with a word: pin, param, function, …", "put C code after a line that consists of ;;");
     const Keyword* found = nullptr;
     std::vector<std::string> all;
     for (const Keyword& row : keywords) {
@@ -98,28 +98,28 @@ bool Parser::declaration() {
     }
     if (!found) {
         std::string help = did_you_mean(keyword.text, all);
-        if (help.empty()) help = "declarations: " + listed(all, all.size()) + "; C code stands behind a line that consists of ;;";
-        return in_.error(keyword.span, "no declaration is called '" + keyword.text + "'", "", help), false;
+        if (help.empty()) help = "declarations: " + listed(all, all.size()) + "; C code follows a line that consists of ;;";
+        return in_.error(keyword.span, "unknown declaration '" + keyword.text + "'", "", help), false;
     }
     const bool good = (this->*found->handler)(keyword);
     if (in_.take_broken() || !good) return false;
     if (!in_.at_code() && in_.take(';')) return true;
     const Span here = in_.at_code() ? in_.behind() : in_.here();
-    in_.error(here, "the declaration does not end here", here.end - here.begin <= 1 ? "a ';' is missing" : "a ';' is missing before this");
+    in_.error(here, "unexpected text in the declaration", here.end - here.begin <= 1 ? "missing ';'" : "missing ';' before this");
     return in_.at_code() || std::find(all.begin(), all.end(), in_.peek_word()) != all.end();  // the next one can be read
 }
 
 bool Parser::component(const Text& keyword) {
-    if (tree_.name.given()) return in_.error(keyword.span, "a file describes one component"), false;
+    if (tree_.name.given()) return in_.error(keyword.span, "duplicate component declaration"), false;
     tree_.name = in_.word();
-    if (!tree_.name.given()) return fail("here the component's name is missing", "component NAME \"what it does\";");
+    if (!tree_.name.given()) return fail("missing component name", "component NAME \"what it does\";");
     doc(tree_.summary);
     return true;
 }
 
 bool Parser::name(Name& name, const std::string& of) {
     const Text written = in_.hal_name();
-    if (!written.given()) return fail("here the name of the " + of + " is missing");
+    if (!written.given()) return fail("missing name of the " + of + "");
     name = spelled(written);
     return true;
 }
@@ -137,7 +137,7 @@ bool Parser::type(Item& item) {
     if (word == "signed") type = HAL_TYPE_S32;
     if (word == "unsigned") type = HAL_TYPE_U32;
     if (!word.given() || !type) {
-        if (!word.given()) return fail("here a type is missing", "types: " + listed(type_names(), type_names().size()));
+        if (!word.given()) return fail("missing type", "types: " + listed(type_names(), type_names().size()));
         std::string help = did_you_mean(word.text, type_names());
         if (help.empty()) help = "types: " + listed(type_names(), type_names().size());
         return in_.error(word.span, "unknown type '" + word.text + "'", "", help), false;
@@ -155,14 +155,14 @@ bool Parser::array(Item& item) {
     if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 || item.size > largest_array) {
         item.size = 1;
         in_.error(size.given() ? size.span : in_.here(),
-                  "the size of an array is a whole number from 1 to " + std::to_string(largest_array), "",
-                  "what depends on the personality stands behind it: [16 : personality & 0xff]");
+                  "the size of an array must be an integer, 1.." + std::to_string(largest_array), "",
+                  "put the part that depends on the personality after it: [16 : personality & 0xff]");
     }
     if (in_.take(':')) {
         item.count = in_.expression("]");
-        if (!item.count.given()) return fail("here the number of elements is missing", "[16 : personality & 0xff]");
+        if (!item.count.given()) return fail("missing number of elements", "[16 : personality & 0xff]");
     }
-    return in_.take(']') || fail("a '[' without its ']'");
+    return in_.take(']') || fail("'[' without ']'");
 }
 
 bool Parser::item(const Text& keyword) {
@@ -189,8 +189,8 @@ bool Parser::item(const Text& keyword) {
     if (!known) {
         const Span at = word.given() ? word.span : in_.here();
         if (item.parameter)
-            in_.error(at, "a parameter is r (the component sets it) or rw", "", "param rw float gain = 1.0 \"what it is\";");
-        else in_.error(at, "a pin is in, out or io", "", "pin in float angle \"what it is\";");
+            in_.error(at, "invalid direction: a parameter is r (set by the component) or rw", "", "param rw float gain = 1.0 \"what it is\";");
+        else in_.error(at, "invalid direction: a pin is in, out or io", "", "pin in float angle \"what it is\";");
         return false;
     }
     if (!type(item) || !name(item.name, item.parameter ? "parameter" : "pin")) return false;
@@ -199,9 +199,9 @@ bool Parser::item(const Text& keyword) {
         const bool start = in_.take('=');
         Text& part = start ? item.start : item.condition;
         if (!start) in_.word();
-        if (part.given()) return in_.error(part.span, start ? "a second start value" : "a second condition"), false;
+        if (part.given()) return in_.error(part.span, start ? "duplicate initial value" : "duplicate condition"), false;
         part = in_.expression(start ? "" : "=");
-        if (!part.given()) return fail(start ? "here the start value is missing" : "here the condition is missing");
+        if (!part.given()) return fail(start ? "missing initial value" : "missing condition");
     }
     doc(item.doc);
     tree_.items.push_back(std::move(item));
@@ -220,16 +220,16 @@ bool Parser::function(const Text&) {
 bool Parser::variable(const Text&) {
     Variable variable;
     variable.type = in_.word();
-    if (!variable.type.given()) return fail("here the type of the variable is missing", "variable double old;");
+    if (!variable.type.given()) return fail("missing type of the variable", "variable double old;");
     while (in_.take('*')) variable.stars += '*';
     const Text written = in_.word();
     if (!written.given())
-        return fail("here the name of the variable is missing", "the type is one word: use a typedef for struct, long long, …");
+        return fail("missing name of the variable", "the type is one word: use a typedef for struct, long long, …");
     variable.name = spelled(written);
     variable.name.c = written.text;
     while (in_.take('[')) {  // several make a table
         const Text size = in_.expression("]");
-        if (!size.given() || !in_.take(']')) return fail("here the size of the array is missing");
+        if (!size.given() || !in_.take(']')) return fail("missing size of the array");
         if (!variable.size.given()) variable.size = size;
         else variable.size.text += "][" + size.text;
     }
@@ -238,7 +238,7 @@ bool Parser::variable(const Text&) {
             variable.start = *text;
             variable.start.text.insert(0, 1, '"').push_back('"');
         } else variable.start = in_.expression("");
-        if (!variable.start.given()) return fail("here the start value is missing");
+        if (!variable.start.given()) return fail("missing initial value");
     }
     Text ignored;
     doc(ignored);
@@ -249,7 +249,7 @@ bool Parser::variable(const Text&) {
 bool Parser::option(const Text&) {
     Option option;
     option.name = in_.word();
-    if (!option.name.given()) return fail("here the name of the option is missing");
+    if (!option.name.given()) return fail("missing name of the option");
     doc(option.value);
     if (!option.value.given()) option.value = in_.expression("");
     tree_.options.push_back(std::move(option));
@@ -265,10 +265,10 @@ bool Parser::modparam(const Text&) {
                false;
     parameter.dummy = type == "dummy";
     parameter.name = in_.word();
-    if (!parameter.name.given()) return fail("here the name of the parameter is missing");
+    if (!parameter.name.given()) return fail("missing name of the parameter");
     if (in_.take('=')) {
         parameter.start = in_.expression("");
-        if (!parameter.start.given()) return fail("here the default is missing");
+        if (!parameter.start.given()) return fail("missing default value");
     }
     doc(parameter.doc);
     tree_.parameters.push_back(std::move(parameter));
@@ -277,7 +277,7 @@ bool Parser::modparam(const Text&) {
 
 bool Parser::include(const Text&) {
     const auto header = in_.header();
-    if (!header) return fail("here a file's name is missing", "include <rtapi_math.h>; or include \"mine.h\";");
+    if (!header) return fail("missing file name", "include <rtapi_math.h>; or include \"mine.h\";");
     tree_.includes.push_back(*header);
     return true;
 }
@@ -287,7 +287,7 @@ bool Parser::prose(const Text& keyword) {
     Text text;
     doc(text);
     if (!text.given())
-        return fail("here a text is missing", keyword.text + " \"a line\"; or " + keyword.text + " \"\"\"several lines\"\"\";");
+        return fail("missing text", keyword.text + " \"a line\"; or " + keyword.text + " \"\"\"several lines\"\"\";");
     (tree_.*list).push_back(std::move(text));
     return true;
 }

@@ -74,7 +74,7 @@ void Scanner::skip() {
         else if (starts("//")) at_ = std::min(text_.find('\n', at_), text_.size());
         else if (starts("/*")) {
             const std::size_t end = text_.find("*/", at_ + 2);
-            if (end == std::string_view::npos) error(span(at_, at_ + 2), "this comment has no end", "", "put */ behind it");
+            if (end == std::string_view::npos) error(span(at_, at_ + 2), "unterminated comment", "", "end it with */");
             at_ = end == std::string_view::npos ? text_.size() : end + 2;
         } else break;
     }
@@ -149,8 +149,8 @@ std::optional<Text> Scanner::string() {
     while (end < text_.size() && !text_.substr(end).starts_with(closing) && (triple || text_[end] != '\n'))
         end += text_[end] == '\\' && end + 1 < text_.size() ? 2 : 1;
     if (end >= text_.size() || !text_.substr(end).starts_with(closing)) {
-        error(span(begin, from), "this text has no end", "",
-              triple ? "put \"\"\" behind it" : "put \" at its end; a text of several lines stands between \"\"\" and \"\"\"");
+        error(span(begin, from), "unterminated string", "",
+              triple ? "end it with \"\"\"" : "end it with \"; text of several lines goes between \"\"\" and \"\"\"");
         at_ = triple ? text_.size() : std::min(text_.find('\n', begin), text_.size());
         last_ = at_;
         broken_ = true;
@@ -207,7 +207,7 @@ Text Scanner::expression(std::string_view stops) {
         text += text_.substr(at_, length);
         end = at_ += length;
     }
-    if (depth > 0) error(span(begin, end), "a '(' without its ')'");
+    if (depth > 0) error(span(begin, end), "'(' without ')'");
     while (text.ends_with(' ')) text.pop_back();
     if (end > begin) last_ = end;
     return {std::move(text), end > begin ? span(begin, end) : Span{}};

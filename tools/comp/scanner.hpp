@@ -35,7 +35,7 @@ public:
     /// "…", """…""", either with r before it. Nothing when none comes next.
     std::optional<Text> string();
     bool at_string();
-    /// True once after a string without end: what follows cannot be judged.
+    /// Returns true once after an unterminated string: what follows cannot be parsed.
     bool take_broken() { return std::exchange(broken_, false); }
     /// "file.h" or <file.h>
     std::optional<Text> header();

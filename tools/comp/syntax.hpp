@@ -81,7 +81,7 @@ struct Tree {
 /// Reads the declarations. What cannot be read is reported and left out.
 Tree parse(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics);
 
-/// What can be said of a whole file: names that clash, what is missing, what cannot be had.
+/// Checks a whole file: name clashes, missing parts, unsupported features.
 void check(const Tree& tree, const Sources& sources, std::uint32_t source, Diagnostics& diagnostics);
 
 /// Spells a written name for netlists and for C.
@@ -90,7 +90,7 @@ Name spelled(Text written);
 /// `name` with its block of `#` as a number of the same width.
 std::string numbered(const std::string& name, unsigned index);
 
-/// True when the code is the body of the only function: it nowhere says FUNCTION.
+/// Returns true when the code is the body of the only function, without a FUNCTION macro.
 bool implicit_function(const Tree& tree, std::string_view code);
 
 /// Where a whole word stands in C code, outside of comments and strings; npos if nowhere.
@@ -99,7 +99,7 @@ std::size_t find_word(std::string_view code, std::string_view word, std::size_t 
 /// The C source.
 std::string emit(const Tree& tree, const Sources& sources);
 
-/// The manual's text in Markdown: what description, examples, notes, … say.
+/// Returns the manual text in Markdown, from description, examples, notes, …
 std::string manual(const Tree& tree);
 
 /// Text in the macros of manual pages (groff's man) as Markdown; other text stays as it is.

@@ -46,17 +46,17 @@ SessionOptions alone(bool check) {
     return options;
 }
 
-/// What a pin says that means nothing; "" when nothing does.
+/// Returns the option of a pin that has no effect, or "".
 std::string mistake_of(const Pin& pin, const std::string& own) {
     const bool output = pin.dir == HAL_DIR_OUT;
-    if (!*pin.doc) return fmt::format("pin '{}' has no documentation; say what it is in a few words behind its name", own);
+    if (!*pin.doc) return fmt::format("pin '{}' has no documentation; describe it in a few words after its name", own);
     if ((pin.flags & HAL_PIN_SAFE) && (pin.dir == HAL_DIR_IN || pin.dir == HAL_DIR_PARAM))
-        return fmt::format("pin '{}' is an {} and has .safe, which is of outputs: they take that value when the machine stops", own,
-                           pin.dir == HAL_DIR_IN ? "input" : "argument of the user (a parameter)");
+        return fmt::format("pin '{}' is an {} and has .safe, which applies to outputs only: the value they take when the machine stops", own,
+                           pin.dir == HAL_DIR_IN ? "input" : "parameter");
     if ((pin.flags & HAL_PIN_FINITE) && pin.type != HAL_TYPE_FLOAT)
-        return fmt::format("pin '{}' has .finite, which is of pins of type double: no other has NaN or infinity", own);
+        return fmt::format("pin '{}' has .finite, which applies to pins of type double only", own);
     if ((pin.flags & HAL_PIN_FINITE) && !output && pin.dir != HAL_DIR_IO)
-        return fmt::format("pin '{}' has .finite, which is of outputs: what comes from elsewhere is not this component's fault", own);
+        return fmt::format("pin '{}' has .finite, which applies to outputs only", own);
     return {};
 }
 
@@ -261,7 +261,7 @@ std::string without_false_hint(const std::string& messages, const PluginSource& 
     std::istringstream in(messages);
     bool dropping = false;
     for (std::string line; std::getline(in, line);) {
-        if (line.find("static assertion failed") != std::string::npos && line.find("the component lacks the line") != std::string::npos) {
+        if (line.find("static assertion failed") != std::string::npos && line.find("missing line in the component: using") != std::string::npos) {
             while (!kept.empty() && std::regex_search(kept.back(), leads_in)) kept.pop_back();
             dropping = true;
             continue;

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* built_in = "threads";
 
-/// What `open` had to say, in one line.
+/// Returns the error of `open` in one line.
 std::string reason(const Diagnostics& diagnostics) {
     if (diagnostics.all().empty()) return "it cannot be opened";
     const Diagnostic& first = diagnostics.all().front();
@@ -62,7 +62,7 @@ int list(const Plugins& plugins, const DocOptions& options) {
     return print(text) && good ? 0 : 1;
 }
 
-/// The page of one component. False after saying on stderr why there is none.
+/// Makes the page of one component. Returns false after printing the error.
 bool page_of(const Plugins& plugins, const std::string& name, const DocOptions& options, Page& page) {
     if (name == built_in) {
         page = threads_page();
@@ -105,7 +105,7 @@ int write_all_pages(const std::vector<Page>& pages, const Plugins& plugins, cons
     const fs::path folder(options.output);
     std::error_code problem;
     fs::create_directories(folder, problem);
-    if (problem) return fail(options, fmt::format("'{}' cannot be made: {}", folder.string(), problem.message()));
+    if (problem) return fail(options, fmt::format("cannot create '{}': {}", folder.string(), problem.message()));
     for (const Page& page : pages)
         if (!write_page(folder / (form.before + page.name + form.after), form.write(page, !options.all), options)) return 1;
     if (form.chosen != &DocOptions::html || !options.all) return 0;
@@ -129,11 +129,11 @@ int run_doc(const DocOptions& given) {
     DocOptions options = given;
     if (options.markdown + options.json + options.man + options.html > 1)
         return fail(options, "--markdown, --json, --man and --html exclude each other; give one");
-    if (options.all && !options.words.empty()) return fail(options, "--all is about all components; leave out their names, or --all");
+    if (options.all && !options.words.empty()) return fail(options, "--all and component names exclude each other; leave one out");
     const Plugins plugins;
     if (options.words.empty() && !options.all) return list(plugins, options);
     if (options.all) {
-        if (options.output.empty()) return fail(options, "so many pages go into a folder; type: hal doc --all --output DIR");
+        if (options.output.empty()) return fail(options, "--all needs a folder; type: hal doc --all --output DIR");
         options.words = plugins.available();
     }
     if (!options.output.empty() && !(options.markdown || options.json || options.man)) options.html = true;

@@ -38,7 +38,7 @@ int run_explain(const ExplainOptions& options) {
         if (row == pages.end()) {
             const std::string hint = did_you_mean(code, names);
             return fail(options,
-                        fmt::format("there is no diagnostic '{}'; {}", code, hint.empty() ? "type 'hal explain' for the list" : hint));
+                        fmt::format("unknown code '{}'; {}", code, hint.empty() ? "type 'hal explain' for the list" : hint));
         }
         if (!print(fmt::format("{}\n\n{}\n", row->name, row->page))) return 1;
     }

@@ -30,7 +30,7 @@ std::optional<std::string> rendered(const std::string& text, Render render) {
 
 }  // namespace
 
-// Raw HTML in the text is left out (the library's default): what a plugin says of itself is text.
+// Raw HTML is left out (the library's default): the texts of a plugin are not trusted.
 std::optional<std::string> markdown_as_html(const std::string& text) {
     return rendered(text, [](cmark_node* document, cmark_parser* parser) {
         return cmark_render_html(document, CMARK_OPT_DEFAULT, cmark_parser_get_syntax_extensions(parser));

@@ -77,7 +77,7 @@ Finding kernel() {
                        : version.find("PREEMPT") != std::string::npos       ? "PREEMPT"
                                                                             : "no preemption";
     return {Verdict::fair, "kernel",
-            fmt::format("{} ({}), not PREEMPT_RT: wake-ups are late by milliseconds now and then", about.release, kind),
+            fmt::format("{} ({}), not PREEMPT_RT: occasional wake-up latencies of milliseconds", about.release, kind),
             "sudo apt install linux-image-rt-amd64, then reboot into it"};
 }
 
@@ -91,7 +91,7 @@ Finding machine() {
             stat >> word;
             for (int i = 0; i < 8 && stat >> value; ++i) steal = value;
             return {Verdict::fair, "machine",
-                    fmt::format("virtual: the host takes the processor away at will ({} s so far)",
+                    fmt::format("virtual: the host preempts the processor ({} s so far)",
                                 static_cast<double>(steal) / static_cast<double>(::sysconf(_SC_CLK_TCK))),
                     "run on bare metal, or give the guest dedicated processors"};
         }
@@ -110,7 +110,7 @@ Finding scheduling() {
     ::getrlimit(RLIMIT_RTPRIO, &limit);
     const std::string why = capable(cap_sys_nice) ? "cap_sys_nice" : fmt::format("limit rtprio {}", limit.rlim_cur);
     if (problem == 0) return {Verdict::good, "SCHED_FIFO", fmt::format("allowed up to priority 98 ({})", why)};
-    return {Verdict::poor, "SCHED_FIFO", fmt::format("refused ({}): threads compete with every other program", why),
+    return {Verdict::poor, "SCHED_FIFO", fmt::format("denied ({}): threads compete with every other program", why),
             grant_command(), limits_of_a_group};
 }
 
@@ -128,21 +128,21 @@ Finding capabilities() {
     const std::string path = own_path();
     const bool on_file = ::getxattr(path.c_str(), "security.capability", nullptr, 0) > 0;
     if (capable(cap_sys_nice) && capable(cap_ipc_lock) && capable(cap_net_raw))
-        return {Verdict::good, "capabilities", on_file ? "granted to the program file" : "all there (by user)"};
+        return {Verdict::good, "capabilities", on_file ? "granted to the program file" : "all present (by user)"};
     return {Verdict::fair, "capabilities",
             on_file ? "granted to the program file, but not effective (a nosuid mount, or a container)"
                     : "none granted to the program file: raw sockets and priorities need them",
             grant_command()};
 }
 
-/// What the kernel answers; a container may refuse in spite of the capability.
+/// Asks the kernel: a container may deny it in spite of the capability.
 Finding raw_ethernet() {
     const int socket = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);
     const int problem = errno;
     if (socket >= 0) ::close(socket);
     if (socket >= 0) return {Verdict::good, "raw Ethernet", "allowed (cap_net_raw)"};
     if (problem == EPERM || problem == EACCES)
-        return {Verdict::fair, "raw Ethernet", "refused: links of the kind eth:enp3s0 cannot be opened", grant_command()};
+        return {Verdict::fair, "raw Ethernet", "denied: links such as eth:enp3s0 cannot be opened", grant_command()};
     return {Verdict::fair, "raw Ethernet", fmt::format("no packet sockets in this kernel: {}", std::strerror(problem)),
             "use a kernel with CONFIG_PACKET, as every distribution's is"};
 }
@@ -152,7 +152,7 @@ Finding throttling() {
     if (text.empty()) return {Verdict::good, "throttling", "none visible"};
     if (text == "-1") return {Verdict::good, "throttling", "off (kernel.sched_rt_runtime_us = -1)"};
     return {Verdict::good, "throttling",
-            fmt::format("real-time threads may use {} us of each {} us; a thread that stays below is not touched", text,
+            fmt::format("real-time threads may use {} us of each {} us; threads below this limit are not affected", text,
                         first_line("/proc/sys/kernel/sched_rt_period_us"))};
 }
 
@@ -166,7 +166,7 @@ Finding governor() {
     std::string all;
     for (const auto& g : governors) all += (all.empty() ? "" : ", ") + g;
     if (governors == std::set<std::string>{"performance"}) return {Verdict::good, "frequency", "governor performance"};
-    return {Verdict::fair, "frequency", fmt::format("governor {}: a processor that slept starts slowly", all),
+    return {Verdict::fair, "frequency", fmt::format("governor {}: an idle processor ramps up slowly", all),
             "sudo cpupower frequency-set -g performance"};
 }
 
@@ -196,11 +196,11 @@ Finding idle_states() {
     if (device >= 0) ::close(device);
     unsigned states = 0;
     while (!first_line(fmt::format("/sys/devices/system/cpu/cpu0/cpuidle/state{}/name", states)).empty()) ++states;
-    if (states <= 1) return {Verdict::good, "idle states", "no deep ones visible"};
+    if (states <= 1) return {Verdict::good, "idle states", "no deep states visible"};
     if (device >= 0)
         return {Verdict::good, "idle states", fmt::format("{}, held shallow through /dev/cpu_dma_latency while threads run", states)};
     return {Verdict::fair, "idle states",
-            fmt::format("{}, and /dev/cpu_dma_latency may not be written: a deep sleep ends up to 0.2 ms late", states),
+            fmt::format("{}, and /dev/cpu_dma_latency is not writable: leaving a deep state takes up to 0.2 ms", states),
             "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; sudo chgrp realtime /dev/cpu_dma_latency; "
             "sudo chmod 0660 /dev/cpu_dma_latency, then log in again; lost at reboot, unless the line KERNEL==\"cpu_dma_latency\", "
             "GROUP=\"realtime\", MODE=\"0660\" is in /etc/udev/rules.d/99-cpu-dma-latency.rules"};
@@ -214,7 +214,7 @@ Finding management_interrupts() {
     if (device >= 0) ::close(device);
     if (!read) return {Verdict::good, "firmware", "system-management interrupts cannot be counted from here (as root: modprobe msr)"};
     return {count == 0 ? Verdict::good : Verdict::fair, "firmware", fmt::format("{} system-management interrupts since power-on", count),
-            count == 0 ? "" : "in the firmware set-up switch off legacy USB, and power management of fans and memory"};
+            count == 0 ? "" : "in the firmware setup, disable legacy USB, and power management of fans and memory"};
 }
 
 constexpr Finding (*checks[])() = {kernel,     machine,  scheduling, memory,       capabilities, raw_ethernet,
@@ -266,7 +266,7 @@ int run_doctor(const DoctorOptions& options) {
                                         {"max_ns", jitter.max_ns}});
             continue;
         }
-        const std::string title = spin == 0 ? fmt::format("\nwake-up at 1 kHz, {}, how late:\n{:42} {:>10} {:>10} {:>10}\n", jitter.policy,
+        const std::string title = spin == 0 ? fmt::format("\nwake-up latency at 1 kHz, {}:\n{:42} {:>10} {:>10} {:>10}\n", jitter.policy,
                                                           "", "p50", "p99", "max")
                                             : "";
         if (!print(fmt::format("{}  {:40} {:>10} {:>10} {:>10}\n", title, how, format_duration(jitter.p50_ns),

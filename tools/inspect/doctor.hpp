@@ -10,7 +10,7 @@ struct DoctorOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.value("--seconds", seconds, "S", "how long each measurement takes (default 2)").in(0.0, 3600.0);
+        set.value("--seconds", seconds, "S", "duration of each measurement (default 2)").in(0.0, 3600.0);
         set.flag("--json", json, "as JSON");
     }
 };

@@ -11,10 +11,10 @@ struct GraphOptions : NetlistOptions {
     std::string output;  ///< empty: standard output
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "netlists, in the order they would be loaded");
+        set.words("FILE", "netlists in load order");
         set.value("-o,--output", output, "FILE", "a .svg or .dot file; without it DOT goes to standard output");
-        set.value("--node", part, "NAME", "of a netlist for several machines: the part of this one");
-        set.value("-i,--ini", ini, "FILE", "where [SECTION]KEY is looked up");
+        set.value("--node", part, "NAME", "draw the part of this node of a netlist for several machines");
+        set.value("-i,--ini", ini, "FILE", "INI file for [SECTION]KEY");
     }
 };
 

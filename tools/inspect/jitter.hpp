@@ -13,7 +13,7 @@ struct Jitter {
     double p50_ns = 0, p99_ns = 0, max_ns = 0;
 };
 
-/// Runs an empty periodic thread for so long, at the highest priority it is allowed, with memory locked while it runs.
+/// Runs an empty periodic thread for the given duration, at the highest permitted priority, with memory locked.
 /// It sleeps to each deadline less `spin_ns`, then spins. Takes `duration_ns`; [setup]
 Jitter measure_jitter(std::int64_t period_ns, std::int64_t spin_ns, std::int64_t duration_ns);
 

@@ -61,7 +61,7 @@ std::string problem_of(const std::vector<std::string>& fields, const Stream& str
     return {};
 }
 
-/// Sends records, waiting for room; false after saying why not, or when it is ended.
+/// Sends records, waiting for space. Returns false after an error, which it prints, or when it is ended.
 bool feed(Stream& stream, const PlayOptions& options, json records, const StopRequest& stop) {
     while (!records.empty()) {
         const json reply = stream.client->request({{"stream", stream.name}, {"records", records}});

@@ -93,7 +93,7 @@ private:
     std::int64_t next_ = 0;
 };
 
-/// Takes records until there are enough, or somebody ends it. Returns the exit code.
+/// Takes records until the count is reached or the command is ended. Returns the exit code.
 int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
     StopRequest stop;
     stop.listen();

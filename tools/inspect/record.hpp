@@ -12,12 +12,12 @@ struct RecordOptions : StreamOptions {
     bool csv = false, tag = false;
 
     void declare(OptionSet& set) override {
-        set.words("CHANNEL FILE", "the number of the sampler (default 0), then the file to write (default: standard output)", false);
-        set.value("-c,--channel", channel, "CHANNEL", "a sampler by its number or by its instance's name");
+        set.words("CHANNEL FILE", "number of the sampler (default 0), then the file to write (default: standard output)", false);
+        set.value("-c,--channel", channel, "CHANNEL", "a sampler, by number or by instance name");
         set.flag("--csv", csv, "comma-separated, with the time of each sample and a line of column names first");
-        set.value("-n,--count", count, "N", "end after so many samples");
-        set.flag("-t,--tag", tag, "begin each line with the sample's number");
-        set.value("-N,--name", name, "NAME", "of the instance to read from");
+        set.value("-n,--count", count, "N", "end after N samples");
+        set.flag("-t,--tag", tag, "begin each line with the sample number");
+        set.value("-N,--name", name, "NAME", "the instance to read from");
     }
 };
 

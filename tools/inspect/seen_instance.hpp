@@ -16,7 +16,7 @@ struct SeenThread {
     bool faulted = false;
 };
 
-/// One instance, as its status says (hal/status.h): from its control socket, or from the network.
+/// One instance, as in its status (hal/status.h): from its control socket, or from the network.
 struct SeenInstance {
     std::string instance, host, cell, node;
     std::int64_t pid = 0;
@@ -29,7 +29,7 @@ struct SeenInstance {
     bool same(const SeenInstance& other) const { return pid == other.pid && instance == other.instance && host == other.host; }
 };
 
-/// Of a status text. False when it is none.
+/// Parses a status text. Returns false when it is invalid.
 bool read_status(std::string_view text, SeenInstance& seen);
 
 /// A table for people, sorted as given.

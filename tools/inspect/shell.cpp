@@ -59,7 +59,7 @@ Client::Options client_options(const RemoteShellOptions& options) {
     return how;
 }
 
-/// Commands on standard input that is no terminal: a file as a whole; from a pipe, each line when it comes, so that a
+/// Executes commands from standard input that is not a terminal: a file as a whole; from a pipe, each line when it comes, so that a
 /// program can wait for the answer.
 int follow_input(Client& client, const RemoteShellOptions& options) {
     struct stat about{};
@@ -87,10 +87,10 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
         if (last > 0)
             sentence += fmt::format("{} carried out before the error in line {}", last == 1 ? "line 1 was" : fmt::format("lines 1 to {} were", last), first);
         if (last > 0 && begin != 0) sentence += "; ";
-        if (begin != 0) sentence += fmt::format("what was collected from line {} on had no effect", begin);
+        if (begin != 0) sentence += fmt::format("the edits collected from line {} on had no effect", begin);
         fail(options, sentence);
     } else if (executor.collecting()) {
-        return fail(options, fmt::format("'begin' in line {} without 'commit': what was collected had no effect", begin));
+        return fail(options, fmt::format("'begin' in line {} without 'commit': the collected edits had no effect", begin));
     }
     return status;
 }
@@ -98,7 +98,7 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
 /// A connection that ends in a `begin` takes what was collected with it.
 int without_commit(const RemoteShellOptions& options, const Client::Answer& last, int status) {
     if (!last.collecting || options.loudness == Loudness::nothing) return last.collecting ? 1 : status;
-    return fail(options, "'begin' without 'commit' had no effect; write all of it into a file, or type: hal shell");
+    return fail(options, "'begin' without 'commit' had no effect; write the transaction to a file, or type: hal shell");
 }
 
 /// Reads this user's INI file: the instance knows only its own. False after printing what is wrong with it.
@@ -147,7 +147,7 @@ int follow_file(Client& client, const RemoteShellOptions& options) {
 
 int run_shell(const RemoteShellOptions& options) {
     if (options.from_file && !options.words.empty() && !options.classic && options.words.size() > 1)
-        return fail(options, fmt::format("nothing is expected behind the file at '{}'; options go before -f", options.words[1]));
+        return fail(options, fmt::format("unexpected argument '{}' after the file; options go before -f", options.words[1]));
     std::string problem;
     const auto client = Client::connect(instance_wanted(options.name), problem);
     if (!client) return fail(options, problem);
@@ -155,7 +155,7 @@ int run_shell(const RemoteShellOptions& options) {
     Client::Options how = client_options(options);
     if (!options.ini.empty() && !read_ini(options, how)) return 1;
     if (!client->set_options(how) && !client->connected())
-        return fail(options, fmt::format("instance '{}' does not answer", client->instance()));
+        return fail(options, fmt::format("instance '{}' does not respond", client->instance()));
     if (options.from_file && !options.words.empty()) return follow_file(*client, options);
     if (!options.execute.empty()) {
         int status = 0;

@@ -13,11 +13,11 @@ struct RemoteShellOptions : ExecutionOptions {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.value("-N,--name", name, "NAME", "of the instance to talk to; needed when several run");
-        set.flag("-f,--file", from_file, "the first word is a file of commands; without one: standard input");
+        set.value("-N,--name", name, "NAME", "the instance; required when several are running");
+        set.flag("-f,--file", from_file, "read commands from the file given as the first word, or from standard input");
         set.values("-e,--execute", execute, "COMMAND", "execute this command; may be repeated");
-        set.value("-i,--ini", ini, "FILE", "where [SECTION]KEY is looked up, with -f");
-        set.flag("-k,--keep-going", keep_going, "go on after an error");
+        set.value("-i,--ini", ini, "FILE", "INI file for [SECTION]KEY, with -f");
+        set.flag("-k,--keep-going", keep_going, "continue after an error");
         set.flag("-s,--script", script, "output for scripts: no titles, one line per item");
         set.flag("--json", json, "output as JSON");
         set.flag("--echo", echo, "echo each command on stderr");

@@ -27,7 +27,7 @@ bool Stream::open(const StreamOptions& options, const char* component) {
         words.erase(words.begin());
     }
     if (words.size() > 1) {
-        fail(options, fmt::format("nothing is expected at '{}'; a channel is a number, or --channel NAME",
+        fail(options, fmt::format("unexpected argument '{}'; a channel is a number, or --channel NAME",
                                   words.size() == 2 ? words.front() : words.back()));
         return false;
     }
@@ -52,7 +52,7 @@ bool Stream::open(const StreamOptions& options, const char* component) {
 }
 
 std::string Stream::lost() const {
-    return client->connected() ? fmt::format("'{}' is gone: it was unloaded, or its machine has ended", name)
+    return client->connected() ? fmt::format("'{}' has ended: it was unloaded, or its machine has exited", name)
                                : fmt::format("instance '{}' has ended", client->instance());
 }
 

@@ -20,7 +20,7 @@ struct Stream {
     bool timed = false;           ///< its records carry the time of their cycle
     std::string file;             ///< the words' file; empty: standard input or output
 
-    /// Reads CHANNEL and FILE from the words, connects, and asks for the columns. False after saying why.
+    /// Reads CHANNEL and FILE from the words, connects, and requests the columns. Returns false after printing the error.
     /// `component`: "sampler" or "streamer"; a channel that is a number belongs to it.
     bool open(const StreamOptions& options, const char* component);
     /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME` sees that it is ready.

@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t usual_count = 4;
 constexpr std::int64_t pause_ns = 200'000'000, look_ns = 2'000'000;
-constexpr auto patience = std::chrono::seconds(30);  // the component gives up long before, unless its thread stands still
+constexpr auto patience = std::chrono::seconds(30);  // the component times out long before, unless its thread stalls
 
 enum class Outcome { none, answered, unanswered, no_room, no_address, not_running };  // of the pin ping-result
 
@@ -38,7 +38,7 @@ public:
     Pinger(Client& client, std::string instance, std::string station)
         : client_(client), instance_(std::move(instance)), station_(std::move(station)), pin_(instance_ + "." + station_ + ".ping") {}
 
-    /// What a ping came to; none: `problem` says why no more can be sent.
+    /// Returns the outcome of a ping; none: no more can be sent, and `problem` is the reason.
     Outcome ask(const StopRequest& stop, std::string& problem) {
         if (!look(problem)) return Outcome::none;
         const auto wish = static_cast<std::uint32_t>(number(pins_, "ping")) + 1;
@@ -56,11 +56,11 @@ public:
                 return static_cast<Outcome>(static_cast<int>(number(pins_, "ping-result")));
             }
             if (static_cast<std::uint32_t>(number(pins_, "ping")) != wish) {
-                problem = fmt::format("somebody else pings {} at the moment ({} was set); try again", station_, pin_);
+                problem = fmt::format("another client is pinging {} ({} is set); try again", station_, pin_);
                 return Outcome::none;
             }
         }
-        problem = fmt::format("{} did not take the wish: does the thread of {}.receive run?", instance_, instance_);
+        problem = fmt::format("{} did not accept the ping request; check that the thread of {}.receive runs", instance_, instance_);
         return Outcome::none;
     }
     double time() const { return number(pins_, "ping-time"); }
@@ -76,7 +76,7 @@ private:
             if (const std::string name = pin.value("name", ""); name.starts_with(before) && pin.contains("value"))
                 pins_[name.substr(before.size())] = pin["value"];
         if (pins_.contains("ping")) return true;
-        problem = fmt::format("there is no pin {} any more", pin_);
+        problem = fmt::format("pin {} was removed", pin_);
         return false;
     }
 
@@ -89,24 +89,24 @@ private:
 std::string explanation(Outcome last, const StationPins& pins, const std::string& instance, const std::string& station) {
     switch (last) {
     case Outcome::no_room:
-        return fmt::format("nothing left {}: other frames fill its slots, or it has none; give one a larger SIZE in the schedule",
+        return fmt::format("{} sent nothing: other frames fill its slots, or it has none; increase a SIZE in the schedule",
                            instance);
     case Outcome::no_address:
-        return fmt::format("{} has not heard {} yet and does not know its address; write its mac into the schedule", instance, station);
-    case Outcome::not_running: return fmt::format("{} may not send: see hal tdma status", instance);
+        return fmt::format("{} has received no frame from {} and does not know its address; add its mac to the schedule", instance, station);
+    case Outcome::not_running: return fmt::format("{} has no permission to send; see: hal tdma status", instance);
     default: break;
     }
     if (is_on(pins, station + ".online"))
-        return fmt::format("{} is heard, but answers no ping: stations of an earlier Halcyon, and RTnet's, do not know it", station);
-    return fmt::format("{} is not heard either: is it switched on, its cable in?", station);
+        return fmt::format("{} is online but does not answer pings; earlier versions of Halcyon and RTnet stations do not support them", station);
+    return fmt::format("{} is offline; check its power and its cable", station);
 }
 
-const char* word(Outcome outcome) {
+const char* to_string(Outcome outcome) {
     switch (outcome) {
     case Outcome::unanswered: return "no answer";
-    case Outcome::no_room: return "not sent, no room in the slots";
-    case Outcome::no_address: return "not sent, its address is not known";
-    case Outcome::not_running: return "not sent, this station may not";
+    case Outcome::no_room: return "not sent, slots full";
+    case Outcome::no_address: return "not sent, unknown address";
+    case Outcome::not_running: return "not sent, no permission to send";
     default: return "?";
     }
 }
@@ -124,9 +124,9 @@ std::string instance_with(const std::map<std::string, StationPins>& instances, c
     if (known.empty()) {
         std::string all;
         for (const auto& [instance, pins] : instances) all += (all.empty() ? "" : ", ") + instance;
-        problem = fmt::format("there is no '{}' to ask from; there is {}", options.from, all);
+        problem = fmt::format("unknown station '{}' in --from; use {}", options.from, all);
     } else {
-        problem = fmt::format("there is no other station '{}'{}", station, known);
+        problem = fmt::format("unknown station '{}'{}", station, known);
     }
     return {};
 }
@@ -134,7 +134,7 @@ std::string instance_with(const std::map<std::string, StationPins>& instances, c
 }  // namespace
 
 int run_tdma_ping(const TdmaPingOptions& options) {
-    if (options.words.size() != 1) return fail(options, "one station at a time: hal tdma ping STATION");
+    if (options.words.size() != 1) return fail(options, "exactly one station is required: hal tdma ping STATION");
     StopRequest stop;
     std::string problem;
     const auto client = Client::connect(instance_wanted(options.name), problem);
@@ -146,7 +146,7 @@ int run_tdma_ping(const TdmaPingOptions& options) {
     if (instance.empty()) return fail(options, problem);
     const std::string& station = options.words.front();
     if (!is_on(instances.at(instance), "running"))
-        return fail(options, fmt::format("{} is not running and may not send: see hal tdma status", instance));
+        return fail(options, fmt::format("{} is not running; see: hal tdma status", instance));
 
     Pinger pinger(*client, instance, station);
     std::vector<double> times;
@@ -158,7 +158,7 @@ int run_tdma_ping(const TdmaPingOptions& options) {
         last = pinger.ask(stop, problem);
         if (last == Outcome::none) break;
         ++done;
-        std::string line = fmt::format("{} {}: {}\n", station, done, word(last));
+        std::string line = fmt::format("{} {}: {}\n", station, done, to_string(last));
         if (last == Outcome::answered) {
             times.push_back(pinger.time());
             line = fmt::format("{} {}: {:.2f} us, {:.2f} cycles; {:.2f} us of it at {}, {:.2f} us each way\n", station, done, pinger.time(),

@@ -12,7 +12,7 @@ namespace hal::tools {
 
 using StationPins = std::map<std::string, nlohmann::json>;  ///< of one instance of `tdma`, by the rest of their names
 
-/// By the names of the instances: tdma.0 …; a `problem` where the machine did not say.
+/// By the names of the instances: tdma.0 …; sets `problem` when the machine did not report it.
 std::map<std::string, StationPins> stations_of(Client&, std::string& problem);
 double number(const StationPins&, const std::string& name);  ///< 0 where there is none
 bool is_on(const StationPins&, const std::string& name);

@@ -12,7 +12,7 @@ struct TdmaStatusOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.value("-N,--name", name, "NAME", "of the instance; needed when several run");
+        set.value("-N,--name", name, "NAME", "the instance; required when several are running");
         set.flag("--json", json, "as JSON");
     }
 };

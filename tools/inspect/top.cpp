@@ -28,7 +28,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr auto status_period = std::chrono::milliseconds(500);
 constexpr double silent_after_s = 2, gone_after_s = 30;
-constexpr std::size_t most_instances = 1000;  // whoever floods the topic does not fill the memory
+constexpr std::size_t most_instances = 1000;  // a publisher that floods the topic does not fill the memory
 
 std::vector<std::string_view> words_of(std::string_view text) {
     std::vector<std::string_view> words;
@@ -57,7 +57,7 @@ public:
         if (ear_ != nullptr) close_(ear_);
     }
     bool absent() const { return absent_; }
-    /// False: `problem` says why not.
+    /// Returns false and sets `problem` to the reason.
     bool open(const std::string& settings, std::string& problem) {
         // Beside the program, as it was built; else where the loader looks.
         // (Under the address sanitizer that does not know whose path counts.)
@@ -173,7 +173,7 @@ bool read_status(std::string_view text, SeenInstance& seen) {
 }
 
 std::string top_table(const std::vector<SeenInstance>& all) {
-    if (all.empty()) return "no instance runs; start one: hal run FILE.hal\n";
+    if (all.empty()) return "no instance is running; start one: hal run FILE.hal\n";
     std::string text = fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST", "NODE", "THREAD", "PERIOD",
                                    "CYCLES", "MISSED", "FAULTS");
     for (const SeenInstance& one : all) {
@@ -182,7 +182,7 @@ std::string top_table(const std::vector<SeenInstance>& all) {
         for (std::size_t i = 0; i < std::max<std::size_t>(one.threads.size(), 1); ++i) {
             const SeenThread thread = i < one.threads.size() ? one.threads[i] : SeenThread{"-", 0, 0, 0, false};
             const std::string state = i != 0        ? ""
-                                      : silent      ? fmt::format("  silent for {:.0f} s", one.silent_s)
+                                      : silent      ? fmt::format("  offline for {:.0f} s", one.silent_s)
                                       : one.running ? ""
                                                     : "  stopped";
             text +=
@@ -228,7 +228,7 @@ int run_top(const TopOptions& options) {
     if (!there && (!network.absent() || !options.dds.empty())) return fail(options, problem);
     Network* const over = there ? &network : nullptr;
     const bool live = ::isatty(STDOUT_FILENO) != 0 && !options.json && !options.once;
-    if (there && !live) std::this_thread::sleep_for(3 * status_period);  // everybody has said something by then
+    if (there && !live) std::this_thread::sleep_for(3 * status_period);  // every instance has published its status by then
     if (!live) return print(options.json ? top_json(everybody(over)) : top_table(everybody(over))) ? 0 : 1;
     const auto end = options.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options.for_ns) : Clock::time_point::max();
     while (Clock::now() < end) {

@@ -14,10 +14,10 @@ struct TopOptions : Options {
     bool once = false, json = false;
 
     void declare(OptionSet& set) override {
-        set.for_how_long(for_ns, "in a terminal: end after 10s …; without it: until Ctrl-C");
-        set.flag("--once", once, "the table once, as it is when the output is no terminal");
-        set.flag("--json", json, "once, as JSON");
-        set.value("--dds", dds, "SETTINGS", "how to meet others: interfaces=ADDRESS domain=N peers=… (default: on this machine only)");
+        set.for_how_long(for_ns, "end after 10s … in a terminal; default: run until Ctrl-C");
+        set.flag("--once", once, "print the table once (the default when the output is not a terminal)");
+        set.flag("--json", json, "print once, as JSON");
+        set.value("--dds", dds, "SETTINGS", "DDS discovery: interfaces=ADDRESS domain=N peers=… (default: this machine only)");
     }
 };
 

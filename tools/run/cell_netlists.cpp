@@ -37,7 +37,7 @@ ShellOptions for_check() {
     return how;
 }
 
-/// Words KEY=VALUE that the components of DDS take. False after saying which is none.
+/// Reads words KEY=VALUE for the DDS components. Returns false after printing an invalid one.
 bool good_settings(const Options& options, const std::string& settings) {
     static constexpr std::array<std::string_view, 7> keys{"domain",        "interfaces", "peers",   "server",
                                                           "shared_memory", "profile",    "security"};
@@ -49,7 +49,7 @@ bool good_settings(const Options& options, const std::string& settings) {
         if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() &&
             word.find_first_of("\"'#$[]{}\\\n") == word.npos)
             continue;
-        fail(options, fmt::format("--dds: '{}' is no setting; write KEY=VALUE, the keys are: {}", word, fmt::join(keys, " ")));
+        fail(options, fmt::format("--dds: invalid setting '{}'; use KEY=VALUE with one of the keys: {}", word, fmt::join(keys, " ")));
         return false;
     }
     return true;
@@ -60,7 +60,7 @@ int execute(const Options& options, Cell& cell, const std::string& command, Outp
     const auto colon = command.find(':');
     const std::size_t node = colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
     if (node == cell.size())
-        return fail(options, fmt::format("in which node? write --execute '{}: {}'", cell.nodes().front().name, command));
+        return fail(options, fmt::format("--execute needs a node; use --execute '{}: {}'", cell.nodes().front().name, command));
     return cell.shell(node).execute(command.substr(colon + 1), output, "<commandline>");
 }
 
@@ -97,8 +97,8 @@ int check_cell(const NetlistOptions& options, std::vector<NodeLine> nodes) {
 }
 
 int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
-    if (options.cycles != 0) return fail(options, "--cycles counts the cycles of one machine; of several: --for 10s");
-    if (!options.name.empty()) return fail(options, "--name is of one machine; choose it: --node " + nodes.front().name);
+    if (options.cycles != 0) return fail(options, "--cycles applies to one machine; for several use --for 10s");
+    if (!options.name.empty()) return fail(options, "--name applies to one machine; select it: --node " + nodes.front().name);
     export_variables(options, "sim");
     StopRequest stop;
     CycleGuard guard;
@@ -107,7 +107,7 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     SessionOptions session;
     session.name = fmt::format("sim-{}", ::getpid());
     session.virtual_clock = true;
-    if (!options.show.empty()) return fail(options, "--show is of one machine; of several: --execute 'NODE: getp NAME'");
+    if (!options.show.empty()) return fail(options, "--show applies to one machine; for several use --execute 'NODE: getp NAME'");
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
     Cell cell(cell_name(options.words), std::move(nodes), session, shell_options(options));
@@ -139,7 +139,7 @@ int load_node(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     ProcessOutput output;
     Cell cell(cell_name(options.words), std::move(nodes), offline(), for_check());
     {
-        TextOutput said;  // what is no error the part itself says when it is loaded
+        TextOutput said;  // other messages are printed when the part itself is loaded
         if (!cell.load(options.words, options.ini, said)) {
             write_all(STDERR_FILENO, said.err_text);
             return 1;

@@ -11,13 +11,13 @@
 
 namespace hal::tools {
 
-/// The nodes of the files of `options`; none: they are of one machine. Nothing after saying what is wrong with --node.
+/// Returns the nodes of the files of `options`, none for a netlist of one machine; nullopt after printing an error in --node.
 std::optional<std::vector<NodeLine>> requested_nodes(const NetlistOptions& options);
 
 /// All nodes checked. Returns the exit code.
 int check_cell(const NetlistOptions& options, std::vector<NodeLine> nodes);
 
-/// All nodes on the virtual clock in this process, or options.part alone, to which the others are silent. Returns the exit code.
+/// Runs all nodes on the virtual clock in this process, or options.part alone, with the others offline. Returns the exit code.
 int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes);
 
 /// Loads the part of options.part into the machine, with what it needs for the signals of the others. Returns the exit status.

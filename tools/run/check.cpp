@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal check`: everything wrong with netlists that can be known without running them.
+// `hal check`: check netlists without running them.
 #include "run/check.hpp"
 
 #include <unistd.h>

@@ -12,9 +12,9 @@ struct CheckOptions : NetlistOptions {
     std::vector<std::string> assume;  ///< components that exist only elsewhere
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "netlists, in the order they would be loaded; FILE.ini: those of its [HAL] section");
-        set.value("-i,--ini", ini, "FILE", "where [SECTION]KEY is looked up");
-        set.values("--assume", assume, "NAME", "a component, or the beginning of names, that exists only elsewhere");
+        set.words("FILE", "netlists in load order; FILE.ini: the netlists of its [HAL] section");
+        set.value("-i,--ini", ini, "FILE", "INI file for [SECTION]KEY");
+        set.values("--assume", assume, "NAME", "a component, or a prefix of names, that exists on the target machine only");
     }
 };
 

@@ -10,7 +10,7 @@ struct FmtOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("FILE", "netlists to format in place; - formats standard input");
-        set.flag("--check", check, "change nothing; exit code 1 when a file is not formatted");
+        set.flag("--check", check, "change nothing; exit status 1 when a file is not formatted");
     }
 };
 

@@ -108,7 +108,7 @@ HostedMachine::~HostedMachine() {
 bool HostedMachine::serve(bool needed) {
     const std::string& name = session.options().name;
     if (!good_instance_name(name)) {
-        fail(options_, fmt::format("'{}' is no name for an instance; use letters, digits, '-', '_' and '.', at most 64", name));
+        fail(options_, fmt::format("invalid instance name '{}'; use up to 64 letters, digits, '-', '_' and '.'", name));
         return false;
     }
     ServerOptions how;

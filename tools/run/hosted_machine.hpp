@@ -23,7 +23,7 @@ public:
     ~HostedMachine();  ///< outputs safe, processes ended, instances destroyed
     HostedMachine(const HostedMachine&) = delete;
 
-    /// Opens the control socket. False after saying why on stderr; one that is not `needed` is done without.
+    /// Opens the control socket. Returns false after printing the error; a socket that is not `needed` is optional.
     bool serve(bool needed);
     /// Runs the files; what they print goes to `output`, without one to the process's own. Returns the exit status.
     int load(Output* output = nullptr);

@@ -15,8 +15,8 @@ struct NetlistOptions : ExecutionOptions {
 
 protected:
     void declare_netlists(OptionSet& set) {
-        set.value("-i,--ini", ini, "FILE", "where [SECTION]KEY is looked up");
-        set.flag("-k,--keep-going", keep_going, "go on after an error, command by command, as halcmd -k does");
+        set.value("-i,--ini", ini, "FILE", "INI file for [SECTION]KEY");
+        set.flag("-k,--keep-going", keep_going, "continue after an error, command by command, as halcmd -k does");
     }
 };
 

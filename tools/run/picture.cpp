@@ -35,7 +35,7 @@ std::string degrees(double radians) {
 }
 
 std::string status_line(const Scene& scene) {
-    return fmt::format("  t {:6.1f} s   {} wake-up late p50 {} p99 {}   missed {}{}", scene.seconds, scene.thread.name,
+    return fmt::format("  t {:6.1f} s   {} wake-up latency p50 {} p99 {}   missed {}{}", scene.seconds, scene.thread.name,
                        format_duration(scene.thread.wakeup_p50_ns), format_duration(scene.thread.wakeup_p99_ns), scene.missed,
                        scene.faults != 0 ? fmt::format("   faults {}: show fault", scene.faults) : "");
 }
@@ -117,7 +117,7 @@ struct Picture::State {
         const std::lock_guard lock(session.mutex);
         Scene scene;
         for (const auto& reading : session.read(motif.signals)) {
-            if (!reading || reading->type != HAL_TYPE_FLOAT) return std::nullopt;  // somebody deleted the signal
+            if (!reading || reading->type != HAL_TYPE_FLOAT) return std::nullopt;  // the signal was deleted
             scene.values.push_back(reading->value.real);
         }
         scene.seconds = static_cast<double>(session.now_ns() - start_ns) * 1e-9;

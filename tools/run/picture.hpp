@@ -33,7 +33,7 @@ const Motif* motif_for(const Model& model);
 /// below the last picture. Changes no mode of the terminal, so there is nothing to restore whatever happens.
 class Picture {
 public:
-    /// Nothing when standard output is no terminal, it is too small, or the netlist has no motif.
+    /// Returns nullptr when standard output is not a terminal, it is too small, or the netlist has no motif.
     static std::unique_ptr<Picture> start(Session& session);
     ~Picture();
     /// Writes a line to standard error, in the terminal below the last picture; the next picture is drawn below it. [any]

@@ -107,7 +107,7 @@ std::string loaded_summary(Session& session) {
             24);
     }
     for (const ThreadReport& report : session.thread_reports())
-        if (!report.supervised) text += fmt::format("thread {} is not supervised (supervise=off): if it hangs, nobody notices\n", report.name);
+        if (!report.supervised) text += fmt::format("thread {} is not supervised (supervise=off): a hang is not detected\n", report.name);
     for (const std::string& line : session.missing_privileges()) text += line + "\n";
     return text;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal run` and `halrun`: netlists in real-time threads until somebody ends it.
+// `hal run` and `halrun`: netlists in real-time threads until the program is ended.
 #include "run/run.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace hal::tools {
 
 namespace {
 
-/// LinuxCNC's halrun: only what the commands print; threads start when the netlist says so; ends after the files unless
+/// LinuxCNC's halrun: only what the commands print; threads start at the netlist's `start`; ends after the files unless
 /// the user types.
 int run_classic(HostedMachine& machine, const RunOptions& options) {
     const int status = machine.load();
@@ -35,12 +35,12 @@ std::string end_reason(int signal) {
     return name ? fmt::format("ended by SIG{}\n", name) : "";
 }
 
-/// --watchdog. False after saying why not.
+/// Opens the device of --watchdog. Returns false after printing the error.
 bool attach_watchdog(HostedMachine& machine, const RunOptions& options) {
     if (options.watchdog.empty()) return true;
     const std::lock_guard lock(machine.session.mutex);
     std::string problem;
-    if (machine.session.model().threads.empty()) problem = "--watchdog: there is no thread whose progress could feed it";
+    if (machine.session.model().threads.empty()) problem = "--watchdog needs a thread whose progress feeds the device; the netlist has none";
     if (problem.empty() && machine.session.attach_watchdog(options.watchdog, problem)) return true;
     fail(options, problem);
     return false;
@@ -71,7 +71,7 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     machine.shut_down();
     print("\n" + end_reason(machine.stop.signal()) + report);
     if (!machine.session.watchdog_disarmed())
-        fail(options, options.watchdog + " was not disarmed, because a thread does not end: it resets this host after its timeout");
+        fail(options, options.watchdog + "was not disarmed, because a thread does not end; it resets this host after its timeout");
     return faulted ? 1 : status;
 }
 
@@ -79,10 +79,10 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
 
 int run_run(const RunOptions& options) {
     if (options.words.empty() && !options.interactive && !options.classic)
-        return fail(options, "a netlist is missing; type: hal run FILE.hal, or hal run -I");
+        return fail(options, "missing netlist; type: hal run FILE.hal, or hal run -I");
     if (!options.dds.empty() && options.part.empty())
         return fail(options,
-                    "--dds is about the nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take " +
+                    "--dds applies to nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take " +
                         options.dds + " themselves");
     if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
     const auto nodes = requested_nodes(options);

@@ -15,15 +15,15 @@ struct RunOptions : NetlistOptions {
     bool interactive = false, no_picture = false;
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "netlists (.hal), or an INI file whose [HAL]HALFILE names them", false);
+        set.words("FILE", "netlists (.hal), or an INI file with [HAL]HALFILE", false);
         set.flag("-I,--interactive", interactive, "open the shell after loading; leaving it ends the run");
-        set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; without it: until Ctrl-C");
-        set.value("-N,--name", name, "NAME", "of this instance, when several run on one machine (default: default)");
+        set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; default: run until Ctrl-C");
+        set.value("-N,--name", name, "NAME", "name of this instance, when several run on one machine (default: default)");
         declare_netlists(set);
         set.value("--watchdog", watchdog, "DEVICE", "write to this device (/dev/watchdog) while every thread makes progress");
         set.flag("--no-picture", no_picture, "no live picture in the terminal");
-        set.value("--node", part, "NAME", "of a netlist for several machines: load the part of this one");
-        set.value("--dds", dds, "SETTINGS", "how nodes meet: interfaces=ADDRESS domain=N peers=… (default: on this machine only)");
+        set.value("--node", part, "NAME", "load the part of this node of a netlist for several machines");
+        set.value("--dds", dds, "SETTINGS", "DDS discovery: interfaces=ADDRESS domain=N peers=… (default: this machine only)");
     }
 };
 

@@ -67,7 +67,7 @@ int show_values(const SimOptions& options, Session& session) {
         for (const auto& [own, pin] : session.model().pin) names.emplace_back(own);
         for (const auto& [own, signal] : session.model().signal) names.emplace_back(own);
         const std::string hint = did_you_mean(name, names);
-        return fail(options, fmt::format("--show: there is no pin, parameter or signal '{}'{}", name, hint.empty() ? "" : "; " + hint));
+        return fail(options, fmt::format("--show: unknown pin, parameter or signal '{}'{}", name, hint.empty() ? "" : "; " + hint));
     }
     std::size_t width = 0;
     for (const Shown& one : all) width = std::max(width, one.name.size());

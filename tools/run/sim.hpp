@@ -18,17 +18,17 @@ struct SimOptions : NetlistOptions {
     bool quiet = false;  ///< no summary
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "netlists (.hal), or an INI file whose [HAL]HALFILE names them");
+        set.words("FILE", "netlists (.hal), or an INI file with [HAL]HALFILE");
         set.for_how_long(for_ns, "advance the virtual clock by 10s, 250ms … after loading");
-        set.value("--cycles", cycles, "N", "advance by so many cycles of the fastest thread after loading");
+        set.value("--cycles", cycles, "N", "advance by N cycles of the fastest thread after loading");
         set.duration("--cycle-limit", cycle_limit_ns, "end with status 1 when one cycle takes longer than this in wall time", 1, "10s, 1min or 500ms");
         set.value("-N,--name", name, "NAME", "of the instance");
         declare_netlists(set);
         set.flag("--report", report, "print the timing report on stderr at the end");
         set.values("--show", show, "NAMES", "print these pins, parameters and signals at the end; patterns like 'pid.*' too; may be repeated");
-        set.flag("-q,--quiet", quiet, "no summary; without it there is one on stderr when that is a terminal or the netlist printed nothing");
-        set.value("--node", part, "NAME", "of a netlist for several machines: this one alone; without it all of them together");
-        set.values("-e,--execute", execute, "COMMAND", "execute this command at the end; of several machines: 'NODE: COMMAND'; may be repeated");
+        set.flag("-q,--quiet", quiet, "no summary (default: on stderr, when that is a terminal or the netlist printed nothing)");
+        set.value("--node", part, "NAME", "simulate only this node of a netlist for several machines (default: all nodes)");
+        set.values("-e,--execute", execute, "COMMAND", "execute this command at the end; for several machines: 'NODE: COMMAND'; may be repeated");
     }
 };
 

@@ -276,7 +276,7 @@ static int run_function(int f) {
 int main(int argc, char **argv) {
     void *const library = argc > 1 ? dlopen(argv[1], RTLD_NOW) : NULL;
     component = library ? dlsym(library, "hal_plugin") : NULL;
-    if (!component) return printf("refused: it cannot be opened\n"), 3;
+    if (!component) return printf("rejected: it cannot be opened\n"), 3;
     arguments_given = argv + 2;
     argument_count = argc - 2;
     for (int number = 0; number < 6; ++number) signal((const int[]){SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGALRM, SIGABRT}[number], ended);

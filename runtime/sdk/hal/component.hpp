@@ -437,14 +437,14 @@ bool guarded(const hal_host* host, Action action) noexcept {
 
 template <class C>
 void construct(const hal_host* host, void* memory) {
-    new (memory) C(host);  // "no matching function": the component lacks the line: using Component::Component;
+    new (memory) C(host);  // "no matching function": missing line in the component: using Component::Component;
 }
 
 template <std::derived_from<Component> C>
 constexpr hal_component component(const char* name, const char* summary, const char* doc = "") {
     // An error in a member's declaration makes C unconstructible as well; then it is no aggregate, because the constructor is inherited.
     static_assert(std::is_constructible_v<C, const hal_host*> || !std::is_aggregate_v<C>,
-                  "the component lacks the line: using Component::Component;");
+                  "missing line in the component: using Component::Component;");
     constexpr Traits traits = traits_of<C>();
     return {
         sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name, summary, doc,

@@ -417,7 +417,7 @@ static bool take_pin(const hal_host *host_itself, const hal_pin_decl *decl, hal_
 }
 static bool take_function(const hal_host *host_itself, const hal_function_decl *decl) {
     (void)host_itself;
-    rtapi_print_msg(RTAPI_MSG_ERR, "%s: '%s': a program has no functions for threads\n", name_of_program, decl->name);
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: '%s': a program cannot have functions for threads\n", name_of_program, decl->name);
     return false;
 }
 static const char *take_argument(const hal_host *host_itself, const hal_argument_decl *decl) {
