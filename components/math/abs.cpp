@@ -6,7 +6,7 @@ namespace {
 struct Abs : hal::Component {
     using Component::Component;
     hal::In<double>  in{*this, "in", "the input"};
-    hal::Out<double> out{*this, "out", "the input without its sign"};
+    hal::Out<double> out{*this, "out", "absolute value of the input"};
     hal::Out<bool>   sign{*this, "sign", "TRUE while in is below 0"};
     hal::Out<bool>   is_positive{*this, "is-positive", "TRUE while in is above 0"};
     hal::Out<bool>   is_negative{*this, "is-negative", "TRUE while in is below 0"};

@@ -3,8 +3,8 @@
 
 using AbsS32 = AbsInteger<std::int32_t>;
 
-HAL_COMPONENT(AbsS32, "abs_s32", "Amount and sign of a 32-bit integer", R"(
-The smallest number, -2^31, whose amount the type does not have, gives the largest, 2^31 - 1.
+HAL_COMPONENT(AbsS32, "abs_s32", "Absolute value and sign of a 32-bit integer", R"(
+For -2^31, whose absolute value is out of range, `out` is 2^31 - 1.
 
     loadrt abs_s32 names=distance
     addf distance servo

@@ -3,8 +3,8 @@
 
 using AbsS64 = AbsInteger<std::int64_t>;
 
-HAL_COMPONENT(AbsS64, "abs_s64", "Amount and sign of a 64-bit integer", R"(
-The smallest number, -2^63, whose amount the type does not have, gives the largest, 2^63 - 1.
+HAL_COMPONENT(AbsS64, "abs_s64", "Absolute value and sign of a 64-bit integer", R"(
+For -2^63, whose absolute value is out of range, `out` is 2^63 - 1.
 
     loadrt abs_s64 names=distance
     addf distance servo

@@ -5,11 +5,11 @@ namespace {
 
 struct Blend : hal::Component {
     using Component::Component;
-    hal::In<double>  in0{*this, "in0", "the output while select is 0"};
-    hal::In<double>  in1{*this, "in1", "the output while select is 1"};
-    hal::In<double>  select{*this, "select", "share of in1"};
-    hal::Out<double> out{*this, "out", "between in0 and in1"};
-    hal::Param<bool> open{*this, "open", "TRUE: select below 0 or above 1 leads beyond in0 and in1; FALSE: it is limited"};
+    hal::In<double>  in0{*this, "in0", "output for select 0"};
+    hal::In<double>  in1{*this, "in1", "output for select 1"};
+    hal::In<double>  select{*this, "select", "fraction of in1, 0..1"};
+    hal::Out<double> out{*this, "out", "interpolation between in0 and in1"};
+    hal::Param<bool> open{*this, "open", "TRUE extrapolates for select below 0 or above 1; FALSE limits select to 0..1"};
     hal::Function    run{*this, "", hal::step<&Blend::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {

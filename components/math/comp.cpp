@@ -5,10 +5,10 @@ namespace {
 
 struct Comp : hal::Component {
     using Component::Component;
-    hal::In<double>    in0{*this, "in0", "the inverting input"};
-    hal::In<double>    in1{*this, "in1", "the other input"};
+    hal::In<double>    in0{*this, "in0", "inverting input"};
+    hal::In<double>    in1{*this, "in1", "non-inverting input"};
     hal::Out<bool>     out{*this, "out", "TRUE while in1 is above in0, with hysteresis"};
-    hal::Out<bool>     equal{*this, "equal", "TRUE while the inputs differ by no more than hyst / 2"};
+    hal::Out<bool>     equal{*this, "equal", "TRUE while the inputs differ by at most hyst / 2"};
     hal::Param<double> hyst{*this, "hyst", "width of the hysteresis"};
     hal::Function      run{*this, "", hal::step<&Comp::update>, "compares"};
 
@@ -27,9 +27,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Comp, "comp", "Compares two values, with hysteresis", R"(
-`out` becomes TRUE when `in1` rises above `in0 + hyst/2` and FALSE when it falls to `in0 - hyst/2`. With `hyst` 0 that is
-`in1 > in0`. Set `hyst` when you use `equal`: measured values are hardly ever exactly equal. An input that is not a number
-leaves `out` as it is and makes `equal` FALSE.
+`out` becomes TRUE when `in1` rises above `in0 + hyst/2` and FALSE when it falls to `in0 - hyst/2`. With `hyst` 0 `out` is
+`in1 > in0`. Set `hyst` to use `equal`: measured values are hardly ever exactly equal. While an input is NaN,
+`out` keeps its value and `equal` is FALSE.
 
     loadrt comp names=too-hot
     addf too-hot servo

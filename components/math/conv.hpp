@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The conv_* components: one value to another type, with what happens to values the other type does not have.
+// The conv_* components: conversion between types, with wrap-around or clamping of values out of range.
 #pragma once
 
 #include <limits>
@@ -9,7 +9,7 @@
 
 namespace conv {
 
-/// True when every value of `From` lies in the range of `To`.
+/// True if every value of `From` is in the range of `To`.
 template <class To, class From>
 constexpr bool always_fits() {
     if constexpr (std::same_as<To, double> || std::same_as<From, bool>) return true;
@@ -17,7 +17,7 @@ constexpr bool always_fits() {
     else return std::in_range<To>(std::numeric_limits<From>::min()) && std::in_range<To>(std::numeric_limits<From>::max());
 }
 
-/// True when `value` lies in the range of `To`; a value that is not a number does not. [any]
+/// Returns true if `value` is in the range of `To`; false for NaN. [any]
 template <class To, class From>
 constexpr bool fits(From value) noexcept {
     if constexpr (always_fits<To, From>()) return true;
@@ -30,40 +30,40 @@ constexpr bool fits(From value) noexcept {
     } else return std::in_range<To>(value);
 }
 
-/// `value` modulo 2^64, after cutting off its fraction; 0 for infinity and what is not a number. [any]
+/// Returns `value` truncated to an integer modulo 2^64; 0 for infinity and NaN. [any]
 inline std::uint64_t wrapped(double value) noexcept {
     const double rest = std::fmod(std::trunc(std::fabs(value)), 0x1p64);
     const auto bits = std::isfinite(rest) ? static_cast<std::uint64_t>(rest) : 0;
     return value < 0.0 ? 0 - bits : bits;
 }
 
-/// `value` in the other type. What does not fit wraps around (a bit is TRUE for all but 0), or goes to the nearest end
-/// of the range when `clamp` is set. [any]
+/// Converts `value`. A value out of range wraps around (a bit is TRUE for all but 0), or is set to the nearest limit of the
+/// range if `clamp` is set. [any]
 template <class To, class From>
 constexpr To convert(From value, bool clamp) noexcept {
     if (clamp && !fits<To>(value)) {
         if (value > From{0}) return std::numeric_limits<To>::max();
         if (value < From{0}) return std::numeric_limits<To>::lowest();
-        return To{};  // not a number
+        return To{};  // NaN
     }
     if constexpr (std::same_as<To, bool>) return value != From{0};
     else if constexpr (std::same_as<From, double>) return fits<To>(value) ? static_cast<To>(value) : static_cast<To>(wrapped(value));
     else return static_cast<To>(value);
 }
 
-/// A conversion that can always be made.
+/// A conversion without loss of range.
 template <class From, class To>
 struct Widening : hal::Component {
     using Component::Component;
-    hal::In<From> in{*this, "in", "the value to convert"};
-    hal::Out<To>  out{*this, "out", "the same value in the other type"};
+    hal::In<From> in{*this, "in", "value to convert"};
+    hal::Out<To>  out{*this, "out", "converted value"};
     hal::Function run{*this, "", hal::step<&Widening::update>, "converts"};
 
     void update(hal::Cycle) noexcept { out = convert<To, From>(in, false); }
 
     static constexpr const char* manual = R"(
-HAL does not convert between types by itself; this component stands between two signals. Every input has an output; a
-64-bit integer keeps about 16 digits when it becomes a float. For example:
+HAL does not convert between types implicitly; link this component between two signals. Every input value is in the range of the output; a
+64-bit integer keeps about 16 digits as a float. For example:
 
     loadrt conv_s32_float
     addf conv-s32-float.0 servo
@@ -72,14 +72,14 @@ HAL does not convert between types by itself; this component stands between two 
 )";
 };
 
-/// A conversion that not every value survives.
+/// A conversion to a smaller range.
 template <class From, class To>
 struct Narrowing : hal::Component {
     using Component::Component;
-    hal::In<From>    in{*this, "in", "the value to convert"};
-    hal::Out<To>     out{*this, "out", "the value in the other type"};
-    hal::Out<bool>   out_of_range{*this, "out-of-range", "TRUE while in is not in the range of out"};
-    hal::Param<bool> clamp{*this, "clamp", "TRUE: what is out of range goes to the nearest end of it; FALSE: it wraps around"};
+    hal::In<From>    in{*this, "in", "value to convert"};
+    hal::Out<To>     out{*this, "out", "converted value"};
+    hal::Out<bool>   out_of_range{*this, "out-of-range", "TRUE while in is outside of the range of out"};
+    hal::Param<bool> clamp{*this, "clamp", "TRUE limits values to the range of out; FALSE wraps them around"};
     hal::Function    run{*this, "", hal::step<&Narrowing::update>, "converts"};
 
     void update(hal::Cycle) noexcept {
@@ -89,10 +89,10 @@ struct Narrowing : hal::Component {
     }
 
     static constexpr const char* manual = R"(
-HAL does not convert between types by itself; this component stands between two signals. A float loses its fraction
-(1.9 becomes 1, -1.9 becomes -1). A value that the other type does not have sets `out-of-range` and wraps around (modulo
-2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, goes to the nearest end of the range. An input that is not
-a number gives 0. For example:
+HAL does not convert between types implicitly; link this component between two signals. The fraction of a float is truncated
+(1.9 becomes 1, -1.9 becomes -1). A value out of range sets `out-of-range` and wraps around (modulo
+2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, is set to the nearest limit of the range. A NaN input
+gives 0. For example:
 
     loadrt conv_float_s32
     addf conv-float-s32.0 servo

@@ -7,7 +7,7 @@ struct Deadzone : hal::Component {
     using Component::Component;
     hal::In<double>    in{*this, "in", "the input"};
     hal::Out<double>   out{*this, "out", "center inside the zone, in outside"};
-    hal::Param<double> center{*this, "center", "the middle of the zone"};
+    hal::Param<double> center{*this, "center", "centre of the zone"};
     hal::Param<double> threshold{*this, "threshold", "width of the zone", {.initial = 1.0}};
     hal::Function      run{*this, "", hal::step<&Deadzone::update>, "computes out"};
 

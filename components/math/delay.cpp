@@ -7,25 +7,25 @@ namespace {
 
 struct Delay : hal::Component {
     using Component::Component;
-    hal::Argument          depth{*this, "depth", 1000, "the longest delay in cycles", {.min = 1, .max = 10'000'000}};
-    hal::In<double>        in{*this, "in", "the value"};
-    hal::In<bool>          bit_in{*this, "bit-in", "a bit that goes beside it"};
-    hal::In<std::uint32_t> cycles{*this, "cycles", "how many cycles later"};
-    hal::In<double>        seconds{*this, "seconds", "how much later, on top of cycles", {.unit = "s"}};
-    hal::In<bool>          interpolate{*this, "interpolate", "TRUE: between two cycles on the straight line; FALSE: the nearest cycle"};
-    hal::In<bool>          reset{*this, "reset", "while TRUE the inputs are passed and fill the line"};
-    hal::Out<double>       out{*this, "out", "in, later"};
-    hal::Out<bool>         bit_out{*this, "bit-out", "bit-in, later"};
-    hal::Out<double>       delayed{*this, "delay", "how much later out is", {.unit = "s", .finite = true}};
-    hal::Out<bool>         limited{*this, "limited", "TRUE: more than depth is wanted, or less than nothing"};
-    hal::Function          run{*this, "", hal::step<&Delay::update>, "stores in, gives out"};
+    hal::Argument          depth{*this, "depth", 1000, "maximum delay in cycles", {.min = 1, .max = 10'000'000}};
+    hal::In<double>        in{*this, "in", "value"};
+    hal::In<bool>          bit_in{*this, "bit-in", "bit to delay with the value"};
+    hal::In<std::uint32_t> cycles{*this, "cycles", "delay in cycles"};
+    hal::In<double>        seconds{*this, "seconds", "delay added to cycles", {.unit = "s"}};
+    hal::In<bool>          interpolate{*this, "interpolate", "TRUE interpolates linearly between two cycles; FALSE takes the nearest cycle"};
+    hal::In<bool>          reset{*this, "reset", "TRUE passes the inputs and fills the memory with them"};
+    hal::Out<double>       out{*this, "out", "in, delayed"};
+    hal::Out<bool>         bit_out{*this, "bit-out", "bit-in, delayed"};
+    hal::Out<double>       delayed{*this, "delay", "delay in use", {.unit = "s", .finite = true}};
+    hal::Out<bool>         limited{*this, "limited", "TRUE: the requested delay is above depth or negative"};
+    hal::Function          run{*this, "", hal::step<&Delay::update>, "stores in and updates out"};
 
     void update(hal::Cycle cycle) noexcept {
         const double most = static_cast<double>(size_ - 1);
         const double wanted = static_cast<double>(cycles) + seconds / cycle.seconds();
         const bool possible = wanted >= -1e-9 && wanted <= most + 1e-9;
-        double back = wanted >= most ? most : wanted > 0.0 ? wanted : 0.0;  // 0 for what is not a number
-        // Seconds that are meant to be whole periods must not fall short of one by rounding.
+        double back = wanted >= most ? most : wanted > 0.0 ? wanted : 0.0;  // 0 for NaN
+        // Seconds that are a multiple of the period must not round down to one period less.
         const double whole = std::round(back);
         if (!interpolate || std::fabs(back - whole) < 1e-6) back = whole;
 
@@ -47,7 +47,7 @@ private:
         double value;
         bool bit;
     };
-    /// What came `n` cycles ago; before the first, the first.
+    /// Returns the input `n` cycles ago; before the first, the first.
     const Sample& at(std::size_t n) const noexcept { return line_[(newest_ + size_ - std::min(n, filled_ - 1)) % size_]; }
 
     std::size_t size_ = static_cast<std::size_t>(depth) + 1, newest_ = 0, filled_ = 0;
@@ -56,15 +56,15 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Delay, "delay", "Gives a value and a bit back some cycles or seconds later", R"(
+HAL_COMPONENT(Delay, "delay", "Delays a value and a bit by cycles or seconds", R"(
     out(t) = in(t - cycles * period - seconds)
 
-A dead time: of a bus, a camera, a conveyor. The memory is taken when the component is loaded: `depth` cycles, 16 bytes each. The delay
-may change at any time; when it grows, values come twice, when it shrinks, some are left out. A delay of a part of a period is the nearest
-cycle, or with `interpolate` lies on the straight line between its neighbours (a value that is not a number then spoils both).
+A dead time, as of a bus, a camera or a conveyor. The memory is allocated when the component is loaded: `depth` cycles, 16 bytes each. The delay
+may change at any time: when it grows, values are repeated; when it shrinks, values are skipped. A delay that is not a multiple of the period is rounded to
+the nearest cycle, or with `interpolate` interpolated linearly between its neighbours (a NaN then affects both intervals).
 
-Before the first value is old enough `out` is the first value; `reset` starts like that again. A delay beyond `depth` is `depth`, a
-negative one or what is not a number is 0, and `limited` says so.
+Until the first value is old enough, `out` is the first value; `reset` restarts this. A delay above `depth` counts as `depth`, a
+negative or NaN delay as 0; `limited` is TRUE then.
 
     loadrt delay names=camera-lag depth=100
     addf camera-lag servo

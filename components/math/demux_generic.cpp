@@ -6,13 +6,13 @@ namespace {
 struct DemuxGeneric : hal::Component {
     using Component::Component;
     hal::InstanceName          name{*this, "demux-gen", 2};
-    hal::TextArgument          text{*this, "config", "ff4", "type in, type out (b f s u) and number of outputs, for each demux",
+    hal::TextArgument          text{*this, "config", "ff4", "type in, type out (b f s u) and number of outputs, for each instance",
                                     {.per_instance = true}};
     routed::Config             config{text.get()};
     routed::Choice             choice{*this, config};
-    routed::AnyType<hal::Ins>  in{*this, config.from, "in-", "", 1, "the value"};
-    routed::AnyType<hal::Outs> out{*this, config.to, "out-", "-##", config.ways, "follows the value while # is chosen"};
-    hal::Function              run{*this, "", hal::step<&DemuxGeneric::update>, "computes the chosen output"};
+    routed::AnyType<hal::Ins>  in{*this, config.from, "in-", "", 1, "value"};
+    routed::AnyType<hal::Outs> out{*this, config.to, "out-", "-##", config.ways, "set to the value while # is selected"};
+    hal::Function              run{*this, "", hal::step<&DemuxGeneric::update>, "updates the selected output"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::uint64_t way = choice.update(cycle);
@@ -24,8 +24,8 @@ struct DemuxGeneric : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(DemuxGeneric, "demux_generic", "Routes a value of any type to one of many outputs", R"(
-The way back of `mux_generic`, with the same `config=`, choice, debouncing and conversion of types. The chosen output follows
-the input; the others keep their values, 0 at first. `config=fu12` makes `demux-gen.00` with a float in and twelve u32 out.
+The inverse of `mux_generic`, with the same `config=`, selection, debouncing and type conversion. The selected output follows
+the input; the others keep their values, initially 0. `config=fu12` creates `demux-gen.00` with a float input and twelve u32 outputs.
 
     loadrt demux_generic config=ss3 names=to-axis
     addf to-axis servo

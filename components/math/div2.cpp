@@ -8,7 +8,7 @@ struct Div2 : hal::Component {
     hal::In<double>    in0{*this, "in0", "dividend"};
     hal::In<double>    in1{*this, "in1", "divisor"};
     hal::Out<double>   out{*this, "out", "in0 / in1"};
-    hal::Param<double> deadband{*this, "deadband", "smallest amount of the divisor: one nearer to 0 counts as this"};
+    hal::Param<double> deadband{*this, "deadband", "smallest absolute value of the divisor; a smaller one counts as this"};
     hal::Function      run{*this, "", hal::step<&Div2::update>, "divides"};
 
     void update(hal::Cycle) noexcept {
@@ -21,8 +21,8 @@ struct Div2 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Div2, "div2", "Quotient of two numbers", R"(
-A divisor between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, so that `out` stays moderate.
-LinuxCNC's manual page promises an `out` of 0 there; what the component does is this. With a `deadband` of 0 a divisor of 0 gives 0.
+A divisor between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`.
+(LinuxCNC's manual page documents an `out` of 0 there; its component behaves as described here.) With a `deadband` of 0 a divisor of 0 gives 0.
 
     loadrt div2 names=power-factor
     addf power-factor servo

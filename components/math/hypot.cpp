@@ -17,7 +17,7 @@ struct Hypot : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Hypot, "hypot", "Length of a vector of up to three components", R"(
-`out = sqrt(in0^2 + in1^2 + in2^2)`, without overflow on the way. Leave unused inputs at 0.
+`out = sqrt(in0^2 + in1^2 + in2^2)`, without intermediate overflow. Leave unused inputs at 0.
 
     loadrt hypot names=path-speed
     addf path-speed servo

@@ -5,11 +5,11 @@ namespace {
 
 struct Ilowpass : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t>  in{*this, "in", "counts, for example of a hand wheel"};
-    hal::Out<std::int32_t> out{*this, "out", "in * scale, smoothed; goes round at the ends of the type"};
+    hal::In<std::int32_t>  in{*this, "in", "counts, for example of a handwheel"};
+    hal::Out<std::int32_t> out{*this, "out", "in * scale, smoothed; wraps around at the limits of the type"};
     hal::Param<double>     scale{*this, "scale", "steps of out per count", {.initial = 1024.0}};
-    hal::Param<double>     gain{*this, "gain", "share of the way to the input in each cycle, 0 to 1", {.initial = 0.5}};
-    hal::Function          run{*this, "", hal::step<&Ilowpass::update>, "smooths"};
+    hal::Param<double>     gain{*this, "gain", "filter gain per cycle, 0..1", {.initial = 0.5}};
+    hal::Function          run{*this, "", hal::step<&Ilowpass::update>, "filters the counts"};
 
     void update(hal::Cycle) noexcept {
         const double next = state_ + (in * scale.get() - state_) * gain;
@@ -24,9 +24,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Ilowpass, "ilowpass", "Low-pass filter for counts", R"(
-Makes the steps of a hand wheel into smooth motion: `out` goes to `in * scale` by the share `gain` per cycle and gets
-all the way there. Divide the jog scale of the axis by `scale`. `out` goes round at the ends of its type, as counters do; what follows
-must take differences. A cycle whose result is not a number is left out; above a gain of 2 the filter is unstable.
+Turns the steps of a handwheel into smooth motion: each cycle, `out` moves by the fraction `gain` of the remaining distance to `in * scale`, and it
+reaches it exactly. Divide the jog scale of the axis by `scale`. `out` wraps around at the limits of its type, as counters do; use its
+differences. A cycle whose result is NaN is skipped; above a gain of 2 the filter is unstable.
 
     loadrt ilowpass names=wheel-smooth
     addf wheel-smooth servo

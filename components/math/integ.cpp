@@ -7,8 +7,8 @@ struct Integ : hal::Component {
     using Component::Component;
     hal::In<double>  in{*this, "in", "the input"};
     hal::In<double>  gain{*this, "gain", "factor of in", {.initial = 1.0}};
-    hal::Out<double> out{*this, "out", "the integral of gain * in over time"};
-    hal::In<bool>    reset{*this, "reset", "while TRUE out is 0"};
+    hal::Out<double> out{*this, "out", "integral of gain * in over time"};
+    hal::In<bool>    reset{*this, "reset", "TRUE sets out to 0"};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::Function    run{*this, "", hal::step<&Integ::update>, "integrates"};
@@ -27,8 +27,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Integ, "integ", "Integrator with gain, reset and limits", R"(
-`out = out + gain * in * period`, kept between `min` and `max`, which also keeps it from winding up. A cycle whose input
-is not a number is left out.
+`out = out + gain * in * period`, limited to `min` and `max`, which also prevents wind-up. NaN inputs are ignored.
 
     loadrt integ names=distance
     addf distance servo

@@ -19,7 +19,7 @@ struct Invert : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Invert, "invert", "Reciprocal", R"(
-`out = 1 / in`, and 0 while `|in| <= deadband`; so an input of 0 gives 0, not infinity.
+`out = 1 / in`, and 0 while `|in| <= deadband`, so an input of 0 gives 0 and not infinity.
 
     loadrt invert names=period
     addf period servo

@@ -5,17 +5,17 @@ namespace {
 
 // The curve is f(x) = a x^p + b x for deadband <= x <= 1, with f(deadband) = 0 and f(1) = 1:
 //     a = d / (d - d^p) = 1 / (1 - d^(p - 1)),  b = 1 - a
-// For p = 1 the two terms are one and the same: f is the straight line between these points, the limit for p -> 1
-// when d = 0, and the only line there is otherwise.
+// For p = 1 the two terms are equal: f is the straight line between these points, the limit for p -> 1
+// when d = 0, and the only solution otherwise.
 struct Joyhandle : hal::Component {
     using Component::Component;
-    hal::In<double>    in{*this, "in", "position of the stick, -1 to 1"};
-    hal::Out<double>   out{*this, "out", "the shaped value"};
-    hal::Param<double> power{*this, "power", "1 or more: how much the curve bends", {.initial = 2.0}};
-    hal::Param<double> deadband{*this, "deadband", "positions between plus and minus this give 0; 0 to 0.99"};
-    hal::Param<double> scale{*this, "scale", "value of the curve at the stop", {.initial = 1.0}};
-    hal::Param<double> offset{*this, "offset", "added to the amount of the curve outside the dead band"};
-    hal::Param<bool>   inverse{*this, "inverse", "TRUE: steep first and flat at the stop"};
+    hal::In<double>    in{*this, "in", "position of the joystick, -1..1"};
+    hal::Out<double>   out{*this, "out", "shaped value"};
+    hal::Param<double> power{*this, "power", "exponent of the curve, at least 1", {.initial = 2.0}};
+    hal::Param<double> deadband{*this, "deadband", "positions within ±deadband give 0; 0..0.99"};
+    hal::Param<double> scale{*this, "scale", "value of the curve at full deflection", {.initial = 1.0}};
+    hal::Param<double> offset{*this, "offset", "added to the absolute value of the curve outside the deadband"};
+    hal::Param<bool>   inverse{*this, "inverse", "TRUE: steep at the centre and flat at full deflection"};
     hal::Function      run{*this, "", hal::step<&Joyhandle::update>, "shapes the value"};
 
     void update(hal::Cycle) noexcept {
@@ -44,9 +44,9 @@ HAL_COMPONENT(Joyhandle, "joyhandle", "Shapes the movement of a joystick", R"(
     out = ±(scale * (a |in|^power + b |in|) + offset)      for deadband <= |in| <= 1
     out = 0                                                for |in| < deadband
 
-`a` and `b` are such that the curve begins at `deadband` with `offset` and ends at 1 with `scale + offset`; beyond 1 it stays there.
-`inverse` turns the curve by half a turn; unlike in LinuxCNC it does so for both directions of the stick. A `power` below 1
-counts as 1, a `deadband` below 0 as 0 and above 0.99 as 0.99. An input that is not a number gives 0.
+`a` and `b` are such that the curve starts at `deadband` with `offset` and ends at 1 with `scale + offset`; above 1 it is constant.
+`inverse` rotates the curve by half a turn, in contrast to LinuxCNC for both directions of the stick. A `power` below 1
+counts as 1, a `deadband` below 0 as 0 and above 0.99 as 0.99. A NaN input gives 0.
 
     loadrt joyhandle names=stick-x
     addf stick-x servo

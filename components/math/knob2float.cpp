@@ -5,17 +5,17 @@ namespace {
 
 struct Knob2float : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t> counts{*this, "counts", "position of the knob, most often an encoder's counts"};
-    hal::In<bool>         enable{*this, "enable", "TRUE: the knob moves out; FALSE: out stands"};
+    hal::In<std::int32_t> counts{*this, "counts", "position of the knob, usually encoder counts"};
+    hal::In<bool>         enable{*this, "enable", "TRUE: the knob changes out; FALSE holds out"};
     hal::In<double>       scale{*this, "scale", "change of out per count"};
-    hal::Out<double>      out{*this, "out", "the value"};
-    hal::Param<double>    max_out{*this, "max-out", "largest value; counts beyond are lost", {.initial = 1.0}};
-    hal::Param<double>    min_out{*this, "min-out", "smallest value; counts beyond are lost", {.initial = 0.0}};
+    hal::Out<double>      out{*this, "out", "value"};
+    hal::Param<double>    max_out{*this, "max-out", "largest value; counts beyond it are lost", {.initial = 1.0}};
+    hal::Param<double>    min_out{*this, "min-out", "smallest value; counts beyond it are lost", {.initial = 0.0}};
     hal::Function         run{*this, "", hal::step<&Knob2float::update>, "follows the knob"};
 
     void update(hal::Cycle) noexcept {
         const std::int32_t now = counts;
-        // the counter may go round at the ends of its type
+        // the counter may wrap around
         const auto moved = static_cast<std::int32_t>(static_cast<std::uint32_t>(now) - static_cast<std::uint32_t>(last_));
         last_ = now;
         const double next = std::fmin(std::fmax(value_ + moved * scale.get(), min_out), max_out);
@@ -31,8 +31,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Knob2float, "knob2float", "Turns the counts of a knob into a number within limits", R"(
-While `enable` is TRUE each count changes `out` by `scale`, between `min-out` and `max-out`; turning back from a limit takes effect at
-once. Counts while `enable` is FALSE are ignored. When `min-out` is above `max-out`, `max-out` wins.
+While `enable` is TRUE each count changes `out` by `scale`, between `min-out` and `max-out`; turning back from a limit takes effect
+immediately. Counts while `enable` is FALSE are ignored. If `min-out` is above `max-out`, `max-out` applies.
 
     loadrt knob2float names=feed
     addf feed servo

@@ -6,22 +6,22 @@ namespace {
 struct Limit1 : hal::Component {
     using Component::Component;
     hal::In<double>  in{*this, "in", "the value to limit"};
-    hal::Out<double> out{*this, "out", "in, kept between min and max"};
+    hal::Out<double> out{*this, "out", "in, limited to min and max"};
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::Function    run{*this, "", hal::step<&Limit1::update>, "computes out"};
 
-    // Not std::clamp: min above max is the user's right, and then max wins.
+    // Not std::clamp: users may set min above max, and then max applies.
     void update(hal::Cycle) noexcept { out = std::min(std::max(in.get(), min.get()), max.get()); }
 };
 
 }  // namespace
 
-HAL_COMPONENT(Limit1, "limit1", "Keeps a value between two limits", R"(
+HAL_COMPONENT(Limit1, "limit1", "Limits a value to a range", R"(
 `out = min(max(in, min), max)`
 
-When `min` is above `max`, `max` wins. An input that is not a number passes through unchanged, so that whoever
-consumes it can see the fault. `limit2` also limits the slope, `limit3` also the acceleration.
+If `min` is above `max`, `max` applies. NaN passes through unchanged, so that the consumer can detect the fault.
+`limit2` also limits the slope, `limit3` the slope and the acceleration.
 
     loadrt limit1 names=torque-limit
     addf torque-limit servo

@@ -5,9 +5,9 @@ namespace {
 
 struct Limit2 : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the value to follow"};
-    hal::Out<double> out{*this, "out", "follows in within the limits"};
-    hal::In<bool>    load{*this, "load", "while TRUE out is in at once, whatever maxv is"};
+    hal::In<double>  in{*this, "in", "target value"};
+    hal::Out<double> out{*this, "out", "follows in, within the limits"};
+    hal::In<bool>    load{*this, "load", "TRUE sets out to in immediately, regardless of maxv"};
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>  maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
@@ -24,7 +24,7 @@ struct Limit2 : hal::Component {
     }
 
 private:
-    // `value` between the limits, max last. NaN when one of the three is, or the value is infinite.
+    // Limits `value`, with max last. NaN if one of the three is NaN or the value is infinite.
     double limited(double value) const noexcept {
         const double low = min, high = max;
         if (!std::isfinite(value) || std::isnan(low) || std::isnan(high)) return NAN;
@@ -36,9 +36,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Limit2, "limit2", "Follows a value within limits of position and speed", R"(
-`out` starts at 0 and goes to `in`, limited to `min` and `max`, by at most `maxv` per second. `load` puts it there at once. In a cycle
-whose input or goal is not a number or infinite `out` stays; it stays, too, while `maxv` is not above 0. When `min` is above `max`,
-`max` wins.
+`out` starts at 0 and moves to `in`, limited to `min` and `max`, by at most `maxv` per second. `load` sets it to `in` immediately. While the
+input or a limit is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. If `min` is above `max`,
+`max` applies.
 
     loadrt limit2 names=spindle-ramp
     addf spindle-ramp servo

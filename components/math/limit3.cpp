@@ -18,10 +18,10 @@ constexpr double rounding = 16e-16;  // of a few additions, relative
 
 double bounded(double value) { return std::clamp(value, -largest, largest); }
 
-// q(m), the way over which braking fades out.
+// q(m), the distance over which braking fades out.
 double fading_way(double m) { return (m + 1.0) * (m + 2.0) / 6.0; }
 
-// p at the way q on the line through the points (q(k), p(k)): k moves go there.
+// p at the distance q on the line through the points (q(k), p(k)): k moves cover it.
 double speed_for(double q, double m) {
     if (q <= fading_way(m)) {  // q(k) = k (k+1) (k+2) / 6m
         const double y = 6.0 * m * q * (1.0 - rounding);
@@ -34,7 +34,7 @@ double speed_for(double q, double m) {
     return p + (j - 1.0) + (way - (j - 1.0) * (p + j / 2.0)) / (p + j);
 }
 
-// The largest speed that stops at the end of `way`, which may be negative. The last move is all of the way.
+// The largest speed that stops at the end of `way`, which may be negative. The last move covers all of it.
 double stopping_speed(double way, double a, double m) {
     return std::abs(way) * m <= a ? way : std::copysign(a * speed_for(std::abs(way) / a, m), way);
 }
@@ -74,10 +74,10 @@ double next_speed(double way, double before, double most, double a, double m, bo
 
 struct Limit3 : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the value to follow"};
-    hal::Out<double> out{*this, "out", "follows in within the limits"};
+    hal::In<double>  in{*this, "in", "target value"};
+    hal::Out<double> out{*this, "out", "follows in, within the limits"};
     hal::In<bool>    enable{*this, "enable", "TRUE: out follows in; FALSE: out returns to 0 within the limits", {.initial = true}};
-    hal::In<bool>    load{*this, "load", "while TRUE out is in at once, whatever maxv and maxa are"};
+    hal::In<bool>    load{*this, "load", "TRUE sets out to in immediately, regardless of maxv and maxa"};
     hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
     hal::In<double>  maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
@@ -98,9 +98,9 @@ struct Limit3 : hal::Component {
     }
 
 private:
-    // Reads in, min and max; what is not a number keeps its last value. Returns the speed to meet the input at: of its last
-    // two the smaller one, because a step or a jitter has a speed in one cycle and none or the opposite in the next. An
-    // input that is faster than maxv cannot be met and counts as standing.
+    // Reads in, min and max; NaN keeps the last value. Returns the speed at which to meet the input: the smaller of its last
+    // two, because a step or a jitter has a speed in one cycle and none or the opposite in the next. An
+    // input faster than maxv cannot be met and counts as stationary.
     double look_at_input(double v) noexcept {
         const double input = in, low = min, high = max, before = speed_in_;
         if (!std::isnan(low)) low_ = bounded(low);
@@ -116,7 +116,7 @@ private:
         const double before = position_;
         position_ = std::clamp(input_, low_now_, high_);
         rest_ = 0.0;
-        speed_ = carried_ ? position_ - before : 0.0;  // the jump at its beginning is no speed
+        speed_ = carried_ ? position_ - before : 0.0;  // its initial jump does not count as speed
         arrived_ = true;
     }
 
@@ -153,7 +153,7 @@ private:
         position_ = place;
         rest_ = 0.0;
     }
-    // Adds to the position and keeps what the sum rounds off: with it the stops of a long way are exact.
+    // Adds to the position and keeps the rounding error of the sum, so that stops after a long distance are exact.
     void move(double by) noexcept {
         by += rest_;
         const double sum = position_ + by, part = sum - position_;
@@ -161,10 +161,10 @@ private:
         position_ = sum;
     }
 
-    double position_ = 0.0, rest_ = 0.0;             // out, and what is rounded off it
+    double position_ = 0.0, rest_ = 0.0;             // out and its rounding error
     double speed_ = 0.0;                             // of out, per cycle like all speeds here
-    double input_ = 0.0, speed_in_ = 0.0;            // in as last seen, and its speed
-    double low_ = 0.0, high_ = 0.0, low_now_ = 0.0;  // min and max as last seen; the lower of them
+    double input_ = 0.0, speed_in_ = 0.0;            // last valid in, and its speed
+    double low_ = 0.0, high_ = 0.0, low_now_ = 0.0;  // last valid min and max; the lower of them
     bool arrived_ = true;                            // out is on its goal
     bool carried_ = false;                           // by load, in the last cycle
 };
@@ -172,21 +172,21 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Limit3, "limit3", "Follows a value within limits of position, velocity and acceleration", R"(
-`out` goes to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without overshoot; it meets a moving
-input at its own speed, and follows an input that keeps the limits itself without any lag. It brakes in time for `min`
-and `max`. When a limit is moved, or the input turns round, so that the output can no longer stop in time, `maxa` is
-kept and the output comes back. It moves with all of `maxa` or all of `maxv` until it is only some cycles from a stop. With
-`smooth-steps` above 2 the acceleration fades out over that many cycles: it takes a little longer and is gentle to a
+`out` moves to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without overshoot; it meets a moving
+input at the input's speed, and follows an input within the limits without lag. It brakes in time for `min`
+and `max`. If a limit moves or the input reverses so that the output can no longer stop in time, the output overshoots within
+`maxa` and returns. It uses the full `maxa` or the full `maxv` until a few cycles before a stop. With
+`smooth-steps` above 2 the acceleration fades out over that many cycles: this takes slightly longer and is smoother with a
 jittering input.
 
-`out` starts at 0; `load` puts it on the input. While the input, `min` or `max` is not a number its last value counts. With `maxa` not
-positive `out` stands still. When `min` is above `max`, `max` wins.
+`out` starts at 0; `load` sets it to the input. While the input, `min` or `max` is NaN its last valid value applies. If `maxa` is not
+positive, `out` does not move. If `min` is above `max`, `max` applies.
 
-**Otherwise than LinuxCNC's**, which accelerates and cruises the same: it stops with `maxa` and is then exactly
-there (there each of the last cycles goes half of what is left, for some 30 cycles). It keeps `min` and `max` also with `maxv` and
-`maxa` as they are by default (there `out` goes beyond). It leaves `min` and `max` with the input (there some cycles before the
-input is back, to have its speed by then). An input that comes nearer faster than `maxv` it brakes towards (there it turns round).
-It leaves `load` with the speed at which it was carried and within `maxa` (there within `maxv` at once).
+**Differences from LinuxCNC:** acceleration and cruising are the same. Halcyon's `limit3` stops with `maxa` exactly at the target
+(LinuxCNC halves the remaining distance in each of about 30 last cycles), respects `min` and `max` also with the default `maxv` and
+`maxa` (LinuxCNC exceeds them), leaves `min` and `max` together with the input (LinuxCNC a few cycles earlier,
+to match its speed), brakes towards an input that approaches faster than `maxv` (LinuxCNC reverses), and
+leaves `load` with the speed of the input and within `maxa` (LinuxCNC within `maxv` only).
 
     loadrt limit3 names=jog
     addf jog servo

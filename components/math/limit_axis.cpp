@@ -5,20 +5,20 @@ namespace {
 
 struct LimitAxis : hal::Component {
     using Component::Component;
-    hal::Argument           count{*this, "personality", 2, "how many ranges", {.min = 1, .max = 10}};
-    hal::In<double>         fb{*this, "fb", "decides on the range; most often the position of another axis"};
-    hal::Out<double>        min_output{*this, "min-output", "lower limit of the present range"};
-    hal::Out<double>        max_output{*this, "max-output", "upper limit of the present range"};
-    hal::Out<std::uint32_t> current{*this, "current-range", "the present range"};
-    hal::Out<bool>          no_range{*this, "error-no-range", "TRUE: fb is in no enabled range; the limits stay"};
-    hal::Out<bool>          bad_limits{*this, "error-limits", "TRUE: the range's max-limit is below its min-limit; the limits stay"};
+    hal::Argument           count{*this, "personality", 2, "number of ranges", {.min = 1, .max = 10}};
+    hal::In<double>         fb{*this, "fb", "value that selects the range, usually the position of another axis"};
+    hal::Out<double>        min_output{*this, "min-output", "lower limit of the current range"};
+    hal::Out<double>        max_output{*this, "max-output", "upper limit of the current range"};
+    hal::Out<std::uint32_t> current{*this, "current-range", "number of the current range"};
+    hal::Out<bool>          no_range{*this, "error-no-range", "TRUE: fb is in no enabled range; the limits are held"};
+    hal::Out<bool>          bad_limits{*this, "error-limits", "TRUE: the range's max-limit is below its min-limit; the limits are held"};
     hal::Ins<double>        min_limit{*this, "min-limit-##", count, "lower limit of range #"};
     hal::Ins<double>        max_limit{*this, "max-limit-##", count, "upper limit of range #"};
-    hal::Ins<double>        min_range{*this, "min-range-##", count, "range # begins at this fb"};
-    hal::Ins<double>        max_range{*this, "max-range-##", count, "range # ends at this fb"};
-    hal::Ins<bool>          enable{*this, "enable-##", count, "FALSE: range # is not there", {.initial = true}};
-    hal::Ins<bool>          sticky{*this, "sticky-##", count, "TRUE: range # stays the present one while fb is in it", {.initial = true}};
-    hal::Function           run{*this, "", hal::step<&LimitAxis::update>, "chooses the range"};
+    hal::Ins<double>        min_range{*this, "min-range-##", count, "lowest fb of range #"};
+    hal::Ins<double>        max_range{*this, "max-range-##", count, "highest fb of range #"};
+    hal::Ins<bool>          enable{*this, "enable-##", count, "FALSE disables range #", {.initial = true}};
+    hal::Ins<bool>          sticky{*this, "sticky-##", count, "TRUE: range # remains the current one while fb is in it", {.initial = true}};
+    hal::Function           run{*this, "", hal::step<&LimitAxis::update>, "selects the range"};
 
     void update(hal::Cycle) noexcept {
         std::size_t chosen = current_;
@@ -46,8 +46,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(LimitAxis, "limit_axis", "Limits of an axis that depend on another axis", R"(
-The first enabled range with `min-range` <= `fb` <= `max-range` gives the limits. A sticky range stays the present one while `fb` is
-in it, even when an earlier one holds `fb`, too. When there is no range, or its limits are the wrong way round, the outputs stay and an
+The first enabled range with `min-range` <= `fb` <= `max-range` sets the limits. A sticky range remains the current one while `fb` is
+in it, even if an earlier one contains `fb`, too. If no range matches, or its limits are inverted, the outputs are held and an
 error output is TRUE: stop the axis then. `personality` is the number of ranges, up to 10.
 
     # C may turn only a little while Z is above -10

@@ -5,13 +5,13 @@ namespace {
 
 struct Lincurve : hal::Component {
     using Component::Component;
-    hal::Argument       count{*this, "personality", 2, "how many points", {.min = 1, .max = 16}};
-    hal::In<double>     in{*this, "in", "where on the x axis"};
-    hal::Out<double>    out{*this, "out", "the curve there"};
-    hal::Io<double>     out_io{*this, "out-io", "the same, for pins that are io"};
-    hal::Params<double> x{*this, "x-val-##", count, "x of point #; must not fall from point to point"};
+    hal::Argument       count{*this, "personality", 2, "number of points", {.min = 1, .max = 16}};
+    hal::In<double>     in{*this, "in", "position on the x axis"};
+    hal::Out<double>    out{*this, "out", "value of the curve"};
+    hal::Io<double>     out_io{*this, "out-io", "like out, for signals with io pins"};
+    hal::Params<double> x{*this, "x-val-##", count, "x of point #; must not decrease from point to point"};
     hal::Params<double> y{*this, "y-val-##", count, "y of point #"};
-    hal::Function       run{*this, "", hal::step<&Lincurve::update>, "looks up the curve"};
+    hal::Function       run{*this, "", hal::step<&Lincurve::update>, "evaluates the curve"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;
@@ -35,10 +35,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Lincurve, "lincurve", "A curve through points, joined by straight lines", R"(
+HAL_COMPONENT(Lincurve, "lincurve", "Piecewise linear curve through given points", R"(
 `out` is the value at `in` of the curve through the points (`x-val-00`, `y-val-00`), (`x-val-01`, `y-val-01`) …; before the
-first and after the last point it is flat. `personality` is the number of points, up to 16. Two points with the same x make
-a step, and the value of the second one belongs to the x itself. While `in` is not a number the output stays.
+first and after the last point it is constant. `personality` is the number of points, up to 16. Two points with the same x are
+a step; at this x the value of the second one applies. While `in` is NaN the output keeps its value.
 
     # a thermocouple
     loadrt lincurve personality=3 names=thermo

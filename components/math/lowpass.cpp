@@ -6,9 +6,9 @@ namespace {
 struct Lowpass : hal::Component {
     using Component::Component;
     hal::In<double>  in{*this, "in", "the input"};
-    hal::Out<double> out{*this, "out", "the input, smoothed"};
-    hal::In<bool>    load{*this, "load", "while TRUE out is in"};
-    hal::In<double>  gain{*this, "gain", "share of the new value, 0 to 1"};
+    hal::Out<double> out{*this, "out", "filtered input"};
+    hal::In<bool>    load{*this, "load", "TRUE copies in to out"};
+    hal::In<double>  gain{*this, "gain", "weight of the new value, 0..1"};
     hal::Function    run{*this, "", hal::step<&Lowpass::update>, "filters"};
 
     void update(hal::Cycle) noexcept {
@@ -25,7 +25,7 @@ private:
 
 HAL_COMPONENT(Lowpass, "lowpass", "First-order low-pass filter", R"(
 `out = out + (in - out) * gain`. For a corner frequency f in Hz and a period T in s: `gain = 1 - exp(-2 pi f T)`. The
-gain is 0, and the output stands still, until it is set; above 2 the filter is unstable. A cycle whose input is not a number is left out.
+gain is 0 until it is set, so the output does not change; above 2 the filter is unstable. NaN inputs are ignored.
 
     # 10 Hz in a 1 kHz thread
     loadrt lowpass names=load-smooth

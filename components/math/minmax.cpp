@@ -6,10 +6,10 @@ namespace {
 struct Minmax : hal::Component {
     using Component::Component;
     hal::In<double>  in{*this, "in", "the input"};
-    hal::In<bool>    reset{*this, "reset", "while TRUE min and max are in"};
+    hal::In<bool>    reset{*this, "reset", "TRUE sets min and max to in"};
     hal::Out<double> max{*this, "max", "highest input since the reset"};
     hal::Out<double> min{*this, "min", "lowest input since the reset"};
-    hal::Function    run{*this, "", hal::step<&Minmax::update>, "watches the input"};
+    hal::Function    run{*this, "", hal::step<&Minmax::update>, "updates min and max"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;
@@ -30,8 +30,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Minmax, "minmax", "Keeps the lowest and the highest value seen", R"(
-The first input, and any input while `reset` is TRUE, is both. Inputs that are not numbers are passed over.
+HAL_COMPONENT(Minmax, "minmax", "Tracks the minimum and the maximum of a value", R"(
+The first input, and any input while `reset` is TRUE, sets both. NaN inputs are ignored.
 
     loadrt minmax names=error-range
     addf error-range servo

@@ -6,16 +6,16 @@ namespace {
 struct Modmath : hal::Component {
     using Component::Component;
     hal::InstanceName      name{*this, "mod-dir"};
-    hal::InstanceCount     count{*this, "mod_dir", 1, "how many instances"};
-    hal::In<std::int32_t>  actual{*this, "actual", "where it is"};
-    hal::In<std::int32_t>  desired{*this, "desired", "where it shall be"};
-    hal::Io<std::int32_t>  min{*this, "min-num", "first position", {.initial = 0}};
-    hal::Io<std::int32_t>  max{*this, "max-num", "last position", {.initial = 15}};
-    hal::Io<bool>          wrap{*this, "wrap", "TRUE: the first position follows the last one", {.initial = true}};
-    hal::Out<bool>         up{*this, "up", "TRUE: the way up is not longer"};
-    hal::Out<bool>         down{*this, "down", "TRUE: the way down is shorter"};
-    hal::Out<bool>         on_target{*this, "on-target", "TRUE: it is there"};
-    hal::Function          run{*this, "", hal::step<&Modmath::update>, "chooses the way"};
+    hal::InstanceCount     count{*this, "mod_dir", 1, "number of instances"};
+    hal::In<std::int32_t>  actual{*this, "actual", "current position"};
+    hal::In<std::int32_t>  desired{*this, "desired", "target position"};
+    hal::Io<std::int32_t>  min{*this, "min-num", "lowest position", {.initial = 0}};
+    hal::Io<std::int32_t>  max{*this, "max-num", "highest position", {.initial = 15}};
+    hal::Io<bool>          wrap{*this, "wrap", "TRUE: the lowest position follows the highest one", {.initial = true}};
+    hal::Out<bool>         up{*this, "up", "TRUE: move up; the distance upwards is not longer"};
+    hal::Out<bool>         down{*this, "down", "TRUE: move down; the distance downwards is shorter"};
+    hal::Out<bool>         on_target{*this, "on-target", "TRUE: actual equals desired"};
+    hal::Function          run{*this, "", hal::step<&Modmath::update>, "selects the direction"};
 
     void update(hal::Cycle) noexcept {
         const std::int64_t positions = std::int64_t{max} - min + 1, apart = std::int64_t{desired} - actual;
@@ -35,9 +35,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Modmath, "modmath", "The shorter way to a position of a magazine", R"(
-The positions are `min-num` to `max-num`. With `wrap` they lie on a circle, and of two equal ways `up` is taken; without,
-on a line. `mod_dir=2` makes two instances, `mod-dir.0` and `mod-dir.1`.
+HAL_COMPONENT(Modmath, "modmath", "Shortest direction to a position of a tool magazine", R"(
+The positions are `min-num` to `max-num`. With `wrap` they form a circle, and of two equal distances `up` is selected; without
+`wrap` they form a line. `mod_dir=2` creates two instances, `mod-dir.0` and `mod-dir.1`.
 
     loadrt modmath names=magazine
     addf magazine servo

@@ -6,14 +6,14 @@ namespace {
 struct Mux16 : hal::Component {
     using Component::Component;
     hal::In<bool>          gray{*this, "use-graycode", "TRUE: the sel inputs are Gray code"};
-    hal::In<bool>          keep{*this, "suppress-no-input", "TRUE: while all sel inputs are FALSE the outputs stay; in00 cannot be chosen"};
-    hal::In<double>        debounce_time{*this, "debounce-time", "how long a choice must hold before the outputs follow", {.unit = "s"}};
-    hal::Ins<bool>         sel{*this, "sel#", 4, "bit # of the choice"};
-    hal::Out<double>       out_f{*this, "out-f", "the chosen input"};
-    hal::Out<std::int32_t> out_s{*this, "out-s", "the chosen input without its fraction, limited to the type"};
-    hal::Ins<double>       in{*this, "in##", 16, "goes to the outputs while # is chosen"};
-    hal::Out<double>       elapsed{*this, "elapsed", "how long the choice has held", {.unit = "s"}};
-    hal::Out<std::int32_t> selected{*this, "selected", "the choice, from Gray code or binary"};
+    hal::In<bool>          keep{*this, "suppress-no-input", "TRUE holds the outputs while all sel inputs are FALSE; in00 cannot be selected"};
+    hal::In<double>        debounce_time{*this, "debounce-time", "time for which a new selection must be stable", {.unit = "s"}};
+    hal::Ins<bool>         sel{*this, "sel#", 4, "bit # of the selection"};
+    hal::Out<double>       out_f{*this, "out-f", "selected input"};
+    hal::Out<std::int32_t> out_s{*this, "out-s", "selected input, truncated and limited to the range of s32"};
+    hal::Ins<double>       in{*this, "in##", 16, "input for selection #"};
+    hal::Out<double>       elapsed{*this, "elapsed", "time for which the selection has been stable", {.unit = "s"}};
+    hal::Out<std::int32_t> selected{*this, "selected", "selection, decoded"};
     hal::Function          run{*this, "", hal::step<&Mux16::update>, "computes the outputs"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -41,10 +41,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Mux16, "mux16", "Selects one of sixteen values, with Gray code and debouncing", R"(
-The choice is the number `sel3 sel2 sel1 sel0`, binary or in Gray code, in which neighbouring positions of a switch differ
-in one bit. A new choice must hold for `debounce-time`; until then the outputs follow the last one. (In LinuxCNC a contact that goes
-on bouncing gets through.)
-`out-s` is 0 while the value is not a number.
+The selection is the number `sel3 sel2 sel1 sel0`, in binary or in Gray code, in which adjacent positions of a switch differ
+in one bit. A new selection must be stable for `debounce-time`; until then the previous one is in use. (In LinuxCNC a contact that
+bounces for longer passes.)
+`out-s` is 0 while the value is NaN.
 
     loadrt mux16 names=override
     addf override servo

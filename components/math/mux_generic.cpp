@@ -6,12 +6,12 @@ namespace {
 struct MuxGeneric : hal::Component {
     using Component::Component;
     hal::InstanceName           name{*this, "mux-gen", 2};
-    hal::TextArgument           text{*this, "config", "ff4", "type in, type out (b f s u) and number of inputs, for each mux",
+    hal::TextArgument           text{*this, "config", "ff4", "type in, type out (b f s u) and number of inputs, for each instance",
                                      {.per_instance = true}};
     routed::Config              config{text.get()};
     routed::Choice              choice{*this, config};
-    routed::AnyType<hal::Ins>   in{*this, config.from, "in-", "-##", config.ways, "goes to the output while # is chosen"};
-    routed::AnyType<hal::Outs>  out{*this, config.to, "out-", "", 1, "the chosen input"};
+    routed::AnyType<hal::Ins>   in{*this, config.from, "in-", "-##", config.ways, "input for selection #"};
+    routed::AnyType<hal::Outs>  out{*this, config.to, "out-", "", 1, "selected input"};
     hal::Function               run{*this, "", hal::step<&MuxGeneric::update>, "computes the output"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -24,14 +24,14 @@ struct MuxGeneric : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(MuxGeneric, "mux_generic", "Selects one of many values of any type", R"(
-`config=bb8,fu12` makes `mux-gen.00`, which selects one of eight bits, and `mux-gen.01`, which selects one of twelve floats and gives a
-u32. The letters are b bit, f float, s s32, u u32; first the type in, then the type out.
+`config=bb8,fu12` creates `mux-gen.00`, which selects one of eight bits, and `mux-gen.01`, which selects one of twelve floats and converts it
+to u32. The letters are b (bit), f (float), s (s32) and u (u32): first the type in, then the type out.
 
-The choice is `sel-int` plus the number made of the `sel-bit` inputs, which are there when the number of inputs is a power of
-two. A choice beyond the last input is the last one. A new choice must hold for `debounce-us`; until then the output follows the last one.
+The selection is `sel-int` plus the binary number of the `sel-bit` inputs, which exist if the number of inputs is a power of
+two. A selection above the last input selects the last one. A new selection must be stable for `debounce-us`; until then the previous one is in use.
 
-A value that the type of the output does not have is cut to an integer and limited to the range of the type. A float is
-FALSE within 2e-7 of 0. What is not a number gives 0.
+A value is truncated to an integer and limited to the range of the output's type. As a bit, a float is
+FALSE within 2e-7 of 0. NaN gives 0.
 
     loadrt mux_generic config=sf3 names=tool-speed
     addf tool-speed servo

@@ -7,9 +7,9 @@ struct Near : hal::Component {
     using Component::Component;
     hal::In<double>    in1{*this, "in1", "first value"};
     hal::In<double>    in2{*this, "in2", "second value"};
-    hal::Out<bool>     out{*this, "out", "TRUE while the values are near each other"};
-    hal::Param<double> scale{*this, "scale", "largest ratio of the two", {.initial = 1.0}};
-    hal::Param<double> difference{*this, "difference", "largest difference of the two"};
+    hal::Out<bool>     out{*this, "out", "TRUE while the values are nearly equal"};
+    hal::Param<double> scale{*this, "scale", "maximum ratio of the two", {.initial = 1.0}};
+    hal::Param<double> difference{*this, "difference", "maximum difference of the two"};
     hal::Function      run{*this, "", hal::step<&Near::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
@@ -23,9 +23,9 @@ struct Near : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Near, "near", "Tells whether two values are roughly equal", R"(
+HAL_COMPONENT(Near, "near", "Detects whether two values are nearly equal", R"(
 `out` is TRUE while the larger of two values of the same sign is at most `scale` times the smaller one, or while they
-differ by at most `difference`. Equal values are always near; what is not a number is near nothing.
+differ by at most `difference`. For equal values `out` is always TRUE, with a NaN input FALSE.
 
     loadrt near names=at-speed
     addf at-speed servo

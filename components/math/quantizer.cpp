@@ -7,17 +7,17 @@ enum Mode : std::uint32_t { nearest = 0, down = 1, up = 2, towards_zero = 3 };
 
 struct Quantizer : hal::Component {
     using Component::Component;
-    hal::In<double>        in{*this, "in", "the value"};
-    hal::In<double>        step{*this, "step", "between two levels; 0: passes in", {.initial = 1.0}};
-    hal::In<double>        offset{*this, "offset", "where level 0 lies"};
-    hal::In<std::uint32_t> mode{*this, "mode", "0 nearest level; 1 the one below; 2 the one above; 3 the one towards level 0"};
-    hal::In<double>        hysteresis{*this, "hysteresis", "how far in has to be beyond the border of a level to leave it, in steps"};
+    hal::In<double>        in{*this, "in", "value"};
+    hal::In<double>        step{*this, "step", "distance between two levels; 0 copies in to out", {.initial = 1.0}};
+    hal::In<double>        offset{*this, "offset", "value of level 0"};
+    hal::In<std::uint32_t> mode{*this, "mode", "rounding: 0 nearest; 1 down; 2 up; 3 towards level 0"};
+    hal::In<double>        hysteresis{*this, "hysteresis", "distance, in steps, by which in must pass the border of a level to leave it"};
     hal::In<double>        min{*this, "min-level", "lowest level", {.initial = -most}};
     hal::In<double>        max{*this, "max-level", "highest level", {.initial = most}};
     hal::Out<double>       out{*this, "out", "level * step + offset", {.finite = true}};
     hal::Out<double>       error{*this, "error", "in - out", {.finite = true}};
-    hal::Out<std::int64_t> level{*this, "level", "the level"};
-    hal::Out<bool>         limited{*this, "limited", "TRUE: in lies beyond the lowest or the highest level"};
+    hal::Out<std::int64_t> level{*this, "level", "number of the level"};
+    hal::Out<bool>         limited{*this, "limited", "TRUE: in is below the lowest or above the highest level"};
     hal::Function          run{*this, "", hal::step<&Quantizer::update>, "rounds in to a level"};
 
     void update(hal::Cycle) noexcept {
@@ -29,7 +29,7 @@ struct Quantizer : hal::Component {
             return;
         }
         double wanted = rounded(exact);
-        // Between the old level and the next it moves only once in is beyond the border by the hysteresis.
+        // Between two adjacent levels, change only once in is beyond the border by the hysteresis.
         if (hysteresis > 0.0 && known_ && std::fabs(level_) <= most) {
             const double band = std::min(hysteresis.get(), 1e6), low = rounded(exact - band), high = rounded(exact + band);
             wanted = low > level_ ? low : high < level_ ? high : level_;
@@ -64,17 +64,17 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Quantizer, "quantizer", "Rounds a value to levels: a converter, an encoder, a detent", R"(
-    level = rounding of (in - offset) / step by mode, kept between min-level and max-level
+HAL_COMPONENT(Quantizer, "quantizer", "Rounds a value to discrete levels, as an A/D converter or an encoder does", R"(
+    level = (in - offset) / step, rounded by mode and limited to min-level and max-level
     out   = level * step + offset
     error = in - out
 
-Halves are rounded away from 0 in mode 0. With `hysteresis` h a level is left only when `in` is beyond its border by h steps, so noise
-does not make it chatter. A converter of 12 bits for +-10 V: step 20/4096, min-level -2048, max-level 2047 (B. Widrow, I. Kollar,
-*Quantization Noise*, Cambridge 2008). With equal chances of all values in a step the error has a standard deviation of step / sqrt(12).
+Mode 0 rounds halves away from 0. With `hysteresis` h the level changes only when `in` is beyond its border by h steps, so that noise
+does not cause chatter. A 12-bit converter for ±10 V has step 20/4096, min-level -2048, max-level 2047 (B. Widrow, I. Kollar,
+*Quantization Noise*, Cambridge 2008). For values distributed uniformly within a step, the standard deviation of the error is step / sqrt(12).
 
-While `in` is not a number its last value counts. With `step` 0, infinite or not a number, or beyond 2^53 levels, `out` is `in` and
-`level` is 0. Its sign does not matter. A mode above 3 is mode 0. When `min-level` is above `max-level`, `max-level` wins.
+While `in` is NaN or infinite its last valid value applies. With `step` 0, infinite or NaN, or above 2^53 levels, `out` is `in` and
+`level` is 0. The sign of `step` has no effect. A mode above 3 is mode 0. If `min-level` is above `max-level`, `max-level` applies.
 
     loadrt quantizer names=adc
     addf adc servo

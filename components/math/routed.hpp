@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mux_generic and demux_generic: any number of ways, any type in, any type out.
+// mux_generic and demux_generic: any number of channels, any type in, any type out.
 #pragma once
 
 #include "conv.hpp"
@@ -7,7 +7,7 @@
 
 namespace routed {
 
-/// What `fu12` says: float in, u32 out, 12 ways. The number may stand anywhere between the letters.
+/// Parses `fu12`: float in, u32 out, 12 channels. The number may be anywhere between the letters.
 struct Config {
     char from = 0, to = 0;
     std::int64_t ways = 0;
@@ -18,16 +18,16 @@ struct Config {
         for (const char c : text) {
             if (c >= '0' && c <= '9') digits += c;
             else if (const char letter = static_cast<char>(c | 0x20); letter != 'b' && letter != 'f' && letter != 's' && letter != 'u')
-                refuse("has a letter that is no type: b bit, f float, s s32, u u32; write it like fu12");
+                refuse("has an invalid type letter; use b (bit), f (float), s (s32) or u (u32), as in fu12");
             else if (from == 0) from = letter;
             else if (to == 0) to = letter;
-            else refuse("names more than two types; write it like fu12");
+            else refuse("has more than two types; write the type in, the type out and the number of channels, as in fu12");
         }
-        if (to == 0) refuse("names no two types; write the type in, the type out and the number of ways, like fu12");
+        if (to == 0) refuse("has fewer than two types; write the type in, the type out and the number of channels, as in fu12");
         ways = digits.empty() || digits.size() > 4 ? 0 : std::stol(digits);
-        if (ways < 1 || ways > 1024) refuse("has no number of ways from 1 to 1024");
+        if (ways < 1 || ways > 1024) refuse("has no number of channels in 1..1024; write it as in fu12");
     }
-    /// The selection bits: as many as the ways need when these are a power of two, otherwise none.
+    /// Returns the number of selection bits: log2 of the channels if these are a power of two, else 0.
     std::int64_t select_bits() const noexcept {
         std::int64_t bits = 0;
         while ((std::int64_t{1} << bits) < ways) ++bits;
@@ -35,7 +35,7 @@ struct Config {
     }
 };
 
-/// The pin a component has of the one type it was configured for: one of four rows, the others empty.
+/// The pins of the configured type: one of four arrays, the others are empty.
 template <template <class> class Row>
 class AnyType {
 public:
@@ -45,7 +45,7 @@ public:
           s32_(component, name(before, "s32", after).c_str(), type == 's' ? count : 0, doc),
           u32_(component, name(before, "u32", after).c_str(), type == 'u' ? count : 0, doc) {}
 
-    /// Calls `action` with the row that has pins. [realtime]
+    /// Calls `action` with the array that has pins. [realtime]
     template <class Action>
     void visit(Action action) noexcept {
         if (bit_.size() != 0) action(bit_);
@@ -62,7 +62,7 @@ private:
     Row<std::uint32_t> u32_;
 };
 
-/// `value` in the other type: cut, and limited to its range. A float within 2e-7 of 0 is FALSE. [any]
+/// Converts `value`, truncated and limited to the range of the other type. A float within 2e-7 of 0 is FALSE. [any]
 template <class To, class From>
 To converted(From value) noexcept {
     if constexpr (std::same_as<To, bool> && std::same_as<From, double>) return std::fabs(value) > 2e-7;
@@ -77,20 +77,20 @@ void copy(const In& from, Out& to) noexcept {
     to = converted<To>(from.get());
 }
 
-/// The choice both components make, with debouncing.
+/// The debounced selection of both components.
 class Choice {
 public:
     Choice(hal::Component& component, const Config& config)
         : ways(static_cast<std::uint64_t>(config.ways)),
-          keep{component, "suppress-no-input", "TRUE: a choice of 0 changes nothing; way 00 cannot be chosen"},
-          debounce_us{component, "debounce-us", "how long a choice must hold before it counts", {.unit = "us"}},
-          bit{component, "sel-bit-##", config.select_bits(), "bit # of the choice"},
-          number{component, "sel-int", "added to the number made of the bits"},
-          elapsed{component, "elapsed", "how long the choice has held", {.unit = "us"}},
-          selected{component, "selected", "the choice that counts"} {}
+          keep{component, "suppress-no-input", "TRUE ignores the selection 0; channel 00 cannot be selected"},
+          debounce_us{component, "debounce-us", "time for which a new selection must be stable", {.unit = "us"}},
+          bit{component, "sel-bit-##", config.select_bits(), "bit # of the selection"},
+          number{component, "sel-int", "number added to that of the sel-bit pins"},
+          elapsed{component, "elapsed", "time for which the selection has been stable", {.unit = "us"}},
+          selected{component, "selected", "selection in use"} {}
 
-    /// The way that counts now, the last one for a choice beyond it; none (the number of ways) at first and while a
-    /// choice of 0 is suppressed. [realtime]
+    /// Returns the selected channel, the last one for a selection above it; the number of channels if there is none yet or the
+    /// selection 0 is suppressed. [realtime]
     std::uint64_t update(const hal::Cycle& cycle) noexcept {
         std::uint64_t wanted = number;
         for (std::size_t i = 0; i < bit.size(); ++i) wanted += bit[i] ? std::uint64_t{1} << i : 0;

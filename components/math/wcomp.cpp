@@ -5,7 +5,7 @@ namespace {
 
 struct Wcomp : hal::Component {
     using Component::Component;
-    hal::In<double> in{*this, "in", "the value to compare"};
+    hal::In<double> in{*this, "in", "value to compare"};
     hal::In<double> min{*this, "min", "lower end of the window"};
     hal::In<double> max{*this, "max", "upper end of the window"};
     hal::Out<bool>  out{*this, "out", "TRUE while in is strictly between min and max"};
@@ -25,7 +25,7 @@ struct Wcomp : hal::Component {
 
 HAL_COMPONENT(Wcomp, "wcomp", "Window comparator", R"(
 Exactly one of `under`, `out` and `over` is TRUE while `min` is below `max`. A window with `max` at or below `min` is
-empty: `out` is never TRUE, and `under` and `over` may be TRUE together. With an input that is not a number all are FALSE.
+empty: `out` is never TRUE, and `under` and `over` may be TRUE together. With a NaN input all are FALSE.
 
     loadrt wcomp names=in-position
     addf in-position servo

@@ -6,13 +6,13 @@ namespace {
 struct WeightedSum : hal::Component {
     hal::InstanceName       name{*this, "wsum"};
     hal::WholeFunctionNames whole{*this};
-    hal::Argument           size{*this, "wsum_sizes", 8, "bits of each sum, a number per sum", {.per_instance = true, .min = 1, .max = 32}};
+    hal::Argument           size{*this, "wsum_sizes", 8, "number of bits, for each sum", {.per_instance = true, .min = 1, .max = 32}};
     hal::Ins<bool>          bit{*this, "bit.#.in", size, "TRUE adds the weight of bit #"};
-    hal::Ios<std::int32_t>  weight{*this, "bit.#.weight", size, "weight of bit #; at first 2^#"};
-    hal::In<bool>           hold{*this, "hold", "TRUE: the sum stays"};
-    hal::Out<std::int32_t>  sum{*this, "sum", "the sum"};
-    hal::Io<std::int32_t>   offset{*this, "offset", "always added"};
-    hal::Function           run{*this, "process_wsums", hal::step<&WeightedSum::update>, "adds up all sums", {.shared = true}};
+    hal::Ios<std::int32_t>  weight{*this, "bit.#.weight", size, "weight of bit #; initially 2^#"};
+    hal::In<bool>           hold{*this, "hold", "TRUE holds the sum"};
+    hal::Out<std::int32_t>  sum{*this, "sum", "sum"};
+    hal::Io<std::int32_t>   offset{*this, "offset", "constant added to the sum"};
+    hal::Function           run{*this, "process_wsums", hal::step<&WeightedSum::update>, "computes all sums", {.shared = true}};
 
     explicit WeightedSum(const hal_host* host) : Component(host) {
         std::uint32_t power = 1;
@@ -33,9 +33,9 @@ struct WeightedSum : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(WeightedSum, "weighted_sum", "Number from weighted bits", R"(
-`sum` is `offset` plus the weights of all bits that are TRUE; `hold` keeps it. The weights are 1, 2, 4 … at first, so that bits are a
-binary number. `wsum_sizes=3,8` makes `wsum.0` of three bits and `wsum.1` of eight; one function, `process_wsums`, adds up all of them.
-A sum goes round at the ends of its type. LinuxCNC has at most 8 sums of 16 bits; here a sum has up to 32 bits.
+`sum` is `offset` plus the weights of all bits that are TRUE; `hold` holds it. The weights are initially 1, 2, 4 …, so that the bits are a
+binary number. `wsum_sizes=3,8` creates `wsum.0` with three bits and `wsum.1` with eight; one function, `process_wsums`, computes all sums.
+A sum wraps around at the limits of its type. LinuxCNC supports up to 8 sums of 16 bits; in Halcyon a sum has up to 32 bits.
 
     # a switch of four positions, coded with two contacts, as tool numbers from 10 on
     loadrt weighted_sum names=tool wsum_sizes=2
