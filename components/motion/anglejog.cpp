@@ -9,24 +9,24 @@ namespace {
 
 struct Anglejog : hal::Component {
     using Component::Component;
-    hal::In<bool>          enable_in{*this, "enable-in", "TRUE: counts move the axes; FALSE: angle and scale are taken over"};
-    hal::In<std::int32_t>  counts_in{*this, "counts-in", "counts of the hand wheel"};
+    hal::In<bool>          enable_in{*this, "enable-in", "TRUE: counts move the axes; FALSE: a new angle and scale are accepted"};
+    hal::In<std::int32_t>  counts_in{*this, "counts-in", "counts of the handwheel"};
     hal::In<double>        angle_in{*this, "angle-degrees-in", "direction of the motion", {.unit = "deg"}};
-    hal::In<std::int32_t>  factor_in{*this, "iscale-factor", "how many output counts make an input count; at least 1", {.initial = 10000}};
-    hal::In<double>        scale_in{*this, "scale-in", "way per count"};
+    hal::In<std::int32_t>  factor_in{*this, "iscale-factor", "output counts per input count; at least 1", {.initial = 10000}};
+    hal::In<double>        scale_in{*this, "scale-in", "distance per count"};
     hal::In<double>        max_velocity{*this, "max-vel", "largest speed along the direction"};
     hal::In<double>        max_acceleration{*this, "max-accel", "largest acceleration along the direction"};
-    hal::In<double>        accel_fraction{*this, "accel-fraction-in", "share of the axes' acceleration to use", {.initial = 1.0}};
+    hal::In<double>        accel_fraction{*this, "accel-fraction-in", "fraction of the axes' acceleration to use", {.initial = 1.0}};
     hal::Out<bool>         enable_out{*this, "enable-out", "for jog-enable of both axes"};
-    hal::Out<double>       current_scale{*this, "current-scale", "way per count, as in use"};
+    hal::Out<double>       current_scale{*this, "current-scale", "distance per count in use"};
     hal::Out<double>       scale_out{*this, "current-scale-out", "for jog-scale of both axes"};
     hal::Out<std::int32_t> cosine_counts{*this, "coscounts", "for jog-counts of the first axis"};
     hal::Out<std::int32_t> sine_counts{*this, "sincounts", "for jog-counts of the second axis"};
     hal::Out<double>       cosine_fraction{*this, "cos-accel-fraction", "for jog-accel-fraction of the first axis"};
     hal::Out<double>       sine_fraction{*this, "sin-accel-fraction", "for jog-accel-fraction of the second axis"};
-    hal::Out<bool>         active{*this, "active", "TRUE while it moves"};
+    hal::Out<bool>         active{*this, "active", "TRUE while moving"};
     hal::Out<double>       current_angle{*this, "current-angle-degrees", "direction in use", {.unit = "deg"}};
-    hal::Out<double>       current_magnitude{*this, "current-mag", "way along the direction"};
+    hal::Out<double>       current_magnitude{*this, "current-mag", "distance along the direction"};
     hal::Out<double>       current_velocity{*this, "current-vel", "speed along the direction"};
     hal::Function          run{*this, "", &Anglejog::update, "computes the counts of both axes"};
 
@@ -64,7 +64,7 @@ struct Anglejog : hal::Component {
 private:
     static std::int32_t counts(double way, double unit) noexcept {
         if (unit == 0.0) return 0;
-        const double exact = way / unit;  // a share of 1e-6 of a count up: 3 must not become 2.9999999999 and then 2
+        const double exact = way / unit;  // 1e-6 of a count is added: 3 must not become 2.9999999999 and then 2
         return static_cast<std::int32_t>(std::clamp(std::trunc(exact + std::copysign(1e-6, exact)), -2147483648.0, 2147483647.0));
     }
     plan::Axis way_;
@@ -74,10 +74,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Anglejog, "anglejog", "Jogs two axes at an angle with one hand wheel", R"(
-The wheel's `counts-in` times `scale-in` is a way along `angle-degrees-in`; it is gone with at most `max-vel` and `max-accel`. The cosine
-of it comes out as `coscounts` for the first axis, the sine as `sincounts` for the second, in units of `current-scale-out` =
-scale / `iscale-factor`. Angle, scale and factor are taken over while `enable-in` is FALSE; then what is left of the way is forgotten, too.
+HAL_COMPONENT(Anglejog, "anglejog", "Jogs two axes at an angle with one handwheel", R"(
+`counts-in` times `scale-in` is a distance along `angle-degrees-in`, covered with at most `max-vel` and `max-accel`. Its cosine component is
+`coscounts` for the first axis, its sine component `sincounts` for the second, in units of `current-scale-out` =
+scale / `iscale-factor`. New values of angle, scale and factor are accepted while `enable-in` is FALSE, which also discards the remaining distance.
 Set `max-vel` and `max-accel` no higher than either axis allows.
 
     loadrt anglejog names=aj

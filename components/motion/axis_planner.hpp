@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Trapezoidal motion of one axis in steps of one period: what simple_tp and moveoff share.
+// Trapezoidal motion of one axis in steps of one period, for simple_tp and moveoff.
 #pragma once
 
 #include <algorithm>
@@ -9,17 +9,17 @@ namespace plan {
 
 inline constexpr double huge = 1e20;  // beyond it sums would lose all digits, or overflow
 
-/// The largest way in one period after which a stop exactly at a point `distance` ahead is still possible, when the way may
-/// change by at most `a` from one period to the next. Counted back from the stop the ways of a braking axis are a, 2a, 3a ...
-/// and add up to p(j) = a j (j + 1) / 2. A distance between p(j) and p(j + 1) takes a way at the same share between j a and
-/// (j + 1) a; what remains then lies at that share between p(j - 1) and p(j), so it arrives exactly. [realtime]
+/// Returns the largest distance for one period after which a stop exactly at a point `distance` ahead is still possible, if the distance per
+/// period may change by at most `a` from one period to the next. Counted back from the stop, the distances of a braking axis are a, 2a, 3a ...
+/// and add up to p(j) = a j (j + 1) / 2. A `distance` at a fraction between p(j) and p(j + 1) gives the same fraction between j a and
+/// (j + 1) a; the remaining distance is then at that fraction between p(j - 1) and p(j), so the axis arrives exactly. [realtime]
 inline double braking_way(double distance, double a) noexcept {
     const double j = std::floor(std::sqrt(0.25 + 2.0 * distance / a) - 0.5);
     const double share = (distance - 0.5 * a * j * (j + 1.0)) / (a * (j + 1.0));
     return a * (j + std::clamp(share, 0.0, 1.0));
 }
 
-/// Where an axis is and how fast it moves.
+/// Position and velocity of an axis.
 class Axis {
 public:
     double position() const noexcept { return position_; }
@@ -28,8 +28,8 @@ public:
     void stop_at_once() noexcept { velocity_ = 0.0; }
     bool at(double target) const noexcept { return position_ == target; }
 
-    /// One period on the way to `target`, or, without one or with one that is not a number or beyond 1e20, to a rest.
-    /// Limits that are not positive are 0. [realtime]
+    /// Moves for one period towards `target`; without a target, or with one that is NaN or beyond 1e20, brakes to a stop.
+    /// Limits that are not positive count as 0. [realtime]
     void step(const double* target, double max_velocity, double max_acceleration, double dt) noexcept {
         const double a = max_acceleration > 0.0 ? std::clamp(max_acceleration, 1e-20, huge) : 0.0;
         const double limit = max_velocity > 0.0 ? std::min(max_velocity, huge) : 0.0;
@@ -41,7 +41,7 @@ public:
         velocity_ += std::clamp(wanted - velocity_, -change, change);
 
         const double way = velocity_ * dt;
-        const double rounding = 1e-14 * (std::fabs(position_) + std::fabs(left));  // without it the last bits would never be gone
+        const double rounding = 1e-14 * (std::fabs(position_) + std::fabs(left));  // without it the last bits would never be covered
         position_ = left != 0.0 && std::fabs(left - way) <= rounding ? *target : position_ + way;
     }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Moves an axis for a test, by hand or to and fro: what steptest and axistest share. The position commanded is a point to go
-// to; the step generator or drive behind it makes a motion of it.
+// Moves an axis for a test, by jogging or back and forth, for steptest and axistest. The commanded position is an end point;
+// the step generator or drive that follows it limits speed and acceleration.
 #pragma once
 
 #include <cmath>
@@ -12,25 +12,25 @@ namespace axis_test {
 
 struct Mover : hal::Component {
     using Component::Component;
-    hal::In<bool>          jog_minus{*this, "jog-minus", "TRUE: moves in the negative direction"};
-    hal::In<bool>          jog_plus{*this, "jog-plus", "TRUE: moves in the positive direction"};
-    hal::In<bool>          run{*this, "run", "TRUE: moves to and fro around where it was"};
-    hal::In<double>        max_velocity{*this, "maxvel", "largest speed"};
-    hal::In<double>        amplitude{*this, "amplitude", "how far to either side to go"};
-    hal::In<std::int32_t>  direction{*this, "dir", "0: to both sides, 1: positive side, 2: negative side"};
-    hal::Out<double>       position_cmd{*this, "position-cmd", "position to go to"};
-    hal::In<double>        position_fb{*this, "position-fb", "position of the axis"};
-    hal::Out<bool>         running{*this, "running", "TRUE while it moves to and fro"};
-    hal::Out<double>       run_target{*this, "run-target", "end it is going to"};
-    hal::Out<double>       run_start{*this, "run-start", "position when run became TRUE"};
+    hal::In<bool>          jog_minus{*this, "jog-minus", "TRUE jogs in the negative direction"};
+    hal::In<bool>          jog_plus{*this, "jog-plus", "TRUE jogs in the positive direction"};
+    hal::In<bool>          run{*this, "run", "TRUE moves back and forth around the initial position"};
+    hal::In<double>        max_velocity{*this, "maxvel", "maximum speed"};
+    hal::In<double>        amplitude{*this, "amplitude", "distance of each end from the initial position"};
+    hal::In<std::int32_t>  direction{*this, "dir", "0: both sides, 1: positive side, 2: negative side"};
+    hal::Out<double>       position_cmd{*this, "position-cmd", "commanded position"};
+    hal::In<double>        position_fb{*this, "position-fb", "position feedback of the axis"};
+    hal::Out<bool>         running{*this, "running", "TRUE while moving back and forth"};
+    hal::Out<double>       run_target{*this, "run-target", "end that the axis is moving to"};
+    hal::Out<double>       run_start{*this, "run-start", "initial position: feedback when run became TRUE"};
     hal::Out<double>       run_low{*this, "run-low", "lower end"};
     hal::Out<double>       run_high{*this, "run-high", "upper end"};
-    hal::In<std::int32_t>  pause{*this, "pause", "rest at each end", {.unit = "s"}};
-    hal::Param<double>     epsilon{*this, "epsilon", "an end counts as reached this near", {.initial = 0.001}};
+    hal::In<std::int32_t>  pause{*this, "pause", "pause at each end", {.unit = "s"}};
+    hal::Param<double>     epsilon{*this, "epsilon", "tolerance for reaching an end", {.initial = 0.001}};
     hal::Out<double>       elapsed{*this, "elapsed", "time at this end", {.unit = "s"}};
 
 protected:
-    /// One cycle; a jog commands a position `lead` ahead. [realtime]
+    /// Runs one cycle; a jog commands a position `lead` ahead. [realtime]
     void move(double lead, double dt) noexcept {
         if (run && !was_running_) begin();
         was_running_ = run;

@@ -5,18 +5,18 @@ namespace {
 
 struct Axistest : axis_test::Mover {
     using Mover::Mover;
-    hal::Function step{*this, "update", &Axistest::update, "computes the position to go to"};
+    hal::Function step{*this, "update", &Axistest::update, "computes the commanded position"};
 
     void update(hal::Cycle cycle) noexcept { move(std::fabs(max_velocity), cycle.seconds()); }
 };
 
 }  // namespace
 
-HAL_COMPONENT(Axistest, "axistest", "Moves an axis behind a trajectory planner, to try speed and acceleration", R"(
-While `run` is TRUE `position-cmd` is one end of a way around the position where it began, then the other: `run-low` and `run-high`,
-`amplitude` to the sides that `dir` says. It changes when `position-fb` is within `epsilon` of the end and has rested there for `pause`
-seconds. A jog commands a position ahead of the axis, as far as it goes in a second at `maxvel`. Else the command is the position.
-A planner between this and the axis makes the motion, for example `simple_tp`.
+HAL_COMPONENT(Axistest, "axistest", "Moves an axis through a trajectory planner, to test speed and acceleration", R"(
+While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the distance
+`amplitude` from the initial position on the sides selected by `dir`. It changes after `position-fb` has been within `epsilon` of the end for `pause`
+seconds. A jog commands a position ahead of the axis, by the distance of one second at `maxvel`. Otherwise the command is the feedback.
+Put a planner that limits the motion, for example `simple_tp`, between this component and the axis.
 
     loadrt axistest names=try
     loadrt simple_tp names=tp

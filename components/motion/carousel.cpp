@@ -20,46 +20,46 @@ struct Carousel : hal::Component {
     static constexpr hal::ArgumentOptions list(std::int64_t min, std::int64_t max) {
         return {.per_instance = true, .min = min, .max = max};
     }
-    hal::Argument     pockets{*this, "pockets", 8, "how many pockets", list(1, 1000)};
+    hal::Argument     pockets{*this, "pockets", 8, "number of pockets", list(1, 1000)};
     hal::TextArgument encoding_name{*this, "encoding", "gray", "gray, binary, bcd, single, index, edge or counts", {.per_instance = true}};
-    hal::Argument     num_sense{*this, "num_sense", 4, "how many position sensors; index has 2", list(1, 1000)};
-    hal::Argument     directions{*this, "dir", 2, "2: turns both ways, 1: forward only", list(1, 2)};
+    hal::Argument     num_sense{*this, "num_sense", 4, "number of position sensors; index has 2", list(1, 1000)};
+    hal::Argument     directions{*this, "dir", 2, "2: both directions, 1: forward only", list(1, 2)};
     hal::Argument     parity_wanted{*this, "parity", 0, "1: odd, 0: even parity", list(0, 1)};
     const Encoding    encoding = encoding_of(encoding_name.get());
 
-    hal::In<std::int32_t>  pocket_number{*this, "pocket-number", "pocket to go to; beyond the last it starts again at 1; 0: stays"};
-    hal::In<bool>          enable{*this, "enable", "rising edge: goes to the pocket; FALSE stops it"};
-    hal::Out<bool>         active{*this, "active", "TRUE while it moves, homes, aligns or locks"};
-    hal::Out<bool>         ready{*this, "ready", "TRUE once it is at the pocket, until it moves again"};
-    hal::In<bool>          strobe{*this, "strobe", "FALSE: the sensors do not count", {.initial = true}};
+    hal::In<std::int32_t>  pocket_number{*this, "pocket-number", "target pocket; wraps around above the last one; 0: no move"};
+    hal::In<bool>          enable{*this, "enable", "a rising edge starts the move to the target pocket; FALSE stops it"};
+    hal::Out<bool>         active{*this, "active", "TRUE while moving, homing, aligning or locking"};
+    hal::Out<bool>         ready{*this, "ready", "TRUE at the target pocket, until the next move"};
+    hal::In<bool>          strobe{*this, "strobe", "FALSE ignores the position sensors", {.initial = true}};
     hal::In<bool>          parity{*this, "parity", "parity bit of the position encoder"};
     hal::Ins<bool>         sense{*this, "sense-#", sensors(), "position sensor #"};
-    hal::In<double>        rev_pulse{*this, "rev-pulse", "how long to run in reverse at the pocket, to lock it", {.unit = "s"}};
-    hal::In<double>        fwd_dc{*this, "fwd-dc", "motor-vel while it turns forward"};
-    hal::In<double>        rev_dc{*this, "rev-dc", "motor-vel while it turns in reverse"};
-    hal::In<double>        hold_dc{*this, "hold-dc", "motor-vel while it rests"};
-    hal::In<double>        align_dc{*this, "align-dc", "speed of the last slow move on to the marker; 0: there is none"};
-    hal::In<double>        decel_time{*this, "decel-time", "how long to wait before that move", {.unit = "s"}};
+    hal::In<double>        rev_pulse{*this, "rev-pulse", "duration of the reverse run that locks the carousel at the pocket", {.unit = "s"}};
+    hal::In<double>        fwd_dc{*this, "fwd-dc", "motor-vel while turning forward"};
+    hal::In<double>        rev_dc{*this, "rev-dc", "motor-vel while turning in reverse"};
+    hal::In<double>        hold_dc{*this, "hold-dc", "motor-vel at standstill"};
+    hal::In<double>        align_dc{*this, "align-dc", "speed of the final slow alignment to the marker; 0: no alignment"};
+    hal::In<double>        decel_time{*this, "decel-time", "pause before the alignment", {.unit = "s"}};
     hal::In<std::int32_t>  counts{*this, "counts", "counts: rawcounts of the encoder or step generator"};
     hal::In<std::int32_t>  scale{*this, "scale", "counts: counts from pocket to pocket", {.initial = 100}};
-    hal::In<std::int32_t>  width{*this, "width", "counts: so far from its centre a pocket is reached"};
+    hal::In<std::int32_t>  width{*this, "width", "counts: distance from its centre within which a pocket is reached"};
     hal::In<std::int32_t>  home_offset{*this, "home-offset", "counts: counts from the index to pocket 1"};
-    hal::Io<bool>          index_enable{*this, "index-enable", "counts: TRUE while it waits for the encoder's index"};
-    hal::In<bool>          jog_fwd{*this, "jog-fwd", "rising edge: one pocket forward"};
-    hal::In<bool>          jog_rev{*this, "jog-rev", "rising edge: one pocket back, if it turns both ways"};
-    hal::Out<bool>         motor_fwd{*this, "motor-fwd", "TRUE: the motor turns to larger numbers", {.safe = false}};
-    hal::Out<bool>         motor_rev{*this, "motor-rev", "TRUE: the motor turns to smaller numbers", {.safe = false}};
-    hal::Out<bool>         parity_error{*this, "parity-error", "TRUE: sensors and parity bit do not fit"};
-    hal::Out<std::int32_t> current_position{*this, "current-position", "the pocket that is there; 0: not known"};
-    hal::Out<double>       motor_vel{*this, "motor-vel", "for a motor with a speed: fwd-dc, rev-dc, align-dc or hold-dc", {.safe = 0.0}};
-    hal::Out<bool>         homed{*this, "homed", "TRUE: the place of pocket 1 has been found"};
-    hal::In<bool>          unhome{*this, "unhome", "TRUE: forgets it"};
-    hal::Out<std::int32_t> state{*this, "state", "0 rests, 1 homes, 2 moves, 3 slows down, 4 5 6 aligns, 7 locks, 8 jogs"};
-    hal::Out<bool>         homing{*this, "homing", "TRUE while it looks for pocket 1"};
-    hal::Out<double>       timer{*this, "timer", "time left of decel-time or rev-pulse", {.unit = "s"}};
-    hal::Out<std::int32_t> motor_dir{*this, "motor-dir", "1 forward, -1 reverse, 0 rests"};
-    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles a reading of gray, binary, bcd or single has to last before it counts"};
-    hal::Function run{*this, "", &Carousel::update, "one step of the carousel"};
+    hal::Io<bool>          index_enable{*this, "index-enable", "counts: TRUE while waiting for the encoder's index"};
+    hal::In<bool>          jog_fwd{*this, "jog-fwd", "a rising edge moves one pocket forward"};
+    hal::In<bool>          jog_rev{*this, "jog-rev", "a rising edge moves one pocket back (with dir=2)"};
+    hal::Out<bool>         motor_fwd{*this, "motor-fwd", "TRUE drives the motor forward, to higher pocket numbers", {.safe = false}};
+    hal::Out<bool>         motor_rev{*this, "motor-rev", "TRUE drives the motor in reverse, to lower pocket numbers", {.safe = false}};
+    hal::Out<bool>         parity_error{*this, "parity-error", "TRUE: the sensors do not match the parity bit"};
+    hal::Out<std::int32_t> current_position{*this, "current-position", "current pocket; 0: unknown"};
+    hal::Out<double>       motor_vel{*this, "motor-vel", "speed command for the motor: fwd-dc, rev-dc, align-dc or hold-dc", {.safe = 0.0}};
+    hal::Out<bool>         homed{*this, "homed", "TRUE: the position of pocket 1 is known"};
+    hal::In<bool>          unhome{*this, "unhome", "TRUE clears homed"};
+    hal::Out<std::int32_t> state{*this, "state", "0 idle, 1 homing, 2 moving, 3 decelerating, 4 5 6 aligning, 7 locking, 8 jogging"};
+    hal::Out<bool>         homing{*this, "homing", "TRUE while homing to pocket 1"};
+    hal::Out<double>       timer{*this, "timer", "remaining time of decel-time or rev-pulse", {.unit = "s"}};
+    hal::Out<std::int32_t> motor_dir{*this, "motor-dir", "1 forward, -1 reverse, 0 stopped"};
+    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles for which a reading of gray, binary, bcd or single must be stable"};
+    hal::Function run{*this, "", &Carousel::update, "reads the sensors and controls the motor"};
 
     void update(hal::Cycle cycle) noexcept {
         if (unhome) homed = false;
@@ -91,7 +91,7 @@ private:
     }
     bool absolute() const noexcept { return encoding < Encoding::index; }
     bool has_place() const noexcept { return absolute() || homed; }
-    /// `pocket` as a number from 1 to pockets.
+    /// Returns `pocket` wrapped to 1..pockets.
     std::int64_t wrapped(std::int64_t pocket) const noexcept { return ((pocket - 1) % pockets + pockets) % pockets + 1; }
     void enter(State next) noexcept { state_ = next; }
 
@@ -138,7 +138,7 @@ private:
 
     void look_at_pulses() noexcept {
         const bool index = sense[0], pulse = sense[1], changed = strobe && pulse != was_pulse_;
-        const bool aligning = state_ >= State::slows && state_ <= State::returns;  // it goes over the same marker again
+        const bool aligning = state_ >= State::slows && state_ <= State::returns;  // it passes the same marker again
         if (strobe) was_pulse_ = pulse;
         marker_ = encoding == Encoding::edge || pulse;
         if (!strobe) return;
@@ -267,7 +267,7 @@ private:
 
     State state_ = State::rests;
     bool was_enabled_ = false, was_jog_fwd_ = false, was_jog_rev_ = false, was_pulse_ = false;
-    bool marker_ = false;  // it stands at a pocket
+    bool marker_ = false;  // at the centre of a pocket
     bool moved_ = false, asked_index_ = false;
     int direction_ = 1;
     std::uint32_t stable_ = 0;
@@ -278,8 +278,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Carousel, "carousel", "Turns the carousel of a tool changer to a pocket", R"(
-A rising edge of `enable` makes `active` TRUE and turns to `pocket-number`, the shorter way if `dir=2`; then `active` is FALSE and `ready`
-TRUE. `enable` FALSE stops it. Pockets count from 1.
+A rising edge of `enable` sets `active` and moves to `pocket-number`, in the shorter direction with `dir=2`; then `active` is FALSE and `ready`
+TRUE. `enable` FALSE stops the carousel. Pockets are numbered from 1.
 
 | encoding | sensors |
 | --- | --- |
@@ -289,15 +289,15 @@ TRUE. `enable` FALSE stops it. Pockets count from 1.
 | edge | as index, but both edges of sense-1 are pockets |
 | counts | `counts`, `scale` per pocket; sense-0 or the encoder's index (`index-enable`) is the home |
 
-The last three have to find pocket 1: the first `enable` turns it forward until the index, which goes on when `enable` falls. In index and
-edge the count is corrected at each pass of the index. Counts reach a pocket `width` from its centre.
+The last three must first find pocket 1: the first `enable` turns forward until the index, even if `enable` becomes FALSE meanwhile. With `index` and
+`edge`, each pass of the index corrects the count. With `counts`, a pocket is reached within `width` of its centre.
 
-With `align-dc` it stops at the marker for `decel-time`, goes back slowly until the marker has come and gone, and forward on to it. With
-`rev-pulse` it is then driven against its lock in reverse, so long. At rest `motor-vel` is `hold-dc`. `jog-fwd` and `jog-rev` move by
-one pocket while it rests and is not enabled.
+With `align-dc` the carousel stops at the marker for `decel-time`, moves back slowly past the marker, and forward onto it. With
+`rev-pulse` it is then driven in reverse against its lock for that time. At standstill `motor-vel` is `hold-dc`. `jog-fwd` and `jog-rev` move by
+one pocket while the carousel is stopped and disabled.
 
-All arguments are lists with an element per carousel (`pockets=10,10,8`); what is missing has its default, where LinuxCNC's own repeats
-the last.
+All arguments are lists with an element per carousel (`pockets=10,10,8`); missing elements have the default value (LinuxCNC repeats
+the last element).
 
     loadrt carousel pockets=12 encoding=index names=tools
     addf tools servo

@@ -10,43 +10,43 @@ namespace {
 struct DiffDrive : hal::Component {
     using Component::Component;
 
-    hal::In<double> linear{*this, "linear", "wanted speed forwards", {.unit = "m/s"}};
-    hal::In<double> angular{*this, "angular", "wanted speed of turning to the left", {.unit = "rad/s"}};
+    hal::In<double> linear{*this, "linear", "requested forward speed", {.unit = "m/s"}};
+    hal::In<double> angular{*this, "angular", "requested turning speed, positive to the left", {.unit = "rad/s"}};
     hal::In<bool> enable{*this, "enable", "FALSE: both wheels are commanded to rest at once", {.initial = true}};
-    hal::In<double> left_angle{*this, "left-angle", "measured angle of the left wheel, growing forwards", {.unit = "rad"}};
-    hal::In<double> right_angle{*this, "right-angle", "measured angle of the right wheel, growing forwards", {.unit = "rad"}};
-    hal::In<bool> load{*this, "load", "while TRUE the pose is load-x, load-y, load-heading"};
-    hal::In<double> load_x{*this, "load-x", "where the robot stands", {.unit = "m"}};
-    hal::In<double> load_y{*this, "load-y", "where the robot stands", {.unit = "m"}};
-    hal::In<double> load_heading{*this, "load-heading", "where it looks", {.unit = "rad"}};
+    hal::In<double> left_angle{*this, "left-angle", "measured angle of the left wheel, positive forwards", {.unit = "rad"}};
+    hal::In<double> right_angle{*this, "right-angle", "measured angle of the right wheel, positive forwards", {.unit = "rad"}};
+    hal::In<bool> load{*this, "load", "TRUE sets the pose to load-x, load-y, load-heading"};
+    hal::In<double> load_x{*this, "load-x", "x of the robot to set", {.unit = "m"}};
+    hal::In<double> load_y{*this, "load-y", "y of the robot to set", {.unit = "m"}};
+    hal::In<double> load_heading{*this, "load-heading", "heading of the robot to set", {.unit = "rad"}};
 
-    hal::Param<double> left_radius{*this, "left-radius", "of the left wheel", {.initial = 0.04, .unit = "m"}};
-    hal::Param<double> right_radius{*this, "right-radius", "of the right wheel", {.initial = 0.04, .unit = "m"}};
-    hal::Param<double> track{*this, "track", "between the points where the wheels touch the ground", {.initial = 0.25, .unit = "m"}};
-    hal::Param<double> max_rim{*this, "max-wheel-speed", "at the rim of either wheel; 0: none", {.unit = "m/s"}};
-    hal::Param<double> max_linear{*this, "max-linear", "speed; 0: none", {.unit = "m/s"}};
-    hal::Param<double> max_angular{*this, "max-angular", "speed of turning; 0: none", {.unit = "rad/s"}};
-    hal::Param<double> max_linear_acceleration{*this, "max-linear-acceleration", "0: none", {.unit = "m/s^2"}};
-    hal::Param<double> max_angular_acceleration{*this, "max-angular-acceleration", "0: none", {.unit = "rad/s^2"}};
+    hal::Param<double> left_radius{*this, "left-radius", "radius of the left wheel", {.initial = 0.04, .unit = "m"}};
+    hal::Param<double> right_radius{*this, "right-radius", "radius of the right wheel", {.initial = 0.04, .unit = "m"}};
+    hal::Param<double> track{*this, "track", "distance between the wheels' contact points", {.initial = 0.25, .unit = "m"}};
+    hal::Param<double> max_rim{*this, "max-wheel-speed", "limit on the rim speed of each wheel; 0: no limit", {.unit = "m/s"}};
+    hal::Param<double> max_linear{*this, "max-linear", "limit on the forward speed; 0: no limit", {.unit = "m/s"}};
+    hal::Param<double> max_angular{*this, "max-angular", "limit on the turning speed; 0: no limit", {.unit = "rad/s"}};
+    hal::Param<double> max_linear_acceleration{*this, "max-linear-acceleration", "limit on the forward acceleration; 0: no limit", {.unit = "m/s^2"}};
+    hal::Param<double> max_angular_acceleration{*this, "max-angular-acceleration", "limit on the angular acceleration; 0: no limit", {.unit = "rad/s^2"}};
 
     hal::Out<double> left_speed{*this, "left-speed", "commanded speed of the left wheel", {.unit = "rad/s", .safe = 0.0, .finite = true}};
     hal::Out<double> right_speed{*this, "right-speed",
                                  "commanded speed of the right wheel", {.unit = "rad/s", .safe = 0.0, .finite = true}};
-    hal::Out<bool> limited{*this, "limited", "TRUE: the commanded speeds are less than wanted"};
-    hal::Out<double> x{*this, "x", "of the middle of the axle", {.unit = "m", .finite = true}};
-    hal::Out<double> y{*this, "y", "of the middle of the axle", {.unit = "m", .finite = true}};
-    hal::Out<double> heading{*this, "heading", "0 along x, growing to the left, above -pi up to pi", {.unit = "rad", .finite = true}};
-    hal::Out<double> turned{*this, "turned", "the heading with all its turns", {.unit = "rad", .finite = true}};
-    hal::Out<double> distance{*this, "distance", "way of the middle of the axle; backwards counts negative", {.unit = "m", .finite = true}};
-    hal::Out<double> actual_linear{*this, "actual-linear", "measured speed", {.unit = "m/s", .finite = true}};
-    hal::Out<double> actual_angular{*this, "actual-angular", "measured speed of turning", {.unit = "rad/s", .finite = true}};
+    hal::Out<bool> limited{*this, "limited", "TRUE: a limit reduces the commanded speeds"};
+    hal::Out<double> x{*this, "x", "x of the centre of the axle", {.unit = "m", .finite = true}};
+    hal::Out<double> y{*this, "y", "y of the centre of the axle", {.unit = "m", .finite = true}};
+    hal::Out<double> heading{*this, "heading", "heading: 0 along x, positive to the left, -pi..pi", {.unit = "rad", .finite = true}};
+    hal::Out<double> turned{*this, "turned", "heading including whole turns", {.unit = "rad", .finite = true}};
+    hal::Out<double> distance{*this, "distance", "distance covered by the centre of the axle; negative backwards", {.unit = "m", .finite = true}};
+    hal::Out<double> actual_linear{*this, "actual-linear", "measured forward speed", {.unit = "m/s", .finite = true}};
+    hal::Out<double> actual_angular{*this, "actual-angular", "measured turning speed", {.unit = "rad/s", .finite = true}};
 
-    hal::Function measure{*this, "odometry", &DiffDrive::odometry, "pose and speeds from the angles of the wheels"};
-    hal::Function run{*this, "command", &DiffDrive::command, "speeds of the wheels from the wanted motion"};
+    hal::Function measure{*this, "odometry", &DiffDrive::odometry, "computes pose and speeds from the wheel angles"};
+    hal::Function run{*this, "command", &DiffDrive::command, "computes the wheel speeds from the requested motion"};
 
     void odometry(hal::Cycle cycle) noexcept {
         const double left = left_angle, right = right_angle, base = width();
-        const bool good = std::fabs(left) <= most && std::fabs(right) <= most;  // FALSE for what is not a number, too
+        const bool good = std::fabs(left) <= most && std::fabs(right) <= most;  // FALSE for NaN, too
         double way = 0.0, turn = 0.0;
         if (good && started_) {
             const double l = (left - last_left_) * radius(left_radius), r = (right - last_right_) * radius(right_radius);
@@ -60,7 +60,7 @@ struct DiffDrive : hal::Component {
             if (std::fabs(load_heading) <= most) heading_ = load_heading;
             distance_ = 0.0;
         } else {
-            // The chord of the arc, in the direction of its middle: exact while the ratio of the wheels' speeds is constant.
+            // The chord of the arc, in the direction at its midpoint: exact while the ratio of the wheel speeds is constant.
             const double half = turn / 2, chord = std::fabs(half) < 1e-4 ? 1 - half * half / 6 : std::sin(half) / half;
             x_ += way * chord * std::cos(heading_ + half);
             y_ += way * chord * std::sin(heading_ + half);
@@ -79,7 +79,7 @@ struct DiffDrive : hal::Component {
     void command(hal::Cycle cycle) noexcept {
         const double wanted_v = std::isfinite(linear) ? std::clamp(linear.get(), -most, most) : 0.0;
         const double wanted_w = std::isfinite(angular) ? std::clamp(angular.get(), -most, most) : 0.0;
-        // All limits shorten (v, w) as a whole, so that the robot keeps to its curve.
+        // All limits scale (v, w) as a vector, so that the robot stays on its curve.
         double share = 1.0;
         const auto within = [&](double value, double limit) {
             if (limit > 0.0 && std::fabs(value) * share > limit) share = limit / std::fabs(value);
@@ -119,18 +119,18 @@ HAL_COMPONENT(DiffDrive, "diff_drive", "Kinematics and odometry of a robot on tw
     left-speed  = (linear - angular track / 2) / left-radius
     right-speed = (linear + angular track / 2) / right-radius
 
-    l, r    = ways of the wheels in a cycle,  way = (l + r) / 2,  turn = (r - l) / track
+    l, r    = distances of the wheels in a cycle,  way = (l + r) / 2,  turn = (r - l) / track
     x      += way * sin(turn/2) / (turn/2) * cos(heading + turn/2)
     y      += way * sin(turn/2) / (turn/2) * sin(heading + turn/2)
     heading += turn
 
 (G. Dudek, M. Jenkin, *Computational Principles of Mobile Robotics*, chapter 3; the chord of the arc as in J. Borenstein, H. Everett, L.
-Feng, *Where am I?*, 1996, 1.3.1, with the exact factor.) The pose is exact while the wheels keep the ratio of their speeds over a cycle.
-SI units; heading 0 looks along x, to the left is positive. Two radii, because on a real robot they differ by what calibration finds.
+Feng, *Where am I?*, 1996, 1.3.1, with the exact factor.) The pose is exact if the ratio of the wheel speeds is constant within a cycle.
+Units are SI; heading 0 is along x, positive to the left. The radii are separate because they differ on a real robot (calibrate them).
 
-`linear` and `angular` are shortened together by the limits of speed and of the wheels, so the robot stays on its curve, only slower; the
-limits of acceleration shorten their change together. `enable` FALSE commands rest at once. A wheel angle that is not a number is left
-out, and the way is made up for when it is back. The first cycle only takes the angles. A radius or track that is not positive counts as
+The speed limits scale `linear` and `angular` together, so the robot stays on its curve at a lower speed; the
+acceleration limits scale their changes together. `enable` FALSE commands standstill immediately. NaN wheel angles are
+ignored; the next valid angle includes the motion meanwhile. The first cycle only stores the angles. A radius or track that is not positive counts as
 1e-9.
 
     loadrt diff_drive names=base

@@ -5,12 +5,12 @@ namespace {
 
 struct Differential : hal::Component {
     using Component::Component;
-    hal::In<double>  roll_cmd{*this, "roll-cmd", "wanted roll", {.unit = "deg"}};
-    hal::In<double>  pitch_cmd{*this, "pitch-cmd", "wanted pitch", {.unit = "deg"}};
-    hal::Out<double> roll_fb{*this, "roll-fb", "roll from the motors' positions", {.unit = "deg"}};
-    hal::Out<double> pitch_fb{*this, "pitch-fb", "pitch from the motors' positions", {.unit = "deg"}};
-    hal::Out<double> motor0_cmd{*this, "motor0-cmd", "position for motor 0", {.unit = "deg"}};
-    hal::Out<double> motor1_cmd{*this, "motor1-cmd", "position for motor 1", {.unit = "deg"}};
+    hal::In<double>  roll_cmd{*this, "roll-cmd", "commanded roll", {.unit = "deg"}};
+    hal::In<double>  pitch_cmd{*this, "pitch-cmd", "commanded pitch", {.unit = "deg"}};
+    hal::Out<double> roll_fb{*this, "roll-fb", "roll, from the motor positions", {.unit = "deg"}};
+    hal::Out<double> pitch_fb{*this, "pitch-fb", "pitch, from the motor positions", {.unit = "deg"}};
+    hal::Out<double> motor0_cmd{*this, "motor0-cmd", "commanded position of motor 0", {.unit = "deg"}};
+    hal::Out<double> motor1_cmd{*this, "motor1-cmd", "commanded position of motor 1", {.unit = "deg"}};
     hal::In<double>  motor0_fb{*this, "motor0-fb", "position of motor 0", {.unit = "deg"}};
     hal::In<double>  motor1_fb{*this, "motor1-fb", "position of motor 1", {.unit = "deg"}};
     hal::Function    run{*this, "", &Differential::update, "computes commands and feedback"};
@@ -29,7 +29,7 @@ HAL_COMPONENT(Differential, "differential", "Kinematics of a differential transm
     motor0-cmd = roll-cmd + pitch-cmd      roll-fb  = (motor0-fb + motor1-fb) / 2
     motor1-cmd = roll-cmd - pitch-cmd      pitch-fb = (motor0-fb - motor1-fb) / 2
 
-Both motors the same way: roll; against each other: pitch.
+Both motors in the same direction: roll; in opposite directions: pitch.
 
     loadrt differential names=wrist
     addf wrist servo

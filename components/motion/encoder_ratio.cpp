@@ -6,14 +6,14 @@
 
 namespace {
 
-/// Counts all edges of two phases; a jump of both at once is no direction and counts nothing.
+/// Counts all edges of two phases; a change of both at once has no direction and is ignored.
 class Edges {
 public:
     int operator()(bool a, bool b) noexcept {
         const unsigned now = (a != b ? 1u : 0u) | (b ? 2u : 0u);  // 0 1 2 3 in the order in which A leads B
         const unsigned moved = (now - last_) & 3u;
         last_ = now;
-        if (!started_) return started_ = true, 0;  // where the phases stand is no edge
+        if (!started_) return started_ = true, 0;  // the first sample has no edges
         return moved == 1 ? 1 : moved == 3 ? -1 : 0;
     }
 
@@ -23,24 +23,24 @@ private:
 };
 
 struct Counted {
-    std::int64_t master = 0;  // only what it moved while enabled
+    std::int64_t master = 0;  // only counts made while enabled
     std::int64_t slave = 0;
 };
 
 struct EncoderRatio : hal::Component {
     using Component::Component;
 
-    hal::Function sample{*this, "sample", &EncoderRatio::sample_phases, "samples and counts; in the fastest thread", {.shared = true}};
+    hal::Function sample{*this, "sample", &EncoderRatio::sample_phases, "samples and counts; belongs in the fastest thread", {.shared = true}};
     hal::In<bool> master_a{*this, sample, "master-A", "phase A of the master's encoder"};
     hal::In<bool> master_b{*this, sample, "master-B", "phase B of the master's encoder"};
     hal::In<bool> slave_a{*this, sample, "slave-A", "phase A of the slave's encoder"};
     hal::In<bool> slave_b{*this, sample, "slave-B", "phase B of the slave's encoder"};
-    hal::In<bool> enable{*this, sample, "enable", "TRUE: the slave is to follow the master; FALSE: the master's motion does not count"};
+    hal::In<bool> enable{*this, sample, "enable", "TRUE: the slave follows the master; FALSE: the master's motion is ignored"};
 
-    hal::Function update{*this, "update", &EncoderRatio::update_error, "computes the error; in the servo thread", {.shared = true}};
-    hal::Out<double> error{*this, update, "error", "how far the slave is ahead of where it should be", {.unit = "turn", .finite = true}};
-    hal::Io<std::uint32_t> master_ppr{*this, update, "master-ppr", "counts per turn of the master, four per pulse"};
-    hal::Io<std::uint32_t> slave_ppr{*this, update, "slave-ppr", "counts per turn of the slave, four per pulse"};
+    hal::Function update{*this, "update", &EncoderRatio::update_error, "computes the error; belongs in the servo thread", {.shared = true}};
+    hal::Out<double> error{*this, update, "error", "position error of the slave, positive when ahead", {.unit = "turn", .finite = true}};
+    hal::Io<std::uint32_t> master_ppr{*this, update, "master-ppr", "counts per revolution of the master, four per pulse"};
+    hal::Io<std::uint32_t> slave_ppr{*this, update, "slave-ppr", "counts per revolution of the slave, four per pulse"};
     hal::Io<std::uint32_t> master_teeth{*this, update, "master-teeth", "teeth of the master's gear"};
     hal::Io<std::uint32_t> slave_teeth{*this, update, "slave-teeth", "teeth of the slave's gear"};
 
@@ -71,13 +71,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(EncoderRatio, "encoder_ratio", "Electronic gear: the error of a slave axis that follows a master", R"(
-Counts the encoders of both axes and gives the error for a position loop of the slave:
+Counts the encoders of both axes and computes the error for the position loop of the slave:
 
     error = slave / slave-ppr - master / master-ppr * master-teeth / slave-teeth
 
-The master's counts are those made while `enable` was TRUE, so engaging and releasing the gear is no jump; while it is FALSE the slave
-is held where it is. All edges count: for an encoder of 500 pulses per turn `ppr` is 2000. A `ppr` or `slave-teeth` of 0 stands for an axis
-that does not move. `encoder-ratio.sample` has to run at least twice as often as edges come.
+Master counts are counted while `enable` is TRUE only, so engaging and releasing the gear causes no jump; while it is FALSE the slave
+holds its position. All edges count: for an encoder with 500 pulses per revolution `ppr` is 2000. A `ppr` or `slave-teeth` of 0 disables that
+axis. `encoder-ratio.sample` must run at least twice as often as edges occur.
 
     loadrt encoder_ratio names=hob
     loadrt pid names=hob-pid

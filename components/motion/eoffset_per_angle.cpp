@@ -9,23 +9,23 @@ namespace {
 
 struct EoffsetPerAngle : hal::Component {
     using Component::Component;
-    hal::In<bool>          active{*this, "active", "TRUE while there is an offset (motion.eoffset-active)"};
+    hal::In<bool>          active{*this, "active", "TRUE while an offset is active (motion.eoffset-active)"};
     hal::In<bool>          is_on{*this, "is-on", "TRUE: the machine is on"};
-    hal::In<bool>          enable_in{*this, "enable-in", "TRUE: an offset is computed; FALSE: it is taken back"};
+    hal::In<bool>          enable_in{*this, "enable-in", "TRUE computes the offset; FALSE removes it"};
     hal::In<double>        radius_ref{*this, "radius-ref", "radius of the part", {.initial = 1.0}};
     hal::In<double>        angle{*this, "angle", "angle of the part", {.unit = "deg"}};
-    hal::In<double>        start_angle{*this, "start-angle", "angle at which the shape begins", {.unit = "deg"}};
+    hal::In<double>        start_angle{*this, "start-angle", "angle at which the shape starts", {.unit = "deg"}};
     hal::In<std::int32_t>  fnum{*this, "fnum", "shape: 0 polygon inside, 1 polygon outside, 2 sine, 3 square wave; others are 0"};
     hal::In<double>        rfraction{*this, "rfraction", "amplitude as a fraction of radius-ref", {.initial = 0.1}};
     hal::In<double>        fmult{*this, "fmult", "sides of the polygon, or waves per turn", {.initial = 6.0}};
     hal::In<std::uint32_t> k{*this, "k", "counts per unit; 0 is 10000", {.initial = 10000}};
-    hal::Out<bool>         is_off{*this, "is-off", "the opposite of is-on"};
+    hal::Out<bool>         is_off{*this, "is-off", "inverse of is-on"};
     hal::Out<bool>         enable_out{*this, "enable-out", "for axis.L.eoffset-enable"};
     hal::Out<bool>         clear{*this, "clear", "for axis.L.eoffset-clear"};
     hal::Out<std::int32_t> kcounts{*this, "kcounts", "the offset in counts, for axis.L.eoffset-counts"};
     hal::Out<double>       kreciprocal{*this, "kreciprocal", "1 / k, for axis.L.eoffset-scale"};
     hal::Out<double>       eoffset{*this, "eoffset-dbg", "the offset"};
-    hal::Out<std::uint32_t> state{*this, "state-dbg", "1 waits for enable-in, 2 computes, 3 takes the offset back"};
+    hal::Out<std::uint32_t> state{*this, "state-dbg", "1 waiting for enable-in, 2 computing, 3 removing the offset"};
     hal::Function          run{*this, "", &EoffsetPerAngle::update, "computes the offset"};
 
     void update(hal::Cycle) noexcept {
@@ -42,7 +42,7 @@ struct EoffsetPerAngle : hal::Component {
             if (const auto shape = value()) offset = *shape;
             else state_ = returns;
         }
-        const double exact = offset * per_unit;  // a millionth is added: 2500 must not become 2499.9999999999 and then 2499
+        const double exact = offset * per_unit;  // 1e-6 is added: 2500 must not become 2499.9999999999 and then 2499
         const double counts = std::clamp(std::trunc(exact + std::copysign(1e-6, exact)), -2147483648.0, 2147483647.0);
         is_off = !is_on;
         enable_out = state_ != waits;
@@ -56,7 +56,7 @@ struct EoffsetPerAngle : hal::Component {
 private:
     static constexpr std::uint32_t waits = 1, computes = 2, returns = 3;
 
-    /// The offset at this angle; nothing when the shape cannot be.
+    /// Returns the offset at this angle, or nothing for an impossible shape.
     std::optional<double> value() const noexcept {
         const double amplitude = radius_ref * rfraction, wave = (angle - start_angle) / 360.0 * fmult;
         if (!std::isfinite(amplitude) || !std::isfinite(wave)) return {};
@@ -85,9 +85,9 @@ With a = `radius-ref` * `rfraction` and t the angle since `start-angle`:
 | 2 | a / 2 * (1 - cos(fmult t)) | sine |
 | 3 | a in the middle half of each wave, else 0 | square wave |
 
-A polygon needs an `fmult` of 3 or more. `kcounts` is the offset times `k`, without its fraction. A rising edge of `enable-in` starts;
-when it falls `clear` is TRUE until `active` is FALSE. When the shape cannot be, the offset is taken back, and
-`enable-in` has to rise again.
+A polygon needs an `fmult` of 3 or more. `kcounts` is the offset times `k`, truncated. A rising edge of `enable-in` starts the offset;
+after its falling edge `clear` is TRUE until `active` is FALSE. If the shape is impossible, the offset is removed, and
+`enable-in` must rise again.
 
     loadrt eoffset_per_angle names=opa
     addf opa servo

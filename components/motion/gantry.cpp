@@ -5,19 +5,19 @@ namespace {
 
 struct Gantry : hal::Component {
     using Component::Component;
-    hal::Argument personality{*this, "personality", 2, "how many joints", {.per_instance = true, .min = 1, .max = 64}};
+    hal::Argument personality{*this, "personality", 2, "number of joints", {.per_instance = true, .min = 1, .max = 64}};
 
-    hal::Function read{*this, "read", &Gantry::read_joints, "computes feedback and the combined switches; before the motion"};
-    hal::Function write{*this, "write", &Gantry::write_joints, "computes the commands of the joints; after the motion"};
-    hal::Outs<double> pos_cmd{*this, "joint.##.pos-cmd", personality, "position for joint ##"};
+    hal::Function read{*this, "read", &Gantry::read_joints, "computes feedback and combined switches; add it before the motion controller"};
+    hal::Function write{*this, "write", &Gantry::write_joints, "computes the joint commands; add it after the motion controller"};
+    hal::Outs<double> pos_cmd{*this, "joint.##.pos-cmd", personality, "commanded position of joint ##"};
     hal::Ins<double>  pos_fb{*this, "joint.##.pos-fb", personality, "position of joint ##"};
     hal::Ins<bool>    joint_home{*this, "joint.##.home", personality, "home switch of joint ##"};
     hal::Outs<double> offset{*this, "joint.##.offset", personality, "position-cmd - pos-cmd of joint ##, found while homing"};
-    hal::In<double>   position_cmd{*this, "position-cmd", "wanted position"};
+    hal::In<double>   position_cmd{*this, "position-cmd", "commanded position"};
     hal::Out<double>  position_fb{*this, "position-fb", "position, from joint 0"};
-    hal::Out<bool>    home{*this, "home", "TRUE from when all home switches are on until all are off again"};
+    hal::Out<bool>    home{*this, "home", "TRUE after all home switches were on, until all are off again"};
     hal::Out<bool>    limit{*this, "limit", "TRUE while any home switch is on"};
-    hal::In<double>   search_vel{*this, "search-vel", "its sign says in which direction the home switches are"};
+    hal::In<double>   search_vel{*this, "search-vel", "search velocity; its sign is the direction of the home switches"};
 
     void read_joints(hal::Cycle) noexcept {
         watch_switches();
@@ -55,13 +55,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Gantry, "gantry", "Drives several joints from one axis and squares them while homing", R"(
-All joints follow `position-cmd`, each with an offset of its own: pos-cmd = position-cmd - offset. While `position-cmd` moves in the
-direction of `search-vel` and some but not all home switches are on, the joints whose switch is on stand still, and their offset takes
-up the motion. When the last switch comes on the offsets are found: all joints move together again, and stay so until all switches have
-been off. The joint stops without a ramp, so home slowly, and let HOME_SEARCH_VEL and HOME_LATCH_VEL have the same sign.
+All joints follow `position-cmd`, each with its own offset: pos-cmd = position-cmd - offset. While `position-cmd` moves in the
+direction of `search-vel` and some but not all home switches are on, the joints whose switch is on do not move, and their offset absorbs
+the motion. Once the last switch is on, the offsets are known and all joints move together, until all switches have
+been off. Joints stop without a ramp, so home slowly, and use the same sign for HOME_SEARCH_VEL and HOME_LATCH_VEL.
 
-`personality` is the number of joints, 2 when it is not given. `position-fb` is that of joint 0 with its offset. An input that is not
-a number leaves the last command.
+`personality` is the number of joints, 2 by default. `position-fb` is the feedback of joint 0 plus its offset. While an input is NaN,
+the last command is held.
 
     loadrt gantry names=y personality=2
     addf y.read servo

@@ -14,10 +14,10 @@ enum Mode : std::uint32_t { follow = 0, set_points = 1, table = 2, velocity_mode
 
 struct SetPoint {
     double position = 0.0, velocity = 0.0;  // velocity 0: max-velocity
-    bool flying = false;                    // the one before is passed without a stop
+    bool flying = false;                    // the previous set-point is passed without a stop
 };
 
-/// A ring of set-points that wait, allocated once.
+/// A ring of queued set-points, allocated once.
 class Queue {
 public:
     explicit Queue(std::int64_t depth) : depth_(static_cast<std::size_t>(depth)), ring_(std::make_unique<SetPoint[]>(depth_)) {}
@@ -43,51 +43,51 @@ private:
 struct MotionProfile : hal::Component {
     using Component::Component;
 
-    hal::Argument depth{*this, "queue", 8, "how many set-points may wait", {.min = 1, .max = 256}};
+    hal::Argument depth{*this, "queue", 8, "capacity of the set-point queue", {.min = 1, .max = 256}};
     hal::Argument rows{*this, "table", 0, "rows of the table of set-points", {.min = 0, .max = 256}};
 
-    hal::In<std::uint32_t> mode{*this, "mode", "0 follows target; 1 set-points by hand-shake; 2 the table; 3 target-velocity"};
-    hal::In<double> target{*this, "target", "where to go (modes 0 and 1)"};
-    hal::In<double> target_velocity{*this, "target-velocity", "mode 3: the wanted speed; mode 1: speed of this set-point, 0: max-velocity"};
-    hal::In<double> max_velocity{*this, "max-velocity", "largest speed", {.initial = 1.0, .unit = "1/s"}};
-    hal::In<double> max_acceleration{*this, "max-acceleration", "largest acceleration", {.initial = 1.0, .unit = "1/s^2"}};
-    hal::In<double> max_deceleration{*this, "max-deceleration", "largest deceleration; 0: as max-acceleration", {.unit = "1/s^2"}};
-    hal::In<double> max_jerk{*this, "max-jerk", "largest change of acceleration; 0: none, speed goes in trapezoids", {.unit = "1/s^3"}};
-    hal::In<bool> new_set_point{*this, "new-set-point", "mode 1: a rising edge hands over target and target-velocity"};
-    hal::In<bool> change_immediately{*this, "change-immediately", "the new set-point replaces the present one and all that wait"};
-    hal::In<bool> change_on_set_point{*this, "change-on-set-point", "the new set-point is gone on to without a stop at the one before"};
-    hal::In<bool> relative{*this, "relative", "the new set-point counts from the one before"};
+    hal::In<std::uint32_t> mode{*this, "mode", "0 follow target; 1 set-points by handshake; 2 table; 3 target-velocity"};
+    hal::In<double> target{*this, "target", "target position (modes 0 and 1)"};
+    hal::In<double> target_velocity{*this, "target-velocity", "mode 3: target speed; mode 1: speed of this set-point, 0: max-velocity"};
+    hal::In<double> max_velocity{*this, "max-velocity", "maximum speed", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<double> max_acceleration{*this, "max-acceleration", "maximum acceleration", {.initial = 1.0, .unit = "1/s^2"}};
+    hal::In<double> max_deceleration{*this, "max-deceleration", "maximum deceleration; 0: max-acceleration", {.unit = "1/s^2"}};
+    hal::In<double> max_jerk{*this, "max-jerk", "maximum jerk; 0: no limit (trapezoidal profile)", {.unit = "1/s^3"}};
+    hal::In<bool> new_set_point{*this, "new-set-point", "mode 1: a rising edge submits target and target-velocity"};
+    hal::In<bool> change_immediately{*this, "change-immediately", "TRUE: the new set-point replaces the current one and the queue"};
+    hal::In<bool> change_on_set_point{*this, "change-on-set-point", "TRUE: no stop at the previous set-point before the new one"};
+    hal::In<bool> relative{*this, "relative", "TRUE: the new set-point is relative to the previous one"};
     hal::In<bool> run_table{*this, "run-table", "mode 2: a rising edge starts the table, FALSE stops"};
-    hal::In<bool> repeat_table{*this, "repeat-table", "the table starts again after its last row"};
+    hal::In<bool> repeat_table{*this, "repeat-table", "TRUE restarts the table after its last row"};
     hal::In<std::uint32_t> table_length{*this, "table-length", "rows in use; 0: all"};
-    hal::In<bool> halt{*this, "halt", "TRUE: brakes to rest; FALSE: goes on"};
-    hal::In<bool> stop_in{*this, "stop", "TRUE: brakes to rest and forgets all set-points"};
-    hal::In<bool> quick_stop{*this, "quick-stop", "as stop, by quick-deceleration and quick-jerk"};
+    hal::In<bool> halt{*this, "halt", "TRUE brakes to a stop; FALSE resumes"};
+    hal::In<bool> stop_in{*this, "stop", "TRUE brakes to a stop and discards all set-points"};
+    hal::In<bool> quick_stop{*this, "quick-stop", "like stop, with quick-deceleration and quick-jerk"};
     hal::In<double> quick_deceleration{*this, "quick-deceleration",
-                                       "deceleration of a quick stop; 0: as max-deceleration", {.unit = "1/s^2"}};
-    hal::In<double> quick_jerk{*this, "quick-jerk", "jerk of a quick stop; 0: none", {.unit = "1/s^3"}};
-    hal::In<bool> load{*this, "load", "while TRUE position is load-position, at rest, and all set-points are forgotten"};
-    hal::In<double> load_position{*this, "load-position", "where to begin"};
+                                       "deceleration of a quick stop; 0: max-deceleration", {.unit = "1/s^2"}};
+    hal::In<double> quick_jerk{*this, "quick-jerk", "jerk of a quick stop; 0: no limit", {.unit = "1/s^3"}};
+    hal::In<bool> load{*this, "load", "TRUE sets the position to load-position, at standstill, and discards all set-points"};
+    hal::In<double> load_position{*this, "load-position", "position to load"};
 
     hal::Ins<double> row_position{*this, "row-##-position", rows, "position of row ## of the table"};
     hal::Ins<double> row_velocity{*this, "row-##-velocity", rows, "speed to row ##; 0: max-velocity"};
-    hal::Ins<double> row_dwell{*this, "row-##-dwell", rows, "rest at row ##", {.unit = "s"}};
+    hal::Ins<double> row_dwell{*this, "row-##-dwell", rows, "dwell at row ##", {.unit = "s"}};
 
-    hal::Out<double> position{*this, "position", "of the profile", {.finite = true}};
-    hal::Out<double> velocity{*this, "velocity", "of the profile", {.unit = "1/s", .finite = true}};
-    hal::Out<double> acceleration{*this, "acceleration", "of the profile", {.unit = "1/s^2", .finite = true}};
-    hal::Out<double> jerk{*this, "jerk", "of the profile; 0 in trapezoids", {.unit = "1/s^3", .finite = true}};
-    hal::Out<bool> done{*this, "done", "TRUE: at the target (mode 3: at the speed) and nothing waits"};
-    hal::Out<bool> moving{*this, "moving", "TRUE: the speed or the acceleration is not 0"};
-    hal::Out<bool> acknowledge{*this, "set-point-acknowledge", "rises when a set-point was taken; FALSE: the next may come"};
-    hal::Out<std::uint32_t> queue_length{*this, "queue-length", "set-points that wait, without the present one"};
-    hal::Out<bool> queue_full{*this, "queue-full", "TRUE: a set-point would have to wait to be taken"};
-    hal::Out<std::uint32_t> passed{*this, "set-points-done", "set-points or rows reached since load"};
-    hal::Out<std::uint32_t> row{*this, "table-row", "the row of the table it is going to or resting at"};
-    hal::Out<double> time_left{*this, "time-left", "until it is there", {.unit = "s", .finite = true}};
-    hal::Out<bool> bad_limit{*this, "limit-error", "TRUE: a limit or the mode makes no sense; it stops by the last good limits"};
+    hal::Out<double> position{*this, "position", "position of the profile", {.finite = true}};
+    hal::Out<double> velocity{*this, "velocity", "velocity of the profile", {.unit = "1/s", .finite = true}};
+    hal::Out<double> acceleration{*this, "acceleration", "acceleration of the profile", {.unit = "1/s^2", .finite = true}};
+    hal::Out<double> jerk{*this, "jerk", "jerk of the profile; 0 in trapezoidal profiles", {.unit = "1/s^3", .finite = true}};
+    hal::Out<bool> done{*this, "done", "TRUE: target (mode 3: speed) reached and queue empty"};
+    hal::Out<bool> moving{*this, "moving", "TRUE while the speed or the acceleration is not 0"};
+    hal::Out<bool> acknowledge{*this, "set-point-acknowledge", "TRUE: the set-point was accepted; FALSE: ready for the next one"};
+    hal::Out<std::uint32_t> queue_length{*this, "queue-length", "number of queued set-points, without the current one"};
+    hal::Out<bool> queue_full{*this, "queue-full", "TRUE: the next set-point is accepted only after the queue has space"};
+    hal::Out<std::uint32_t> passed{*this, "set-points-done", "number of set-points or rows reached since load"};
+    hal::Out<std::uint32_t> row{*this, "table-row", "current row of the table"};
+    hal::Out<double> time_left{*this, "time-left", "time until the target is reached", {.unit = "s", .finite = true}};
+    hal::Out<bool> bad_limit{*this, "limit-error", "TRUE: invalid limit or mode; the profile stops with the last valid limits"};
 
-    hal::Function run{*this, "", &MotionProfile::update, "one step of the profile"};
+    hal::Function run{*this, "", &MotionProfile::update, "computes the next point of the profile"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
@@ -130,11 +130,11 @@ private:
         start_table_ = run_table && !was_run_;
         was_run_ = run_table;
     }
-    /// No set-point any more; it brakes to rest unless something new is wanted.
+    /// Discards all set-points; the profile brakes to a stop unless a new target follows.
     void forget() noexcept {
         queue_.clear();
         has_goal_ = in_table_ = false;
-        if (load || stop_in || quick_stop) waiting_ = false;  // a press meanwhile is no wish for later
+        if (load || stop_in || quick_stop) waiting_ = false;  // an edge meanwhile is discarded
     }
 
     void want() noexcept {
@@ -181,23 +181,23 @@ private:
         counted_ = false;
         side_ = goal_.position < generator_.state().position ? -1.0 : 1.0;
     }
-    /// Goes on to the next set-point when the present one is passed in flight.
+    /// Advances to the next set-point when the current one is passed without a stop.
     void fly() noexcept {
         while (has_goal_ && flies_to(goal_.position, 0) && side_ * (generator_.state().position - goal_.position) >= 0.0) {
             count();
             begin(queue_.pop());
         }
     }
-    /// The present set-point was reached: once.
+    /// Called once when the current set-point is reached.
     void count() noexcept {
         if (!counted_) passed = passed + 1;
         counted_ = true;
     }
-    /// Whether waiting set-point `i` is gone to without a stop at `before`: it lies farther on the same way.
+    /// Returns true if queued set-point `i` follows without a stop at `before`: it is further in the same direction.
     bool flies_to(double before, std::size_t i) const noexcept {
         return i < queue_.size() && queue_[i].flying && side_ * (queue_[i].position - before) > 0.0;
     }
-    /// Where the next stop is. Planning to there at the speed of the present set-point leaves the way to stop.
+    /// Returns the position of the next stop. Planning to it at the speed of the current set-point leaves the distance to stop.
     double last_of_flight() const noexcept {
         double last = goal_.position;
         if (mode == set_points)
@@ -215,7 +215,7 @@ private:
         begin({std::isfinite(to) ? clamped(to) : generator_.state().position, std::isfinite(speed) ? std::fabs(speed) : 0.0, false});
     }
 
-    /// At the end of a path: goes on to what comes next; true when nothing does.
+    /// Advances at the end of a path; true if there is nothing to follow.
     bool arrive(double dt) noexcept {
         if (mode == velocity_mode) return true;
         if (!has_goal_) return mode != table || !in_table_;
@@ -273,8 +273,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(MotionProfile, "motion_profile", "Motion to a target within limits of speed, acceleration, deceleration and jerk", R"(
-`position` goes to its target as fast as the limits allow and stops there exactly. With `max-jerk` 0 the speed goes in trapezoids, else in
-S-curves of up to seven segments. Target and limits may change in any cycle and from any state of motion. Units are yours: mm gives mm/s,
+`position` moves to its target as fast as the limits allow and stops there exactly. With `max-jerk` 0 the speed profile is trapezoidal, else an
+S-curve of up to seven segments. Target and limits may change in any cycle and in any state of motion. The units are up to the user: mm gives mm/s,
 mm/s^2, mm/s^3.
 
     settled speed  = v + a |a| / (2 jerk)                              what the speed comes to when the acceleration fades out
@@ -282,29 +282,29 @@ mm/s^2, mm/s^3.
     trapezoid      : x = w^2 / (2 acc) + w T + w^2 / (2 dec)           w the cruising speed, T how long
     rest to rest   : w >= acc^2 / jerk: each ramp takes w / acc + acc / jerk,  else 2 sqrt(w / jerk)
 
-The path is made anew from the present state when something changes, by the decisions of T. Kroeger, *On-Line Trajectory Generation in
-Robotic Systems* (Springer 2010, ch. 3 to 5), out of the segments of L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic
-Machines and Robots* (Springer 2008, 3.2 and 3.4); the cruising speed is the root of way(w) = x. It is time-optimal for equal acceleration
-and deceleration. Where they differ and the speed changes its sign, it takes the faster of two ways: with the smaller limit, or over a
-moment of rest. A start beyond a limit (the limit was lowered on the way) is brought back within it first. A change costs some
-microseconds, other cycles next to nothing.
+After each change the path is planned again from the current state, by the decisions of T. Kroeger, *On-Line Trajectory Generation in
+Robotic Systems* (Springer 2010, ch. 3 to 5), from the segments of L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic
+Machines and Robots* (Springer 2008, 3.2 and 3.4); the cruising speed is the root of distance(w) = x. The path is time-optimal for equal acceleration
+and deceleration. If they differ and the speed changes its sign, the faster of two paths is used: with the smaller limit throughout, or with a
+momentary stop. A state beyond a limit (because the limit was lowered during the move) is brought within it first. Planning takes a few
+microseconds; the cost of other cycles is negligible.
 
-* **mode 0** follows `target` and stops at each. (For an input that never rests use `limit3`, which meets its speed.)
+* **mode 0** follows `target` and stops at each. (For an input in continuous motion use `limit3`, which matches its speed.)
 * **mode 1** takes set-points as CiA 402 does in profile position mode. Set `target`, `target-velocity` (0: `max-velocity`), `relative`;
   raise `new-set-point`; wait for `set-point-acknowledge`; lower it; when acknowledge is FALSE the next may come. It waits in the queue
   (argument `queue`, 8 long), or replaces all with `change-immediately`. With `change-on-set-point` the one before, if it lies on the same
   way, is passed at its own speed without a stop; the speed of the new one counts from the cycle after. When the queue is full a set-point
-  is taken as soon as there is room, provided `new-set-point` stays TRUE.
-* **mode 2** goes through a table (argument `table`: its rows), each row with position, speed and rest. `run-table` starts it and, when
+  is accepted as soon as the queue has space, provided `new-set-point` stays TRUE.
+* **mode 2** runs a table (argument `table`: number of rows), each row with position, speed and dwell. `run-table` starts it and, when
   FALSE, stops.
 * **mode 3** brings the speed to `target-velocity`.
 
-`halt` brakes and keeps everything for later; `stop` and `quick-stop` brake and forget set-points, queue and table; a change of mode
-forgets them, too. In mode 0 and 3 the motion goes on when they end. `load` puts the position somewhere at rest (on the feedback, while
+`halt` brakes and keeps the set-points; `stop` and `quick-stop` brake and discard the set-point, the queue and the table, as does a change of
+mode. In modes 0 and 3 the motion resumes when they end. `load` sets the position at standstill (to the feedback, while
 the drive is off).
 
-While `target` is not a number its last value counts (in mode 1 the set-point is not taken). A limit that is negative or not a number, or
-0 for speed or acceleration, sets `limit-error`, and the motion stops by the last good limits. Positions stay within +-1e15.
+While `target` is NaN its last valid value applies (in mode 1 the set-point is rejected). A limit that is negative or NaN, or
+0 for speed or acceleration, sets `limit-error`, and the motion stops with the last valid limits. Positions are limited to ±1e15.
 
     loadrt motion_profile names=x-profile
     addf x-profile servo

@@ -13,35 +13,35 @@ using Offsets = std::array<double, most_joints>;
 
 struct Moveoff : hal::Component {
     using Component::Component;
-    hal::Argument personality{*this, "personality", 3, "how many joints", {.per_instance = true, .min = 1, .max = most_joints}};
+    hal::Argument personality{*this, "personality", 3, "number of joints", {.per_instance = true, .min = 1, .max = most_joints}};
 
-    hal::Function read{*this, "read-inputs", &Moveoff::read_inputs, "moves the offsets; first"};
-    hal::Function write{*this, "write-outputs", &Moveoff::write_outputs, "adds the offsets to positions and feedback; second"};
+    hal::Function read{*this, "read-inputs", &Moveoff::read_inputs, "computes the offsets; add it before write-outputs"};
+    hal::Function write{*this, "write-outputs", &Moveoff::write_outputs, "adds the offsets to commands and feedback; add it after read-inputs"};
 
     hal::In<bool>   power_on{*this, "power-on", "TRUE: the machine is on (motion.motion-enabled)"};
-    hal::In<bool>   move_enable{*this, "move-enable", "TRUE, and apply-offsets: offsets follow offset-in"};
-    hal::In<bool>   apply_offsets{*this, "apply-offsets", "TRUE, and move-enable: offsets follow offset-in"};
-    hal::In<bool>   backtrack_enable{*this, "backtrack-enable", "TRUE: offsets return the way they went", {.initial = true}};
-    hal::In<double> epsilon{*this, "epsilon", "a waypoint counts as reached this near; at least 0.0001", {.initial = 0.0005}};
-    hal::In<double> threshold{*this, "waypoint-threshold", "motion of one joint that makes a waypoint", {.initial = 0.02}};
-    hal::In<double> sample_time{*this, "waypoint-sample-secs", "shortest time between waypoints", {.initial = 0.02, .unit = "s"}};
-    hal::Out<bool>  warning{*this, "warning", "TRUE: apply-offsets went FALSE while there were offsets"};
-    hal::Out<bool>  offset_applied{*this, "offset-applied", "TRUE: there are offsets"};
-    hal::Out<bool>  waypoint_limit{*this, "waypoint-limit", "TRUE: no room for waypoints, offsets stand until they are told to return"};
-    hal::Out<std::int32_t> waypoint_count{*this, "waypoint-ct", "waypoints kept"};
-    hal::Out<std::int32_t> waypoint_percent{*this, "waypoint-percent-used", "share of the room for them", {.unit = "%"}};
-    hal::Ins<double>  offset_in{*this, "offset-in-#", personality, "wanted offset of joint #"};
-    hal::Ins<double>  pos{*this, "pos-#", personality, "position of joint # from the motion"};
+    hal::In<bool>   move_enable{*this, "move-enable", "with apply-offsets TRUE, TRUE moves the offsets to offset-in"};
+    hal::In<bool>   apply_offsets{*this, "apply-offsets", "with move-enable TRUE, TRUE moves the offsets to offset-in"};
+    hal::In<bool>   backtrack_enable{*this, "backtrack-enable", "TRUE: offsets return along their path", {.initial = true}};
+    hal::In<double> epsilon{*this, "epsilon", "tolerance for reaching a waypoint; at least 0.0001", {.initial = 0.0005}};
+    hal::In<double> threshold{*this, "waypoint-threshold", "motion of a joint that adds a waypoint", {.initial = 0.02}};
+    hal::In<double> sample_time{*this, "waypoint-sample-secs", "minimum time between waypoints", {.initial = 0.02, .unit = "s"}};
+    hal::Out<bool>  warning{*this, "warning", "TRUE: apply-offsets became FALSE with offsets active"};
+    hal::Out<bool>  offset_applied{*this, "offset-applied", "TRUE while an offset is not 0"};
+    hal::Out<bool>  waypoint_limit{*this, "waypoint-limit", "TRUE: the waypoint memory is full; the offsets are held until they return"};
+    hal::Out<std::int32_t> waypoint_count{*this, "waypoint-ct", "number of stored waypoints"};
+    hal::Out<std::int32_t> waypoint_percent{*this, "waypoint-percent-used", "used part of the waypoint memory", {.unit = "%"}};
+    hal::Ins<double>  offset_in{*this, "offset-in-#", personality, "target offset of joint #"};
+    hal::Ins<double>  pos{*this, "pos-#", personality, "commanded position of joint # from the motion controller"};
     hal::Ins<double>  fb{*this, "fb-#", personality, "feedback of joint #"};
-    hal::Outs<double> offset_current{*this, "offset-current-#", personality, "offset of joint #"};
-    hal::Outs<double> pos_plus{*this, "pos-plusoffset-#", personality, "position of joint # with its offset, for the motor"};
-    hal::Outs<double> fb_minus{*this, "fb-minusoffset-#", personality, "feedback of joint # without its offset, for the motion"};
-    hal::Ins<double>  max_velocity{*this, "offset-vel-#", personality, "largest speed of offset #", {.initial = 10.0}};
-    hal::Ins<double>  max_acceleration{*this, "offset-accel-#", personality, "largest acceleration of offset #", {.initial = 100.0}};
+    hal::Outs<double> offset_current{*this, "offset-current-#", personality, "current offset of joint #"};
+    hal::Outs<double> pos_plus{*this, "pos-plusoffset-#", personality, "commanded position of joint # plus its offset, for the motor"};
+    hal::Outs<double> fb_minus{*this, "fb-minusoffset-#", personality, "feedback of joint # minus its offset, for the motion controller"};
+    hal::Ins<double>  max_velocity{*this, "offset-vel-#", personality, "maximum speed of offset #", {.initial = 10.0}};
+    hal::Ins<double>  max_acceleration{*this, "offset-accel-#", personality, "maximum acceleration of offset #", {.initial = 100.0}};
     hal::Ins<double>  min{*this, "offset-min-#", personality, "lowest offset of joint #", {.initial = -1e20}};
     hal::Ins<double>  max{*this, "offset-max-#", personality, "highest offset of joint #", {.initial = 1e20}};
-    hal::In<bool>     limit_test{*this, "dbg-waypoint-limit-test", "TRUE: room for ten waypoints only"};
-    hal::Out<std::int32_t> state{*this, "dbg-state", "0: no offsets, 1: offsets follow, 2: they return, 3: the machine is off"};
+    hal::In<bool>     limit_test{*this, "dbg-waypoint-limit-test", "TRUE limits the memory to ten waypoints"};
+    hal::Out<std::int32_t> state{*this, "dbg-state", "0: no offsets, 1: moving to offset-in, 2: returning, 3: machine off"};
 
     void read_inputs(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
@@ -62,7 +62,7 @@ struct Moveoff : hal::Component {
     void write_outputs(hal::Cycle) noexcept {
         for (std::size_t i = 0; i < pos.size(); ++i) {
             const double offset = axes_[i].position();
-            fb_minus[i] = fb[i] - applied_[i];  // the feedback is that of the last command
+            fb_minus[i] = fb[i] - applied_[i];  // the feedback belongs to the last command
             offset_current[i] = offset;
             pos_plus[i] = pos[i] + offset;
             applied_[i] = offset;
@@ -70,7 +70,7 @@ struct Moveoff : hal::Component {
     }
 
 private:
-    static constexpr std::size_t room = 1000;
+    static constexpr std::size_t max_waypoints = 1000;
     enum : std::int32_t { idle = 0, follows = 1, returns = 2, off = 3 };
 
     void pause() noexcept {
@@ -79,7 +79,7 @@ private:
         publish();
     }
 
-    /// Only at rest do the settings of waypoints count.
+    /// Reads the waypoint settings, only while there are no offsets.
     void settle() noexcept {
         near_ = epsilon >= 0.0001 ? epsilon.get() : 0.0001;
         step_ = threshold > 0.0 ? threshold.get() : 0.0;
@@ -95,7 +95,7 @@ private:
     }
 
     void follow(double dt) noexcept {
-        const std::size_t most = limit_test ? 10 : room;
+        const std::size_t most = limit_test ? 10 : max_waypoints;
         const bool full = used_ >= most;
         for (std::size_t i = 0; i < pos.size(); ++i) {
             const double target = std::min(std::max(offset_in[i].get(), min[i].get()), max[i].get());
@@ -134,7 +134,7 @@ private:
         offset_applied = any;
         warning = any && !apply_offsets && (warning || was_applying_);
         was_applying_ = apply_offsets;
-        const std::size_t most = limit_test ? 10 : room;
+        const std::size_t most = limit_test ? 10 : max_waypoints;
         waypoint_limit = state_ == follows && used_ >= most;
         waypoint_count = static_cast<std::int32_t>(used_);
         waypoint_percent = static_cast<std::int32_t>(std::min<std::size_t>(100 * used_ / most, 100));
@@ -143,7 +143,7 @@ private:
 
     std::array<plan::Axis, most_joints> axes_;
     Offsets applied_{}, last_{};
-    std::vector<Offsets> waypoints_ = std::vector<Offsets>(room);  // the memory is touched here, not in a cycle
+    std::vector<Offsets> waypoints_ = std::vector<Offsets>(max_waypoints);  // allocated here, not in a cycle
     std::size_t used_ = 0;
     std::int32_t state_ = idle;
     bool paused_ = false, was_applying_ = false;
@@ -152,17 +152,17 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Moveoff, "moveoff", "Offsets of joint positions, for example to step aside while a program is paused", R"(
+HAL_COMPONENT(Moveoff, "moveoff", "Adds offsets to joint positions, for example to move the tool away during a pause", R"(
     pos-plusoffset = pos + offset,   fb-minusoffset = fb - offset
 
 While `power-on`, `move-enable` and `apply-offsets` are TRUE, each offset moves to its `offset-in`, within `offset-min` and `offset-max`,
-`offset-vel` and `offset-accel`. When one of the enables falls, the offsets return to 0: with `backtrack-enable` from waypoint to waypoint
-the way they went, else each joint directly. A waypoint is kept when a joint has moved by `waypoint-threshold`, not more often than every
-`waypoint-sample-secs`; there is room for 1000. When it is used up the offsets stand until they are told to return. The three settings of
-waypoints are read while there are no offsets.
+`offset-vel` and `offset-accel`. When one of the enables becomes FALSE, the offsets return to 0: with `backtrack-enable` along the waypoints
+of their path, else each joint directly. A waypoint is stored when a joint has moved by `waypoint-threshold`, at most every
+`waypoint-sample-secs`. The memory holds 1000 waypoints; when it is full, the offsets are held until they return. The three waypoint settings
+are read while there are no offsets.
 
-`warning` is TRUE from when `apply-offsets` falls while there are offsets until they are gone or it is TRUE again; a text is not printed.
-While `power-on` is FALSE the offsets stay as they are. Nothing here knows the machine's limits: use `offset-min` and `offset-max`.
+`warning` is TRUE after `apply-offsets` becomes FALSE with offsets active, until they are 0 or it is TRUE again; no message is printed.
+While `power-on` is FALSE the offsets are held. The component does not know the machine's limits: set `offset-min` and `offset-max`.
 
     loadrt moveoff names=mv personality=2
     addf mv.read-inputs servo

@@ -5,14 +5,14 @@ namespace {
 
 struct Orient : hal::Component {
     using Component::Component;
-    hal::In<bool>         enable{*this, "enable", "rising edge: chooses the position to go to; TRUE: the error is watched"};
-    hal::In<std::int32_t> mode{*this, "mode", "0: the shorter way, 1: clockwise (to larger positions), 2: counterclockwise"};
+    hal::In<bool>         enable{*this, "enable", "a rising edge computes the command; while TRUE the error is monitored"};
+    hal::In<std::int32_t> mode{*this, "mode", "0: shortest direction, 1: clockwise (increasing position), 2: counterclockwise"};
     hal::In<double>       position{*this, "position", "position of the spindle", {.unit = "turn"}};
-    hal::In<double>       angle{*this, "angle", "where to stop", {.unit = "deg"}};
-    hal::Out<double>      command{*this, "command", "position to go to", {.unit = "turn"}};
+    hal::In<double>       angle{*this, "angle", "target angle", {.unit = "deg"}};
+    hal::Out<double>      command{*this, "command", "commanded position", {.unit = "turn"}};
     hal::Out<double>      poserr{*this, "poserr", "position - command", {.unit = "deg"}};
     hal::Out<bool>        is_oriented{*this, "is-oriented", "TRUE while enabled and within tolerance"};
-    hal::In<double>       tolerance{*this, "tolerance", "largest error that counts as there", {.initial = 0.5, .unit = "deg"}};
+    hal::In<double>       tolerance{*this, "tolerance", "maximum error for is-oriented", {.initial = 0.5, .unit = "deg"}};
     hal::Function         run{*this, "", &Orient::update, "computes command and the error"};
 
     void update(hal::Cycle) noexcept {
@@ -36,7 +36,7 @@ private:
         case 0: command = up - position < position - down ? up : down; break;
         case 1: command = up; break;
         case 2: command = down; break;
-        default: break;  // no such mode: the last command stays
+        default: break;  // invalid mode: hold the last command
         }
     }
     bool was_enabled_ = false;
@@ -45,16 +45,16 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Orient, "orient", "Stops a spindle at an angle: the command for its position loop", R"(
-At the rising edge of `enable` the command is set to a position with the fraction `angle` / 360:
+A rising edge of `enable` sets the command to a position whose fraction of a turn is `angle` / 360:
 
 | mode | command |
 | --- | --- |
-| 0 | the nearest; of two as near, the smaller one |
+| 0 | the nearest; of two equally near, the smaller one |
 | 1 | the next at or above `position` (clockwise) |
 | 2 | the next at or below `position` (counterclockwise) |
 
-In another mode, or when position or angle is not a finite number, the command stays. `angle` may be any number of degrees; whole turns
-are left out. While enabled, `poserr` is `position` - `command` in degrees, and `is-oriented` says that it is within `tolerance`.
+In any other mode, or if position or angle is NaN or infinite, the command is held. `angle` may be any number of degrees; whole turns
+are ignored. While enabled, `poserr` is `position` - `command` in degrees, and `is-oriented` is TRUE while it is within `tolerance`.
 
     loadrt orient names=orient
     loadrt pid names=orient-pid

@@ -7,14 +7,14 @@
 // L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic Machines and Robots*, Springer 2008, 3.2 and 3.4
 // (trapezoidal and double-S profiles). With J the jerk, and (v, a) the present state:
 //
-//   v + a|a| / (2J)                    the speed at which it is when the acceleration has faded out: "settled"
+//   v + a|a| / (2J)                    the speed after the acceleration has faded out: "settled"
 //   peak^2 = J dv + a^2 / 2            the acceleration between which and 0 a change of speed by dv goes up and down;
-//                                      above the limit it is the limit, held for what is missing of dv
-//   x = S(w) + T w                     the way of: to the cruising speed w, at it for a time T, and to rest
+//                                      above the limit it is the limit, held for the rest of dv
+//   x = S(w) + T w                     the distance of: to the cruising speed w, at w for a time T, and to a stop
 //
-// Stopping at once leads to a point; the target lies before or behind it, which gives the sign of w. S is continuous and,
-// above the settled speed, grows with w. So either w is the limit and T what is left, or T = 0 and w the root of S(w) = x.
-// Between the stop point and S(settled) while it brakes, it brakes less for a moment: the root is that acceleration.
+// Stopping immediately leads to a point; the target is before or behind it, which gives the sign of w. S is continuous and,
+// above the settled speed, increases with w. So either w is the limit and T the remaining time, or T = 0 and w the root of S(w) = x.
+// Between the stop point and S(settled) while braking, it brakes less for a moment: the root is that acceleration.
 #pragma once
 
 #include <algorithm>
@@ -26,15 +26,15 @@
 namespace motion {
 
 inline constexpr double unlimited = std::numeric_limits<double>::infinity();
-inline constexpr double farthest = 1e15;  // positions are kept within ± this
+inline constexpr double farthest = 1e15;  // positions are limited to ± this
 
-/// All above 0; `deceleration` is for slowing down; a jerk of `unlimited` gives trapezoids.
+/// Limits of the motion, all above 0; a jerk of `unlimited` gives trapezoidal profiles.
 struct Limits {
     double velocity = 1.0, acceleration = 1.0, deceleration = 1.0, jerk = unlimited;
     bool operator==(const Limits&) const = default;
 
-    /// Brings user values into the range in which nothing overflows: a deceleration of 0 is the acceleration, a jerk of
-    /// 0 none. False when a value makes no sense. [realtime]
+    /// Limits user values to the range without overflow: a deceleration of 0 is the acceleration, a jerk of
+    /// 0 unlimited. False if a value is invalid. [realtime]
     static bool from(double velocity, double acceleration, double deceleration, double jerk, Limits& to) noexcept {
         if (!(velocity > 0.0 && acceleration > 0.0 && deceleration >= 0.0 && jerk >= 0.0)) return false;
         const auto sane = [](double x) { return std::clamp(x, 1e-18, 1e18); };
@@ -54,7 +54,7 @@ struct State {
     State mirrored() const noexcept { return {-position, -velocity, -acceleration}; }
 };
 
-/// A row of segments of constant jerk, built from its start on.
+/// A sequence of segments of constant jerk, built from its start.
 class Path {
 public:
     Path() = default;
@@ -67,13 +67,13 @@ public:
         end_.acceleration = 0.0;
         append(time, 0.0);
     }
-    /// Brings the acceleration to `a`.
+    /// Changes the acceleration to `a`.
     void ramp(double a) noexcept {
         if (jerk_ < unlimited) append(std::fabs(a - end_.acceleration) / jerk_, std::copysign(jerk_, a - end_.acceleration));
         end_.acceleration = a;
     }
-    /// Changes the speed to `v`, with an acceleration of 0 there, using accelerations within ±`most` on the way; one
-    /// that is beyond at the start comes back at once.
+    /// Changes the speed to `v`, with an acceleration of 0 there, with accelerations within ±`most`; an initial acceleration
+    /// beyond it returns to it immediately.
     void reach(double v, double most) noexcept {
         if (!(jerk_ < unlimited)) {
             end_.acceleration = std::copysign(most, v - end_.velocity);
@@ -94,7 +94,7 @@ public:
         end_.velocity = v;
         end_.acceleration = 0.0;
     }
-    /// The speed at which it will be when the acceleration has faded out.
+    /// Returns the speed after the acceleration has faded out.
     double settled() const noexcept {
         if (!(jerk_ < unlimited)) return end_.velocity;
         return end_.velocity + end_.acceleration * std::fabs(end_.acceleration) / (2 * jerk_);
@@ -103,10 +103,10 @@ public:
         for (std::size_t i = 0; i < used_; ++i) segments_[i] = {segments_[i].begin, segments_[i].start.mirrored(), -segments_[i].jerk};
         end_ = end_.mirrored();
     }
-    /// The end is where it was meant to be, free of rounding.
+    /// Sets the end exactly, without rounding errors.
     void settle_at(double position) noexcept { end_.position = position; }
 
-    /// The state at `time` after the start, and the jerk there; later than the end it goes on with the end's speed.
+    /// Returns the state `time` after the start, and the jerk there; after the end it continues with the end's speed.
     State at(double time, double& jerk) const noexcept {
         jerk = 0.0;
         if (time >= duration_) return {end_.position + end_.velocity * (time - duration_), end_.velocity, end_.acceleration};
@@ -135,7 +135,7 @@ private:
 };
 
 namespace detail {
-/// Where `f` changes its sign between `low` (f <= 0) and `high` (f >= 0), on the side of `low`: T. R. Chandrupatla, *A new hybrid
+/// Returns where `f` changes its sign between `low` (f <= 0) and `high` (f >= 0), on the side of `low`: T. R. Chandrupatla, *A new hybrid
 /// quadratic/bisection algorithm*, Advances in Engineering Software 28 (1997), to the last bits. Between ends of different
 /// order of magnitude it bisects the exponents. [realtime]
 template <class F>
@@ -163,14 +163,14 @@ double root(double low, double high, double f_low, double f_high, F f) noexcept 
     return fa <= 0.0 ? a : b;
 }
 
-/// How a change of speed crosses 0 when the limits on its two sides differ: with the smaller one all the way, or with
-/// each of them to and from a moment of rest. Neither is always the faster.
+/// How a change of speed crosses 0 if the limits on its two sides differ: with the smaller one throughout, or with
+/// each of them to and from a momentary stop. Neither is always the faster.
 enum class Crossing { through, over_rest };
 
-/// Continues `path` to the speed `v`, which is not negative.
+/// Continues `path` to the speed `v` (not negative).
 inline void to_speed(Path& path, double v, const Limits& limits, Crossing crossing) noexcept {
     const double now = path.end().velocity, settled = path.settled();
-    if (settled > v || v == 0.0) return path.reach(v, limits.deceleration);  // slower, or back to rest after all
+    if (settled > v || v == 0.0) return path.reach(v, limits.deceleration);  // slower, or to a stop
     if (std::min(now, settled) >= 0.0) return path.reach(v, limits.acceleration);
     if (crossing == Crossing::through || settled >= 0.0) return path.reach(v, std::min(limits.acceleration, limits.deceleration));
     path.reach(0.0, limits.deceleration);
@@ -191,12 +191,12 @@ inline Path over(const State& start, double w, double cruise, const Limits& limi
     return path;
 }
 
-/// To rest at `target`, which lies behind the point of stopping at once (in positive direction).
+/// Returns the path to a stop at `target`, which is behind the point of an immediate stop (in positive direction).
 inline Path forward(const State& start, double target, const Limits& limits, Crossing crossing) noexcept {
     const auto miss = [&](double w) { return over(start, w, 0.0, limits, crossing).end().position - target; };
     constexpr double slowest = 1e-60;
     const double settled = Path(start, limits.jerk).settled(), top = limits.velocity;
-    // Where the speed cannot be had finely enough, what is left of the way is made up for at that speed.
+    // If the resolution of the speed is too coarse, the remaining distance is covered at that speed.
     const auto by_way_of = [&](double w) {
         const double left = -miss(w), rounding = 1e-13 * (std::fabs(start.position) + std::fabs(target));
         return over(start, w, left > rounding ? left / w : 0.0, limits, crossing);
@@ -205,7 +205,7 @@ inline Path forward(const State& start, double target, const Limits& limits, Cro
     if (beyond <= 0.0) return over(start, top, -beyond / top, limits, crossing);
     if (settled >= 0.0 && settled <= top) {
         const double at_settled = miss(settled);
-        if (at_settled > 0.0) {  // only while it brakes: less, for a moment
+        if (at_settled > 0.0) {  // only while braking: brake less for a moment
             const auto easing = [&](double a) {
                 Path path(start, limits.jerk);
                 path.ramp(a);
@@ -219,7 +219,7 @@ inline Path forward(const State& start, double target, const Limits& limits, Cro
         }
         return by_way_of(root(std::max(settled, slowest), top, at_settled, beyond, miss));
     }
-    // From a start that is too fast S has a hump, but it begins at the stop point, before the target, and ends behind it.
+    // From a start that is too fast S has a local maximum, but it starts at the stop point, before the target, and ends behind it.
     const double least = miss(slowest);
     if (least >= 0.0) return stop(start, limits);
     return by_way_of(root(slowest, top, least, beyond, miss));
@@ -228,8 +228,8 @@ inline Path forward(const State& start, double target, const Limits& limits, Cro
 inline bool same(double a, double b, double scale) noexcept { return std::fabs(a - b) <= 4e-15 * (std::fabs(a) + std::fabs(b) + scale); }
 }  // namespace detail
 
-/// The fastest way from `start` to rest at `target`. Limits are kept, unless the start is beyond: then it comes back
-/// within them first, as fast as the others allow. [realtime]
+/// Returns the fastest path from `start` to a stop at `target`. If the start is beyond a limit, the path returns
+/// within it first, as fast as the other limits allow. [realtime]
 inline Path path_to_position(const State& start, double target, const Limits& limits) noexcept {
     const Path stop = detail::stop(start, limits);
     Path best = stop;
@@ -248,7 +248,7 @@ inline Path path_to_position(const State& start, double target, const Limits& li
     return best;
 }
 
-/// The fastest change of speed from `start` to `velocity`. [realtime]
+/// Returns the fastest change of speed from `start` to `velocity`. [realtime]
 inline Path path_to_velocity(const State& start, double velocity, const Limits& limits) noexcept {
     const bool back = velocity < 0.0;
     const State from = back ? start.mirrored() : start;
@@ -261,15 +261,15 @@ inline Path path_to_velocity(const State& start, double velocity, const Limits& 
     return best;
 }
 
-/// A point that moves: follows a path that is made anew whenever what is wanted changes.
+/// A moving point: follows a path that is planned again after each change of the target or the limits.
 class Generator {
 public:
     const State& state() const noexcept { return state_; }
     double jerk() const noexcept { return jerk_; }
-    /// Where it will rest (or was, when the change of speed ended).
+    /// Returns the position at the end of the path.
     double end_position() const noexcept { return path_.end().position; }
     double time_left() const noexcept { return std::max(0.0, path_.duration() - time_); }
-    /// The path has been gone to its end.
+    /// True after the end of the path.
     bool arrived() const noexcept { return time_ >= path_.duration(); }
     bool moving() const noexcept { return state_.velocity != 0.0 || state_.acceleration != 0.0; }
 
@@ -289,7 +289,7 @@ public:
     }
     void advance(double seconds) noexcept {
         time_ += seconds;
-        // A path of a whole number of periods ends in its last one, whatever the sum of the periods was rounded to.
+        // A path of a whole number of periods ends in its last one, regardless of the rounding of the sum.
         if (std::fabs(path_.duration() - time_) < 1e-6 * seconds) time_ = path_.duration();
         const State next = path_.at(time_, jerk_);
         if (std::isfinite(next.position + next.velocity + next.acceleration) && std::fabs(next.position) <= farthest) state_ = next;

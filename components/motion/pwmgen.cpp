@@ -10,7 +10,7 @@
 
 namespace {
 
-/// What `update` asks of `make-pulses`.
+/// The command of `update` for `make-pulses`.
 struct Order {
     bool on = false;
     bool reverse = false;
@@ -22,22 +22,22 @@ struct Order {
 struct Pwmgen : hal::Component {
     enum Type { single, with_direction, up_down };
 
-    hal::Argument type{*this, "output_type", 0, "0 one output, 1 with direction, 2 up and down; a number per instance",
+    hal::Argument type{*this, "output_type", 0, "0: one output, 1: output and direction, 2: up and down; one number per instance",
                        {.per_instance = true, .min = 0, .max = 2}};
 
-    hal::Function make{*this, "make-pulses", &Pwmgen::make_pulses, "makes the waveforms; in the fastest thread", {.shared = true}};
+    hal::Function make{*this, "make-pulses", &Pwmgen::make_pulses, "generates the waveforms; belongs in the fastest thread", {.shared = true}};
     std::optional<hal::Out<bool>> pwm, dir, up, down;
 
-    hal::Function run{*this, "update", &Pwmgen::update, "takes new values; in the servo thread", {.shared = true}};
-    hal::In<bool> enable{*this, run, "enable", "FALSE: all outputs are low"};
-    hal::In<double> value{*this, run, "value", "commanded value: scale is full duty forwards, -scale backwards"};
-    hal::Io<double> scale{*this, run, "scale", "value that gives full duty", {.initial = 1.0}};
+    hal::Function run{*this, "update", &Pwmgen::update, "computes the duty cycles; belongs in the servo thread", {.shared = true}};
+    hal::In<bool> enable{*this, run, "enable", "FALSE sets all outputs low"};
+    hal::In<double> value{*this, run, "value", "commanded value: scale is full duty forward, -scale in reverse"};
+    hal::Io<double> scale{*this, run, "scale", "value for full duty", {.initial = 1.0}};
     hal::Io<double> offset{*this, run, "offset", "added to the duty cycle: dc = value / scale + offset"};
-    hal::Io<double> min_duty{*this, run, "min-dc", "smallest duty cycle while enabled, 0 to 1"};
-    hal::Io<double> max_duty{*this, run, "max-dc", "largest duty cycle, 0 to 1", {.initial = 1.0}};
-    hal::Io<double> frequency{*this, run, "pwm-freq", "frequency; set to what can be made; 0: pulse density modulation", {.unit = "Hz"}};
-    hal::Io<bool> dither{*this, run, "dither-pwm", "TRUE: the duty alternates between two steps so that its average is exact"};
-    hal::Out<double> duty{*this, run, "curr-dc", "duty cycle after scaling, limits and rounding, -1 to 1"};
+    hal::Io<double> min_duty{*this, run, "min-dc", "minimum duty cycle while enabled, 0..1"};
+    hal::Io<double> max_duty{*this, run, "max-dc", "maximum duty cycle, 0..1", {.initial = 1.0}};
+    hal::Io<double> frequency{*this, run, "pwm-freq", "PWM frequency, rounded to a possible one; 0: pulse density modulation", {.unit = "Hz"}};
+    hal::Io<bool> dither{*this, run, "dither-pwm", "TRUE: the duty cycle alternates between two steps so that its average is exact"};
+    hal::Out<double> duty{*this, run, "curr-dc", "duty cycle after scaling, limits and rounding, -1..1"};
 
     explicit Pwmgen(const hal_host* host) : Component(host) {
         const hal::PinOptions<bool> off{.safe = false};
@@ -46,8 +46,8 @@ struct Pwmgen : hal::Component {
             down.emplace(*this, make, "down", "waveform for negative values", off);
             return;
         }
-        pwm.emplace(*this, make, "pwm", "the waveform", off);
-        if (type == with_direction) dir.emplace(*this, make, "dir", "low forwards, high backwards", off);
+        pwm.emplace(*this, make, "pwm", "waveform", off);
+        if (type == with_direction) dir.emplace(*this, make, "dir", "direction: low forward, high in reverse", off);
     }
 
     void make_pulses(hal::Cycle cycle) noexcept {
@@ -93,14 +93,14 @@ private:
             period = std::round(period);
             next.duty = std::round(next.duty * period) / period;
         }
-        // Written only when it really changes: rounding must not make the frequency walk away from what was asked.
+        // Written only on a change: repeated rounding must not let the frequency drift.
         if (std::fabs(tick_hz / period - frequency) > 1e-9 * frequency) frequency = tick_hz / period;
         next.period = period;
         return next;
     }
 
-    /// One tick of PWM. A period takes up the newest order at its start only, as hardware with buffered registers does;
-    /// what rounding to whole ticks takes from it the next one gets back.
+    /// Runs one tick of PWM. A period takes the newest command at its start only, as hardware with buffered registers does;
+    /// the next period compensates its rounding to whole ticks.
     bool pulse(const Order& wanted) noexcept {
         if (tick_ == 0) {
             const double length = wanted.period + length_rest_, high = wanted.duty * wanted.period + (wanted.dither ? high_rest_ : 0.0);
@@ -115,7 +115,7 @@ private:
         return level;
     }
 
-    /// One tick of pulse density modulation: the duty adds up, and each whole is a pulse.
+    /// Runs one tick of pulse density modulation: the duty cycle accumulates, and each whole one is a pulse.
     bool dense(const Order& wanted) noexcept {
         tick_ = 0;
         reverse_ = wanted.reverse;
@@ -146,8 +146,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in software", R"(
-`pwmgen.update` turns the values of all instances into duty cycles and belongs into the servo thread, after the controller;
-`pwmgen.make-pulses` makes the waveforms in the fastest thread. The two may run on different processors.
+`pwmgen.update` converts the values of all instances to duty cycles and belongs in the servo thread, after the controller;
+`pwmgen.make-pulses` generates the waveforms in the fastest thread. The two may run on different CPUs.
 
     dc = value / scale + offset, kept between min-dc and max-dc (and between -max-dc and -min-dc)
 
@@ -164,11 +164,11 @@ HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in sof
 
 All outputs go low on stop, unload and faults.
 
-**Otherwise than LinuxCNC's**, whose waveforms are else the same: the first PWM period begins when `enable` is seen (there the
-outputs stay low for up to a period, and all periods begin one fast period earlier than here). `dir` changes with a period, so that
-none has both directions (there within one, and in `update`, a fast period earlier). `dir` is FALSE and `curr-dc` 0 while disabled
-(there both go on). PDM makes its first pulse when the duties add up to one (there at once). A `scale` set before the first cycle
-counts (there 2 does not).
+**Differences from LinuxCNC:** the waveforms are the same except in these cases. The first PWM period starts with `enable` (LinuxCNC: the
+outputs stay low for up to a period, and all periods start one fast period earlier). `dir` changes between periods, so that
+no period has both directions (LinuxCNC: within a period, in `update`, a fast period earlier). `dir` is FALSE and `curr-dc` 0 while disabled
+(LinuxCNC: both are updated). PDM generates its first pulse when the accumulated duty cycle reaches one (LinuxCNC: immediately). A `scale` set before
+the first cycle is used (LinuxCNC ignores a scale of 2).
 
     loadrt pwmgen output_type=1
     loadrt pid

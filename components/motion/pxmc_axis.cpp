@@ -8,7 +8,7 @@
 
 namespace {
 
-/// The values of pin `error-code`. Published: never renumber.
+/// The values of pin `error-code`, which is public: never renumber them.
 enum Error : std::uint32_t {
     none = 0,
     following_error = 1,
@@ -22,44 +22,44 @@ enum Error : std::uint32_t {
 struct PxmcAxis : hal::Component {
     using Component::Component;
 
-    hal::In<bool> enable{*this, "enable", "TRUE closes the loop where the axis is; FALSE: output is 0"};
-    hal::In<bool> reset{*this, "reset", "a rising edge clears the error when its cause is gone"};
-    hal::In<double> actual_position{*this, "actual-position", "measured"};
+    hal::In<bool> enable{*this, "enable", "TRUE closes the loop at the current position; FALSE sets output to 0"};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears the error if its cause no longer exists"};
+    hal::In<double> actual_position{*this, "actual-position", "measured position"};
     hal::In<bool> go{*this, "go", "a rising edge starts a move to requested-position"};
-    hal::In<double> requested_position{*this, "requested-position", "where to go at the next go"};
-    hal::In<bool> speed_mode{*this, "speed-mode", "TRUE: goes at requested-speed instead"};
+    hal::In<double> requested_position{*this, "requested-position", "target of the next go"};
+    hal::In<bool> speed_mode{*this, "speed-mode", "TRUE moves at requested-speed instead"};
     hal::In<double> requested_speed{*this, "requested-speed",
-                                    "speed-mode: the wanted speed; else that of the move, 0: max-speed", {.unit = "1/s"}};
-    hal::In<bool> stop_in{*this, "stop", "TRUE brakes to rest and forgets the move"};
+                                    "speed in speed-mode; otherwise speed of the move, 0: max-speed", {.unit = "1/s"}};
+    hal::In<bool> stop_in{*this, "stop", "TRUE brakes to a stop and discards the move"};
 
-    hal::In<double> max_speed{*this, "max-speed", "of the trajectory", {.initial = 1.0, .unit = "1/s"}};
-    hal::In<double> max_acceleration{*this, "max-acceleration", "of the trajectory", {.initial = 1.0, .unit = "1/s^2"}};
-    hal::In<double> max_jerk{*this, "max-jerk", "of the trajectory; 0: none", {.unit = "1/s^3"}};
-    hal::In<double> p_gain{*this, "P", "output per following error", {.initial = 1.0}};
-    hal::In<double> i_gain{*this, "I", "output per following error and second"};
-    hal::In<double> d_gain{*this, "D", "output per difference of speed"};
-    hal::In<double> feed_forward{*this, "FF", "output per commanded speed"};
-    hal::In<double> max_output{*this, "max-output", "limit on the output; 0: none"};
+    hal::In<double> max_speed{*this, "max-speed", "maximum speed of the trajectory", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<double> max_acceleration{*this, "max-acceleration", "maximum acceleration of the trajectory", {.initial = 1.0, .unit = "1/s^2"}};
+    hal::In<double> max_jerk{*this, "max-jerk", "maximum jerk of the trajectory; 0: no limit", {.unit = "1/s^3"}};
+    hal::In<double> p_gain{*this, "P", "proportional gain: output per following error", {.initial = 1.0}};
+    hal::In<double> i_gain{*this, "I", "integral gain: output per following error and second"};
+    hal::In<double> d_gain{*this, "D", "derivative gain: output per speed error"};
+    hal::In<double> feed_forward{*this, "FF", "feed-forward: output per commanded speed"};
+    hal::In<double> max_output{*this, "max-output", "limit on the output; 0: no limit"};
 
-    hal::In<double> max_following_error{*this, "max-following-error", "beyond it the axis is in error; 0: not watched"};
+    hal::In<double> max_following_error{*this, "max-following-error", "following error at which the axis faults; 0: not monitored"};
     hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -motion::farthest}};
     hal::In<double> max_position{*this, "max-position", "highest position", {.initial = motion::farthest}};
-    hal::In<double> position_margin{*this, "position-margin", "how far beyond these it may be measured; 0: not watched"};
-    hal::In<double> overspeed{*this, "overspeed", "highest measured speed against max-speed; 0: not watched"};
+    hal::In<double> position_margin{*this, "position-margin", "permitted overtravel beyond min-position and max-position; 0: not monitored"};
+    hal::In<double> overspeed{*this, "overspeed", "measured speed, as a multiple of max-speed, at which the axis faults; 0: not monitored"};
     hal::In<double> speed_filter{*this, "speed-filter", "time constant of actual-speed", {.unit = "s"}};
-    hal::In<double> window{*this, "position-window", "busy lasts until the axis is as close; 0: until the trajectory ends"};
+    hal::In<double> window{*this, "position-window", "distance to the target at which busy ends; 0: busy ends with the trajectory"};
 
-    hal::Out<double> output{*this, "output", "to the motor", {.safe = 0.0, .finite = true}};
-    hal::Out<double> position{*this, "commanded-position", "of the trajectory", {.finite = true}};
-    hal::Out<double> speed{*this, "commanded-speed", "of the trajectory", {.unit = "1/s", .finite = true}};
-    hal::Out<double> actual_speed{*this, "actual-speed", "measured", {.unit = "1/s", .finite = true}};
+    hal::Out<double> output{*this, "output", "command to the motor", {.safe = 0.0, .finite = true}};
+    hal::Out<double> position{*this, "commanded-position", "position of the trajectory", {.finite = true}};
+    hal::Out<double> speed{*this, "commanded-speed", "speed of the trajectory", {.unit = "1/s", .finite = true}};
+    hal::Out<double> actual_speed{*this, "actual-speed", "measured speed", {.unit = "1/s", .finite = true}};
     hal::Out<double> error_out{*this, "following-error", "commanded - actual position", {.finite = true}};
-    hal::Out<bool> busy{*this, "busy", "TRUE: a move is under way"};
-    hal::Out<bool> error{*this, "error", "TRUE: the axis is switched off by a fault; see error-code"};
-    hal::Out<std::uint32_t> error_code{*this, "error-code", "which; see the table"};
-    hal::Out<bool> request_limited{*this, "request-limited", "TRUE: the position or the speed asked for is beyond a limit and is cut"};
+    hal::Out<bool> busy{*this, "busy", "TRUE while moving"};
+    hal::Out<bool> error{*this, "error", "TRUE: a fault has disabled the axis; see error-code"};
+    hal::Out<std::uint32_t> error_code{*this, "error-code", "cause of the fault; see the table"};
+    hal::Out<bool> request_limited{*this, "request-limited", "TRUE: the requested position or speed exceeds a limit and is reduced"};
 
-    hal::Function run{*this, "do-control", &PxmcAxis::update, "measures, watches, plans and controls"};
+    hal::Function run{*this, "do-control", &PxmcAxis::update, "measures, monitors, plans and controls"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
@@ -71,7 +71,7 @@ struct PxmcAxis : hal::Component {
         motion::Limits limits;
         const bool sound = motion::Limits::from(max_speed, max_acceleration, 0.0, max_jerk, limits) && min_position <= max_position;
 
-        std::uint32_t found = none;  // what would be wrong with an axis that is off
+        std::uint32_t found = none;  // a disabled axis has no error
         if (!sound) found = bad_parameter;
         else if (!measured) found = bad_feedback;
         if (cleared && found == none) code_ = none;
@@ -100,7 +100,7 @@ private:
     }
 
     std::uint32_t watch(const motion::Limits& limits) const noexcept {
-        if (position_margin > 0.0) {  // an axis that is led back from beyond a limit is no fault: only what moves on outwards
+        if (position_margin > 0.0) {  // returning from beyond a limit is not a fault, moving further outwards is
             if (measured_ < min_position - position_margin && generator_.state().velocity <= 0.0 && speed_ < 0.0) return below_min;
             if (measured_ > max_position + position_margin && generator_.state().velocity >= 0.0 && speed_ > 0.0) return above_max;
         }
@@ -114,7 +114,7 @@ private:
         const double asked = std::isfinite(requested_speed) ? requested_speed.get() : 0.0;
         if (stop_in) moves_ = false;
         else if (speed_mode) {
-            // Towards the limit of position at that speed: so it also stops there in time.
+            // Towards the position limit at that speed, so that it also stops there in time.
             moves_ = false;
             request_limited = std::fabs(asked) > limits.velocity;
             if (asked != 0.0) {
@@ -140,7 +140,7 @@ private:
             return p_gain * e + i_gain * sum + d_gain * (now.velocity - speed_) + feed_forward * now.velocity;
         };
         double wanted = effort(integral);
-        // What would push farther into saturation is not integrated.
+        // Anti-windup: do not integrate further into saturation.
         if (most > 0.0 && std::fabs(wanted) > most && i_gain * e * wanted > 0.0) wanted = effort(integral = integral_);
         if (!std::isfinite(wanted)) {
             code_ = bad_parameter;
@@ -179,8 +179,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(PxmcAxis, "pxmc_axis", "Position controller of one axis: trajectory, PID, supervision", R"(
-One axis as the motion controllers of small mobile robots have it: it is told a position or a speed, plans the way, closes the loop and
-watches it.
+One axis as in the motion controllers of small mobile robots: it takes a position or a speed, plans the trajectory, closes the loop and
+monitors it.
 
     commanded = time-optimal way to requested-position within max-speed, max-acceleration, max-jerk (see motion_profile)
     e         = commanded-position - actual-position
@@ -189,22 +189,22 @@ watches it.
 (G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 4.3; the trajectory: T. Kroeger, *On-Line Trajectory
 Generation in Robotic Systems*, Springer 2010.) Units are those of `actual-position`; all limits and gains may change at any time.
 
-* `enable` closes the loop where the axis is, at rest. A rising edge of `go` starts a move; another one, on the way, too.
-* `speed-mode` goes at `requested-speed`, and stops at `min-position` and `max-position`. Positions beyond them are cut
+* `enable` closes the loop at the current position, at standstill. A rising edge of `go` starts a move, also during a move.
+* `speed-mode` moves at `requested-speed`, and stops at `min-position` and `max-position`. Positions beyond them are limited
   (`request-limited`).
-* `stop` brakes by `max-acceleration`. `busy` is TRUE while the trajectory runs (and until the axis is within `position-window`).
-* The integral is held while it would push farther into saturation.
+* `stop` brakes with `max-acceleration`. `busy` is TRUE while the trajectory runs (and until the axis is within `position-window`).
+* The integral is held while it would increase the saturation.
 
-An error takes `output` to 0 in the same cycle and stays until a rising edge of `reset`; after it the axis holds where it is.
+An error sets `output` to 0 in the same cycle and remains until a rising edge of `reset`; then the axis holds its current position.
 
 | error-code | |
 | --- | --- |
 | 0 | none |
 | 1 | following error above `max-following-error` |
-| 2, 3 | measured below `min-position` or above `max-position` by more than `position-margin`, and moving on outwards |
+| 2, 3 | measured position below `min-position` or above `max-position` by more than `position-margin`, and moving outwards |
 | 4 | measured speed above `overspeed` * `max-speed` |
-| 5 | the feedback is not a number |
-| 6 | a limit is 0, negative or not a number, or a gain gives no number |
+| 5 | the feedback is NaN or infinite |
+| 6 | a limit is 0, negative or NaN, or the output is NaN because of a gain |
 
     loadrt pxmc_axis names=left-wheel
     addf left-wheel.do-control servo

@@ -10,20 +10,20 @@ namespace {
 struct SimEncoder : hal::Component {
     using Component::Component;
 
-    hal::Function make{*this, "make-pulses", &SimEncoder::make_pulses, "makes the phases; in the fastest thread", {.shared = true}};
-    hal::Out<bool> phase_a{*this, make, "phase-A", "phase A: leads while speed is positive"};
+    hal::Function make{*this, "make-pulses", &SimEncoder::make_pulses, "generates the phases; belongs in the fastest thread", {.shared = true}};
+    hal::Out<bool> phase_a{*this, make, "phase-A", "phase A, leading while speed is positive"};
     hal::Out<bool> phase_b{*this, make, "phase-B", "phase B"};
-    hal::Out<bool> phase_z{*this, make, "phase-Z", "index, one count wide, once per turn"};
+    hal::Out<bool> phase_z{*this, make, "phase-Z", "index pulse, one count wide, once per revolution"};
     hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts", "counts since the start, four per pulse"};
-    hal::Param<std::uint32_t> pulses{*this, make, "ppr", "pulses per turn; four counts each", {.initial = 100}};
+    hal::Param<std::uint32_t> pulses{*this, make, "ppr", "pulses per revolution, four counts each", {.initial = 100}};
 
-    hal::Function run{*this, "update-speed", &SimEncoder::update_speed, "takes the speed; in the servo thread", {.shared = true}};
+    hal::Function run{*this, "update-speed", &SimEncoder::update_speed, "reads the speed; belongs in the servo thread", {.shared = true}};
     hal::In<double> speed{*this, run, "speed", "speed in user units per second"};
-    hal::Param<double> scale{*this, run, "scale", "user units per turn", {.initial = 1.0}};
+    hal::Param<double> scale{*this, run, "scale", "user units per revolution", {.initial = 1.0}};
 
     void make_pulses(hal::Cycle cycle) noexcept {
         const std::int64_t per_turn = 4 * static_cast<std::int64_t>(pulses);
-        // At most an edge per cycle: a faster shaft could not be told from a slower one.
+        // At most one edge per cycle: more could not be distinguished from fewer.
         const double step = turns_per_second_.load(std::memory_order_relaxed) * static_cast<double>(per_turn) * cycle.seconds();
         place_ += step > 1.0 ? 1.0 : step < -1.0 ? -1.0 : step;
         const double whole = std::floor(place_);
@@ -50,10 +50,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SimEncoder, "sim_encoder", "A quadrature encoder that turns at a commanded speed", R"(
-Makes the phases an encoder of `ppr` pulses per turn shows while its shaft turns at `speed` / `scale` turns per second.
-`sim-encoder.update-speed` belongs into the servo thread, `sim-encoder.make-pulses` into the fastest; it makes at most an
-edge per period, so the speed is limited to 1 / (4 ppr T) turns per second.
+HAL_COMPONENT(SimEncoder, "sim_encoder", "Simulated quadrature encoder that turns at a commanded speed", R"(
+Generates the phases of an encoder with `ppr` pulses per revolution whose shaft turns at `speed` / `scale` revolutions per second.
+`sim-encoder.update-speed` belongs in the servo thread, `sim-encoder.make-pulses` in the fastest thread; it generates at most one
+edge per period T, so the speed is limited to 1 / (4 ppr T) revolutions per second.
 
     loadrt sim_encoder num_chan=1
     loadrt encoder num_chan=1

@@ -6,14 +6,14 @@ namespace {
 
 struct SimpleTp : hal::Component {
     using Component::Component;
-    hal::In<double>  target{*this, "target-pos", "where to go"};
-    hal::In<double>  max_velocity{*this, "maxvel", "largest speed"};
-    hal::In<double>  max_acceleration{*this, "maxaccel", "largest change of speed per second"};
-    hal::In<bool>    enable{*this, "enable", "FALSE: the wanted speed is 0, it brakes"};
-    hal::Out<double> position{*this, "current-pos", "where it is"};
-    hal::Out<double> velocity{*this, "current-vel", "how fast it moves"};
-    hal::Out<bool>   active{*this, "active", "TRUE while it moves or has somewhere to go"};
-    hal::Function    run{*this, "update", &SimpleTp::update, "one step on the way"};
+    hal::In<double>  target{*this, "target-pos", "target position"};
+    hal::In<double>  max_velocity{*this, "maxvel", "maximum speed"};
+    hal::In<double>  max_acceleration{*this, "maxaccel", "maximum acceleration"};
+    hal::In<bool>    enable{*this, "enable", "FALSE brakes to a stop"};
+    hal::Out<double> position{*this, "current-pos", "current position"};
+    hal::Out<double> velocity{*this, "current-vel", "current velocity"};
+    hal::Out<bool>   active{*this, "active", "TRUE until the target is reached"};
+    hal::Function    run{*this, "update", &SimpleTp::update, "computes the next position"};
 
     void update(hal::Cycle cycle) noexcept {
         const double goal = target;
@@ -32,10 +32,10 @@ private:
 
 HAL_COMPONENT(SimpleTp, "simple_tp", "Trajectory planner for one axis: trapezoidal speed to a target", R"(
 Moves `current-pos` to `target-pos` with at most `maxvel` and `maxaccel`, and stops there without overshoot. The target and the limits
-may change at any moment: it turns round, or slows down, within `maxaccel`. With `enable` FALSE, or while the target is not a number or
-beyond 1e20, it brakes with `maxaccel` and stays. It starts at 0. With `maxaccel` not positive the speed cannot change.
+may change at any time: the axis reverses or decelerates within `maxaccel`. While `enable` is FALSE, or the target is NaN or
+beyond 1e20, it brakes with `maxaccel` and stops. The initial position is 0. If `maxaccel` is not positive, the speed cannot change.
 
-It brakes as late as whole periods allow, so it arrives some periods earlier than LinuxCNC's own, which comes in more slowly.
+It brakes as late as whole periods allow, so it arrives a few periods earlier than LinuxCNC's.
 
     loadrt simple_tp names=tp
     addf tp.update servo

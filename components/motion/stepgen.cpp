@@ -11,11 +11,11 @@
 
 namespace {
 
-/// What `update-freq` asks of `make-pulses`.
+/// The command of `update-freq` for `make-pulses`.
 struct Order {
     bool on = false;
     double rate = 0.0;          // steps per second, signed
-    double slope = 0.0;         // steps per second squared to get there; 0: at once
+    double slope = 0.0;         // acceleration towards rate, steps per second squared; 0: immediate
     std::int64_t step_ns = 0, space_ns = 0, hold_ns = 0, setup_ns = 0;
 };
 
@@ -46,26 +46,26 @@ constexpr std::array<Sequence, 13> sequences{{
 struct Stepgen : hal::Component {
     enum Type { step_dir, up_down };
 
-    hal::Argument type{*this, "step_type", 0, "waveform, 0 to 15; one number per instance", {.per_instance = true, .min = 0, .max = user_type}};
+    hal::Argument type{*this, "step_type", 0, "waveform, 0..15; one number per instance", {.per_instance = true, .min = 0, .max = user_type}};
     hal::TextArgument control{*this, "ctrl_type", "p", "p: position-cmd, v: velocity-cmd; one letter per instance", {.per_instance = true}};
     hal::TextArgument user{*this, "user_step_type", "", "states of step type 15: at most 10 numbers of up to 5 bits, 0x1,0x2,0x4"};
 
-    hal::Function make{*this, "make-pulses", &Stepgen::make_pulses, "makes the waveforms; in the fastest thread", {.shared = true}};
+    hal::Function make{*this, "make-pulses", &Stepgen::make_pulses, "generates the waveforms; belongs in the fastest thread", {.shared = true}};
     std::optional<hal::Out<bool>> first, second;  // step and dir, or up and down
     hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts", "steps made since the start"};
 
-    hal::Function capture{*this, "capture-position", &Stepgen::capture_position, "publishes the position; before the controller", {.shared = true}};
+    hal::Function capture{*this, "capture-position", &Stepgen::capture_position, "updates the position feedback; belongs before the controller", {.shared = true}};
     hal::Out<std::int32_t> counts{*this, capture, "counts", "steps made since the start"};
-    hal::Out<double> position_fb{*this, capture, "position-fb", "position in length units, finer than a step"};
+    hal::Out<double> position_fb{*this, capture, "position-fb", "position in length units, with sub-step resolution"};
 
-    hal::Function run{*this, "update-freq", &Stepgen::update_freq, "takes new commands; in the servo thread, after the controller", {.shared = true}};
-    hal::In<bool> enable{*this, run, "enable", "FALSE: no steps"};
+    hal::Function run{*this, "update-freq", &Stepgen::update_freq, "reads the command; belongs in the servo thread, after the controller", {.shared = true}};
+    hal::In<bool> enable{*this, run, "enable", "FALSE stops the generator"};
     std::optional<hal::In<double>> position_cmd, velocity_cmd;
     hal::Param<double> position_scale{*this, run, "position-scale", "steps per length unit; 0 counts as 1", {.initial = 1.0}};
-    hal::Param<double> max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: what the timing allows"};
-    hal::Param<double> max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: none"};
-    hal::Out<double> frequency{*this, run, "frequency", "steps per second asked for", {.unit = "Hz"}};
-    hal::Param<std::uint32_t> step_length{*this, run, "steplen", "length of a step pulse, or shortest time in a state", {.initial = 1, .unit = "ns"}};
+    hal::Param<double> max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: limited by the pulse timing only"};
+    hal::Param<double> max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: no limit"};
+    hal::Out<double> frequency{*this, run, "frequency", "current step rate", {.unit = "Hz"}};
+    hal::Param<std::uint32_t> step_length{*this, run, "steplen", "length of a step pulse, or minimum time in a state", {.initial = 1, .unit = "ns"}};
     std::optional<hal::Param<std::uint32_t>> step_space, dir_hold, dir_setup, dir_delay;
 
     explicit Stepgen(const hal_host* host) : Component(host) {
@@ -73,23 +73,23 @@ struct Stepgen : hal::Component {
         const hal::PinOptions<bool> off{.safe = false};
         const hal::PinOptions<std::uint32_t> one{.initial = 1, .unit = "ns"};
         if (type == step_dir) {
-            first.emplace(*this, make, "step", "a pulse per step", off);
+            first.emplace(*this, make, "step", "one pulse per step", off);
             second.emplace(*this, make, "dir", "TRUE for steps backwards");
         } else if (type == up_down) {
-            first.emplace(*this, make, "up", "a pulse per step forwards", off);
-            second.emplace(*this, make, "down", "a pulse per step backwards", off);
+            first.emplace(*this, make, "up", "one pulse per step forwards", off);
+            second.emplace(*this, make, "down", "one pulse per step backwards", off);
         } else {
             sequence_ = type == user_type ? user_sequence() : sequences[static_cast<std::size_t>(type - first_sequence)];
             static constexpr std::array names{"phase-A", "phase-B", "phase-C", "phase-D", "phase-E"};
             for (int i = 0; i < sequence_.phases; ++i)
-                phase_[static_cast<std::size_t>(i)].emplace(*this, make, names[static_cast<std::size_t>(i)], "one of the motor's phases", off);
+                phase_[static_cast<std::size_t>(i)].emplace(*this, make, names[static_cast<std::size_t>(i)], "phase of the motor", off);
         }
-        if (type <= up_down) step_space.emplace(*this, run, "stepspace", "shortest time between step pulses; 0: a pulse in every period", one);
+        if (type <= up_down) step_space.emplace(*this, run, "stepspace", "minimum time between step pulses; 0: a pulse in every period", one);
         if (type == step_dir) {
-            dir_hold.emplace(*this, run, "dirhold", "from the end of a pulse to a change of dir", one);
-            dir_setup.emplace(*this, run, "dirsetup", "from a change of dir to the next pulse", one);
+            dir_hold.emplace(*this, run, "dirhold", "minimum time from the end of a pulse to a change of dir", one);
+            dir_setup.emplace(*this, run, "dirsetup", "minimum time from a change of dir to the next pulse", one);
         } else {
-            dir_delay.emplace(*this, run, "dirdelay", "between steps in opposite directions", one);
+            dir_delay.emplace(*this, run, "dirdelay", "minimum time between steps in opposite directions", one);
         }
         if (control.get() == "p") position_cmd.emplace(*this, run, "position-cmd", "commanded position in length units");
         else velocity_cmd.emplace(*this, run, "velocity-cmd", "commanded speed in length units per second");
@@ -142,9 +142,9 @@ struct Stepgen : hal::Component {
     }
 
 private:
-    /// The speed in steps/s at the end of this period that the command asks for, before limits. For a position: the
-    /// command's own speed, and on top of it what closes the distance e. With an acceleration a the speed changes evenly over
-    /// the period T; from v to w it covers (v + w) T / 2, and what is left must still be enough to brake from w:
+    /// Returns the commanded speed in steps/s at the end of this period, before limits. For a position command: the
+    /// speed of the command plus a correction for the distance e. With an acceleration a the speed changes linearly over
+    /// the period T; from v to w it covers (v + w) T / 2, and the remaining distance must be enough to brake from w:
     ///     e - (v + w) T / 2 = w^2 / 2a,  so  w = sqrt((a T / 2)^2 + 2 a (e - v T / 2)) - a T / 2
     double command(double dt) noexcept {
         if (velocity_cmd) return *velocity_cmd * scale();
@@ -161,7 +161,7 @@ private:
 
     double limited(double wanted, std::int64_t tick_ns, double dt) noexcept {
         if (!std::isfinite(wanted)) return 0.0;
-        const auto ticks = [&](std::int64_t ns) { return (ns + tick_ns - 1) / tick_ns; };  // times are met in whole periods
+        const auto ticks = [&](std::int64_t ns) { return (ns + tick_ns - 1) / tick_ns; };  // times are rounded up to whole periods
         const std::int64_t shortest = type <= up_down ? std::max<std::int64_t>(1, ticks(step_length) + (*step_space > 0 ? ticks(*step_space) : 0))
                                                       : std::max<std::int64_t>(1, ticks(step_length));
         double highest = 1e9 / static_cast<double>(shortest * tick_ns);
@@ -173,7 +173,7 @@ private:
     double acceleration() const noexcept { return std::fabs(max_acceleration * scale()); }
     double scale() const noexcept { return scale_.load(std::memory_order_relaxed); }
 
-    /// Makes one step in `direction` if the timing allows it now. A step that must wait is made later: none is lost.
+    /// Makes one step in `direction` if the timing allows it now, else later; no step is lost.
     void advance(int direction, const Order& wanted) noexcept {
         if (direction != direction_) {
             if (hold_ns_ > 0) return;
@@ -232,7 +232,7 @@ private:
     double rate_ = 0.0;                     // how fast that moves now, in steps per second
     int direction_ = 1;
     bool high_ = false;
-    std::int64_t pulse_ns_ = 0, space_ns_ = 0, hold_ns_ = 0, setup_ns_ = 0;  // what is left of each time
+    std::int64_t pulse_ns_ = 0, space_ns_ = 0, hold_ns_ = 0, setup_ns_ = 0;  // remaining time of each
     // update-freq only
     double last_command_ = 0.0;
 };
@@ -240,14 +240,14 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Stepgen, "stepgen", "Step pulses in software: step and direction, up and down, motor phases", R"(
-`stepgen.make-pulses` makes the waveforms in the fastest thread; `stepgen.capture-position` and `stepgen.update-freq` belong
-into the servo thread, one before and one after what computes the command. The three may run on different processors.
+`stepgen.make-pulses` generates the waveforms in the fastest thread; `stepgen.capture-position` and `stepgen.update-freq` belong
+in the servo thread, before and after the controller. The three may run on different CPUs.
 
-`position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a command that stands
-still: on top of the command's own speed, v = √(2 a e + (a T/2)²) - a T/2 for a distance e. `velocity-cmd` (ctrl_type=v) is
-followed within the same limits. With `maxaccel` the speed changes evenly from one update to the next, not in jumps.
-Steps are whole periods of the fast thread apart, at most one per period; a step that has to
-wait for one of the times below is made later, none is lost. A step is made where the position passes the middle between two.
+`position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a constant
+command: v = √(2 a e + (a T/2)²) - a T/2 for a distance e, plus the speed of the command. `velocity-cmd` (ctrl_type=v) is
+followed within the same limits. With `maxaccel` the speed changes linearly from one update to the next, without jumps.
+There is at most one step per period of the fast thread; a step that must
+wait for one of the times below is delayed, never lost. A step occurs when the position passes the midpoint between two steps.
 
 | step_type | outputs | times used |
 | --- | --- | --- |
@@ -260,15 +260,15 @@ wait for one of the times below is made later, none is lost. A step is made wher
 | 9, 10 | four phases, half step: unipolar, bipolar | steplen, dirdelay |
 | 11, 12 | five phases, full step: one phase on, two on | steplen, dirdelay |
 | 13, 14 | five phases, half step: one or two on, two or three on | steplen, dirdelay |
-| 15 | as `user_step_type` says: a number per state, bit 0 is phase A | steplen, dirdelay |
+| 15 | defined by `user_step_type`: a number per state, bit 0 is phase A | steplen, dirdelay |
 
-All times are in nanoseconds and met in whole periods of the fast thread. With `stepspace` 0 a pulse may come in every period,
-for ports that take it back themselves.
+All times are in nanoseconds and rounded up to whole periods of the fast thread. With `stepspace` 0 a pulse may occur in every period,
+for ports that reset the pulse themselves.
 
-**Otherwise than LinuxCNC's**, whose steps come in other periods: a command that moves steadily is followed one update behind (there
-two and a half), and a move is braked as late as can be. `position-fb` is exact (there it has the steps of a fixed point number,
-2e-8 of it). Without `maxaccel` a speed is taken at once (there within an update). `dir` changes before the first step back (there
-when the speed changes its sign, also where no step follows).
+**Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is followed with a lag of one update (LinuxCNC:
+two and a half), and braking starts as late as possible. `position-fb` is exact (LinuxCNC: fixed point with a resolution of
+2e-8 steps). Without `maxaccel` the speed changes immediately (LinuxCNC: within an update). `dir` changes before the first step back (LinuxCNC:
+when the speed changes its sign, even if no step follows).
 
     loadrt stepgen step_type=0,0 ctrl_type=p,v
     addf stepgen.make-pulses base-thread

@@ -5,11 +5,11 @@ namespace {
 
 struct Steptest : axis_test::Mover {
     using Mover::Mover;
-    hal::In<double> max_acceleration{*this, "maxaccel", "largest acceleration"};
-    hal::Function   step{*this, "", &Steptest::update, "computes the position to go to"};
+    hal::In<double> max_acceleration{*this, "maxaccel", "maximum acceleration"};
+    hal::Function   step{*this, "", &Steptest::update, "computes the commanded position"};
 
     void update(hal::Cycle cycle) noexcept {
-        // So far ahead that a follower with these limits reaches maxvel and need not brake before the next cycle.
+        // Far enough ahead that a follower with these limits reaches maxvel and does not brake before the next cycle.
         const double v = std::fabs(max_velocity), braking = max_acceleration > 0.0 ? v * v / (2.0 * max_acceleration) : 0.0;
         move(2.0 * v * cycle.seconds() + braking, cycle.seconds());
     }
@@ -17,11 +17,11 @@ struct Steptest : axis_test::Mover {
 
 }  // namespace
 
-HAL_COMPONENT(Steptest, "steptest", "Moves an axis with a step generator, to try speed and acceleration", R"(
-While `run` is TRUE `position-cmd` is one end of a way around the position where it began, then the other: `run-low` and `run-high`,
-`amplitude` to the sides that `dir` says. It changes when `position-fb` is within `epsilon` of the end and has rested there for `pause`
-seconds. A jog commands a position ahead of the axis, by two cycles at `maxvel` and the way that braking takes. Else the command is
-the position. The trapezoid is made by the step generator behind it, with its own `maxvel` and `maxaccel`.
+HAL_COMPONENT(Steptest, "steptest", "Moves an axis with a step generator, to test speed and acceleration", R"(
+While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the distance
+`amplitude` from the initial position on the sides selected by `dir`. It changes after `position-fb` has been within `epsilon` of the end for `pause`
+seconds. A jog commands a position ahead of the axis, by two cycles at `maxvel` plus the braking distance. Otherwise the command is
+the feedback. The step generator that follows limits the motion with its own `maxvel` and `maxaccel`.
 
     loadrt steptest names=try
     addf try servo
