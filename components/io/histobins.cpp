@@ -11,28 +11,28 @@ constexpr std::int32_t most = 200;
 
 struct Histobins : hal::Component {
     using Component::Component;
-    hal::In<std::uint32_t> pintype{*this, "pintype", "which input: 0 input, 1 input-s32, 2 input-u32, 3 input-bit"};
+    hal::In<std::uint32_t> pintype{*this, "pintype", "input to use: 0 input, 1 input-s32, 2 input-u32, 3 input-bit"};
     hal::In<double>        input{*this, "input", "value to count, of type float"};
     hal::In<std::int32_t>  input_s32{*this, "input-s32", "value to count, of type s32"};
     hal::In<std::uint32_t> input_u32{*this, "input-u32", "value to count, of type u32"};
     hal::In<bool>          input_bit{*this, "input-bit", "value to count, of type bit"};
-    hal::In<std::uint32_t> nbins{*this, "nbins", "how many bins, 1 to 200", {.initial = 20}};
+    hal::In<std::uint32_t> nbins{*this, "nbins", "number of bins, 1..200", {.initial = 20}};
     hal::In<double>        binsize{*this, "binsize", "width of a bin, above 0", {.initial = 1.0}};
-    hal::In<double>        minvalue{*this, "minvalue", "where the first bin begins"};
+    hal::In<double>        minvalue{*this, "minvalue", "lower edge of the first bin"};
     hal::In<std::int32_t>  index{*this, "index", "bin to show"};
     hal::Out<std::int32_t> check{*this, "check", "the index that is shown"};
-    hal::In<bool>          reset{*this, "reset", "while TRUE everything begins anew"};
-    hal::In<bool>          method{*this, "method", "no effect; both of LinuxCNC's ways to compute the variance have the same result here"};
-    hal::Out<bool>         input_error{*this, "input-error", "TRUE: a setting or the value cannot be; nothing is counted"};
-    hal::Out<double>       binvalue{*this, "binvalue", "values in this bin; -1: there is no such bin"};
-    hal::Out<double>       pextra{*this, "pextra", "values above the last bin"};
-    hal::Out<double>       nextra{*this, "nextra", "values below the first bin"};
+    hal::In<bool>          reset{*this, "reset", "TRUE clears the histogram"};
+    hal::In<bool>          method{*this, "method", "no effect; LinuxCNC's two methods for the variance give the same result here"};
+    hal::Out<bool>         input_error{*this, "input-error", "TRUE: invalid setting or value; nothing is counted"};
+    hal::Out<double>       binvalue{*this, "binvalue", "number of values in this bin; -1: invalid index"};
+    hal::Out<double>       pextra{*this, "pextra", "number of values above the last bin"};
+    hal::Out<double>       nextra{*this, "nextra", "number of values below the first bin"};
     hal::Out<double>       input_min{*this, "input-min", "smallest value"};
     hal::Out<double>       input_max{*this, "input-max", "largest value"};
-    hal::Out<std::uint32_t> nsamples{*this, "nsamples", "how many values"};
+    hal::Out<std::uint32_t> nsamples{*this, "nsamples", "number of values"};
     hal::Out<double>       variance{*this, "variance", "variance of the values"};
     hal::Out<double>       mean{*this, "mean", "mean of the values"};
-    hal::Out<std::int32_t> available{*this, "availablebins", "bins there are", {.initial = most}};
+    hal::Out<std::int32_t> available{*this, "availablebins", "maximum number of bins", {.initial = most}};
     hal::Function          run{*this, "", &Histobins::update, "counts the value"};
 
     void update(hal::Cycle) noexcept {
@@ -88,8 +88,8 @@ private:
 
 HAL_COMPONENT(Histobins, "histobins", "Histogram of a value", R"(
 Counts the value of each cycle in one of `nbins` bins: bin i is from `minvalue` + i `binsize` up to, but not including, the next.
-Set `index` and, when `check` is the same, read `binvalue`. `reset` after a change of the bins. The variance is that of a sample, divided by
-`nsamples` - 1. The first value counts, too, which LinuxCNC's own leaves out of the bins.
+Set `index` and, once `check` is equal to it, read `binvalue`. Set `reset` after a change of the bins. The variance is the sample variance, with the
+divisor `nsamples` - 1. The first value is counted, too (LinuxCNC omits it from the bins).
 
     loadrt histobins names=errors
     addf errors servo

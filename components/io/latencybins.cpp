@@ -12,20 +12,20 @@ using Bins = std::array<std::int32_t, most + 1>;
 
 struct Latencybins : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t>  highest{*this, "maxbinnumber", "number of the last bin on either side, up to 1000", {.initial = most}};
+    hal::In<std::int32_t>  highest{*this, "maxbinnumber", "number of the last bin on either side, at most 1000", {.initial = most}};
     hal::In<std::int32_t>  index{*this, "index", "bin to show"};
-    hal::In<bool>          reset{*this, "reset", "while TRUE everything begins anew"};
+    hal::In<bool>          reset{*this, "reset", "TRUE clears the histogram"};
     hal::In<std::int32_t>  size{*this, "nsbinsize", "width of a bin; nothing is counted while it is not positive", {.unit = "ns"}};
     hal::Out<std::int32_t> check{*this, "check", "the index that is shown"};
-    hal::Out<std::int32_t> latency{*this, "latency", "how much later than a period after the last run this one came", {.unit = "ns"}};
-    hal::Out<std::int32_t> latency_max{*this, "latency-max", "latest so far", {.unit = "ns"}};
-    hal::Out<std::int32_t> latency_min{*this, "latency-min", "earliest so far; negative", {.unit = "ns"}};
-    hal::Out<std::int32_t> positive{*this, "pbinvalue", "runs in bin +index; -1: there is no such bin"};
-    hal::Out<std::int32_t> negative{*this, "nbinvalue", "runs in bin -index; -1: there is no such bin"};
+    hal::Out<std::int32_t> latency{*this, "latency", "time since the last run minus the period", {.unit = "ns"}};
+    hal::Out<std::int32_t> latency_max{*this, "latency-max", "largest latency so far", {.unit = "ns"}};
+    hal::Out<std::int32_t> latency_min{*this, "latency-min", "smallest latency so far; negative", {.unit = "ns"}};
+    hal::Out<std::int32_t> positive{*this, "pbinvalue", "runs in bin +index; -1: invalid index"};
+    hal::Out<std::int32_t> negative{*this, "nbinvalue", "runs in bin -index; -1: invalid index"};
     hal::Out<std::int32_t> positive_extra{*this, "pextra", "runs later than the last bin"};
     hal::Out<std::int32_t> negative_extra{*this, "nextra", "runs earlier than the last bin"};
     hal::Out<std::int32_t> variance{*this, "variance", "variance of the latency, in ns^2"};
-    hal::Out<std::int32_t> available{*this, "availablebins", "bins there are", {.initial = most}};
+    hal::Out<std::int32_t> available{*this, "availablebins", "maximum number of bins", {.initial = most}};
     hal::Function          run{*this, "", &Latencybins::update, "counts this run"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -75,9 +75,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Latencybins, "latencybins", "Histogram of the latency of a thread", R"(
-Counts each run in a bin by its latency, the time since the run before minus the period. Bins go from -`maxbinnumber` to +`maxbinnumber`,
-each `nsbinsize` wide; the two around 0 are one, bin 0. Set `index` and, when `check` is the same, read `pbinvalue` and `nbinvalue`. On a
-virtual clock there is no latency.
+Counts each run in a bin by its latency, the time since the previous run minus the period. Bins go from -`maxbinnumber` to +`maxbinnumber`,
+each `nsbinsize` wide; the two around 0 are combined as bin 0. Set `index` and, once `check` is equal to it, read `pbinvalue` and `nbinvalue`. On a
+virtual clock the latency is 0.
 
     loadrt latencybins names=bins
     addf bins servo 1

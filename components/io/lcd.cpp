@@ -22,7 +22,7 @@ struct Item {
     const Value* value = nullptr;
 };
 
-/// The characters of one item; room is fixed.
+/// The characters of one item, in fixed memory.
 struct Text {
     static constexpr unsigned room = 24;
     void clear() noexcept { length = 0; }
@@ -33,8 +33,8 @@ struct Text {
     unsigned length = 0;
 };
 
-/// A magnitude in `base`, with its sign, `decimals` of its digits behind the separator, in the width of the item; asterisks
-/// when it does not fit.
+/// Formats a magnitude in `base`, with its sign and `decimals` digits after the separator, in the width of the item; asterisks
+/// if it does not fit.
 void number(Text& text, const Item& item, std::uint64_t magnitude, bool negative, unsigned base, unsigned decimals,
             char separator) noexcept {
     std::array<char, Text::room> digits{};  // the last one first
@@ -63,19 +63,19 @@ void real(Text& text, const Item& item, double value, char separator) noexcept {
     double scaled = std::fabs(value);
     for (unsigned i = 0; i < item.precision; ++i) scaled *= 10.0;
     scaled = std::floor(scaled + 0.5);
-    const bool possible = scaled < 1e18;  // false for what is not a number, too
+    const bool possible = scaled < 1e18;  // false for NaN, too
     const std::uint64_t magnitude = possible ? static_cast<std::uint64_t>(scaled) : UINT64_MAX;
     number(text, item, magnitude, std::signbit(value) && scaled != 0.0, 10, item.precision, separator);
 }
 
 struct Lcd : hal::Component {
     hal::InstanceName instance_name{*this, "lcd", 2};
-    hal::TextArgument format{*this, "fmt_strings", "%f", "the text, with | between pages, an element per display", {.per_instance = true}};
-    hal::Out<std::uint32_t> out{*this, "out", "the byte to send; 0: none"};
-    hal::In<std::uint32_t> page_number{*this, "page_num", "page to show; one that there is not is empty"};
-    hal::In<double> contrast{*this, "contrast", "contrast, 0 to 1; sent when it changes"};
+    hal::TextArgument format{*this, "fmt_strings", "%f", "text, with | between pages; one element per display", {.per_instance = true}};
+    hal::Out<std::uint32_t> out{*this, "out", "byte to send; 0: none"};
+    hal::In<std::uint32_t> page_number{*this, "page_num", "page to show; an invalid number shows an empty page"};
+    hal::In<double> contrast{*this, "contrast", "contrast, 0..1; sent when it changes"};
     hal::Param<std::uint32_t> separator{*this, "decimal-separator", "character between units and decimals", {.initial = '.'}};
-    hal::Function run{*this, "", &Lcd::update, "gives the next byte", {.shared = true}};
+    hal::Function run{*this, "", &Lcd::update, "outputs the next byte", {.shared = true}};
 
     explicit Lcd(const hal_host* host) : Component(host) { read_format(format.get()); }
 
@@ -96,7 +96,7 @@ struct Lcd : hal::Component {
     }
 
 private:
-    static constexpr int quiet = 100;  // cycles the display has to start
+    static constexpr int quiet = 100;  // cycles for the display to start
     static constexpr std::string_view begin{"\r\n\x18\r\n\x18\r\n\x18\r\n\x18\x11\x11\x1e\x1a"}, clear_screen{"\x11\x1e\x1a"};
     static constexpr std::string_view end_of_line{"\x18\n\r"}, to_top{"\0\x1b=  ", 5};
 
@@ -168,7 +168,7 @@ private:
         }
     }
 
-    /// What stands behind a backslash: two hexadecimal digits, or the character itself.
+    /// Parses the text after a backslash: two hexadecimal digits, or the character itself.
     static char escaped(const std::string& all, std::size_t& i) {
         const std::string digits = all.substr(i, 2);
         if (digits.size() == 2 && digits.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos) {
@@ -205,14 +205,14 @@ private:
         case 'b':
             item.kind = 'b';
             for (char* choice : {&item.character, &item.other}) {
-                if (i >= all.size()) throw std::invalid_argument("fmt_strings: two characters have to follow %b, for TRUE and for FALSE");
+                if (i >= all.size()) throw std::invalid_argument("fmt_strings: %b must be followed by two characters, for TRUE and for FALSE");
                 const char c = all[i++];
                 *choice = c == '\\' ? escaped(all, i) : c;
             }
             item.value = pin<3>();
             break;
         default:
-            throw std::invalid_argument("fmt_strings: '" + all.substr(start, i - start) + "' is no format; its last letter is one of fdiuxocb");
+            throw std::invalid_argument("fmt_strings: '" + all.substr(start, i - start) + "' is not a valid format; it must end with one of f d i u x o c b");
         }
         pages_.back().push_back(item);
     }
@@ -230,7 +230,7 @@ private:
     std::vector<std::size_t> pins_on_page_;
 
     int waited_ = 0;
-    std::string_view control_ = begin;  // what is sent before all else
+    std::string_view control_ = begin;  // sent first
     std::uint32_t page_ = 0;
     std::size_t item_ = 0;
     unsigned at_ = 0;
@@ -242,21 +242,21 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Lcd, "lcd", "Text and values for a character display, a byte per cycle", R"(
-`fmt_strings=` has a text per display. In it `%` formats, as of C's printf, make a pin each, `page.PP.arg.NN`:
+`fmt_strings=` has a text per display. Each `%` format in it, as in C's printf, creates a pin `page.PP.arg.NN`:
 
 | format | pin | shows |
 | --- | --- | --- |
-| %f | float | a number, with 4 decimals if not told otherwise |
-| %d %i | s32 | a whole number |
-| %u %x %o | u32 | the same decimal, hexadecimal, octal |
-| %c | u32 | the character with this code, as often as the width says |
+| %f | float | a number, with 4 decimals by default |
+| %d %i | s32 | an integer |
+| %u %x %o | u32 | an integer: decimal, hexadecimal, octal |
+| %c | u32 | the character with this code, repeated to the width |
 | %bYN | bit | the first character when TRUE, the second when FALSE |
 
-Between % and letter may stand 0 (leading zeros), + (a sign always), the width with sign and separator, and `.N` decimals. What does not fit
-its width, or is not a number, is shown as asterisks. `\n` is the end of a line, `\t` four spaces, `\NN` the character with this hexadecimal
-code, `\\` a backslash, `%%` a percent sign, `|` begins the next page; a comma (`\2C`) begins the text of the next display.
+Between % and the letter may be 0 (leading zeros), + (always a sign), the width including sign and separator, and `.N` decimals. NaN and values that do
+not fit the width are shown as asterisks. `\n` ends a line, `\t` is four spaces, `\NN` the character with this hexadecimal
+code, `\\` a backslash and `%%` a percent sign; `|` starts the next page, a comma (`\2C`) the text of the next display.
 
-The bytes are those of an ADM-3 terminal, as the Mesa 7I73 takes them. After a start of 100 cycles the page is sent again and again from the
+The bytes are those of an ADM-3 terminal, as for the Mesa 7I73. After a start-up of 100 cycles the page is sent repeatedly from the
 top. Default names are `lcd.00`, `lcd.01` …
 
     loadrt lcd fmt_strings="X %+9.3f|Feed %5d" names=panel

@@ -10,7 +10,7 @@
 
 namespace {
 
-/// What config= says: rows, columns, and whether to scan.
+/// Parses config=: rows, columns, and whether to scan.
 struct Config {
     explicit Config(const std::string& text) {
         char* end = nullptr;
@@ -22,7 +22,7 @@ struct Config {
         if (*end != '\0' || rows < 1 || columns < 1 || rows > 32 || columns > 32)
             throw hal::ArgumentError("config", "config=" + text + " is not ROWSxCOLUMNS, each 1 to 32, with an s at the end to scan");
         if (rows * static_cast<long>(std::bit_ceil(static_cast<unsigned long>(columns))) > 64)
-            throw hal::ArgumentError("config", "config=" + text + " has more than the 64 keys that a key code can name");
+            throw hal::ArgumentError("config", "config=" + text + " has more than 64 keys, the limit of the key code");
     }
     long rows, columns;
     bool scan;
@@ -36,12 +36,12 @@ struct MatrixKb : hal::Component {
     const long stride_ = static_cast<long>(std::bit_ceil(static_cast<unsigned long>(config.columns)));  // of key numbers, per row
     std::array<std::optional<hal::Out<bool>>, 64> keys;  // by key number
     hal::Ins<std::uint32_t> code_in{*this, "keycode", config.scan ? 0 : 1, "code of the keypad: 0xC0 + key: down, 0x80 + key: up"};
-    hal::Outs<std::uint32_t> code_out{*this, "keycode", config.scan ? 1 : 0, "code of the newest change, as in the other mode; else 0x40"};
+    hal::Outs<std::uint32_t> code_out{*this, "keycode", config.scan ? 1 : 0, "code of the newest change: 0xC0 + key: down, 0x80 + key: up; otherwise 0x40"};
     hal::Ins<bool> column{*this, "col-##-in", config.scan ? config.columns : 0, "column ## of the keypad"};
     hal::Outs<bool> row{*this, "row-##-out", config.scan ? config.rows : 0, "row ## of the keypad"};
-    hal::Params<std::uint32_t> rollover{*this, "key_rollover", config.scan ? 1 : 0, "no more count while so many are", {.initial = 2}};
+    hal::Params<std::uint32_t> rollover{*this, "key_rollover", config.scan ? 1 : 0, "maximum number of keys down at the same time", {.initial = 2}};
     hal::Params<bool> negative{*this, "negative-logic", config.scan ? 1 : 0, "TRUE: row and key are active FALSE", {.initial = true}};
-    hal::Function run{*this, "", &MatrixKb::update, "makes keys of codes, or of the columns"};
+    hal::Function run{*this, "", &MatrixKb::update, "decodes key codes or scans the keypad"};
 
     explicit MatrixKb(const hal_host* host) : Component(host) {
         for (long r = 0; r < config.rows; ++r)
@@ -57,11 +57,11 @@ struct MatrixKb : hal::Component {
         for (long c = 0; c < config.columns; ++c) {
             const auto key = static_cast<std::size_t>(driven_ * stride_ + c);
             const bool pressed = column[static_cast<std::size_t>(c)] != negative[0];
-            const bool certain = pressed == seen_[key];  // the same in two scans: it does not bounce
+            const bool certain = pressed == seen_[key];  // equal in two scans: debounced
             seen_[key] = pressed;
             hal::Out<bool>& out = *keys[key];
             if (!certain || pressed == out || (pressed && down_ >= rollover[0])) continue;
-            if (code != 0x40) continue;  // one change per cycle, so that each has its code
+            if (code != 0x40) continue;  // one change per cycle, so that each has its own code
             out = pressed;
             if (pressed) ++down_;
             else --down_;
@@ -88,11 +88,11 @@ HAL_COMPONENT(MatrixKb, "matrix_kb", "Keys of a keypad, from its key codes or by
 `config=` has an element per keypad: rows, an x, columns.
 
 Without s at the end the keypad has a controller: `keycode` 0xC0 + key sets the pin of the key, 0x80 + key clears it, other codes change
-nothing. The key's number is row * w + column, w being the number of columns rounded up to a power of two.
+nothing. The number of a key is row * w + column, where w is the number of columns rounded up to a power of two.
 
-With s the keypad is scanned: one row is driven per cycle, and the columns are read in the next. A key that is the same in two scans
-counts. With `key_rollover` keys down no other counts, since most keypads then show keys that nobody pressed; raise it for keypads with
-diodes. `negative-logic` is for inputs that are TRUE when nothing is connected. Use a slow thread.
+With s the keypad is scanned: one row is driven per cycle, and the columns are read in the next. A key change is accepted if it is equal in two
+scans. With `key_rollover` keys down, further keys are ignored, because most keypads then report ghost keys; increase it for keypads with
+diodes. `negative-logic` is for inputs that are TRUE when open. Use a slow thread.
 
 The default name of an instance is `matrix_kb.N`.
 

@@ -12,11 +12,11 @@ namespace {
 
 struct Message : hal::Component {
     using Component::Component;
-    hal::TextArgument text{*this, "messages", "message", "the texts in quotes, with commas, one per instance", {.per_instance = true}};
-    hal::In<bool>     trigger{*this, "trigger", "its edge shows the message"};
-    hal::In<bool>     force{*this, "force", "rising edge: shows it again if trigger is still as it was"};
-    hal::Param<bool>  edge{*this, "edge", "TRUE: a rising edge of trigger, FALSE: a falling one", {.initial = true}};
-    hal::Function     run{*this, "", &Message::update, "watches trigger and force"};
+    hal::TextArgument text{*this, "messages", "message", "quoted texts separated by commas, one per instance", {.per_instance = true}};
+    hal::In<bool>     trigger{*this, "trigger", "an edge prints the message"};
+    hal::In<bool>     force{*this, "force", "a rising edge prints the message again while trigger is in the triggered state"};
+    hal::Param<bool>  edge{*this, "edge", "edge of trigger: TRUE is rising, FALSE is falling", {.initial = true}};
+    hal::Function     run{*this, "", &Message::update, "detects edges of trigger and force"};
 
     void start() {
         ended_.store(false);
@@ -40,7 +40,7 @@ struct Message : hal::Component {
 private:
     void print() noexcept {
         for (bool last = false; !last;) {
-            last = ended_.load();  // looked at before the count, so that what came before the end is still printed
+            last = ended_.load();  // read before the count, so that all messages before the end are printed
             for (; printed_ != wanted_.load(std::memory_order_relaxed); ++printed_) {
                 log_.print("", text.get());
             }
@@ -58,11 +58,11 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Message, "message", "Shows a message when a bit changes", R"(
-An edge of `trigger` puts the instance's text on the standard error of the process that runs the netlist. The cycle only counts; a thread
-of its own prints, some hundredths of a second later, and at most one line per second: more messages of an instance in that time are
-counted, and the next line ends with their number, as in `(12 times in 1.0 s)`. Before the first cycle `trigger` counts as FALSE. A text
-that is not given is `message`.
+HAL_COMPONENT(Message, "message", "Prints a message when a bit changes", R"(
+An edge of `trigger` prints the instance's text to the standard error of the process that runs the netlist. The cycle only counts; a separate
+thread prints, a few hundredths of a second later, and at most one line per second: further messages of an instance in that time are
+counted, and the next line ends with their number, as in `(12 times in 1.0 s)`. Before the first cycle `trigger` counts as FALSE. The default
+text is `message`.
 
     loadrt message names=oillow,inverterfail messages="Slideway oil low,Spindle inverter fault"
     addf oillow servo

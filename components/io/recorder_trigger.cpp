@@ -27,41 +27,41 @@ enum State : std::uint32_t { idle = 0, filling = 1, armed = 2, recording = 3, ho
 struct RecorderTrigger : hal::Component {
     using Component::Component;
 
-    hal::Argument channels{*this, "channels", 4, "how many values are delayed", {.min = 0, .max = 64}};
-    hal::Argument bit_channels{*this, "bits", 0, "how many bits are delayed", {.min = 0, .max = 64}};
-    hal::Argument depth{*this, "depth", 1000, "the largest pre-trigger, in cycles", {.min = 1, .max = 10'000'000}};
+    hal::Argument channels{*this, "channels", 4, "number of values to delay", {.min = 0, .max = 64}};
+    hal::Argument bit_channels{*this, "bits", 0, "number of bits to delay", {.min = 0, .max = 64}};
+    hal::Argument depth{*this, "depth", 1000, "maximum pre-trigger in cycles", {.min = 1, .max = 10'000'000}};
 
     hal::In<bool> arm{*this, "arm", "a rising edge arms; FALSE disarms"};
-    hal::In<bool> again{*this, "auto-arm", "TRUE: arms again after each record"};
-    hal::In<bool> force{*this, "force", "a rising edge triggers whatever the conditions are"};
-    hal::In<bool> bit{*this, "trigger-bit", "the bit of the condition"};
-    hal::In<double> value{*this, "trigger-value", "the value of the condition"};
+    hal::In<bool> again{*this, "auto-arm", "TRUE arms again after each record"};
+    hal::In<bool> force{*this, "force", "a rising edge triggers regardless of the conditions"};
+    hal::In<bool> bit{*this, "trigger-bit", "bit for the trigger condition"};
+    hal::In<double> value{*this, "trigger-value", "value for the trigger condition"};
     hal::Param<std::uint32_t> bit_mode{*this, "bit-mode",
                                        "0 unused; trigger-bit 1 rises, 2 falls, 3 changes, 4 is TRUE, 5 is FALSE", {.initial = bit_rises}};
     hal::Param<std::uint32_t> value_mode{*this, "value-mode",
                                          "0 unused; trigger-value 1 rises, 2 falls, 3 crosses, 4 is above, 5 is below threshold; "
                                          "6 is outside, 7 is inside threshold and threshold-2"};
-    hal::Param<double> threshold{*this, "threshold", "of trigger-value"};
-    hal::Param<double> threshold_2{*this, "threshold-2", "the other end of the window"};
+    hal::Param<double> threshold{*this, "threshold", "threshold for trigger-value"};
+    hal::Param<double> threshold_2{*this, "threshold-2", "other limit of the window"};
     hal::Param<double> hysteresis{*this, "hysteresis",
-                                  "before it rises again trigger-value has to be lower than threshold by this (falls: higher)"};
-    hal::Param<bool> both{*this, "both", "TRUE: both conditions in the same cycle; FALSE: either"};
+                                  "distance from threshold that trigger-value must reach on the other side before the next edge"};
+    hal::Param<bool> both{*this, "both", "TRUE: both conditions must be met in the same cycle; FALSE: either condition"};
     hal::Param<std::uint32_t> pre{*this, "pre", "cycles to record before the trigger", {.initial = 100}};
     hal::Param<std::uint32_t> post{*this, "post", "cycles to record from the trigger on", {.initial = 900}};
-    hal::Param<double> hold_off{*this, "hold-off", "auto-arm: rest after a record", {.unit = "s"}};
+    hal::Param<double> hold_off{*this, "hold-off", "auto-arm: delay after a record", {.unit = "s"}};
 
-    hal::Ins<double> in{*this, "in-##", channels, "a value to record"};
-    hal::Ins<bool> bit_in{*this, "bit-in-##", bit_channels, "a bit to record"};
-    hal::Outs<double> out{*this, "out-##", channels, "in-##, pre cycles later"};
-    hal::Outs<bool> bit_out{*this, "bit-out-##", bit_channels, "bit-in-##, pre cycles later"};
-    hal::Out<bool> record{*this, "record", "TRUE for pre + post cycles: to the sampler's enable"};
+    hal::Ins<double> in{*this, "in-##", channels, "value to record"};
+    hal::Ins<bool> bit_in{*this, "bit-in-##", bit_channels, "bit to record"};
+    hal::Outs<double> out{*this, "out-##", channels, "in-##, delayed by pre cycles"};
+    hal::Outs<bool> bit_out{*this, "bit-out-##", bit_channels, "bit-in-##, delayed by pre cycles"};
+    hal::Out<bool> record{*this, "record", "TRUE for pre + post cycles; link it to the sampler's enable"};
     hal::Out<bool> triggered{*this, "triggered", "TRUE in the cycle of the trigger"};
-    hal::Out<bool> done{*this, "done", "TRUE: there is a record, and it is not armed again"};
-    hal::Out<std::uint32_t> state{*this, "state", "0 idle; 1 armed, but the pre-trigger fills; 2 armed; 3 recording; 4 holding off"};
-    hal::Out<std::int32_t> index{*this, "index", "cycle of the record that out-## has: 0 at the trigger, -pre at its start"};
-    hal::Out<std::uint32_t> records{*this, "records", "records begun so far"};
+    hal::Out<bool> done{*this, "done", "TRUE: the record is complete and the trigger is not armed again"};
+    hal::Out<std::uint32_t> state{*this, "state", "0 idle; 1 filling the pre-trigger; 2 armed; 3 recording; 4 hold-off"};
+    hal::Out<std::int32_t> index{*this, "index", "cycle of out-## relative to the trigger: -pre at the start of the record"};
+    hal::Out<std::uint32_t> records{*this, "records", "number of records so far"};
 
-    hal::Function run{*this, "", &RecorderTrigger::update, "delays the values and looks for the trigger"};
+    hal::Function run{*this, "", &RecorderTrigger::update, "delays the values and detects the trigger"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool armed_now = arm && !was_arm_, forced = force && !was_force_;
@@ -74,7 +74,7 @@ struct RecorderTrigger : hal::Component {
             state_ = idle;
         } else if (armed_now && state_ != recording) {
             state_ = filling;
-            filled_ = 0;  // what was before the arming belongs to no record
+            filled_ = 0;  // cycles before arming belong to no record
         }
         if (state_ == holding_off && (waited_ += cycle.seconds()) > hold_off) state_ = filling;
         if (state_ == filling) {
@@ -112,7 +112,7 @@ private:
         for (std::size_t i = 0; i < in.size(); ++i) values_[newest_ * in.size() + i] = in[i];
         for (std::size_t i = 0; i < bit_in.size(); ++i) bits_[newest_ * bit_in.size() + i] = bit_in[i];
     }
-    /// While it records the delay is the one of the trigger.
+    /// Returns the delay; during a record the delay at its trigger.
     void give() noexcept {
         const std::size_t back = state_ == recording ? back_ : std::min<std::size_t>(pre, size_ - 1);
         const std::size_t from = (newest_ + size_ - back) % size_;
@@ -139,7 +139,7 @@ private:
             default: return false;
         }
     }
-    /// An edge counts only after the value has been clearly on the other side.
+    /// An edge counts only after the value has been beyond the hysteresis on the other side.
     bool value_fires() noexcept {
         const double x = value, band = std::fabs(hysteresis);
         const bool rises = was_below_ && x >= threshold, falls = was_above_ && x <= threshold;
@@ -171,17 +171,17 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(RecorderTrigger, "recorder_trigger", "Records what came before and after an event of a bit or a value", R"(
-Makes a transient recorder of `sampler`: the values pass through it `pre` cycles late, and `record` enables the sampler from the trigger
-on for `pre` + `post` cycles, so the record begins `pre` cycles before the trigger. `index` says which cycle it is; record it, too.
+HAL_COMPONENT(RecorderTrigger, "recorder_trigger", "Triggers a record of the cycles before and after an event", R"(
+Extends `sampler` to a transient recorder: the values are delayed by `pre` cycles, and `record` enables the sampler from the trigger
+on for `pre` + `post` cycles, so the record starts `pre` cycles before the trigger. `index` is the number of the cycle; record it, too.
 
-A rising edge of `arm` arms; the trigger is looked for once `pre` cycles have been stored. It comes from `trigger-bit` (`bit-mode`), from
-`trigger-value` (`value-mode`, `threshold`), from either or with `both` from both in one cycle, or from `force` at any time. Edges of the
-value need it to have been beyond `hysteresis` on the other side. With `auto-arm` it arms again `hold-off` after each record. `arm` FALSE
-ends the waiting, not a record. A record that is forced before the pre-trigger is full begins with older values.
+A rising edge of `arm` arms the trigger; it is active once `pre` cycles have been stored. The conditions are `trigger-bit` (`bit-mode`) and
+`trigger-value` (`value-mode`, `threshold`), either of them or, with `both`, both in the same cycle; `force` triggers at any time. For an edge, the
+value must first be beyond `hysteresis` on the other side. With `auto-arm` the trigger is armed again `hold-off` after each record. `arm` FALSE
+disarms, but does not end a record. A record forced before the pre-trigger is full starts with older values.
 
-The memory is taken when the component is loaded: `depth` cycles (more for `pre` is cut), 8 bytes per value. The functions in order: what
-makes the values, this, the sampler.
+The memory is allocated when the component is loaded: `depth` cycles (the limit of `pre`), 8 bytes per value. Add the functions in this order: the
+sources of the values, this component, the sampler.
 
     loadrt recorder_trigger names=catch channels=2 depth=2000
     loadrt sampler depth=4000 cfg=ffs

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// When a function really runs, for components that measure a thread.
+// The actual times at which a function runs, for components that measure a thread.
 #pragma once
 
 #include <ctime>
@@ -10,11 +10,11 @@
 
 namespace measure {
 
-/// Time between the runs of a function. On a virtual clock a cycle runs when it is due; which clock it is shows in the
-/// first cycle: a thread on the real one is not minutes away from when it was due.
+/// Time between the runs of a function. On a virtual clock a cycle runs exactly when it is due. The first cycle detects the kind of
+/// clock: a thread on the real clock is not minutes away from its due time.
 class RunTime {
 public:
-    /// Nanoseconds since the last run; a negative number in the first one. [realtime]
+    /// Returns the nanoseconds since the last run; negative in the first run. [realtime]
     std::int64_t since_last(hal::Cycle cycle) noexcept {
         const std::int64_t clock = now();
         if (!started_) {
@@ -37,12 +37,12 @@ private:
     bool started_ = false, real_ = false;
 };
 
-/// Kept in the range of an s32 pin.
+/// Limits `value` to the range of s32.
 inline std::int32_t to_s32(std::int64_t value) noexcept {
     return static_cast<std::int32_t>(std::clamp<std::int64_t>(value, INT32_MIN, INT32_MAX));
 }
 
-/// Mean and variance of what was added so far, one by one (Welford).
+/// Running mean and variance of the added values (Welford).
 class Statistics {
 public:
     void add(double value) noexcept {

@@ -7,17 +7,17 @@ namespace {
 struct Sampler : hal::Component {
     using Component::Component;
 
-    hal::TextArgument cfg{*this, "cfg", "f", "a letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
-    hal::Argument depth{*this, "depth", 4000, "records the FIFO holds", {.per_instance = true, .min = 1, .max = 1 << 26}};
+    hal::TextArgument cfg{*this, "cfg", "f", "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
+    hal::Argument depth{*this, "depth", 4000, "capacity of the FIFO in records", {.per_instance = true, .min = 1, .max = 1 << 26}};
 
     stream::Columns<stream::AnyIn> columns{*this, cfg.get(), depth, false, "value to record"};
-    hal::In<bool> enable{*this, "enable", "FALSE: nothing is recorded", {.initial = true}};
+    hal::In<bool> enable{*this, "enable", "FALSE pauses the recording", {.initial = true}};
     hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO"};
-    hal::Out<bool> full{*this, "full", "TRUE: the FIFO is full and the next record will be lost"};
+    hal::Out<bool> full{*this, "full", "TRUE: the FIFO is full; the next record will be lost"};
     hal::Io<std::int32_t> overruns{*this, "overruns", "records lost because the FIFO was full; may be set"};
     hal::Io<std::int32_t> sample_number{*this, "sample-num", "number of the next record, lost ones included; may be set"};
 
-    hal::Function run{*this, "", &Sampler::sample, "puts a record of all pins into the FIFO"};
+    hal::Function run{*this, "", &Sampler::sample, "writes a record of all pins to the FIFO"};
 
     void start(const hal_host& host) {
         columns.keep_times();
@@ -63,9 +63,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Sampler, "sampler", "Records pins into a FIFO that programs outside read", R"(
-In every cycle in which `enable` is TRUE the values of all pins go into the FIFO, with a running number. `hal record` and
-LinuxCNC-style `halsampler` read it while the machine runs. A full FIFO loses the new record, never an old one: `overruns` counts,
+HAL_COMPONENT(Sampler, "sampler", "Records pins into a FIFO for external programs", R"(
+In each cycle in which `enable` is TRUE, the values of all pins are written to the FIFO with a sequence number. `hal record` and
+LinuxCNC-style `halsampler` read it while the machine runs. If the FIFO is full, the new record is lost, never an old one: `overruns` counts it,
 and the numbers have a gap. The number of pins is not limited.
 
     loadrt sampler depth=2000 cfg=ffb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What sampler and streamer share: a row of pins of several types, and the FIFO of records behind them.
+// Shared by sampler and streamer: an array of pins of several types, and their FIFO of records.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace stream {
 
 constexpr std::string_view letters = "bfsulk";  // of the types below, as cfg= and hal_stream::types have them
 
-/// A pin of any type; the alternatives stand in the order of `letters`.
+/// A pin of any type; the alternatives are in the order of `letters`.
 using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::In<std::int32_t>, hal::In<std::uint32_t>, hal::In<std::int64_t>,
                            hal::In<std::uint64_t>>;
 using AnyOut = std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>, hal::Out<std::uint32_t>,
@@ -29,7 +29,7 @@ class Columns {
 public:
     /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too large. [setup]
     Columns(hal::Component& component, const std::string& cfg, std::int64_t depth, bool to_machine, const char* doc) {
-        if (cfg.empty()) throw hal::ArgumentError("cfg", "cfg= is empty: a letter per pin is needed, of b f s u l k");
+        if (cfg.empty()) throw hal::ArgumentError("cfg", "cfg= is empty; give one letter per pin, of b f s u l k");
         constexpr std::size_t most_values = std::size_t{1} << 26;  // half a gigabyte
         if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) 
             throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) + " records of this cfg need more than 512 MB");
@@ -75,7 +75,7 @@ private:
             case 3: pin.template emplace<4>(component, name.c_str(), doc); break;
             case 4: pin.template emplace<5>(component, name.c_str(), doc); break;
             case 5: pin.template emplace<6>(component, name.c_str(), doc); break;
-            default: throw std::invalid_argument(std::string("cfg has the letter '") + letter + "'; it may have b f s u l k");
+            default: throw std::invalid_argument(std::string("cfg has the letter '") + letter + "'; valid letters are b f s u l k");
         }
         types_ += lower;
     }

@@ -8,18 +8,18 @@ struct Streamer : hal::Component {
     using Component::Component;
     enum ClockMode { free_running, falling, rising, both };
 
-    hal::TextArgument cfg{*this, "cfg", "f", "a letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
-    hal::Argument depth{*this, "depth", 4000, "records the FIFO holds", {.per_instance = true, .min = 1, .max = 1 << 26}};
+    hal::TextArgument cfg{*this, "cfg", "f", "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
+    hal::Argument depth{*this, "depth", 4000, "capacity of the FIFO in records", {.per_instance = true, .min = 1, .max = 1 << 26}};
 
     stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true, "value of the newest record"};
-    hal::In<bool> enable{*this, "enable", "FALSE: the pins stay as they are", {.initial = true}};
-    hal::In<bool> clock{*this, "clock", "edges that take the next record, see clock-mode"};
-    hal::In<std::int32_t> clock_mode{*this, "clock-mode", "0: a record per cycle; per edge of clock: 1 falling, 2 rising, 3 both"};
+    hal::In<bool> enable{*this, "enable", "FALSE holds the pins", {.initial = true}};
+    hal::In<bool> clock{*this, "clock", "clock for the next record; see clock-mode"};
+    hal::In<std::int32_t> clock_mode{*this, "clock-mode", "0: one record per cycle; one per edge of clock: 1 falling, 2 rising, 3 both"};
     hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO"};
-    hal::Out<bool> empty{*this, "empty", "TRUE: there was no record for this cycle", {.initial = true}};
-    hal::Io<std::int32_t> underruns{*this, "underruns", "times a record was due and there was none; may be set"};
+    hal::Out<bool> empty{*this, "empty", "TRUE: no record was available for this cycle", {.initial = true}};
+    hal::Io<std::int32_t> underruns{*this, "underruns", "times a record was due but not available; may be set"};
 
-    hal::Function run{*this, "", &Streamer::play, "puts the next record on the pins"};
+    hal::Function run{*this, "", &Streamer::play, "writes the next record to the pins"};
 
     void start(const hal_host& host) { columns.publish(host); }
 
@@ -69,9 +69,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Streamer, "streamer", "Plays records from a FIFO, which programs outside fill, to pins", R"(
-In every cycle in which a record is due, the next one goes from the FIFO to the pins; without one they stay as they are and
-`underruns` counts. `clock-mode` says when one is due: 0 in every cycle, 1 at falling, 2 at rising, 3 at both edges of `clock`.
+HAL_COMPONENT(Streamer, "streamer", "Plays records that external programs write to a FIFO", R"(
+In each cycle in which a record is due, the next one is copied from the FIFO to the pins; if there is none, the pins are held and
+`underruns` increases. `clock-mode` selects when a record is due: 0 in every cycle, 1 at falling, 2 at rising, 3 at both edges of `clock`.
 The number of pins is not limited.
 
     loadrt streamer depth=2000 cfg=fb

@@ -9,7 +9,7 @@ struct Supply : hal::Component {
     hal::Param<bool> d{*this, "d", "source of q and _q"};
     hal::Param<double> value{*this, "value", "source of variable and _variable"};
     hal::Out<bool> q{*this, "q", "d"};
-    hal::Out<bool> not_q{*this, "_q", "the opposite of d"};
+    hal::Out<bool> not_q{*this, "_q", "inverse of d"};
     hal::Out<double> variable{*this, "variable", "value"};
     hal::Out<double> negative{*this, "_variable", "-value"};
 
@@ -25,9 +25,9 @@ struct Supply : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Supply, "supply", "Outputs that a user sets by hand", R"(
-`setp supply.0.value 3` puts 3 on `variable` and -3 on `_variable`; `setp supply.0.d 1` sets `q` and clears `_q`. Kept for
-netlists that have it: `setp` on an unlinked input and `sets` on a signal without writer do the same.
+HAL_COMPONENT(Supply, "supply", "Outputs with values set by the user", R"(
+`setp supply.0.value 3` sets `variable` to 3 and `_variable` to -3; `setp supply.0.d 1` sets `q` and clears `_q`. It exists for
+netlists that already use it: `setp` on an unlinked input and `sets` on a signal without writer do the same.
 
     loadrt supply num_chan=1
     loadrt pid

@@ -8,13 +8,13 @@ namespace {
 struct Time : hal::Component {
     using Component::Component;
 
-    hal::In<bool> begin{*this, "start", "rising edge: from 0; while TRUE the time runs, while FALSE it stands"};
-    hal::In<bool> pause{*this, "pause", "TRUE: the time stands"};
-    hal::Out<std::uint32_t> seconds{*this, "seconds", "0 to 59", {.unit = "s"}};
-    hal::Out<std::uint32_t> minutes{*this, "minutes", "0 to 59", {.unit = "min"}};
-    hal::Out<std::uint32_t> hours{*this, "hours", "from 0", {.unit = "h"}};
+    hal::In<bool> begin{*this, "start", "a rising edge resets the time; TRUE runs it, FALSE holds it"};
+    hal::In<bool> pause{*this, "pause", "TRUE holds the time"};
+    hal::Out<std::uint32_t> seconds{*this, "seconds", "seconds, 0..59", {.unit = "s"}};
+    hal::Out<std::uint32_t> minutes{*this, "minutes", "minutes, 0..59", {.unit = "min"}};
+    hal::Out<std::uint32_t> hours{*this, "hours", "hours", {.unit = "h"}};
 
-    hal::Function run{*this, "", &Time::update, "lets the time run"};
+    hal::Function run{*this, "", &Time::update, "advances the time"};
 
     void update(hal::Cycle cycle) noexcept {
         if (begin && !began_) elapsed_ns_ = 0;
@@ -34,8 +34,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Time, "time", "Elapsed time in hours, minutes and seconds", R"(
-Counts the time `start` has been TRUE since its last rising edge, without the time `pause` was TRUE. After `start` has gone
-FALSE the result stays. Periods are added up, not clocks read: a missed period is missing.
+Counts the time for which `start` has been TRUE since its last rising edge, excluding the time `pause` was TRUE. When `start` becomes
+FALSE the result is held. The time is a sum of periods, not read from a clock: missed periods are not included.
 
     loadrt time
     addf time.0 servo-thread

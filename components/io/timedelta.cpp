@@ -13,7 +13,7 @@ struct Timedelta : hal::Component {
     hal::Out<std::int32_t> current_error{*this, "current-error", "out - period: positive when it ran late", {.unit = "ns"}};
     hal::Out<std::int32_t> min{*this, "min", "shortest time between two runs", {.unit = "ns"}};
     hal::Out<std::int32_t> max{*this, "max", "longest time between two runs", {.unit = "ns"}};
-    hal::In<bool>          reset{*this, "reset", "while TRUE, jitter, min, max, err and avg-err begin anew"};
+    hal::In<bool>          reset{*this, "reset", "TRUE resets jitter, min, max, err and avg-err"};
     hal::Out<std::int32_t> out{*this, "out", "time since the last run", {.unit = "ns"}};
     hal::Out<std::int32_t> err{*this, "err", "sum of all errors", {.unit = "ns"}};
     hal::Out<double>       average{*this, "avg-err", "mean of all errors", {.unit = "ns"}};
@@ -52,9 +52,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Timedelta, "timedelta", "Measures how regularly a thread runs", R"(
-Each run looks at the time since the one before; the error is its difference from the period. Place it first in the thread to measure
-wake-ups, last to measure what the other functions add. On a virtual clock there are no errors. Histograms of every thread come without it:
-`show thread`.
+Each run measures the time since the previous one; the error is its difference from the period. Add it first in the thread to measure
+wake-ups, last to include the other functions. On a virtual clock the errors are 0. `show thread` prints histograms of every thread
+without this component.
 
     loadrt timedelta names=wake
     addf wake servo 1

@@ -290,10 +290,10 @@ momentary stop. A state beyond a limit (because the limit was lowered during the
 microseconds; the cost of other cycles is negligible.
 
 * **mode 0** follows `target` and stops at each. (For an input in continuous motion use `limit3`, which matches its speed.)
-* **mode 1** takes set-points as CiA 402 does in profile position mode. Set `target`, `target-velocity` (0: `max-velocity`), `relative`;
-  raise `new-set-point`; wait for `set-point-acknowledge`; lower it; when acknowledge is FALSE the next may come. It waits in the queue
-  (argument `queue`, 8 long), or replaces all with `change-immediately`. With `change-on-set-point` the one before, if it lies on the same
-  way, is passed at its own speed without a stop; the speed of the new one counts from the cycle after. When the queue is full a set-point
+* **mode 1** takes set-points like the profile position mode of CiA 402. Set `target`, `target-velocity` (0: `max-velocity`) and `relative`;
+  set `new-set-point`; wait for `set-point-acknowledge`; clear it; once acknowledge is FALSE the next one may follow. It is queued
+  (argument `queue`, capacity 8), or replaces all others with `change-immediately`. With `change-on-set-point` the previous one, if it is in the same
+  direction, is passed at its own speed without a stop; the speed of the new one applies from the next cycle. If the queue is full, a set-point
   is accepted as soon as the queue has space, provided `new-set-point` stays TRUE.
 * **mode 2** runs a table (argument `table`: number of rows), each row with position, speed and dwell. `run-table` starts it and, when
   FALSE, stops.

@@ -12,9 +12,9 @@ struct ChargePump : hal::Component {
     hal::Out<bool> out{*this, "out", "changes in every cycle", {.safe = false}};
     hal::Out<bool> half{*this, "out-2", "changes in every second cycle", {.safe = false}};
     hal::Out<bool> quarter{*this, "out-4", "changes in every fourth cycle", {.safe = false}};
-    hal::In<bool> enable{*this, "enable", "FALSE: the outputs are low", {.initial = true}};
+    hal::In<bool> enable{*this, "enable", "FALSE sets the outputs low", {.initial = true}};
 
-    hal::Function run{*this, "", &ChargePump::update, "the next half wave"};
+    hal::Function run{*this, "", &ChargePump::update, "generates the next half wave"};
 
     void update(hal::Cycle) noexcept {
         phase_ = enable ? phase_ + 1 : 0;
@@ -29,9 +29,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(ChargePump, "charge_pump", "Square waves that prove that the thread runs", R"(
-A charge pump in an output stage keeps a relay closed only while it is fed a square wave: the machine falls into the safe
-state when the thread stops, whatever level the last output had. `out` has half the frequency of the thread, `out-2` and
+HAL_COMPONENT(ChargePump, "charge_pump", "Square waves that show that the thread runs", R"(
+A charge pump in an output stage keeps a relay closed only while its input is a square wave: when the thread stops, the machine enters the safe
+state, regardless of the last output level. `out` has half the frequency of the thread, `out-2` and
 `out-4` a half and a quarter of that. `enable` FALSE stops the waves.
 
     loadrt charge_pump

@@ -7,7 +7,7 @@
 
 namespace {
 
-/// Values of pin `reason`. Published: never renumber.
+/// Values of the public pin `reason`: never renumber them.
 enum Reason : std::uint32_t { agree = 0, differ = 1, values_differ = 2, bits_differ = 3, no_number = 4, bad_parameter = 5, not_reset = 6 };
 
 enum Choice : std::uint32_t { channel_a = 0, mean = 1, lower = 2, higher = 3, nearer_0 = 4 };
@@ -15,33 +15,33 @@ enum Choice : std::uint32_t { channel_a = 0, mean = 1, lower = 2, higher = 3, ne
 struct DualChannel : hal::Component {
     using Component::Component;
 
-    hal::In<double> a{*this, "a", "a value, from channel A"};
-    hal::In<double> b{*this, "b", "the same value, from channel B"};
-    hal::In<bool> bit_a{*this, "bit-a", "a bit, from channel A"};
-    hal::In<bool> bit_b{*this, "bit-b", "the same bit, from channel B"};
-    hal::In<bool> reset{*this, "reset", "a rising edge ends a fault once the channels agree"};
+    hal::In<double> a{*this, "a", "value of channel A"};
+    hal::In<double> b{*this, "b", "value of channel B"};
+    hal::In<bool> bit_a{*this, "bit-a", "bit of channel A"};
+    hal::In<bool> bit_b{*this, "bit-b", "bit of channel B"};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears a fault once the channels agree"};
 
-    hal::Param<double> tolerance{*this, "tolerance", "by which the values may differ"};
-    hal::Param<double> relative{*this, "relative-tolerance", "and by this share of the larger of both"};
-    hal::Param<double> time{*this, "discrepancy-time", "how long they may differ by more", {.unit = "s"}};
-    hal::Param<double> scale_b{*this, "scale-b", "b is multiplied by this", {.initial = 1.0}};
-    hal::Param<double> offset_b{*this, "offset-b", "and then this is added"};
-    hal::Param<bool> antivalent{*this, "antivalent", "TRUE: bit-b is the inverse"};
-    hal::Param<bool> latch{*this, "latch", "TRUE: a fault stays until reset; FALSE: until they agree", {.initial = true}};
+    hal::Param<double> tolerance{*this, "tolerance", "permitted difference of the values"};
+    hal::Param<double> relative{*this, "relative-tolerance", "additional permitted difference as a fraction of the larger value"};
+    hal::Param<double> time{*this, "discrepancy-time", "time for which the channels may differ by more", {.unit = "s"}};
+    hal::Param<double> scale_b{*this, "scale-b", "scale of b", {.initial = 1.0}};
+    hal::Param<double> offset_b{*this, "offset-b", "offset added to b after scaling"};
+    hal::Param<bool> antivalent{*this, "antivalent", "TRUE: bit-b is the inverse of bit-a"};
+    hal::Param<bool> latch{*this, "latch", "TRUE: a fault remains until reset; FALSE: until the channels agree", {.initial = true}};
     hal::Param<std::uint32_t> choice{*this, "choice",
-                                     "out: 0 a; 1 mean; 2 the smaller; 3 the larger; 4 the one nearer to 0", {.initial = mean}};
-    hal::Param<double> substitute{*this, "substitute", "out while ok is FALSE, with use-substitute"};
-    hal::Param<bool> use_substitute{*this, "use-substitute", "TRUE: out is substitute while ok is FALSE; FALSE: the last good value"};
+                                     "value for out: 0 a; 1 mean; 2 smaller; 3 larger; 4 nearer to 0", {.initial = mean}};
+    hal::Param<double> substitute{*this, "substitute", "value of out while ok is FALSE, with use-substitute"};
+    hal::Param<bool> use_substitute{*this, "use-substitute", "TRUE: out is substitute while ok is FALSE; FALSE: the last valid value"};
 
-    hal::Out<bool> ok{*this, "ok", "TRUE: both channels say the same", {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: they have differed for too long"};
-    hal::Out<bool> differs{*this, "differs", "TRUE: they differ in this cycle"};
-    hal::Out<std::uint32_t> reason{*this, "reason", "why ok is FALSE: see the table", {.initial = not_reset}};
-    hal::Out<double> out{*this, "out", "the value", {.finite = true}};
-    hal::Out<bool> bit_out{*this, "bit-out", "TRUE: both bits say so, and ok", {.safe = false}};
+    hal::Out<bool> ok{*this, "ok", "TRUE: both channels agree", {.safe = false}};
+    hal::Out<bool> fault{*this, "fault", "TRUE: the channels differed for longer than discrepancy-time"};
+    hal::Out<bool> differs{*this, "differs", "TRUE: the channels differ in this cycle"};
+    hal::Out<std::uint32_t> reason{*this, "reason", "reason why ok is FALSE: see the table", {.initial = not_reset}};
+    hal::Out<double> out{*this, "out", "checked value", {.finite = true}};
+    hal::Out<bool> bit_out{*this, "bit-out", "TRUE: both bits are TRUE, and ok", {.safe = false}};
     hal::Out<double> difference{*this, "difference", "a - b", {.finite = true}};
-    hal::Out<double> largest{*this, "largest-difference", "of all since the last reset", {.finite = true}};
-    hal::Out<double> since{*this, "differs-for", "how long they have differed", {.unit = "s", .finite = true}};
+    hal::Out<double> largest{*this, "largest-difference", "largest difference since the last reset", {.finite = true}};
+    hal::Out<double> since{*this, "differs-for", "time for which the channels have differed", {.unit = "s", .finite = true}};
 
     hal::Function run{*this, "", &DualChannel::update, "compares the channels"};
 
@@ -71,7 +71,7 @@ struct DualChannel : hal::Component {
         if (pressed) largest_ = 0.0;
         if (numbers) largest_ = std::max(largest_, std::fabs(apart));
 
-        // Within the discrepancy time the value goes on as it was, the bit is FALSE when one of them is.
+        // Within the discrepancy time the value is held, and the bit is FALSE if one of the two is.
         if (found == agree) good_ = chosen(second);
         const bool well = fault_ == agree;
         was_ok_ = well;
@@ -107,19 +107,19 @@ HAL_COMPONENT(DualChannel, "dual_channel", "Compares two channels of a value and
     b'      = b * scale-b + offset-b
     differs = |a - b'| > tolerance + relative-tolerance * max(|a|, |b'|)   or the bits differ
 
-Two encoders, two force sensors, the command and its echo: what one of them says is believed only while the other agrees (the comparison
-of category 3 of ISO 13849-1). They may differ for `discrepancy-time`; meanwhile `out` keeps its value and `bit-out` is FALSE unless both
-bits are TRUE. Longer is a `fault`; it stays until a rising edge of `reset` while they agree, or without `latch` until they agree. A value
-that is not a number and a parameter that makes no sense are faults at once. After a stop or a fault of the runtime a reset is needed,
-too. Leave the pair that is not used unlinked. Software on one computer compares, but is no second channel itself.
+For two encoders, two force sensors, or a command and its feedback: a value is valid only while both channels agree (comparison as in
+category 3 of ISO 13849-1). They may differ for `discrepancy-time`; meanwhile `out` keeps its value and `bit-out` is FALSE unless both
+bits are TRUE. A longer difference is a `fault`; it remains until a rising edge of `reset` while the channels agree, or without `latch` until they agree.
+A NaN value or an invalid parameter is an immediate fault. A stop or a fault of the runtime requires a reset,
+too. Leave an unused pair unlinked. The comparison runs as software on one computer and is not a second channel itself.
 
 | reason | |
 | --- | --- |
-| 0 | they agree |
-| 1 | they differ, not yet for too long |
-| 2, 3 | fault: the values, the bits differed for too long |
-| 4 | fault: a value is not a number |
-| 5 | fault: a parameter is negative or not a number, or choice is above 4 |
+| 0 | the channels agree |
+| 1 | they differ, within the discrepancy time |
+| 2, 3 | fault: the values, the bits differed for longer than the discrepancy time |
+| 4 | fault: a value is NaN or infinite |
+| 5 | fault: a parameter is negative or NaN, or choice is above 4 |
 | 6 | waiting for the reset after a stop of the runtime |
 
     loadrt dual_channel names=x-position

@@ -6,14 +6,14 @@ namespace {
 struct EstopLatch : hal::Component {
     using Component::Component;
 
-    hal::In<bool> ok_in{*this, "ok-in", "TRUE while everything before this latch is well", {.initial = true}};
-    hal::In<bool> fault_in{*this, "fault-in", "TRUE is a fault"};
-    hal::In<bool> reset{*this, "reset", "rising edge: out of the faulted state, if nothing is wrong any more"};
+    hal::In<bool> ok_in{*this, "ok-in", "TRUE while the chain before this latch is OK", {.initial = true}};
+    hal::In<bool> fault_in{*this, "fault-in", "TRUE trips the latch"};
+    hal::In<bool> reset{*this, "reset", "a rising edge leaves the faulted state, if ok-in is TRUE and fault-in FALSE"};
     hal::Out<bool> ok_out{*this, "ok-out", "TRUE in the OK state", {.safe = false}};
     hal::Out<bool> fault_out{*this, "fault-out", "TRUE in the faulted state", {.initial = true, .safe = true}};
-    hal::Out<bool> watchdog{*this, "watchdog", "changes in every cycle of the OK state"};
+    hal::Out<bool> watchdog{*this, "watchdog", "toggles in every cycle of the OK state"};
 
-    hal::Function run{*this, "", &EstopLatch::update, "moves between the two states"};
+    hal::Function run{*this, "", &EstopLatch::update, "updates the state"};
 
     void update(hal::Cycle) noexcept {
         const bool pressed = reset && !was_reset_;
@@ -31,10 +31,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(EstopLatch, "estop_latch", "A link of the emergency-stop chain: remembers a fault until it is reset", R"(
-Two states, "faulted" at the start and "OK". To OK: `ok-in` TRUE, `fault-in` FALSE and a rising edge on `reset`. Back to
-faulted: `ok-in` FALSE or `fault-in` TRUE, in the same cycle. In the OK state `watchdog` changes every cycle, for a `watchdog`
-or a charge pump that trips when this function stops running. Links are chained `ok-out` to `ok-in`.
+HAL_COMPONENT(EstopLatch, "estop_latch", "Emergency stop latch: holds a fault until it is reset", R"(
+The latch has two states: "faulted" (initial) and "OK". A rising edge of `reset` with `ok-in` TRUE and `fault-in` FALSE enters OK.
+`ok-in` FALSE or `fault-in` TRUE enters faulted in the same cycle. In the OK state `watchdog` toggles every cycle, for a `watchdog`
+or a charge pump that trips when this function stops running. Chain latches by linking `ok-out` to the next `ok-in`.
 
     loadrt estop_latch
     addf estop-latch.0 servo-thread

@@ -8,19 +8,19 @@ struct Faults : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.singleton = true};
 
-    hal::In<bool> reset{*this, "reset", "rising edge: acknowledges the faults so far"};
-    hal::Out<bool> active{*this, "active", "TRUE while there is a fault nobody has acknowledged", {.safe = true}};
-    hal::Out<bool> ok{*this, "ok", "the opposite of active", {.safe = false}};
-    hal::Out<std::uint64_t> count{*this, "count", "faults since the start"};
-    hal::Out<std::uint32_t> last_code{*this, "last-code", "what the newest was"};
-    hal::Out<std::uint64_t> last_cycle{*this, "last-cycle", "in which cycle of its thread"};
-    hal::Out<bool> alive{*this, "alive", "changes in each cycle that follows progress of all supervised threads: for a watchdog"};
+    hal::In<bool> reset{*this, "reset", "a rising edge acknowledges all faults so far"};
+    hal::Out<bool> active{*this, "active", "TRUE while a fault is not acknowledged", {.safe = true}};
+    hal::Out<bool> ok{*this, "ok", "inverse of active", {.safe = false}};
+    hal::Out<std::uint64_t> count{*this, "count", "number of faults since the start"};
+    hal::Out<std::uint32_t> last_code{*this, "last-code", "code of the newest fault"};
+    hal::Out<std::uint64_t> last_cycle{*this, "last-cycle", "cycle of its thread in which the newest fault occurred"};
+    hal::Out<bool> alive{*this, "alive", "toggles while all supervised threads make progress; for a watchdog"};
 
-    hal::Function run{*this, "", &Faults::update, "reads the runtime's record"};
+    hal::Function run{*this, "", &Faults::update, "reads the fault record of the runtime"};
 
     void start() {
         record_ = hal::extension<hal_faults>("hal.faults/1");
-        if (record_ == nullptr) throw std::runtime_error("this host keeps no record of faults");
+        if (record_ == nullptr) throw std::runtime_error("the host does not support the extension hal.faults/1 (fault record)");
         supervision_ = hal::extension<hal_supervision>(HAL_SUPERVISION);
     }
 
@@ -48,20 +48,20 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Faults, "faults", "The runtime's record of faults, as pins for the safety chain", R"(
-A component that throws, a value that is not a number on an output declared finite, a cycle beyond its budget or a thread
-that hangs is a fault; `show fault` describes them. Here they are pins: `ok` belongs into the emergency-stop chain.
+HAL_COMPONENT(Faults, "faults", "Faults of the runtime as pins for the safety chain", R"(
+An exception in a component, NaN on an output declared finite, a cycle beyond its budget and a hung thread
+are faults; `show fault` describes them. This component provides them as pins: link `ok` into the emergency stop chain.
 
-`alive` feeds a watchdog: it changes only while the supervisor of the threads runs and finds that each thread has finished a
-cycle within its supervision limit. Put the function into the fastest thread and link `alive` to a watchdog input, or to a
-hardware charge pump: `net alive faults.alive => watchdog.input-0`. It changes every few milliseconds up to 50 ms, so a
-timeout of 200 ms or more fits all machines.
+`alive` is for a watchdog: it toggles only while the thread supervisor runs and each thread has finished a
+cycle within its supervision limit. Add the function to the fastest thread and link `alive` to a watchdog input, or to a
+hardware charge pump: `net alive faults.alive => watchdog.input-0`. It toggles every few milliseconds to 50 ms, so a
+timeout of 200 ms or more is suitable for all machines.
 
 | last-code | |
 | --- | --- |
-| 0 | none so far |
+| 0 | no fault |
 | 1 | a function threw an exception |
-| 2 | not a number on an output that has to be finite |
+| 2 | NaN or infinity on an output declared finite |
 | 3 | a cycle took longer than its budget |
 | 4 | a thread hangs |
 | 5 | raised by a component |

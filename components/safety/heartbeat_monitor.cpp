@@ -7,7 +7,7 @@
 
 namespace {
 
-/// Values of pin `reason`. Published: never renumber.
+/// Values of the public pin `reason`: never renumber them.
 enum Reason : std::uint32_t {
     alive = 0,
     waiting = 1,
@@ -24,32 +24,32 @@ enum Mode : std::uint32_t { toggle_edges = 0, rising_edges = 1, any_change = 2, 
 struct HeartbeatMonitor : hal::Component {
     using Component::Component;
 
-    hal::In<bool> toggle{*this, "toggle", "modes 0 and 1: the beat"};
-    hal::In<std::uint32_t> counter{*this, "counter", "modes 2 and 3: the beat"};
-    hal::In<bool> enable{*this, "enable", "FALSE: not watched, ok is FALSE", {.initial = true}};
-    hal::In<bool> reset{*this, "reset", "a rising edge ends a fault and waits for the next beat"};
+    hal::In<bool> toggle{*this, "toggle", "modes 0 and 1: heartbeat bit"};
+    hal::In<std::uint32_t> counter{*this, "counter", "modes 2 and 3: heartbeat counter"};
+    hal::In<bool> enable{*this, "enable", "FALSE disables the monitor; ok is FALSE", {.initial = true}};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears a fault and waits for the next heartbeat"};
 
     hal::Param<std::uint32_t> mode{*this, "mode",
-                                   "a beat is 0 each edge of toggle; 1 a rising edge; 2 a change of counter; 3 counter going on by step"};
-    hal::Param<std::uint32_t> step{*this, "step", "mode 3: by how much", {.initial = 1}};
-    hal::Param<std::uint32_t> bits{*this, "counter-bits", "mode 3: the counter wraps at 2 to the power of this", {.initial = 32}};
-    hal::Param<double> timeout{*this, "timeout", "longest time between two beats", {.initial = 0.1, .unit = "s"}};
-    hal::Param<double> min_time{*this, "min-time", "shortest time between two beats; 0: none", {.unit = "s"}};
-    hal::Param<double> start_time{*this, "start-time", "longest time to the first beat; 0: as timeout", {.unit = "s"}};
-    hal::Param<std::uint32_t> beats_needed{*this, "beats-needed", "beats in a row, in time, before ok is TRUE", {.initial = 2}};
-    hal::Param<std::uint32_t> misses_allowed{*this, "misses-allowed", "early or skipped beats in a row that are no fault yet"};
+                                   "heartbeat: 0 each edge of toggle; 1 rising edge; 2 change of counter; 3 increment of counter by step"};
+    hal::Param<std::uint32_t> step{*this, "step", "mode 3: increment of the counter", {.initial = 1}};
+    hal::Param<std::uint32_t> bits{*this, "counter-bits", "mode 3: width of the counter; it wraps at 2^counter-bits", {.initial = 32}};
+    hal::Param<double> timeout{*this, "timeout", "maximum time between two heartbeats", {.initial = 0.1, .unit = "s"}};
+    hal::Param<double> min_time{*this, "min-time", "minimum time between two heartbeats; 0: not monitored", {.unit = "s"}};
+    hal::Param<double> start_time{*this, "start-time", "timeout of the first heartbeat; 0: timeout", {.unit = "s"}};
+    hal::Param<std::uint32_t> beats_needed{*this, "heartbeats-needed", "consecutive heartbeats in time before ok is TRUE", {.initial = 2}};
+    hal::Param<std::uint32_t> misses_allowed{*this, "misses-allowed", "tolerated consecutive heartbeats that are early or skipped"};
     hal::Param<bool> latch{*this, "latch",
-                           "TRUE: a fault stays until reset; FALSE: it goes on with the next good beats", {.initial = true}};
+                           "TRUE: a fault remains until reset; FALSE: until the next valid heartbeats", {.initial = true}};
 
-    hal::Out<bool> ok{*this, "ok", "TRUE: it beats as it should", {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: it did not"};
-    hal::Out<std::uint32_t> reason{*this, "reason", "why ok is FALSE: see the table", {.initial = waiting}};
-    hal::Out<double> age{*this, "age", "of the last beat", {.unit = "s", .finite = true}};
-    hal::Out<double> interval{*this, "interval", "between the last two beats", {.unit = "s", .finite = true}};
-    hal::Out<std::uint32_t> beats{*this, "beats", "so far"};
-    hal::Out<std::uint32_t> misses{*this, "misses", "beats that came early or with a gap, and silences, so far"};
+    hal::Out<bool> ok{*this, "ok", "TRUE: the heartbeat is valid", {.safe = false}};
+    hal::Out<bool> fault{*this, "fault", "TRUE: the heartbeat failed"};
+    hal::Out<std::uint32_t> reason{*this, "reason", "reason why ok is FALSE: see the table", {.initial = waiting}};
+    hal::Out<double> age{*this, "age", "time since the last heartbeat", {.unit = "s", .finite = true}};
+    hal::Out<double> interval{*this, "interval", "time between the last two heartbeats", {.unit = "s", .finite = true}};
+    hal::Out<std::uint32_t> beats{*this, "heartbeats", "number of heartbeats so far"};
+    hal::Out<std::uint32_t> misses{*this, "misses", "number of early or skipped heartbeats and timeouts so far"};
 
-    hal::Function run{*this, "", &HeartbeatMonitor::update, "watches for the beat"};
+    hal::Function run{*this, "", &HeartbeatMonitor::update, "monitors the heartbeat"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool pressed = reset && !was_reset_;
@@ -80,7 +80,7 @@ private:
         first_ = true;
     }
 
-    /// Whether there is a beat in this cycle; `wrong` says when it is not the one that was due. The first look gives none.
+    /// Returns whether there is a heartbeat in this cycle; sets `wrong` if it is not the expected one. The first cycle has none.
     bool beaten(std::uint32_t& wrong) noexcept {
         if (!was_watched_) return false;
         switch (mode) {
@@ -141,23 +141,23 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(HeartbeatMonitor, "heartbeat_monitor", "Watches the heartbeat of a partner: a bit that toggles or a counter", R"(
-Watches that something beats: a bit that toggles, a counter that goes on (a bus node's life counter, another computer, a user-space
-program). The time between two beats has to lie in a window, from `min-time` to `timeout` (a window watchdog). `ok` rises after
-`beats-needed` good beats. Silence is a fault at once, a beat that comes early or with a gap when more than `misses-allowed` come in a
-row. A fault stays until a rising edge of `reset`; without `latch` until there were `beats-needed` good beats. After a stop of the runtime
-with `latch` a reset is needed, too.
+HAL_COMPONENT(HeartbeatMonitor, "heartbeat_monitor", "Monitors a heartbeat: a toggling bit or a counter", R"(
+Monitors a heartbeat, such as a toggling bit or an increasing counter (the life counter of a bus node, another computer, a user-space
+program). The time between two heartbeats must be within `min-time` and `timeout` (a window watchdog). `ok` becomes TRUE after
+`heartbeats-needed` valid heartbeats. A timeout is an immediate fault; early or skipped heartbeats are a fault if more than `misses-allowed`
+occur in a row. A fault remains until a rising edge of `reset`, or without `latch` until `heartbeats-needed` valid heartbeats. After a stop of the
+runtime, `latch` requires a reset, too.
 
-`watchdog` watches many bits for silence alone; this one watches one partner closely. The thread has to see every beat.
+`watchdog` monitors many bits for timeouts only; this component monitors one source in detail. The thread must be fast enough to see every heartbeat.
 
 | reason | |
 | --- | --- |
-| 0 | it beats |
-| 1 | waiting for enough beats |
-| 2 | fault: no beat for `timeout`, or no first one for `start-time` |
-| 3 | fault: a beat before `min-time` |
-| 4 | fault: mode 3, the counter went on by something else than `step` |
-| 5 | fault: a parameter makes no sense (timeout 0 or below min-time, mode above 3, counter-bits not 1 to 32) |
+| 0 | heartbeat valid |
+| 1 | waiting for enough heartbeats |
+| 2 | fault: no heartbeat for `timeout`, or no first one for `start-time` |
+| 3 | fault: heartbeat before `min-time` |
+| 4 | fault: mode 3, the counter did not increase by `step` |
+| 5 | fault: invalid parameter (timeout 0 or below min-time, mode above 3, counter-bits not in 1..32) |
 | 6 | enable is FALSE |
 | 7 | waiting for the reset after a stop of the runtime |
 

@@ -10,34 +10,34 @@ namespace {
 struct Interlock : hal::Component {
     using Component::Component;
 
-    hal::Argument inputs{*this, "inputs", 8, "how many conditions", {.min = 1, .max = 64}};
-    hal::Ins<bool> in{*this, "in-##", inputs, "condition ##: TRUE is well"};
-    hal::Ins<double> delay{*this, "delay-##", inputs, "how long condition ## has to be bad to count", {.unit = "s"}};
-    hal::In<std::uint64_t> use{*this, "use-mask", "bit n: condition n is watched", {.initial = ~std::uint64_t{0}}};
-    hal::In<std::uint64_t> invert{*this, "invert-mask", "bit n: condition n is well when FALSE"};
-    hal::In<std::uint64_t> latch{*this, "latch-mask", "bit n: condition n stays bad until reset", {.initial = ~std::uint64_t{0}}};
+    hal::Argument inputs{*this, "inputs", 8, "number of conditions", {.min = 1, .max = 64}};
+    hal::Ins<bool> in{*this, "in-##", inputs, "condition ##: TRUE is good"};
+    hal::Ins<double> delay{*this, "delay-##", inputs, "time for which condition ## must be bad before it trips", {.unit = "s"}};
+    hal::In<std::uint64_t> use{*this, "use-mask", "bit n: condition n is monitored", {.initial = ~std::uint64_t{0}}};
+    hal::In<std::uint64_t> invert{*this, "invert-mask", "bit n: condition n is good when FALSE"};
+    hal::In<std::uint64_t> latch{*this, "latch-mask", "bit n: condition n is latched until reset", {.initial = ~std::uint64_t{0}}};
     hal::In<std::uint64_t> warn{*this, "warn-mask", "bit n: condition n only warns"};
     hal::In<std::uint64_t> bypass{*this, "bypass-mask", "bit n: condition n is bypassed while bypass-enable is TRUE"};
-    hal::In<bool> bypass_enable{*this, "bypass-enable", "the key for the bypass"};
-    hal::In<double> bypass_time{*this, "bypass-time", "longest bypass; 0: no limit", {.unit = "s"}};
-    hal::In<bool> acknowledge{*this, "acknowledge", "a rising edge silences the horn and stops the flashing"};
-    hal::In<bool> reset{*this, "reset", "a rising edge frees latched conditions that are well again"};
-    hal::In<bool> start_needs_reset{*this, "start-needs-reset", "TRUE: ok waits for a reset after the start, too", {.initial = true}};
+    hal::In<bool> bypass_enable{*this, "bypass-enable", "TRUE enables the bypass (key switch)"};
+    hal::In<double> bypass_time{*this, "bypass-time", "maximum duration of a bypass; 0: no limit", {.unit = "s"}};
+    hal::In<bool> acknowledge{*this, "acknowledge", "a rising edge turns off the horn and stops the flashing"};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears latched conditions that are good again"};
+    hal::In<bool> start_needs_reset{*this, "start-needs-reset", "TRUE: ok also requires a reset after the start", {.initial = true}};
 
-    hal::Out<bool> ok{*this, "ok", "TRUE: every condition that is watched is well", {.safe = false}};
-    hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: pressing reset gives ok"};
-    hal::Out<bool> warning{*this, "warning", "TRUE: a condition that only warns is bad"};
-    hal::Out<bool> bypassed{*this, "bypassed", "TRUE: a watched condition is bypassed"};
-    hal::Out<bool> horn{*this, "horn", "TRUE: something new has gone bad, until acknowledge"};
-    hal::Out<std::int32_t> first{*this, "first", "the condition that took ok away first; -1: none", {.initial = -1}};
-    hal::Out<std::uint64_t> first_mask{*this, "first-mask", "bits of all that did in that same cycle"};
-    hal::Out<std::uint64_t> bad{*this, "bad-mask", "bits of the conditions that are bad now"};
+    hal::Out<bool> ok{*this, "ok", "TRUE: all monitored conditions are good", {.safe = false}};
+    hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: a reset would set ok"};
+    hal::Out<bool> warning{*this, "warning", "TRUE: a condition in warn-mask is bad"};
+    hal::Out<bool> bypassed{*this, "bypassed", "TRUE: a monitored condition is bypassed"};
+    hal::Out<bool> horn{*this, "horn", "TRUE: a further condition has tripped; until acknowledge"};
+    hal::Out<std::int32_t> first{*this, "first", "number of the condition that cleared ok first; -1: none", {.initial = -1}};
+    hal::Out<std::uint64_t> first_mask{*this, "first-mask", "bits of all conditions that tripped in that cycle"};
+    hal::Out<std::uint64_t> bad{*this, "bad-mask", "bits of the conditions that are bad"};
     hal::Out<std::uint64_t> tripped{*this, "tripped-mask", "bits of the conditions that are bad or latched"};
-    hal::Out<double> since{*this, "since", "how long ok has been FALSE", {.unit = "s", .finite = true}};
-    hal::Out<std::uint32_t> trips{*this, "trips", "how often ok has gone FALSE"};
+    hal::Out<double> since{*this, "since", "time for which ok has been FALSE", {.unit = "s", .finite = true}};
+    hal::Out<std::uint32_t> trips{*this, "trips", "number of times ok became FALSE"};
     hal::Outs<bool> lamp{*this, "lamp-##", inputs, "lamp of condition ##: see the table"};
 
-    hal::Function run{*this, "", &Interlock::update, "looks at all conditions"};
+    hal::Function run{*this, "", &Interlock::update, "evaluates the conditions"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool pressed = reset && !was_reset_, heard = acknowledge && !was_acknowledged_;
@@ -117,27 +117,27 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Interlock, "interlock", "A table of conditions that all have to hold, with first-out annunciation", R"(
-`ok` is TRUE while every watched condition is well. When it goes FALSE, `first` says which condition began it, whatever follows from that:
-the first-out sequence of ISA-18.1. Masks have a bit per condition (bit 0 is `in-00`; hexadecimal is welcome: 0x11).
+HAL_COMPONENT(Interlock, "interlock", "Interlock of up to 64 conditions with first-out annunciation", R"(
+`ok` is TRUE while every monitored condition is good. When it becomes FALSE, `first` is the number of the condition that tripped first, regardless
+of later ones: the first-out sequence of ISA-18.1. Masks have a bit per condition (bit 0 is `in-00`) and may be written in hexadecimal, as in 0x11.
 
 | mask | bit n set |
 | --- | --- |
-| use-mask | condition n is watched |
-| invert-mask | it is well when FALSE |
-| latch-mask | once bad it stays so until a rising edge of `reset` |
-| warn-mask | it does not touch `ok`, only `warning` |
-| bypass-mask | it is not watched while the key `bypass-enable` is TRUE (at most for `bypass-time`) |
+| use-mask | condition n is monitored |
+| invert-mask | it is good when FALSE |
+| latch-mask | once bad it is latched until a rising edge of `reset` |
+| warn-mask | it affects `warning` only, not `ok` |
+| bypass-mask | it is not monitored while `bypass-enable` is TRUE (for at most `bypass-time`) |
 
 | lamp-## | |
 | --- | --- |
-| off | well |
-| flashes 4 times a second | the first one, not acknowledged |
-| flashes once a second | the first one, acknowledged; or another one, not acknowledged |
-| steady | bad or latched, acknowledged, not the first one |
+| off | good |
+| flashing at 4 Hz | first condition, not acknowledged |
+| flashing at 1 Hz | first condition, acknowledged; or another one, not acknowledged |
+| on | bad or latched, acknowledged, not the first one |
 
-`delay-##` filters a condition that flickers. `acknowledge` silences `horn`; `reset` frees what is well again. With `start-needs-reset`
-the start needs a reset, and a stop or a fault of the runtime always does. This is software on one computer: it is no certified safety
+`delay-##` filters a flickering condition. `acknowledge` turns off `horn`; `reset` clears conditions that are good again. With `start-needs-reset`
+a reset is required after the start; after a stop or a fault of the runtime it is always required. This is software on one computer, not a certified safety
 function.
 
     loadrt interlock names=spindle-may-run inputs=4

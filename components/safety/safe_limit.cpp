@@ -7,13 +7,13 @@
 
 namespace {
 
-/// Values of the reaction pins. Published: never renumber.
+/// Values of the public reaction pins: never renumber them.
 enum Reaction : std::uint32_t { off = 0, warn = 1, limit = 2, stop_2 = 3, stop_1 = 4, stop_0 = 5 };
 
 /// Values of pin `state`.
 enum State : std::uint32_t { running = 0, braking_2 = 1, standing_2 = 2, braking_1 = 3, powerless = 4 };
 
-/// Values of pin `reason`, of which the first to cause a stop is kept.
+/// Values of pin `reason`; the first cause of a stop is kept.
 enum Reason : std::uint32_t {
     none = 0,
     position_below = 1,
@@ -31,51 +31,51 @@ enum Reason : std::uint32_t {
 struct SafeLimit : hal::Component {
     using Component::Component;
 
-    hal::In<double> position{*this, "position", "measured"};
-    hal::In<double> velocity{*this, "velocity", "measured; taken from position while unlinked", {.unit = "1/s"}};
-    hal::In<double> command{*this, "command", "the wanted speed", {.unit = "1/s"}};
-    hal::In<bool> reset{*this, "reset", "a rising edge ends a stop when its cause is gone"};
-    hal::In<bool> stop_in{*this, "stop-in", "TRUE: a stop 1 is asked for from outside"};
+    hal::In<double> position{*this, "position", "measured position"};
+    hal::In<double> velocity{*this, "velocity", "measured velocity; computed from position while unlinked", {.unit = "1/s"}};
+    hal::In<double> command{*this, "command", "requested speed", {.unit = "1/s"}};
+    hal::In<bool> reset{*this, "reset", "a rising edge ends a stop if its cause no longer exists"};
+    hal::In<bool> stop_in{*this, "stop-in", "TRUE requests a stop 1"};
 
     hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -1e15}};
     hal::In<double> max_position{*this, "max-position", "highest position", {.initial = 1e15}};
-    hal::In<double> max_speed{*this, "max-speed", "largest speed", {.initial = 1e15, .unit = "1/s"}};
-    hal::In<double> max_slew{*this, "max-slew", "largest change of speed", {.initial = 1e15, .unit = "1/s^2"}};
+    hal::In<double> max_speed{*this, "max-speed", "maximum speed", {.initial = 1e15, .unit = "1/s"}};
+    hal::In<double> max_slew{*this, "max-slew", "maximum rate of change of the speed", {.initial = 1e15, .unit = "1/s^2"}};
     hal::Param<std::uint32_t> position_reaction{*this, "position-reaction",
                                                 "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = stop_1}};
     hal::Param<std::uint32_t> speed_reaction{*this, "speed-reaction",
                                              "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = stop_1}};
     hal::Param<std::uint32_t> slew_reaction{*this, "slew-reaction",
                                             "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = warn}};
-    hal::Param<double> filter_time{*this, "filter-time", "how long a limit may be exceeded; adds to the reaction time", {.unit = "s"}};
-    hal::Param<double> speed_filter{*this, "speed-filter", "time constant of the speed taken from position", {.unit = "s"}};
+    hal::Param<double> filter_time{*this, "filter-time", "time for which a limit may be exceeded; adds to the reaction time", {.unit = "s"}};
+    hal::Param<double> speed_filter{*this, "speed-filter", "time constant of the speed computed from position", {.unit = "s"}};
     hal::Param<double> stop_deceleration{*this, "stop-deceleration",
-                                         "by which the command is taken to 0 in a stop 1 and 2", {.initial = 1.0, .unit = "1/s^2"}};
+                                         "deceleration of the command in stops 1 and 2", {.initial = 1.0, .unit = "1/s^2"}};
     hal::Param<double> stop_time{*this, "stop-time", "a stop 1 or 2 that lasts longer becomes a stop 0", {.initial = 5.0, .unit = "s"}};
-    hal::Param<double> standstill_speed{*this, "standstill-speed", "below it the axis stands", {.initial = 0.01, .unit = "1/s"}};
+    hal::Param<double> standstill_speed{*this, "standstill-speed", "speed below which the axis counts as stopped", {.initial = 0.01, .unit = "1/s"}};
     hal::Param<double> standstill_time{*this, "standstill-time",
-                                       "for so long, so that a swing is not taken for it", {.initial = 0.05, .unit = "s"}};
-    hal::Param<double> standstill_window{*this, "standstill-window", "how far it may move while it stands in a stop 2; 0: not watched"};
+                                       "time for which the speed must be below standstill-speed, so that a reversal does not count", {.initial = 0.05, .unit = "s"}};
+    hal::Param<double> standstill_window{*this, "standstill-window", "permitted motion during a stop 2; 0: not monitored"};
 
-    hal::Out<double> command_out{*this, "command-out", "the speed it may have", {.unit = "1/s", .safe = 0.0, .finite = true}};
-    hal::Out<bool> power{*this, "power", "TRUE: the drive may have power", {.safe = false}};
-    hal::Out<bool> ok{*this, "ok", "TRUE: no limit is exceeded and no stop is on", {.safe = false}};
+    hal::Out<double> command_out{*this, "command-out", "permitted speed command", {.unit = "1/s", .safe = 0.0, .finite = true}};
+    hal::Out<bool> power{*this, "power", "TRUE enables the power of the drive", {.safe = false}};
+    hal::Out<bool> ok{*this, "ok", "TRUE: no limit is exceeded and no stop is active", {.safe = false}};
     hal::Out<bool> warning{*this, "warning", "TRUE: a limit is exceeded"};
-    hal::Out<bool> limiting{*this, "limiting", "TRUE: command-out is less than command"};
-    hal::Out<bool> stopping{*this, "stop", "TRUE: a stop is on, until reset"};
+    hal::Out<bool> limiting{*this, "limiting", "TRUE: command-out is reduced"};
+    hal::Out<bool> stopping{*this, "stop", "TRUE: a stop is active, until reset"};
     hal::Out<std::uint32_t> state{*this, "state",
-                                  "0 runs; 1 brakes, 2 stands in stop 2; 3 brakes in stop 1; 4 without power", {.initial = powerless}};
-    hal::Out<std::uint32_t> reason{*this, "reason", "why it stopped, or what is exceeded; see the table", {.initial = not_reset}};
-    hal::Out<double> speed_out{*this, "speed", "the speed that is watched", {.unit = "1/s", .finite = true}};
-    hal::Out<double> slew_out{*this, "slew", "the change of speed that is watched", {.unit = "1/s^2", .finite = true}};
+                                  "0 running; 1 braking, 2 stopped in stop 2; 3 braking in stop 1; 4 power off", {.initial = powerless}};
+    hal::Out<std::uint32_t> reason{*this, "reason", "cause of the stop, or limit that is exceeded; see the table", {.initial = not_reset}};
+    hal::Out<double> speed_out{*this, "speed", "monitored speed", {.unit = "1/s", .finite = true}};
+    hal::Out<double> slew_out{*this, "slew", "monitored rate of change of the speed", {.unit = "1/s^2", .finite = true}};
 
-    hal::Function run{*this, "", &SafeLimit::update, "watches the axis and passes the command"};
+    hal::Function run{*this, "", &SafeLimit::update, "monitors the axis and passes the command"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         const bool pressed = reset && !was_reset_;
         was_reset_ = reset;
-        // The host wrote the safe value (stop, a fault): going on needs a reset.
+        // The host wrote the safe value (stop, a fault): a reset is required.
         if (state_ != powerless && !power && has_run_) trip(powerless, not_reset);
         has_run_ = true;
 
@@ -230,35 +230,35 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SafeLimit, "safe_limit", "Supervision of position, speed and slew, with warning, limiting and stops", R"(
-Stands between what commands the speed of an axis and its drive, and watches the axis itself. Every limit has a reaction, in the sense of
+Limits the speed command of an axis before it reaches the drive, and monitors the axis. Every limit has a reaction as defined in
 IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA with STO, SS1, SS2):
 
 | reaction | |
 | --- | --- |
 | 0 | none |
 | 1 | `warning` only |
-| 2 | `command-out` is cut to the limit: to +-`max-speed`; by `max-slew`; to no outward motion at a limit of position |
-| 3 | stop 2: the command goes to 0 by `stop-deceleration`, power stays; moving by more than `standstill-window` then is a stop 0 |
-| 4 | stop 1: the same, then, when it has stood for `standstill-time`, power off |
+| 2 | `command-out` is limited: to ±`max-speed`; by `max-slew`; to no outward motion at a position limit |
+| 3 | stop 2: the command ramps to 0 with `stop-deceleration`, power remains on; motion beyond `standstill-window` then causes a stop 0 |
+| 4 | stop 1: the same, followed by power off after `standstill-time` at standstill |
 | 5 | stop 0: power off in the same cycle |
 
     speed = velocity, or (position - position before) / period through the filter speed-filter,   slew = change of speed / period
 
-A limit counts as exceeded in the cycle in which it is (plus `filter-time`). A stop stays until a rising edge of `reset` when the cause is
-gone, so it begins: the first reset gives the power. Beyond a limit of position a reset helps when the axis stands, and then it may move
-inwards only. A stop that takes longer than `stop-time`, a value that is not a number, a bad parameter are a stop 0; a stop or a fault of
-the runtime needs a reset. `stop-in` is a stop 1 from outside. Wire `power` to the drive's enable. This is software on one computer: it is
-no certified safety function.
+The reaction is in the same cycle (plus `filter-time`). A stop remains until a rising edge of `reset` after its cause no longer
+exists. The initial state is a stop: the first reset enables the power. Beyond a position limit a reset is accepted at standstill, and then the axis may move
+inwards only. A stop that takes longer than `stop-time`, a NaN value and an invalid parameter cause a stop 0; a stop or a fault of
+the runtime requires a reset. `stop-in` requests a stop 1. Link `power` to the drive's enable. This is software on one computer, not
+a certified safety function.
 
 | reason | |
 | --- | --- |
 | 0 | nothing exceeded |
 | 1, 2 | below `min-position`, above `max-position` |
 | 3, 4 | speed, slew |
-| 5 | a measured value is not a number |
-| 6 | a parameter makes no sense |
-| 7, 8 | it did not stop within `stop-time`, it left the place where it stood |
-| 9 | waiting for the first reset, or for that after a stop of the runtime |
+| 5 | a measured value is NaN or infinite |
+| 6 | invalid parameter |
+| 7, 8 | the axis did not stop within `stop-time`, it moved beyond `standstill-window` |
+| 9 | waiting for the first reset, or for the reset after a stop of the runtime |
 | 10 | `stop-in` |
 
     loadrt safe_limit names=x-guard

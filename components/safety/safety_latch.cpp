@@ -5,19 +5,19 @@ namespace {
 
 struct SafetyLatch : hal::Component {
     using Component::Component;
-    hal::In<bool>          error_in{*this, "error-in", "TRUE: something is wrong in this cycle"};
-    hal::In<std::int32_t>  heal{*this, "heal", "what a good cycle takes off the count", {.initial = 1}};
-    hal::In<std::int32_t>  harm{*this, "harm", "what a bad cycle adds to the count", {.initial = 1}};
-    hal::In<bool>          latching{*this, "latching", "TRUE: the error stays until reset; FALSE: until the count is low again",
+    hal::In<bool>          error_in{*this, "error-in", "TRUE: error in this cycle"};
+    hal::In<std::int32_t>  heal{*this, "heal", "decrement of the count in a cycle without error", {.initial = 1}};  // language: quoted (LinuxCNC's name)
+    hal::In<std::int32_t>  harm{*this, "harm", "increment of the count in a cycle with an error", {.initial = 1}};
+    hal::In<bool>          latching{*this, "latching", "TRUE: the error remains until reset; FALSE: until the count is at or below threshold",
                                     {.initial = true}};
     hal::In<bool>          reset{*this, "reset", "a rising edge clears the count and the error"};
     hal::In<std::int32_t>  threshold{*this, "threshold", "a count above this is an error", {.initial = 100}};
     hal::In<std::int32_t>  min{*this, "min", "smallest count", {.initial = 0}};
     hal::In<std::int32_t>  max{*this, "max", "largest count", {.initial = 1000}};
-    hal::In<bool>          enable{*this, "enable", "FALSE: error-out is error-in", {.initial = true}};
-    hal::Out<std::int32_t> count{*this, "count", "the present count"};
-    hal::Out<bool>         error_out{*this, "error-out", "TRUE: there is an error", {.safe = true}};
-    hal::Out<bool>         ok_out{*this, "ok-out", "FALSE: there is an error", {.initial = true, .safe = false}};
+    hal::In<bool>          enable{*this, "enable", "FALSE copies error-in to error-out", {.initial = true}};
+    hal::Out<std::int32_t> count{*this, "count", "current count"};
+    hal::Out<bool>         error_out{*this, "error-out", "TRUE: error", {.safe = true}};
+    hal::Out<bool>         ok_out{*this, "ok-out", "inverse of error-out", {.initial = true, .safe = false}};
     hal::Function          run{*this, "", &SafetyLatch::update, "counts the errors"};
 
     void update(hal::Cycle) noexcept {
@@ -41,12 +41,12 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SafetyLatch, "safety_latch", "Error latch that forgives short disturbances", R"(
-A cycle with `error-in` TRUE adds `harm` to the count, any other takes `heal` off; it stays between `min` and `max`. A
-count above `threshold` makes `error-out` TRUE. With `latching` it stays so until a rising edge of `reset`; without, until the count
-is no longer above the threshold. While the disturbance lasts, `reset` only gives it a new run-up. When `min` is above `max`, `max` wins.
+HAL_COMPONENT(SafetyLatch, "safety_latch", "Error latch that tolerates short disturbances", R"(
+A cycle with `error-in` TRUE adds `harm` to the count, any other decreases it; the count is limited to `min` and `max`. A
+count above `threshold` sets `error-out`. With `latching` it remains TRUE until a rising edge of `reset`; without, until the count
+is no longer above the threshold. During a disturbance, `reset` only restarts the count. If `min` is above `max`, `max` applies.
 
-LinuxCNC's manual page says of `latching` the opposite in one place, and is right in the other.
+LinuxCNC's manual page contradicts itself about `latching`; its component behaves as described here.
 
     # tolerate up to 5 bad cycles, forget one in ten good ones
     loadrt safety_latch names=encoder-watch

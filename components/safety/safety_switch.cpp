@@ -7,7 +7,7 @@
 
 namespace {
 
-/// The values of pin `reason`; from `first_fault` on they are faults. Published: never renumber.
+/// The values of the public pin `reason`; from `first_fault` on they are faults. Never renumber them.
 enum Reason : std::uint32_t {
     is_safe = 0,
     contacts_open = 1,
@@ -30,14 +30,14 @@ struct Times {
     std::int64_t discrepancy, debounce, filter, reset_min, reset_max, test_period, test_width, test_response;
 
     static std::int64_t ns(double seconds) noexcept { return seconds >= 0.0 && seconds <= 1e6 ? std::llround(seconds * 1e9) : -1; }
-    /// Nothing negative or not a number, and both test pulses fit into their period.
+    /// True if no value is negative or NaN and both test pulses fit into their period.
     bool sound(std::int64_t period_ns) const noexcept {
         if (std::min({discrepancy, debounce, filter, reset_min, test_period, test_width, test_response}) < 0 || reset_max < reset_min) return false;
         return test_period == 0 || (test_width >= period_ns && 2 * (test_width + test_response + period_ns) <= test_period);
     }
 };
 
-/// One contact, freed of bouncing.
+/// One debounced contact.
 struct Contact {
     bool closed = false;
     std::int64_t differs_ns = 0;
@@ -49,13 +49,13 @@ struct Contact {
     }
 };
 
-/// The test pulses on the two feeding outputs: one on A at the start of a test period, one on B half a period later.
+/// The test pulses on the two outputs that feed the contacts: on A at the start of a test period, on B half a period later.
 class PulseTest {
 public:
     bool feed_a = true, feed_b = true;      // levels of the outputs
-    bool hides_a = false, hides_b = false;  // a pulse is what makes this contact look open
+    bool hides_a = false, hides_b = false;  // a test pulse makes this contact appear open
 
-    /// One cycle; gives the fault found or 0. `a` and `b` are the levels at the inputs.
+    /// Runs one cycle; returns the fault found or 0. `a` and `b` are the levels at the inputs.
     std::uint32_t step(bool a, bool b, const Times& times, std::int64_t period_ns) noexcept {
         if (times.test_period == 0) {
             *this = PulseTest();
@@ -85,48 +85,48 @@ public:
             feed = true;
         }
         if (pulse_ns_ < times.test_width + times.test_response) return found;
-        if (other_dropped_ && other) found = cross_short;  // it came back with the pulse's end: it is fed by the same wire
+        if (other_dropped_ && other) found = cross_short;  // it returned with the end of the pulse: it is fed by the same wire
         hides_a = hides_b = false;
         pulse_ns_ = -1;
         return found;
     }
 
 private:
-    std::int64_t idle_ns_ = 0, pulse_ns_ = -1;  // since the last pulse began; since this one did, or -1
+    std::int64_t idle_ns_ = 0, pulse_ns_ = -1;  // since the start of the last pulse; since the start of this one, or -1
     bool on_b_ = true, tested_was_high_ = false, other_was_high_ = false, other_dropped_ = false;
 };
 
 struct SafetySwitch : hal::Component {
     using Component::Component;
 
-    hal::In<bool> in_a{*this, "in-a", "contact A: TRUE while it conducts"};
-    hal::In<bool> in_b{*this, "in-b", "contact B: TRUE while it conducts"};
-    hal::In<bool> reset{*this, "reset", "the reset button"};
+    hal::In<bool> in_a{*this, "in-a", "contact A: TRUE while closed"};
+    hal::In<bool> in_b{*this, "in-b", "contact B: TRUE while closed"};
+    hal::In<bool> reset{*this, "reset", "reset button"};
     hal::Out<bool> safe{*this, "safe", "TRUE: the machine may move", {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: the switch, its wiring, the button or a parameter is wrong"};
-    hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: pressing reset helps now"};
-    hal::Out<std::uint32_t> reason{*this, "reason", "why safe is FALSE: a code, see the table", {.initial = contacts_open}};
-    hal::Out<bool> test_a{*this, "test-a", "feeds contact A: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
-    hal::Out<bool> test_b{*this, "test-b", "feeds contact B: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
+    hal::Out<bool> fault{*this, "fault", "TRUE: fault of the switch, its wiring, the button or a parameter"};
+    hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: a reset would be accepted"};
+    hal::Out<std::uint32_t> reason{*this, "reason", "reason why safe is FALSE: see the table", {.initial = contacts_open}};
+    hal::Out<bool> test_a{*this, "test-a", "supply of contact A: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
+    hal::Out<bool> test_b{*this, "test-b", "supply of contact B: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
 
-    hal::Param<bool> antivalent{*this, "antivalent", "TRUE: safe is A conducting and B not; FALSE: both conducting"};
-    hal::Param<double> discrepancy_time{*this, "discrepancy-time", "longest time the contacts may disagree", {.initial = 0.5, .unit = "s"}};
-    hal::Param<double> debounce_time{*this, "debounce-time", "a contact has switched to safe when it has been there for so long", {.initial = 0.01, .unit = "s"}};
-    hal::Param<double> filter_time{*this, "filter-time", "a contact has left safe when it has been away for so long; adds to the reaction time", {.unit = "s"}};
-    hal::Param<std::uint32_t> reset_mode{*this, "reset-mode", "0: no reset needed; 1: on pressing; 2: on releasing after a press of proper length", {.initial = 2}};
-    hal::Param<double> reset_min{*this, "reset-min-time", "mode 2: shortest press", {.initial = 0.05, .unit = "s"}};
-    hal::Param<double> reset_max{*this, "reset-max-time", "mode 2: longest press; beyond it the button counts as stuck", {.initial = 3.0, .unit = "s"}};
-    hal::Param<double> test_period{*this, "test-period", "time between two test pulses on a contact; 0: none", {.unit = "s"}};
-    hal::Param<double> test_width{*this, "test-width", "length of a test pulse; longer than the way out and back", {.initial = 0.003, .unit = "s"}};
-    hal::Param<double> test_response{*this, "test-response", "how long after a test pulse an input may take to come back", {.initial = 0.003, .unit = "s"}};
+    hal::Param<bool> antivalent{*this, "antivalent", "TRUE: A closed and B open is safe; FALSE: both closed are safe"};
+    hal::Param<double> discrepancy_time{*this, "discrepancy-time", "maximum time for which the contacts may disagree", {.initial = 0.5, .unit = "s"}};
+    hal::Param<double> debounce_time{*this, "debounce-time", "time for which a contact must be stable before it counts as safe", {.initial = 0.01, .unit = "s"}};
+    hal::Param<double> filter_time{*this, "filter-time", "time for which a contact must be unsafe before it trips; adds to the reaction time", {.unit = "s"}};
+    hal::Param<std::uint32_t> reset_mode{*this, "reset-mode", "0: no reset; 1: reset on press; 2: reset on release after a press of valid duration", {.initial = 2}};
+    hal::Param<double> reset_min{*this, "reset-min-time", "mode 2: minimum duration of a press", {.initial = 0.05, .unit = "s"}};
+    hal::Param<double> reset_max{*this, "reset-max-time", "mode 2: maximum duration of a press; after it the button counts as stuck", {.initial = 3.0, .unit = "s"}};
+    hal::Param<double> test_period{*this, "test-period", "period of the test pulses on a contact; 0: no test pulses", {.unit = "s"}};
+    hal::Param<double> test_width{*this, "test-width", "duration of a test pulse; must exceed the round trip through the I/O", {.initial = 0.003, .unit = "s"}};
+    hal::Param<double> test_response{*this, "test-response", "maximum time for an input to return after a test pulse", {.initial = 0.003, .unit = "s"}};
 
-    hal::Function run{*this, "", &SafetySwitch::update, "watches contacts, wiring and button"};
+    hal::Function run{*this, "", &SafetySwitch::update, "monitors contacts, wiring and button"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t period_ns = cycle.period_ns();
         const Times times{Times::ns(discrepancy_time), Times::ns(debounce_time), Times::ns(filter_time), Times::ns(reset_min),
                           Times::ns(reset_max), Times::ns(test_period), Times::ns(test_width), Times::ns(test_response)};
-        // The host wrote the safe value (stop, a fault): running again needs a reset like after opening.
+        // The host wrote the safe value (stop, a fault): a reset is required as after opening.
         if (state_ == is_safe && !safe) state_ = waits_for_reset;
 
         const bool sound = times.sound(period_ns) && reset_mode <= 2;
@@ -147,7 +147,7 @@ private:
     bool both_open() const noexcept { return !a_.closed && !b_.closed; }
     bool both_closed() const noexcept { return a_.closed && b_.closed; }
     bool latched() const noexcept { return state_ >= first_fault; }
-    /// Whether a reset would be taken.
+    /// Returns whether a reset would be accepted.
     bool resettable() const noexcept { return state_ == waits_for_reset || (latched() && both_open()); }
 
     void enter(std::uint32_t state) noexcept {
@@ -220,36 +220,36 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SafetySwitch, "safety_switch", "Two-channel safety input with reset, discrepancy time and test pulses", R"(
-Watches a switch with two contacts (door, emergency-stop button, light curtain, base that stands on its table) and says
-whether the machine may move. It follows the practice of two-channel safety relays: ISO 13849-1 (category 3 and 4: a single
-fault must not lose the function and is found at the next demand; clause 5.2.2: a manual reset acts when the button is let go),
+Monitors a switch with two contacts (door, emergency stop button, light curtain) and enables
+the machine. It follows the practice of two-channel safety relays: ISO 13849-1 (category 3 and 4: a single
+fault must not lose the function and is found at the next demand; clause 5.2.2: a manual reset acts when the button is released),
 IEC 61496-1 (start and restart interlock, test pulses on outputs), IEC 60204-1 (9.2.3.4: reset does not start motion),
-PLCopen Safety Part 1 (SF_Equivalent, SF_Antivalent). It is software on one computer: it is no certified safety function.
+PLCopen Safety Part 1 (SF_Equivalent, SF_Antivalent). It is software on one computer, not a certified safety function.
 
-* **Contacts.** `antivalent` FALSE: both conduct while safe. TRUE: A conducts, B does not. `safe` goes FALSE in the cycle in which
-  either contact leaves its place (plus `filter-time`); they are safe again after `debounce-time`.
-* **Discrepancy.** They may disagree for `discrepancy-time`; longer is a fault. Once one has opened, both must open.
-* **Reset.** When both are closed, `reset-mode` 0 goes on at once (also at the start), 1 on pressing `reset`, 2 on releasing it after a press
-  between `reset-min-time` and `reset-max-time`. A press that began too early does not count. A stop or a fault of the runtime needs a reset as well.
-* **Test pulses.** With `test-period` above 0, `test-a` and `test-b` in turn go FALSE for `test-width`. Wire A from `test-a` and B from `test-b`.
+* **Contacts.** `antivalent` FALSE: both are closed while safe. TRUE: A is closed and B open. `safe` becomes FALSE in the cycle in which
+  either contact changes (plus `filter-time`); they are safe again after `debounce-time`.
+* **Discrepancy.** They may disagree for `discrepancy-time`; a longer disagreement is a fault. Once one has opened, both must open.
+* **Reset.** With both contacts safe, `reset-mode` 0 sets `safe` immediately (also at the start), 1 on a press of `reset`, 2 on its release after a press
+  between `reset-min-time` and `reset-max-time`. A press that started too early does not count. A stop or a fault of the runtime also requires a reset.
+* **Test pulses.** With `test-period` above 0, `test-a` and `test-b` alternately become FALSE for `test-width`. Supply A from `test-a` and B from `test-b`.
   A conducting contact must show its pulse (else it is shorted to the supply or to the other), and the other must not. A contact
   that opens during its pulse is seen `test-response` after it: reaction time grows by `test-width` + `test-response`.
-* **Faults** stay until the cause is gone, both contacts have opened and `reset` was given; then both must close again.
+* **Faults** remain until the cause no longer exists, both contacts have opened and `reset` was pressed; then both must close again.
 
 | reason | |
 | --- | --- |
 | 0 | safe |
 | 1 | both contacts open |
-| 2 | one closed, waiting for the other |
-| 3 | one opened, waiting for the other |
+| 2 | one contact closed, waiting for the other |
+| 3 | one contact opened, waiting for the other |
 | 4 | waiting for reset |
-| 5 | reset is held down: let go |
+| 5 | reset is held: release it |
 | 10 | fault: one contact did not close in time |
 | 11 | fault: one contact did not open in time |
 | 12, 13 | fault: A or B did not follow its test pulse |
 | 14 | fault: the contacts are shorted to each other |
-| 15 | fault: reset is stuck (ends when it is let go) |
-| 16 | fault: a parameter makes no sense (negative, or test pulses that do not fit into test-period) |
+| 15 | fault: reset is stuck (ends when it is released) |
+| 16 | fault: invalid parameter (negative, or test pulses that do not fit into test-period) |
 
     loadrt safety_switch names=base-switch
     addf base-switch servo-thread

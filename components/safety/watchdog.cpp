@@ -13,19 +13,19 @@ struct Watchdog : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.singleton = true};
 
-    hal::Argument inputs{*this, "num_inputs", 1, "how many inputs", {.min = 1, .max = 1024}};
+    hal::Argument inputs{*this, "num_inputs", 1, "number of inputs", {.min = 1, .max = 1024}};
 
-    hal::Function process{*this, "process", &Watchdog::watch, "looks for changes of the inputs; fast enough to see each"};
-    hal::Ins<bool> input{*this, process, "input-#", inputs, "has to change again and again"};
-    hal::In<bool> enable{*this, process, "enable-in", "FALSE: ok-out is FALSE; a rising edge starts the watch anew"};
-    hal::Out<bool> ok{*this, process, "ok-out", "TRUE while enabled and no input has been silent for too long", {.safe = false}};
-    hal::Out<std::int32_t> tripped{*this, process, "tripped-by", "the input that was silent; -1: none", {.initial = -1}};
+    hal::Function process{*this, "process", &Watchdog::watch, "monitors the inputs; its thread must be fast enough to see each change"};
+    hal::Ins<bool> input{*this, process, "input-#", inputs, "heartbeat input: must keep changing"};
+    hal::In<bool> enable{*this, process, "enable-in", "FALSE sets ok-out to FALSE; a rising edge restarts the watchdog"};
+    hal::Out<bool> ok{*this, process, "ok-out", "TRUE while enabled and no input has timed out", {.safe = false}};
+    hal::Out<std::int32_t> tripped{*this, process, "tripped-by", "number of the input that timed out; -1: none", {.initial = -1}};
 
-    hal::Function run{*this, "set-timeouts", &Watchdog::set_timeouts, "takes new time limits; in any thread"};
-    hal::Params<double> timeout{*this, run, "timeout-#", inputs, "longest time input-# may stay as it is; 0 or less: never well", {.unit = "s"}};
+    hal::Function run{*this, "set-timeouts", &Watchdog::set_timeouts, "reads the timeouts; in any thread"};
+    hal::Params<double> timeout{*this, run, "timeout-#", inputs, "maximum time between changes of input-#; 0 or less: always tripped", {.unit = "s"}};
 
     void watch(hal::Cycle cycle) noexcept {
-        if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is seen later
+        if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is detected later
         const bool restart = enable && !was_enabled_;
         was_enabled_ = enable;
         bool well = enable && (ok || restart);
@@ -63,11 +63,11 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Watchdog, "watchdog", "Watches for inputs that stop changing", R"(
-Each `input-N` has to change at least once in `timeout-N` seconds. When one does not, `ok-out` goes FALSE and stays so until
-`enable-in` has gone FALSE and TRUE again; `tripped-by` says which it was. A timeout that was never set keeps `ok-out`
-FALSE: a watch nobody configured must not say that all is well. `set-timeouts` has to be in a thread for the limits to be
-taken; the one of `process` has to be fast enough to see each change.
+HAL_COMPONENT(Watchdog, "watchdog", "Detects inputs that stop changing", R"(
+Each `input-N` must change at least once in `timeout-N` seconds. If one does not, `ok-out` becomes FALSE and remains so until
+a rising edge of `enable-in`; `tripped-by` is the number of the input. Without a timeout `ok-out` is always
+FALSE: a watchdog that is not configured must not report OK. Add `set-timeouts` to a thread for the timeouts to take
+effect; the thread of `process` must be fast enough to see each change.
 
     loadrt watchdog num_inputs=2
     loadrt charge_pump
