@@ -13,38 +13,38 @@ namespace {
 struct DcMotor : hal::Component {
     using Component::Component;
 
-    hal::Function run{*this, "update", &DcMotor::update, "moves the motor on by one period"};
+    hal::Function run{*this, "update", &DcMotor::update, "simulates one period"};
 
     hal::In<double> voltage{*this, "voltage", "voltage at the terminals; the pwm input adds to it", {.unit = "V"}};
-    hal::In<bool> pwm{*this, "pwm", "TRUE: the amplifier puts the supply voltage on the motor"};
-    hal::In<bool> direction{*this, "dir", "TRUE: pwm drives backwards"};
+    hal::In<bool> pwm{*this, "pwm", "TRUE: the amplifier applies the supply voltage to the motor"};
+    hal::In<bool> direction{*this, "dir", "TRUE reverses the direction of pwm"};
     hal::In<bool> enable{*this, "enable", "FALSE: the amplifier is off and the motor carries no current", {.initial = true}};
-    hal::In<double> load{*this, "load-torque", "torque of the load against positive turning", {.unit = "N*m"}};
+    hal::In<double> load{*this, "load-torque", "load torque, positive against positive rotation", {.unit = "N*m"}};
 
-    hal::Out<double> current{*this, "current", "in the winding", {.unit = "A", .finite = true}};
-    hal::Out<double> torque{*this, "torque", "of the motor, before friction", {.unit = "N*m", .finite = true}};
+    hal::Out<double> current{*this, "current", "winding current", {.unit = "A", .finite = true}};
+    hal::Out<double> torque{*this, "torque", "motor torque, before friction", {.unit = "N*m", .finite = true}};
     hal::Out<double> velocity{*this, "velocity", "speed of the shaft", {.unit = "rad/s", .finite = true}};
-    hal::Out<double> angle{*this, "angle", "of the shaft", {.unit = "rad", .finite = true}};
-    hal::Out<double> position{*this, "position", "of what the shaft moves: turns * pitch", {.finite = true}};
-    hal::Out<std::int32_t> counts{*this, "counts", "of the encoder on the shaft"};
-    hal::Out<bool> phase_a{*this, "phase-A", "of the encoder on the shaft"};
-    hal::Out<bool> phase_b{*this, "phase-B", "of the encoder on the shaft"};
-    hal::Out<bool> phase_z{*this, "phase-Z", "index of the encoder: TRUE at count 0 of every turn"};
+    hal::Out<double> angle{*this, "angle", "shaft angle", {.unit = "rad", .finite = true}};
+    hal::Out<double> position{*this, "position", "position of the load: revolutions * pitch", {.finite = true}};
+    hal::Out<std::int32_t> counts{*this, "counts", "encoder counts"};
+    hal::Out<bool> phase_a{*this, "phase-A", "encoder phase A"};
+    hal::Out<bool> phase_b{*this, "phase-B", "encoder phase B"};
+    hal::Out<bool> phase_z{*this, "phase-Z", "encoder index: TRUE at count 0 of every revolution"};
     hal::Out<bool> at_min{*this, "at-min", "limit switch: position is at or below min-position"};
     hal::Out<bool> at_max{*this, "at-max", "limit switch: position is at or above max-position"};
 
-    hal::Param<double> supply{*this, "supply-voltage", "of the amplifier", {.initial = 24.0, .unit = "V"}};
-    hal::Param<double> limit{*this, "current-limit", "of the amplifier; 0: none", {.initial = 4.0, .unit = "A"}};
-    hal::Param<double> resistance{*this, "resistance", "of the winding", {.initial = 0.68, .unit = "Ohm"}};
-    hal::Param<double> inductance{*this, "inductance", "of the winding; 0: none", {.initial = 0.001, .unit = "H"}};
+    hal::Param<double> supply{*this, "supply-voltage", "supply voltage of the amplifier", {.initial = 24.0, .unit = "V"}};
+    hal::Param<double> limit{*this, "current-limit", "current limit of the amplifier; 0: no limit", {.initial = 4.0, .unit = "A"}};
+    hal::Param<double> resistance{*this, "resistance", "winding resistance", {.initial = 0.68, .unit = "Ohm"}};
+    hal::Param<double> inductance{*this, "inductance", "winding inductance; 0: none", {.initial = 0.001, .unit = "H"}};
     hal::Param<double> constant{*this, "torque-constant", "torque per current, and voltage per speed", {.initial = 0.0677, .unit = "N*m/A"}};
-    hal::Param<double> inertia{*this, "inertia", "of rotor and load at the shaft", {.initial = 2e-4, .unit = "kg*m^2"}};
+    hal::Param<double> inertia{*this, "inertia", "inertia of rotor and load at the shaft", {.initial = 2e-4, .unit = "kg*m^2"}};
     hal::Param<double> viscous{*this, "viscous", "viscous friction", {.initial = 1e-4, .unit = "N*m*s/rad"}};
     hal::Param<double> coulomb{*this, "coulomb", "Coulomb friction", {.initial = 0.008, .unit = "N*m"}};
-    hal::Param<double> pitch{*this, "pitch", "position units per turn (a screw's pitch in mm)", {.initial = 1.0}};
-    hal::Param<std::uint32_t> encoder_counts{*this, "encoder-counts", "counts per turn after x4 decoding", {.initial = 2000}};
-    hal::Param<double> min_position{*this, "min-position", "where the limit switch at-min acts", {.initial = -1e9}};
-    hal::Param<double> max_position{*this, "max-position", "where the limit switch at-max acts", {.initial = 1e9}};
+    hal::Param<double> pitch{*this, "pitch", "position units per revolution (a screw's pitch in mm)", {.initial = 1.0}};
+    hal::Param<std::uint32_t> encoder_counts{*this, "encoder-counts", "counts per revolution after x4 decoding", {.initial = 2000}};
+    hal::Param<double> min_position{*this, "min-position", "position of the limit switch at-min", {.initial = -1e9}};
+    hal::Param<double> max_position{*this, "max-position", "position of the limit switch at-max", {.initial = 1e9}};
 
     void update(hal::Cycle cycle) noexcept {
         const sim::Winding winding{resistance, inductance, constant, limit};
@@ -60,7 +60,7 @@ struct DcMotor : hal::Component {
 private:
     static constexpr std::int64_t longest_step_ns = 100'000;
 
-    /// Current exactly, then speed and angle by the classical Runge-Kutta step with the mean torque of the step.
+    /// Solves the current exactly, then speed and angle by a classical Runge-Kutta step with the mean torque of the step.
     void step(const sim::Winding& winding, double applied, double dt) noexcept {
         const double before = current_;
         current_ = enable ? winding.step(current_, applied, speed_, dt) : 0.0;
@@ -97,12 +97,12 @@ HAL_COMPONENT(DcMotor, "dc_motor", "A brushed DC motor with amplifier, encoder, 
 
 The usual equations (G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, section 2.3). The
 current is solved exactly over a step, the motion by fourth-order Runge-Kutta in steps of at most 0.1 ms. Friction is smoothed
-around standstill: under a steady torque below the Coulomb torque the shaft creeps. Without load and Coulomb friction the motor
+around standstill: with a constant torque below the Coulomb torque the shaft creeps. Without load and Coulomb friction the motor
 settles at w = u k / (k² + resistance viscous).
 
-The amplifier takes a voltage, or `pwm` and `dir` as `pwmgen` makes them; with `pwm` low the current runs on through the bridge.
-The numbers are those of a motor of 24 V and 85 W, as in the component `furuta`. The encoder's phases need a thread that sees each
-count: at 2000 counts per turn and 100 us up to 31 rad/s, at 50 us up to 62 rad/s.
+The amplifier takes a voltage, or `pwm` and `dir` from `pwmgen`; while `pwm` is low the current freewheels through the bridge.
+The default parameters are those of a motor with 24 V and 85 W, as in the component `furuta`. For the encoder phases the thread must sample
+every count: with 2000 counts per revolution, 100 us allow up to 31 rad/s, 50 us up to 62 rad/s.
 
     loadrt dc_motor names=x-motor
     addf x-motor.update base-thread

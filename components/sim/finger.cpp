@@ -11,22 +11,22 @@ struct Finger : hal::Component {
     using Component::Component;
 
     hal::In<double> effort{*this, "effort", "force of the actuator", {.unit = "N"}};
-    hal::In<bool>   reset{*this, "reset", "while TRUE the finger rests at 0"};
-    hal::In<double> wall{*this, "wall", "where the wall begins", {.initial = 0.01, .unit = "m"}};
+    hal::In<bool>   reset{*this, "reset", "TRUE holds the finger at 0"};
+    hal::In<double> wall{*this, "wall", "position of the wall", {.initial = 0.01, .unit = "m"}};
 
-    hal::Param<double> mass{*this, "mass", "of the finger and what moves with it", {.initial = 0.5, .unit = "kg"}};
-    hal::Param<double> viscous{*this, "viscous", "friction", {.initial = 4.0, .unit = "N*s/m"}};
-    hal::Param<double> max_effort{*this, "max-effort", "limit of the actuator", {.initial = 100.0, .unit = "N"}};
+    hal::Param<double> mass{*this, "mass", "moving mass of finger and actuator", {.initial = 0.5, .unit = "kg"}};
+    hal::Param<double> viscous{*this, "viscous", "viscous friction", {.initial = 4.0, .unit = "N*s/m"}};
+    hal::Param<double> max_effort{*this, "max-effort", "maximum force of the actuator", {.initial = 100.0, .unit = "N"}};
     hal::Param<double> actuator_lag{*this, "actuator-lag", "time constant of the actuator's force", {.initial = 0.002, .unit = "s"}};
-    hal::Param<double> wall_stiffness{*this, "wall-stiffness", "a steel sheet on a bench", {.initial = 2e4, .unit = "N/m"}};
-    hal::Param<double> wall_damping{*this, "wall-damping", "while the finger goes in", {.initial = 50.0, .unit = "N*s/m"}};
+    hal::Param<double> wall_stiffness{*this, "wall-stiffness", "stiffness of the wall (default: a steel sheet on a bench)", {.initial = 2e4, .unit = "N/m"}};
+    hal::Param<double> wall_damping{*this, "wall-damping", "damping of the wall while the finger moves into it", {.initial = 50.0, .unit = "N*s/m"}};
 
-    hal::Out<double> position{*this, "position", "of the finger's tip", {.unit = "m", .finite = true}};
-    hal::Out<double> velocity{*this, "velocity", "of the finger's tip", {.unit = "m/s", .finite = true}};
-    hal::Out<double> force{*this, "force", "of the finger on the wall; never negative", {.unit = "N", .finite = true}};
-    hal::Out<bool>   touching{*this, "touching", "the finger is at the wall"};
+    hal::Out<double> position{*this, "position", "position of the fingertip", {.unit = "m", .finite = true}};
+    hal::Out<double> velocity{*this, "velocity", "velocity of the fingertip", {.unit = "m/s", .finite = true}};
+    hal::Out<double> force{*this, "force", "force of the finger on the wall; never negative", {.unit = "N", .finite = true}};
+    hal::Out<bool>   touching{*this, "touching", "TRUE while the finger touches the wall"};
 
-    hal::Function run{*this, "update", &Finger::update, "moves the finger on by one period"};
+    hal::Function run{*this, "update", &Finger::update, "simulates one period"};
 
     void update(hal::Cycle cycle) noexcept {
         const double m = sim::sane(mass, 1e-6), b = sim::sane(viscous, 0.0), k = sim::sane(wall_stiffness, 0.0),
@@ -37,7 +37,7 @@ struct Finger : hal::Component {
         const double       h = cycle.seconds() / static_cast<double>(steps);
         for (std::int64_t i = 0; i < steps && !reset; ++i) {
             push_ += (wanted - push_) * (lag > 0.0 ? -std::expm1(-h / lag) : 1.0);
-            // the velocity first, with friction and wall at the end of the step: stable for any stiffness
+            // velocity first, with friction and wall at the end of the step: stable for any stiffness
             const double inside = x_ > edge || x_ + v_ * h > edge ? 1.0 : 0.0;
             const double stiff = m / h + b + inside * (d + k * h);
             v_ = (m / h * v_ + push_ - inside * k * std::fmax(x_ - edge, 0.0)) / stiff;
@@ -63,11 +63,11 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Finger, "finger", "A robot's finger in front of a stiff wall", R"(
+HAL_COMPONENT(Finger, "finger", "Simulated robot finger in front of a stiff wall", R"(
     mass x'' = actuator - viscous x' - wall,   wall = max(0, wall-stiffness depth + wall-damping x') where depth = x - wall > 0
     actuator-lag actuator' = effort - actuator
 
-The wall pushes and never pulls. Integrated by backward Euler in steps of 20 us. With the parameters as they are the finger rings on the wall with
+The wall pushes but never pulls. The integration is backward Euler with steps of 20 us. With the default parameters the finger oscillates on the wall with
 √(k / m) = 200 rad/s, damped to a quarter. Numbers are assumed; those of a small gripper against a sheet of steel.
 
     loadrt finger names=tip

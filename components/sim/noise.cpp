@@ -126,9 +126,9 @@ HAL_COMPONENT(Noise, "noise", "Seeded noise: uniform, Gaussian or pink", R"(
 | 2 | pink, power falling with 1/f over 20 octaves, standard deviation 1 (Voss, McCartney) |
 
 The sequence is a function of `seed` alone: the same netlist gives the same values in every run, and two instances with the same seed the
-same noise, so give each its own. A change of `seed` and a rising edge of `restart` start it anew. `hold` n draws every n cycles only;
-`limit` cuts what is larger. A type above 2 is type 0; an amplitude that is not a number is 0. The numbers come from xorshift64* and are
-not for secrets.
+same noise, so give each its own. A change of `seed` and a rising edge of `restart` restart the sequence. `hold` n draws a value every n cycles;
+`limit` limits its magnitude. A type above 2 counts as 0, a NaN amplitude as 0. The generator is xorshift64*, which is
+not cryptographically secure.
 
     loadrt noise names=tacho-noise
     addf tacho-noise servo

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an incremental encoder shows of an angle.
+// Counts and phases of an incremental encoder.
 #pragma once
 
 #include <cmath>

@@ -17,11 +17,11 @@ struct SimAxisHardware : hal::Component {
         std::optional<hal::Out<bool>> home, max, min, both, max_home, min_home, both_home;
     };
     std::array<Axis, names.size()> axes;
-    hal::Out<bool>  home_all{*this, "homesw-all", "TRUE: the home switch of an axis that is homing is on"};
+    hal::Out<bool>  home_all{*this, "homesw-all", "TRUE: the home switch of a homing axis is on"};
     hal::Out<bool>  limit_all{*this, "limitsw-all", "TRUE: a limit switch of an axis that is not homing is on"};
-    hal::Out<bool>  all{*this, "limitsw-homesw-all", "TRUE: either of the two, as with all switches on one input"};
-    hal::In<double> limit_offset{*this, "limit-offset", "limit switches come so much later than their positions", {.initial = 0.01}};
-    hal::Function   run{*this, "update", &SimAxisHardware::update, "switches"};
+    hal::Out<bool>  all{*this, "limitsw-homesw-all", "TRUE: homesw-all or limitsw-all, as with all switches on one input"};
+    hal::In<double> limit_offset{*this, "limit-offset", "distance by which limit switches trip after their positions", {.initial = 0.01}};
+    hal::Function   run{*this, "update", &SimAxisHardware::update, "updates the switches"};
 
     explicit SimAxisHardware(const hal_host* host) : Component(host) {
         for (std::size_t i = 0; i < names.size(); ++i) {
@@ -37,8 +37,8 @@ struct SimAxisHardware : hal::Component {
             real(a.max_lower, "maxsw-lower", "lower end of the maximum switch", 0.0);
             real(a.min_upper, "minsw-upper", "upper end of the minimum switch", 0.0);
             real(a.min_lower, "minsw-lower", "lower end of the minimum switch", 0.0);
-            real(a.home_width, "homesw-hyst", "width of the home switch, half to each side", 0.025);
-            bit(a.homing, "homing", "TRUE: the axis is homing, its limits do not count");
+            real(a.home_width, "homesw-hyst", "width of the home switch, centred", 0.025);
+            bit(a.homing, "homing", "TRUE while the axis is homing; its limit switches are ignored");
             bit(a.home, "homesw-out", "home switch");
             bit(a.max, "maxsw-out", "maximum switch");
             bit(a.min, "minsw-out", "minimum switch");
@@ -77,9 +77,9 @@ struct SimAxisHardware : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(SimAxisHardware, "sim_axis_hardware", "Simulated home and limit switches of X, Y, Z, A, U, V and tandem X2, Y2", R"(
-Each axis has a home switch around `homesw-pos`, `homesw-hyst` wide, and two limit switches with a lower and an upper end. The maximum
-switch begins `limit-offset` above its lower end, the minimum switch ends as much below its upper end. Switches are also given together, as
-machines wire them; while an axis is homing its limits do not count there, and only then does its home switch count in the `-all` pins.
+Each axis has a home switch centred at `homesw-pos`, `homesw-hyst` wide, and two limit switches with a lower and an upper end. The maximum
+switch trips `limit-offset` above its lower end, the minimum switch `limit-offset` below its upper end. Further pins combine switches, as
+on machines with shared inputs; there the limit switches of a homing axis are ignored, and in the `-all` pins only the home switch of a homing axis counts.
 
     loadrt sim_axis_hardware names=switches
     addf switches.update servo

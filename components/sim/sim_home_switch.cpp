@@ -6,12 +6,12 @@ namespace {
 struct SimHomeSwitch : hal::Component {
     using Component::Component;
     hal::In<double> cur_pos{*this, "cur-pos", "position of the axis"};
-    hal::In<double> home_pos{*this, "home-pos", "position of the switch; its sign is the side on which it is on", {.initial = 1.0}};
-    hal::In<double> hysteresis{*this, "hysteresis", "so far back until it is off again", {.initial = 0.1}};
+    hal::In<double> home_pos{*this, "home-pos", "position of the switch; its sign is the side on which the switch is on", {.initial = 1.0}};
+    hal::In<double> hysteresis{*this, "hysteresis", "distance back to the point where it turns off", {.initial = 0.1}};
     hal::Out<bool>  home_sw{*this, "home-sw", "TRUE: the switch is on"};
-    hal::Io<bool>   index_enable{*this, "index-enable", "set: cleared after index-delay-ms, as by an encoder's index"};
-    hal::In<double> index_delay{*this, "index-delay-ms", "how long the index lets wait", {.initial = 10.0, .unit = "ms"}};
-    hal::Function   run{*this, "", &SimHomeSwitch::update, "switches"};
+    hal::Io<bool>   index_enable{*this, "index-enable", "TRUE is cleared after index-delay-ms, as by an encoder index"};
+    hal::In<double> index_delay{*this, "index-delay-ms", "delay of the index", {.initial = 10.0, .unit = "ms"}};
+    hal::Function   run{*this, "", &SimHomeSwitch::update, "updates the switch and the index"};
 
     void update(hal::Cycle cycle) noexcept {
         const double sign = home_pos < 0.0 ? -1.0 : 1.0;
@@ -31,9 +31,9 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SimHomeSwitch, "sim_home_switch", "A simulated home switch, and index", R"(
-`home-sw` goes on at `home-pos` and beyond it, to larger positions, or to smaller ones when `home-pos` is negative; off again `hysteresis`
-before it. `index-enable` TRUE is cleared after `index-delay-ms`.
+HAL_COMPONENT(SimHomeSwitch, "sim_home_switch", "Simulated home switch and index", R"(
+`home-sw` is on at and above `home-pos`, or at and below it if `home-pos` is negative; it turns off `hysteresis`
+before that position. `index-enable` is cleared after `index-delay-ms`.
 
     loadrt sim_home_switch names=x-home
     addf x-home servo

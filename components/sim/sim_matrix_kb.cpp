@@ -11,15 +11,15 @@ namespace {
 constexpr std::uint32_t columns = 8, rows = 8;
 
 struct SimMatrixKb : hal::Component {
-    hal::Out<std::uint32_t> out{*this, "out", "key code: 0xC0 + key when it goes down, 0x80 + key when it comes up"};
+    hal::Out<std::uint32_t> out{*this, "out", "key code: 0xC0 + key when pressed, 0x80 + key when released"};
     std::array<std::optional<hal::In<bool>>, columns * rows> buttons;
-    hal::Function run{*this, "", &SimMatrixKb::update, "makes key codes of buttons"};
+    hal::Function run{*this, "", &SimMatrixKb::update, "encodes the buttons"};
 
     explicit SimMatrixKb(const hal_host* host) : Component(host) {
         for (std::uint32_t column = 0; column < columns; ++column)
             for (std::uint32_t row = 0; row < rows; ++row) {
                 const std::string name = "button.c0" + std::to_string(column) + ".r0" + std::to_string(row);
-                buttons[row * columns + column].emplace(*this, name.c_str(), "TRUE: this key is down");
+                buttons[row * columns + column].emplace(*this, name.c_str(), "TRUE while this key is pressed");
             }
     }
 
@@ -43,10 +43,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SimMatrixKb, "sim_matrix_kb", "Key codes of a simulated keypad of 8 by 8 keys", R"(
-In place of a keypad: a button that changes gives a code for one cycle, 0xC0 + 8 row + column when it goes down, 0x80 + the same when it
-comes up. Without a change the code is 0x40 while a key is down, else 0. When several change at once, one code comes per cycle, the
-smallest key first.
+HAL_COMPONENT(SimMatrixKb, "sim_matrix_kb", "Simulated keypad controller with 8 by 8 keys", R"(
+Simulates a keypad: each change of a button outputs a code for one cycle, 0xC0 + 8 row + column when pressed, 0x80 + 8 row + column when
+released. Without a change the code is 0x40 while a key is pressed, else 0. If several change in one cycle, their codes follow one per cycle, the
+lowest key first.
 
     loadrt sim_matrix_kb names=pad
     addf pad servo

@@ -14,7 +14,7 @@ constexpr std::array in_pins = {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15};
 struct SimParport : hal::Component {
     hal::Function read_function{*this, "read", &SimParport::read, "copies the -in-fake pins to the inputs"};
     hal::Function write_function{*this, "write", &SimParport::write, "copies the outputs to the -out-fake pins"};
-    hal::Function reset_function{*this, "reset", &SimParport::reset, "nothing; the real port ends its pulses here"};
+    hal::Function reset_function{*this, "reset", &SimParport::reset, "no effect; the real port ends its pulses here"};
 
     struct Output {
         std::optional<hal::In<bool>> pin;
@@ -33,16 +33,16 @@ struct SimParport : hal::Component {
         for (std::size_t i = 0; i < out_pins.size(); ++i) {
             const std::string name = numbered(out_pins[i]) + "-out";
             Output& o = outputs[i];
-            o.pin.emplace(*this, write_function, name.c_str(), "output, as the real port has it");
+            o.pin.emplace(*this, write_function, name.c_str(), "output of the port");
             o.fake.emplace(*this, write_function, (name + "-fake").c_str(), "follows the output");
-            o.invert.emplace(*this, write_function, (name + "-invert").c_str(), "TRUE: the other way round");
-            o.reset.emplace(*this, write_function, (name + "-reset").c_str(), "no effect; the real port makes a pulse of it");
+            o.invert.emplace(*this, write_function, (name + "-invert").c_str(), "TRUE inverts the output");
+            o.reset.emplace(*this, write_function, (name + "-reset").c_str(), "no effect; the real port resets the output after a pulse");
         }
         for (std::size_t i = 0; i < in_pins.size(); ++i) {
             const std::string name = numbered(in_pins[i]) + "-in";
             Input& in = inputs[i];
-            in.fake.emplace(*this, read_function, (name + "-fake").c_str(), "what the input is to be");
-            in.pin.emplace(*this, read_function, name.c_str(), "input, as the real port has it");
+            in.fake.emplace(*this, read_function, (name + "-fake").c_str(), "simulated level of the input");
+            in.pin.emplace(*this, read_function, name.c_str(), "input of the port");
             in.inverted.emplace(*this, read_function, (name + "-not").c_str(), "input, inverted");
         }
     }
@@ -64,10 +64,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SimParport, "sim_parport", "The pins of a parallel port without the port", R"(
-Has all pins of `hal_parport` for both directions, under the same names, and with `-fake` at the end their other side: `pin-02-in` follows
-`pin-02-in-fake`, `pin-01-out-fake` follows `pin-01-out`, inverted by `pin-01-out-invert`. Load it with the port's name and the rest of the
-netlist stays as it is.
+HAL_COMPONENT(SimParport, "sim_parport", "Simulated parallel port", R"(
+Has all pins of `hal_parport` for both directions, with the same names, and for each a `-fake` pin for the outside: `pin-02-in` follows
+`pin-02-in-fake`, `pin-01-out-fake` follows `pin-01-out`, inverted by `pin-01-out-invert`. Load it under the port's name; the rest of the
+netlist needs no change.
 
     loadrt sim_parport names=parport.0
     addf parport.0.read base-thread

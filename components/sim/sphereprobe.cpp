@@ -14,8 +14,8 @@ struct Sphereprobe : hal::Component {
     hal::In<std::int32_t> cy{*this, "cy", "centre, y, in counts"};
     hal::In<std::int32_t> cz{*this, "cz", "centre, z, in counts"};
     hal::In<std::int32_t> r{*this, "r", "radius in counts"};
-    hal::Out<bool>        probe_out{*this, "probe-out", "TRUE: the probe touches"};
-    hal::Function         run{*this, "", &Sphereprobe::update, "looks whether the probe touches"};
+    hal::Out<bool>        probe_out{*this, "probe-out", "TRUE while the probe touches"};
+    hal::Function         run{*this, "", &Sphereprobe::update, "detects contact of the probe"};
 
     void update(hal::Cycle) noexcept {
         const double x = away(px, cx), y = away(py, cy), z = away(pz, cz), radius = static_cast<double>(r);
@@ -30,8 +30,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Sphereprobe, "sphereprobe", "Touches a hemisphere that is not there", R"(
-`probe-out` is TRUE while the probe is in or on the hemisphere around the centre (cx, cy, cz) with radius r that lies on a table at height
+HAL_COMPONENT(Sphereprobe, "sphereprobe", "Simulated probe over a hemisphere", R"(
+`probe-out` is TRUE while the probe is in or on the hemisphere with centre (cx, cy, cz) and radius r, which is on a table at height
 cz, or below the table.
 
     loadrt sphereprobe names=ball

@@ -9,26 +9,26 @@ namespace {
 struct SpringDamper : hal::Component {
     using Component::Component;
 
-    hal::In<double> force{*this, "force", "on the mass", {.unit = "N"}};
-    hal::In<double> base{*this, "base-position", "of the foot of spring and damper; it moves evenly within a period", {.unit = "m"}};
-    hal::In<bool> reset{*this, "reset", "while TRUE the mass rests where base-position is"};
+    hal::In<double> force{*this, "force", "force on the mass", {.unit = "N"}};
+    hal::In<double> base{*this, "base-position", "position of the base of spring and damper; linear within a period", {.unit = "m"}};
+    hal::In<bool> reset{*this, "reset", "TRUE holds the mass at base-position"};
 
-    hal::Param<double> mass{*this, "mass", "0: spring and damper only", {.initial = 1.0, .unit = "kg"}};
-    hal::Param<double> stiffness{*this, "stiffness", "of the spring", {.initial = 100.0, .unit = "N/m"}};
-    hal::Param<double> damping{*this, "damping", "of the damper", {.initial = 2.0, .unit = "N*s/m"}};
+    hal::Param<double> mass{*this, "mass", "mass; 0: spring and damper only", {.initial = 1.0, .unit = "kg"}};
+    hal::Param<double> stiffness{*this, "stiffness", "spring stiffness", {.initial = 100.0, .unit = "N/m"}};
+    hal::Param<double> damping{*this, "damping", "damping coefficient", {.initial = 2.0, .unit = "N*s/m"}};
 
-    hal::Out<double> position{*this, "position", "of the mass", {.unit = "m", .finite = true}};
-    hal::Out<double> velocity{*this, "velocity", "of the mass", {.unit = "m/s", .finite = true}};
-    hal::Out<double> reaction{*this, "reaction", "of spring and damper on the mass", {.unit = "N", .finite = true}};
-    hal::Out<double> energy{*this, "energy", "of mass and spring", {.unit = "J", .finite = true}};
+    hal::Out<double> position{*this, "position", "position of the mass", {.unit = "m", .finite = true}};
+    hal::Out<double> velocity{*this, "velocity", "velocity of the mass", {.unit = "m/s", .finite = true}};
+    hal::Out<double> reaction{*this, "reaction", "force of spring and damper on the mass", {.unit = "N", .finite = true}};
+    hal::Out<double> energy{*this, "energy", "energy of mass and spring", {.unit = "J", .finite = true}};
 
-    hal::Function run{*this, "update", &SpringDamper::update, "moves the mass on by one period"};
+    hal::Function run{*this, "update", &SpringDamper::update, "simulates one period"};
 
     void update(hal::Cycle cycle) noexcept {
         const double h = cycle.seconds(), foot = sim::force(base), pull = sim::force(force);
         const double c = sim::sane(stiffness, 0.0), d = sim::sane(damping, 0.0), m = sim::sane(mass, 0.0);
         const double foot_velocity = started_ ? (foot - foot_) / h : 0.0;
-        if (reset || !started_) heavy_.state = {reset ? 0.0 : -foot, 0.0};  // the stretch counts from the foot
+        if (reset || !started_) heavy_.state = {reset ? 0.0 : -foot, 0.0};  // the elongation is relative to the base
         if (!reset) {
             if (m > 0.0) move(m, c, d, pull, foot_velocity, h);
             else creep(c, d, pull, foot_velocity, h);
@@ -52,7 +52,7 @@ private:
         equations.b = {{{0, -1}, {1 / m, d / m}}};
         heavy_.step(equations, {pull, foot_velocity}, h);
     }
-    /// Without mass: d (x' - foot') = force - c stretch.
+    /// Without mass: d (x' - foot') = force - c elongation.
     void creep(double c, double d, double pull, double foot_velocity, double h) noexcept {
         double& stretch = heavy_.state[0];
         double slope = 0.0;
@@ -78,17 +78,17 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SpringDamper, "spring_damper", "A mass on a spring and a damper", R"(
+HAL_COMPONENT(SpringDamper, "spring_damper", "Simulated mass on a spring and a damper", R"(
     mass x'' = force - stiffness (x - base) - damping (x' - base')
 
-(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 2.1.) It swings at sqrt(stiffness / mass) rad/s with a
-damping ratio of damping / (2 sqrt(stiffness mass)), and rests at base + force / stiffness. `reaction` is what the spring and the damper
-do to the mass.
+(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 2.1.) The mass oscillates at sqrt(stiffness / mass) rad/s with a
+damping ratio of damping / (2 sqrt(stiffness mass)); its equilibrium is base + force / stiffness. `reaction` is the force of spring and damper
+on the mass.
 
-The equations are solved exactly for a force that stays constant and a base that moves evenly over a period, so any period is stable.
-Parameters may change at any time; a cycle in which one does costs some microseconds more. Negative ones count as 0. With `mass` 0 spring
-and damper follow the force at once, by the time constant damping / stiffness; with none of the three nothing moves. The mass starts at 0;
-`reset` rests it on the base.
+The equations are solved exactly for a constant force and a base with constant velocity within a period, so any period is stable.
+Parameters may change at any time; such a cycle takes a few microseconds longer. Negative values count as 0. With `mass` 0 spring
+and damper follow the force with the time constant damping / stiffness; if all three are 0, nothing moves. The mass starts at 0;
+`reset` sets it to the base.
 
     loadrt spring_damper names=contact
     addf contact.update servo
