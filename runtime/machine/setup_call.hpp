@@ -42,16 +42,21 @@ private:
     }
 };
 
-/// After the end was asked for, names the call that holds it up, and ends the process when it does not return within 15 s.
+/// Names a call that does not return within 2 s. After end_soon() it ends the process when the call does not return within 15 s.
 class SetupGuard {
 public:
-    ~SetupGuard() { *over_ = true; }
-    /// [any] The end was asked for.
-    void end_soon();
+    struct Flags {
+        std::atomic<bool> ending{false}, over{false};
+    };
+
+    SetupGuard();
+    ~SetupGuard() { flags_->over = true; }
+    SetupGuard(const SetupGuard&) = delete;
+    /// Reports that the end was requested. [any]
+    void end_soon() { flags_->ending = true; }
 
 private:
-    std::shared_ptr<std::atomic<bool>> over_ = std::make_shared<std::atomic<bool>>(false);
-    std::atomic<bool> begun_{false};
+    std::shared_ptr<Flags> flags_ = std::make_shared<Flags>();
 };
 
 }  // namespace hal

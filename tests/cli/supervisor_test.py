@@ -225,8 +225,16 @@ class Supervisor(Case):
         machine.send_signal(signal.SIGTERM)
         err = machine.communicate(timeout=120)[1]
         self.assertEqual(1, machine.returncode)
-        self.assertEqual("hal: 'stuck.0' (stuck) has not returned from stop; the machine ends after it, at the latest in 13 s\n"
-                         "hal: 'stuck.0' (stuck) has not returned from stop for 15 s; outputs were set to their safe values; the process ends\n", err)
+        self.assertEqual("hal: 'stuck.0' (stuck) has not returned from stop for 2 s; the machine ends when it returns, at the latest in 13 s\n"
+                         "hal: 'stuck.0' (stuck) has not returned from stop for 15 s; outputs set to their safe values; the process ends\n", err)
+
+    def test_component_whose_start_does_not_return_is_named_while_the_machine_goes_on(self):
+        machine = self.start("run", self.write("a.hal", "newthread servo 1000000\nloadrt stuck start=1\naddf stuck.0 servo\n"), loaded=False)
+        self.assertEqual("hal: 'stuck.0' (stuck) has not returned from start for 2 s; all commands wait for it\n", machine.stderr.readline())
+        machine.send_signal(signal.SIGTERM)
+        err = machine.communicate(timeout=120)[1]
+        self.assertEqual(1, machine.returncode)
+        self.assertIn("(stuck) has not returned from start for 2 s; the machine ends when it returns, at the latest in 13 s\n", err)
 
     def test_limit_of_its_own(self):
         self.machine("supervise=30ms")
