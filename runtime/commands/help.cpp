@@ -18,13 +18,13 @@ std::string names_of(const CommandRow& row) { return *row.also ? std::string(row
 
 void command_source(Context& context) { context.script.source(context); }
 
-// Those of the file that is run are gone by now: its nodes' parts are taken before the first command.
+// The node lines of the main file have been removed by now: parts are selected before the first command runs.
 void command_node(Context& context) {
     const bool typed = context.session.sources.get(context.command.span.source).name.starts_with('<');
     context.diagnostics.error("misplaced-node", context.command.name.span,
-                              std::string("`node` lines ") + (typed ? "are not typed" : "do not stand in a file that another one reads"),
+                              std::string("`node` lines ") + (typed ? "are not allowed in the shell" : "are not allowed in a file that is read by `source`"),
                               "",
-                              typed ? "write them in a netlist, and type: hal run FILE --node " + context.argument(0)
+                              typed ? "write them in a netlist, then type: hal run FILE --node " + context.argument(0)
                                     : "write `node " + context.argument(0) + "` above the `source` line");
 }
 
@@ -49,8 +49,8 @@ void command_debug(Context& context) {
     int level = -1;
     const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), level);
     if (status != std::errc{} || end != text.data() + text.size() || level < 0 || level > 5) {
-        context.diagnostics.error("unknown-word", context.span(0), "'" + text + "' is no level", "",
-                                  "levels go from 0 (nothing) to 5 (everything)");
+        context.diagnostics.error("unknown-word", context.span(0), "'" + text + "' is not a valid level", "",
+                                  "levels are 0..5: 0 prints nothing, 5 everything");
         return;
     }
     context.shell.options.level = static_cast<Level>(std::min(level, 3));
@@ -60,7 +60,7 @@ void command_help(Context& context) {
     if (context.count() == 0) {
         std::string text;
         for (const auto& row : command_table()) text += fmt::format("  {:<14} {}\n", names_of(row), row.summary);
-        context.output.out(text + "`help COMMAND` says more about one, `explain CODE` about an error.\n");
+        context.output.out(text + "`help COMMAND` describes a command, `explain CODE` an error.\n");
         return;
     }
     const std::string& name = context.argument(0);
@@ -78,7 +78,7 @@ void command_explain(Context& context) {
     if (!page.empty()) return context.output.out(page + "\n");
     std::vector<std::string> codes;
     for (const CodePage& row : all_code_pages()) codes.emplace_back(row.name);
-    context.diagnostics.error("unknown-word", context.span(0), "there is no error code '" + code + "'", did_you_mean(code, codes));
+    context.diagnostics.error("unknown-word", context.span(0), "unknown error code '" + code + "'", did_you_mean(code, codes));
 }
 
 void command_quit(Context& context) { context.script.quit(); }

@@ -69,7 +69,7 @@ std::string clock_text(const Session& session) {
     const auto clock = session.clock_report();
     if (!clock) return {};
     const auto shift = static_cast<double>(clock->shift_ns);
-    return fmt::format("The threads follow the beat of {}: {} {} than by their own clock, of late {:+.1f} ppm\n", clock->leader,
+    return fmt::format("Clock disciplined by {}: {} {} than the local clock, drift {:+.1f} ppm\n", clock->leader,
                        format_duration(std::abs(shift)), shift < 0 ? "earlier" : "later", clock->rate * 1e6);
 }
 

@@ -31,7 +31,7 @@ std::int64_t timeout_option(Context& context, std::size_t i) {
     if (i < context.count())
         if (const auto time = parse_duration_ns(context.argument(i), false); time && *time >= 1'000'000 && *time <= 86'400'000'000'000)
             return *time;
-    context.diagnostics.error("unknown-option", context.span(i), "-t takes a time from 1ms to 24h, such as -t 10s");
+    context.diagnostics.error("unknown-option", context.span(i), "-t requires a duration of 1ms..24h, such as -t 10s");
     return 0;
 }
 
@@ -44,13 +44,13 @@ bool restart_option(Context& context, Plan& plan, std::size_t i, const std::stri
             {"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
         const auto word = std::find_if(std::begin(words), std::end(words), [&](const auto& w) { return value == w.first; });
         if (word != std::end(words)) plan.restart.when = word->second;
-        else context.diagnostics.error("unknown-option", context.span(i), "--restart is no, on-failure or always", "", context.usage());
+        else context.diagnostics.error("unknown-option", context.span(i), "--restart must be no, on-failure or always", "", context.usage());
         return true;
     }
     if (key != "--restart-delay") return false;
     if (const auto delay = parse_duration_ns(value, false); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000)
         plan.restart.delay_ns = *delay;
-    else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay is a time from 10ms to 1h", "", context.usage());
+    else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay must be a duration of 10ms..1h", "", context.usage());
     return true;
 }
 
@@ -81,16 +81,16 @@ bool read_options(Context& context, Plan& plan) {
     }
     plan.program = i;
     if (plan.timeout_ns != 0 && !plan.wait_ready && !plan.wait_end) {
-        context.diagnostics.error("unknown-option", context.span(0), "-t limits the wait of -W, -Wn or -w; none of them is given", "", context.usage());
+        context.diagnostics.error("unknown-option", context.span(0), "-t requires -W, -Wn or -w, whose wait it limits", "", context.usage());
         return false;
     }
     if (plan.wait_end && plan.restart.when != Restart::no) {
-        context.diagnostics.error("unknown-option", context.span(0), "-w waits for a program's end, --restart does not let it end", "", context.usage());
+        context.diagnostics.error("unknown-option", context.span(0), "-w and --restart exclude each other: -w waits for the program to end, --restart starts it again", "", context.usage());
         return false;
     }
     if (i == context.count()) {
-        context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' needs a program to start",
-                                  "something is missing", context.usage());
+        context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' requires the name of a program",
+                                  "missing program", context.usage());
         return false;
     }
     if (plan.name.empty()) {
@@ -119,7 +119,7 @@ public:
     void close_writers() {
         for (auto& pipe : pipes_) close_one(pipe[1]);
     }
-    /// Hands on what has come, waiting at most so long for something. False when both ends are closed.
+    /// Passes on what has arrived; waits at most `timeout_ms` for it. False when both ends are closed.
     bool pass_on(Output& output, int timeout_ms) {
         std::array<pollfd, 2> ready{pollfd{pipes_[0][0], POLLIN, 0}, pollfd{pipes_[1][0], POLLIN, 0}};
         poll(ready.data(), ready.size(), timeout_ms);
@@ -129,11 +129,11 @@ public:
             ssize_t got;
             while ((got = read(pipes_[i][0], text.data(), text.size())) > 0) {
                 const std::string_view part(text.data(), static_cast<std::size_t>(got));
-                if (total_ > most) continue;  // read and thrown away, so that the program is not held up
+                if (total_ > most) continue;  // read and discarded, so that the program does not block
                 total_ += part.size();
                 if (i == 0) output.out(part);
                 else output.err(part);
-                if (total_ > most) output.err("\n(output cut here: more than 1 MiB)\n");
+                if (total_ > most) output.err("\n(output truncated after 1 MiB)\n");
             }
             if (got == 0) close_one(pipes_[i][0]);
         }
@@ -150,10 +150,10 @@ private:
     std::size_t total_ = 0;
 };
 
-/// How long a command has waited: when it is time to report it, and when it is enough.
-class Patience {
+/// How long a command has waited: when to report it, and when to give up.
+class Timeout {
 public:
-    explicit Patience(std::int64_t limit_ns) : limit_(limit_ns) {}
+    explicit Timeout(std::int64_t limit_ns) : limit_(limit_ns) {}
     bool over() const { return limit_.count() != 0 && waited() >= limit_; }
     /// True after 1 s, 10 s, and then every minute.
     bool report_due() {
@@ -169,9 +169,9 @@ private:
     std::chrono::nanoseconds limit_, report_ = 1s;
 };
 
-void report_wait(Context& context, Patience& patience, const auto& what) {
-    if (!patience.report_due() || context.options().level == Level::nothing) return;
-    const std::string text = context.command.name.text + ": " + what() + " (" + patience.text() + ")\n";
+void report_wait(Context& context, Timeout& timeout, const auto& what) {
+    if (!timeout.report_due() || context.options().level == Level::nothing) return;
+    const std::string text = context.command.name.text + ": " + what() + " (" + timeout.text() + ")\n";
     context.lock.unlock();
     context.output.notice(text);
     context.lock.lock();
@@ -183,7 +183,7 @@ void timed_out(Context& context, std::int64_t limit_ns, const std::string& what,
 }
 
 /// Waits until the name that the program is to have is free or a dead program's. False after reporting.
-bool wait_for_name(Context& context, const Plan& plan, Patience& patience) {
+bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
     while (true) {
         const auto* const entry = context.processes.find(plan.name);
         const bool dead = entry && entry->dead(), runs = entry && entry->child && !entry->ended;
@@ -196,14 +196,14 @@ bool wait_for_name(Context& context, const Plan& plan, Patience& patience) {
                                       "in use", entry ? "end the program first: unload " + plan.name : "give the program another name");
             return false;
         }
-        if (patience.over()) {
+        if (timeout.over()) {
             timed_out(context, plan.timeout_ns, "the previous '" + plan.name + "' (process " + std::to_string(entry->pid) + ") did not end",
                       "nothing was started; kill -9 " + std::to_string(entry->pid) + " ends it by force");
             return false;
         }
-        report_wait(context, patience, [&] {
+        report_wait(context, timeout, [&] {
             return "waiting for the previous '" + plan.name + "' to end: process " + std::to_string(entry->pid) +
-                   (entry->stopping ? " has got SIGTERM and still runs" : " has lost its connection and still runs");
+                   (entry->stopping ? " received SIGTERM but is still running" : " lost its connection but is still running");
         });
         if (context.interrupted()) return false;
         context.processes.wait(context.lock, 100ms);
@@ -212,7 +212,7 @@ bool wait_for_name(Context& context, const Plan& plan, Patience& patience) {
 
 constexpr const char* initializing = "has registered it and is initializing";
 
-/// Why the component that is waited for is not there yet: what the program has done so far.
+/// Why the awaited component is not ready yet: what the program has done so far.
 std::string progress(Context& context, const Plan& plan, pid_t pid) {
     const auto* const entry = context.processes.find(plan.name);
     if (entry && entry->owner != 0 && !entry->dead()) return initializing;
@@ -223,7 +223,7 @@ std::string progress(Context& context, const Plan& plan, pid_t pid) {
 }
 
 /// `fresh`: no dead program had the name before.
-void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64_t number, bool fresh, Patience& patience) {
+void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64_t number, bool fresh, Timeout& timeout) {
     const std::string& program = context.argument(plan.program);
     std::string last = "has not registered a component";
     while (true) {
@@ -238,17 +238,17 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
             context.diagnostics.error(
                 "program-ended", context.span(plan.program), "'" + program + "' ended before a component '" + plan.name + "' was ready", "",
                 registered                                 ? "it registered the component and ended while it was initializing"
-                : last == "has not registered a component" ? "a program registers over the control socket; without -W nobody waits for it"
+                : last == "has not registered a component" ? "a program registers over the control socket; omit -W if it does not"
                                                            : "it " + last);
             if (fresh && entry && entry->dead()) context.processes.give_up(*entry);
             return;
         }
-        if (patience.over()) {
+        if (timeout.over()) {
             if (entry) context.processes.give_up(*entry);
             return timed_out(context, plan.timeout_ns, "component '" + plan.name + "' was not ready",
-                             "'" + program + "' " + last + "; it was ended");
+                             "'" + program + "' " + last + "; it was terminated");
         }
-        report_wait(context, patience, [&] {
+        report_wait(context, timeout, [&] {
             return "waiting for component '" + plan.name + "': '" + program + "' (process " + std::to_string(pid) + ") " + last;
         });
         if (context.interrupted()) return;
@@ -256,12 +256,12 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
     }
 }
 
-void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes, const Patience& patience) {
+void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes, const Timeout& timeout) {
     while (true) {
         const auto* const entry = context.processes.find(pid);
         if (entry->ended) break;
-        if (patience.over()) {
-            timed_out(context, plan.timeout_ns, "'" + context.argument(plan.program) + "' did not end", "the program was ended");
+        if (timeout.over()) {
+            timed_out(context, plan.timeout_ns, "'" + context.argument(plan.program) + "' did not end", "the program was terminated");
             context.processes.give_up(*context.processes.find(pid));
             return context.processes.abandon(pid);
         }
@@ -282,9 +282,9 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
     if (pipes) pipes->pass_on(context.output, 0);
     if (status == 0 || plan.ignore_status) return;
     const std::string how =
-        status > 128 ? "was ended by signal " + std::to_string(status - 128) : "failed with exit status " + std::to_string(status);
+        status > 128 ? "was terminated by signal " + std::to_string(status - 128) : "failed with exit status " + std::to_string(status);
     context.diagnostics.error("program-failed", context.span(plan.program), "'" + context.argument(plan.program) + "' " + how, "",
-                              "-i before the program's name ignores the status");
+                              "-i before the name of the program ignores the status");
 }
 
 }  // namespace
@@ -306,8 +306,8 @@ void command_loadusr(Context& context) {
         start.err = pipes->err();
     }
 
-    Patience patience(plan.timeout_ns);
-    if (!plan.any_name && !plan.wait_end && !wait_for_name(context, plan, patience)) return;
+    Timeout timeout(plan.timeout_ns);
+    if (!plan.any_name && !plan.wait_end && !wait_for_name(context, plan, timeout)) return;
     const bool fresh = !plan.any_name && !context.processes.find(plan.name);
     std::string problem;
     const pid_t pid = context.processes.start(start, plan.wait_end, problem);
@@ -316,11 +316,11 @@ void command_loadusr(Context& context) {
         return;
     }
     if (pipes) pipes->close_writers();
-    if (plan.wait_end) return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr, patience);
-    // A program that will say its name itself is entered under its process's name until then.
+    if (plan.wait_end) return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr, timeout);
+    // A program that registers its own name later is listed under the name of its process until then.
     const std::uint64_t number = context.processes.add(pid, plan.name, context.command, !plan.any_name);
     context.processes.keep_alive(pid, start, plan.restart);
-    if (plan.wait_ready) wait_until_ready(context, plan, pid, number, fresh, patience);
+    if (plan.wait_ready) wait_until_ready(context, plan, pid, number, fresh, timeout);
 }
 
 void command_waitusr(Context& context) {
@@ -328,7 +328,7 @@ void command_waitusr(Context& context) {
     const std::int64_t limit_ns = limited ? timeout_option(context, 1) : 0;
     if (context.diagnostics.failed()) return;
     if (context.count() != (limited ? 3U : 1U)) {
-        context.diagnostics.error("wrong-arguments", context.command.span, "'waitusr' needs one program", "", context.usage());
+        context.diagnostics.error("wrong-arguments", context.command.span, "'waitusr' requires one program", "", context.usage());
         return;
     }
     const std::size_t at = limited ? 2 : 0;
@@ -338,9 +338,9 @@ void command_waitusr(Context& context) {
         if (component)
             context.diagnostics.error("not-a-program", context.span(at), "'" + name + "' is a component in this process, not a program", "",
                                       "waitusr waits for programs started by loadusr");
-        return;  // gone already: that is what was waited for
+        return;  // it has already ended
     }
-    const Patience patience(limit_ns);
+    const Timeout timeout(limit_ns);
     // the one that has the name now; another that takes the name over meanwhile is not waited for
     const std::uint64_t number = context.processes.find(name)->number;
     const auto living = [&]() -> const Processes::Entry* {
@@ -349,7 +349,7 @@ void command_waitusr(Context& context) {
         return lives ? entry : nullptr;
     };
     while (const auto* const entry = living()) {
-        if (patience.over())
+        if (timeout.over())
             return timed_out(context, limit_ns,
                              "'" + name + "' (process " + std::to_string(entry->pid) + ", " + entry->state() + ") did not end", "");
         if (context.interrupted()) return;
@@ -361,8 +361,8 @@ namespace {
 
 void no_program(Context& context, const std::string& name) {
     const auto names = context.processes.names();
-    context.diagnostics.error("not-a-program", context.span(0), "there is no program '" + name + "'", did_you_mean(name, names),
-                              names.empty() ? "no program runs" : "programs: " + listed(names));
+    context.diagnostics.error("not-a-program", context.span(0), "unknown program '" + name + "'", did_you_mean(name, names),
+                              names.empty() ? "no program is running" : "programs: " + listed(names));
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ void command_status(Context& context) {
     const std::string_view what = context.argument_or(0, "all");
     if (what == "instance") return context.output.out(context.session.status_text());
     if (what != "all" && what != "lock" && what != "mem") {
-        context.diagnostics.error("unknown-word", context.span(0), "there is no status of '" + std::string(what) + "'", "",
+        context.diagnostics.error("unknown-word", context.span(0), "unknown status '" + std::string(what) + "'", "",
                                   "the choices are: lock, mem, instance, all");
         return;
     }
@@ -170,8 +170,8 @@ void show_faults(Context& context) {
 void command_fault(Context& context) {
     Session& session = context.session;
     if (context.argument(0) == "clear") return context.transaction->when_committed([&session] { session.clear_faults(); });
-    context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' cannot be done to faults", "",
-                              "type `fault clear`, or `show fault` to see them");
+    context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' is not an action on faults", "",
+                              "type `fault clear`; `show fault` lists the faults");
 }
 
 }  // namespace hal

@@ -225,7 +225,7 @@ void command_save(Context& context) {
     if (!known) {
         std::vector<std::string> names{"all", "allu"};
         for (const Section& section : sections) names.emplace_back(section.name);
-        context.diagnostics.error("unknown-word", context.span(0), "there is no '" + std::string(wanted) + "' to save",
+        context.diagnostics.error("unknown-word", context.span(0), "unknown kind '" + std::string(wanted) + "'",
                                   did_you_mean(wanted, names), "the choices are: " + listed(names, names.size()));
         return;
     }

@@ -48,9 +48,11 @@ Script::Parsed Script::parse_text(std::uint32_t source) {
         };
     parsed.commands = parse(session_.sources, source, {state_.ini ? &*state_.ini : &session_.ini, std::move(variable)},
                             parsed.problems);
-    for (Command& command : parsed.commands)  // quotes stay in the words of a netlist, and are no part of a file's name
-        if (command.name.text == "source" || command.name.text == "save")
+    for (Command& command : parsed.commands) {  // quotes remain in the words of a netlist, but do not belong to the name of a file
+        const CommandRow* const row = find_command(command.name.text);
+        if (row && (row->flags & command_path))
             for (Token& word : command.args) word.text = without_quotes(word.text);
+    }
     const auto files = std::count_if(files_.begin(), files_.end(), [](const Open& open) { return !open.path.empty(); });
     if (files <= 1 && !session_.sources.get(source).name.starts_with('<')) take_part(source, parsed);
     return parsed;
@@ -89,7 +91,7 @@ int Script::run(std::uint32_t source) {
         forget_collected(0);
         if (!failed_) {
             pending_.error("open-transaction", {}, "'begin' without 'commit': " + counted(lost, "collected edit") + " did not take effect",
-                           "", "end the row of edits with commit");
+                           "", "end the transaction with commit");
             finish();
         }
     }
@@ -145,7 +147,7 @@ void Script::run_line(const Command& command) {
         lines_.push_back(command.span);
         pending_.error("unknown-command", command.name.span, "unknown command '" + command.name.text + "'",
                        did_you_mean(command.name.text, command_names()),
-                       argument ? "an assignment has blanks around the =: NAME = VALUE" : "`help` lists all commands");
+                       argument ? "write spaces around the = of an assignment: NAME = VALUE" : "`help` lists all commands");
         return;
     }
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) return lines_.push_back(command.span);
@@ -165,7 +167,7 @@ void Script::edit(const Command& command, const CommandRow& row) {
     lines_.push_back(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
-    if (command.name.text == "unload" && !shell_.options.check) {
+    if ((row.flags & command_programs) && !shell_.options.check) {
         Context context{*this, shell_, session_, *state_.processes, output_, row, command, pending_, lock_, &transaction()};
         if (unload_processes(context)) return;
     }
@@ -227,7 +229,7 @@ void Script::act(const Command& command, const CommandRow& row) {
 }
 
 bool Script::collect(const Command& command, const CommandRow& row) {
-    const bool acts = row.function.act == command_start || row.function.act == command_stop;
+    const bool acts = (row.flags & command_collected) != 0;
     if (row.edits() || (row.flags & command_deferred) || acts) {
         const auto other = std::find_if(state_.collected.begin(), state_.collected.end(), [&](const Command& one) {
             return acts && one.name.text != command.name.text && (row_of(one)->flags & command_collected);
@@ -235,9 +237,9 @@ bool Script::collect(const Command& command, const CommandRow& row) {
         if (other != state_.collected.end()) {
             Diagnostic found{Severity::error,
                              "open-transaction",
-                             "'" + command.name.text + "' and '" + other->name.text + "' are in one transaction",
+                             "'" + command.name.text + "' and '" + other->name.text + "' cannot be in the same transaction",
                              {{command.name.span, "second"}, {other->name.span, "first"}},
-                             {"all of a transaction happens together; commit first, then type " + command.name.text}};
+                             {"all commands of a transaction take effect together; commit first, then type " + command.name.text}};
             pending_.add(std::move(found));
             lines_.push_back(command.span);
             return true;
@@ -266,13 +268,13 @@ void Script::group(const Command& command) {
     if (stop() || shell_.options.check) return;
     if (name == "begin") {
         if (state_.collecting)
-            pending_.error("open-transaction", command.name.span, "edits are being collected already", "",
-                           "`commit` makes them take effect, `abort` forgets them");
+            pending_.error("open-transaction", command.name.span, "a transaction is already open", "",
+                           "`commit` applies the collected edits, `abort` discards them");
         else collected_before_ = 0;
         state_.collecting = true;
     } else if (!state_.collecting) {
-        pending_.error("no-transaction", command.name.span, "there is nothing to " + name + ": no 'begin' came before", "",
-                       "`begin` starts to collect edits");
+        pending_.error("no-transaction", command.name.span, "no open transaction to " + name + ": 'begin' is missing", "",
+                       "`begin` opens a transaction");
     } else if (name == "abort") {
         state_.collecting = false;
         forget_collected(0);
@@ -306,8 +308,8 @@ void Script::source(Context& context) {
     for (auto open = files_.begin(); open != files_.end(); ++open) {
         if (open->path != canonical) continue;
         Diagnostic found{
-            Severity::error, "recursive-source", "'" + given + "' is being read already", {{context.span(0), "reads it again"}}, {}};
-        for (auto inner = open + 1; inner != files_.end(); ++inner) found.labels.push_back({inner->at, "reached from here"});
+            Severity::error, "recursive-source", "'" + given + "' includes itself", {{context.span(0), "included again"}}, {}};
+        for (auto inner = open + 1; inner != files_.end(); ++inner) found.labels.push_back({inner->at, "included from here"});
         context.diagnostics.add(std::move(found));
         return;
     }

@@ -132,7 +132,7 @@ int Shell::run_file(const std::string& path, Output& output) {
     if (path.ends_with(".ini")) return run_ini(path, output);
     if (path.ends_with(".tcl"))
         return cannot_read(*this, output, path, "it is a Tcl script", "unsupported-file",
-                           "only .hal and .ini files are read; loops and name lists are written with [0..5] and {x,y,z}");
+                           "only .hal and .ini files are supported; write loops and name lists with [0..5] and {x,y,z}");
     std::string text, problem;
     if (!read_text_file(resolve_path(path, options.directory), text, problem, true)) {
         if (options.check) state_->session.note_missing_text(path);
@@ -175,10 +175,10 @@ int Shell::run_ini(const std::string& path, Output& output) {
             }
             if (options.check) state_->session.note_missing_text(file);
             status = script ? cannot_read(*this, output, file, problem, "unsupported-file",
-                                          "write it as a .hal file; loops become ranges: pid.[0..5].command")
+                                          "rewrite it as a .hal file; loops become ranges: pid.[0..5].command")
                             : cannot_read(*this, output, file, problem, "unreadable-file",
                                           "named by [HAL]" + std::string(key) + " in " + path +
-                                              "; HALLIB_PATH and HALLIB_DIR name further folders to search");
+                                              "; HALLIB_PATH and HALLIB_DIR are further search paths");
         }
     };
     if (options.check) note_programs(state_->session, ini);

@@ -192,7 +192,7 @@ const Kind* find_kind(Context& context, bool to_list) {
         if (kind.name == wanted) return &kind;
         names.emplace_back(kind.name);
     }
-    context.diagnostics.error("unknown-word", context.span(0), "there is no '" + std::string(wanted) + "' to " + context.command.name.text,
+    context.diagnostics.error("unknown-word", context.span(0), "unknown kind '" + std::string(wanted) + "'",
                               did_you_mean(wanted, names), "the kinds are: " + listed(names, names.size()));
     return nullptr;
 }

@@ -22,7 +22,7 @@ struct Processes;
 class Script;
 struct CommandRow;
 
-/// One command that is being executed by its function. The session's mutex is held; who waits gives it back meanwhile.
+/// One command that is being executed by its function. The mutex of the session is held; a command that waits releases it meanwhile.
 struct Context {
     Script& script;
     Shell& shell;
@@ -33,8 +33,8 @@ struct Context {
     const Command& command;
     Diagnostics& diagnostics;            ///< an error in here is the command's failure
     std::unique_lock<std::mutex>& lock;
-    Transaction* transaction = nullptr;  ///< of a deferred command: where it queues what it does
-    unsigned* locks = nullptr;           ///< of a deferred command: Session::lock as it is when the transaction has taken effect
+    Transaction* transaction = nullptr;  ///< of a deferred command: the transaction that queues its action
+    unsigned* locks = nullptr;           ///< of a deferred command: Session::lock after the commit
 
     const ShellOptions& options() const { return shell.options; }
     std::size_t count() const { return command.args.size(); }
@@ -48,7 +48,7 @@ struct Context {
     bool interrupted();
 };
 
-/// What a command does: an edit changes the model, all others act on the machine or look at it.
+/// What a command does: an edit changes the model, all others act on the machine or read it.
 struct CommandFunction {
     using Act = void (*)(Context&);
     using Edit = void (*)(Elaboration&, std::span<const Token>);
@@ -59,23 +59,25 @@ struct CommandFunction {
 };
 
 enum CommandFlags : unsigned {
-    command_plain = 0,        ///< acts on the machine: what was edited before takes effect first
-    command_apart = 1,        ///< does not look at the machine: does not end a transaction
+    command_plain = 0,        ///< acts on the machine: pending edits take effect first
+    command_apart = 1,        ///< does not access the machine: does not end a transaction
     command_waits = 2,        ///< may wait for something outside
     command_transaction = 4,  ///< begin, commit, abort
-    command_checked = 8,      ///< works the same way under `hal check`
-    command_query = 16,       ///< only looks at the machine, with the edits made so far: does not end a transaction
-    command_deferred = 32,    ///< part of a transaction: happens when it has taken effect, and not at all when it does not
-    command_collected = 64,   ///< acts at once, but after `begin` it is deferred
+    command_checked = 8,      ///< executed under `hal check`, too
+    command_query = 16,       ///< only reads the machine, including the edits made so far: does not end a transaction
+    command_deferred = 32,    ///< part of a transaction: executed after its commit, and not at all after a rollback
+    command_collected = 64,   ///< start, stop: acts at once, but after `begin` it is deferred
     command_arrows = 128,     ///< an edit with arrows among its arguments
     command_traceless = 256,  ///< an edit that leaves nothing in the model that points into its text
     command_each = 512,       ///< takes one name; a range of them is a command for each
+    command_path = 1024,      ///< its arguments may be paths: quotes around them are removed
+    command_programs = 2048,  ///< an edit that also ends programs
 };
 
 struct CommandRow {
     const char* name;
     const char* also;       ///< a second name, or ""
-    std::string_view arguments;  ///< what Usage says; the number of arguments follows from it
+    std::string_view arguments;  ///< see Usage; the number of arguments follows from it
     const char* summary;    ///< one line
     const char* help;       ///< more about it, or ""
     CommandFunction function;
@@ -98,7 +100,7 @@ std::vector<std::string> command_names();
 /// Applies an edit by its row. Reports unknown-command when there is none.
 void apply_edit(Transaction& transaction, const Command& command, Diagnostics& diagnostics);
 
-/// Checks the locks. False after reporting which one and how to take it off. Values of pins and signals are free, as in LinuxCNC.
+/// Checks the locks. False after reporting the lock and how to release it. Values of pins and signals are never locked, as in LinuxCNC.
 bool check_lock(const CommandRow& row, const Command& command, unsigned lock, const Model& model, Diagnostics& diagnostics);
 
 /// Makes a command that sets `NAME VALUE` a sets when NAME is a signal, else a setp.
@@ -131,7 +133,7 @@ void command_unlock(Context&);
 void command_loadusr(Context&);
 void command_waitusr(Context&);
 void command_unloadusr(Context&);
-/// The part of `unload NAME|all` that is about processes, a deferred command. True: nothing is left to do.
+/// The part of `unload NAME|all` that ends programs, a deferred command. True: nothing remains to be done.
 bool unload_processes(Context&);
 // help.cpp
 void command_source(Context&);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Name ranges and sets: `[0..5]`, `{x,y,z}`.
 #include <algorithm>
-#include <array>
 #include <charconv>
 
 #include "netlist/netlist.hpp"
@@ -15,7 +14,7 @@ constexpr std::size_t most_bytes = std::size_t{256} << 20;     // of text that o
 constexpr std::size_t most_parts = 1000;                       // ranges and literals of one word
 constexpr std::size_t word_overhead = sizeof(Token);
 
-/// A stretch of a word: a literal, the numbers from `first` to `last`, or the elements of a set.
+/// A segment of a word: a literal, the numbers from `first` to `last`, or the elements of a set.
 struct Part {
     std::string_view literal;
     std::vector<std::string_view> elements;
@@ -332,8 +331,6 @@ private:
 }  // namespace
 
 std::vector<Command> expand(const Command& command, Diagnostics& diagnostics) {
-    static constexpr std::array<std::string_view, 7> literal{"print", "echo", "unecho", "help", "loadusr", "source", "save"};
-    if (std::find(literal.begin(), literal.end(), command.name.text) != literal.end()) return {command};
     const bool plain = !has_range(command.name.text) &&
                        std::none_of(command.args.begin(), command.args.end(), [](const Token& t) { return has_range(t.text); });
     if (plain) return {command};

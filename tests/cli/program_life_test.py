@@ -183,7 +183,7 @@ os._exit(3)
         self.assertIn(f"the previous 'uc' (process {deaf}) did not end within 100 ms [program-timeout]",
                       self.refused("loadusr", "-t", "100ms", "-Wn", "uc", *self.slow("uc")))
         waiter = self.background(str(HAL), "shell", "loadusr", "-Wn", "uc", *self.slow("uc", value="5"))
-        self.assertIn(f"waiting for the previous 'uc' to end: process {deaf} has got SIGTERM and still runs", waiter.stderr.readline())
+        self.assertIn(f"waiting for the previous 'uc' to end: process {deaf} received SIGTERM but is still running", waiter.stderr.readline())
         os.kill(deaf, signal.SIGKILL)
         waiter.communicate(timeout=60)
         self.assertEqual(0, waiter.returncode)

@@ -108,7 +108,7 @@ class PythonTest(Case):
         wait_until(lambda: self.state() == "ready" and self.pid() != first, "it is started again")
         self.assertEqual(0, self.shell("unloadusr", "echo").returncode)
         wait_until(lambda: self.state() == "", "unloadusr ends it for good")
-        self.assertIn("--restart is no, on-failure or always", self.shell("loadusr", "--restart=sometimes", "true").stderr)
+        self.assertIn("--restart must be no, on-failure or always", self.shell("loadusr", "--restart=sometimes", "true").stderr)
 
     def test_a_program_that_always_fails_is_given_up(self):
         self.machine(SERVO + "start\nloadusr --restart=on-failure --restart-delay=10ms false\n")

@@ -82,13 +82,6 @@ TEST_F(Expansion, leaves_quotes_alone) {
     EXPECT_EQ(expanded("setp \"{a,b}\"[0..1] '[0..1]'"), "setp \"{a,b}\"0 '[0..1]'\nsetp \"{a,b}\"1 '[0..1]'\n");
 }
 
-TEST_F(Expansion, leaves_commands_alone_that_take_text) {
-    for (const char* line :
-         {"print {a,b} [0..1] {", "loadusr prog {a,b} {}", "source {a,b}.hal", "echo {", "help [0..x]", "save all {a,b}"})
-        EXPECT_EQ(expanded(line), std::string(line) + "\n");
-    EXPECT_EQ(render(found, sources), "");
-}
-
 TEST_F(Expansion, points_at_the_word_a_name_came_from) {
     const auto commands = parse("net j[0..1] a.{x,y}.out");
     ASSERT_EQ(commands.size(), 1u);

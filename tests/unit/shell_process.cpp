@@ -30,7 +30,7 @@ TEST(Process, waited_for_its_output_and_status_come_back) {
     std::filesystem::permissions(script, std::filesystem::perms::owner_all);
     EXPECT_EQ(machine.line("loadusr -w " + script), 1);
     EXPECT_EQ(machine.out, "out\n");
-    EXPECT_TRUE(has(machine.err, "err\n") && has(machine.err, "was ended by signal 15")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "err\n") && has(machine.err, "was terminated by signal 15")) << machine.err;
     EXPECT_EQ(machine.says("list comp"), "\n");
 }
 

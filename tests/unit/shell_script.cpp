@@ -314,8 +314,8 @@ TEST_F(Files, a_file_that_reads_itself_is_refused_with_the_way_round) {
     folder.write("a.hal", "source b.hal\n");
     folder.write("b.hal", "# b\nsource ./a.hal\n");
     EXPECT_EQ(machine.path("a.hal"), 1);
-    EXPECT_TRUE(has(machine.err, "b.hal:2:8: error: './a.hal' is being read already [recursive-source]")) << machine.err;
-    EXPECT_TRUE(has(machine.err, "reached from here")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "b.hal:2:8: error: './a.hal' includes itself [recursive-source]")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "included from here")) << machine.err;
 }
 
 TEST_F(Files, a_file_beside_the_one_that_names_it_is_found) {

@@ -342,7 +342,7 @@ TEST(Transactions, what_cannot_be_part_of_one_is_rejected_and_leaves_it_open) {
     ASSERT_EQ(world.machine.line("newsig new bit"), 0);
     ASSERT_EQ(world.machine.line("stop"), 0);
     EXPECT_EQ(world.machine.line("start"), 1);
-    EXPECT_TRUE(has(world.machine.err, "'start' and 'stop' are in one transaction")) << world.machine.err;
+    EXPECT_TRUE(has(world.machine.err, "'start' and 'stop' cannot be in the same transaction")) << world.machine.err;
     EXPECT_EQ(world.machine.line("commit"), 0) << world.machine.err;
     EXPECT_FALSE(world.machine.session.running());
     EXPECT_NE(world.machine.session.model().find_signal("new"), nullptr);

@@ -53,7 +53,7 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
     if (!refused.empty())
         return fail(options, fmt::format("{} cannot be checked: its constructor fails: {}; load arguments go behind --", built.name, refused));
     if (found == 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))
-        return fail(options, WIFSIGNALED(status) ? fmt::format("{} cannot be checked: the check was ended by signal {}", built.name, WTERMSIG(status))
+        return fail(options, WIFSIGNALED(status) ? fmt::format("{} cannot be checked: the check was terminated by signal {}", built.name, WTERMSIG(status))
                                                  : fmt::format("{} cannot be checked: the check ended with status {}", built.name, WEXITSTATUS(status)));
     return found == 0 ? 0 : 1;
 }
