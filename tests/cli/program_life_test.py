@@ -289,7 +289,7 @@ class KilledMachine(LifeCase):
         program = self.background(sys.executable, "echo.py", HALCYON_LOST="end")
         wait_until(lambda: self.state("echo") == "ready", "it is ready")
         self.kill(machine)
-        self.assertRegex(program.communicate(timeout=60)[1], r"^echo: the machine 'default' \(process \d+\) is gone; ending\n")
+        self.assertRegex(program.communicate(timeout=60)[1], r"^echo: the machine 'default' \(process \d+\) has ended; ending\n")
 
     def test_programs_in_c(self):
         if SANITIZED:
@@ -305,7 +305,7 @@ class KilledMachine(LifeCase):
         program = self.background(str(follow), HALCYON_LOST="end")
         wait_until(lambda: self.state("follow") == "ready", "it is ready")
         self.kill(machine)
-        self.assertIn(" is gone; ending\n", program.communicate(timeout=60)[1])
+        self.assertIn(" has ended; ending\n", program.communicate(timeout=60)[1])
         self.assertEqual(0, program.returncode)
 
 

@@ -221,7 +221,7 @@ static void be_lost(void) {
     const char *const wanted = getenv("HALCYON_LOST");
     const bool end = wanted && strcmp(wanted, "end") == 0;
     if (end && tied) return; /* the kernel's SIGTERM, or the machine's, is on its way */
-    rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) is gone; %s\n", name_of_program, instance(), machine,
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) has ended; %s\n", name_of_program, instance(), machine,
                     end ? "ending" : "pins keep their values until it is back (HALCYON_LOST=end ends the program instead)");
     if (end) kill(getpid(), SIGTERM);
 }
