@@ -127,7 +127,7 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     if (!good_instance_name(instance) || path.size() >= sizeof address.sun_path) {
-        problem = "'" + s.instance + "' is no name for an instance";
+        problem = "'" + s.instance + "' is not a valid instance name";
         return nullptr;
     }
     path.copy(address.sun_path, sizeof address.sun_path - 1);
@@ -138,7 +138,7 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
             problem = "instance '" + s.instance + "' belongs to another user";
         } else {
             const auto running = running_instances();
-            problem = "no instance '" + s.instance + "' runs here; " +
+            problem = "no instance '" + s.instance + "' is running; " +
                       (running.empty() ? "start one with `hal run FILE.hal`" : "running: " + listed(running) + " (choose with --name)");
         }
         return nullptr;
@@ -158,7 +158,7 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
         s.in.erase(0, end + 1);
     }
     if (!hello.is_object() || hello.value("halcyon", 0) != 1) {
-        problem = hello.is_object() ? "instance '" + s.instance + "' speaks another version of the protocol"
+        problem = hello.is_object() ? "instance '" + s.instance + "' uses another version of the protocol"
                                     : "instance '" + s.instance + "' does not answer";
         return nullptr;
     }

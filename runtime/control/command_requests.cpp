@@ -41,7 +41,7 @@ void append_answer(int status, const Shell& shell, const Reply& output, std::str
 void Connection::State::run(const Json& body, std::string& reply) {
     if (!body["run"].is_array()) return execute(body, text_of(body["run"], "run"), false, reply);
     const auto words = names_in(body["run"], "run");
-    if (words.empty()) throw Refusal{"run needs a command: a line, or its words"};
+    if (words.empty()) throw RequestError{"run requires a command: a line, or its words"};
     const Json& name = member(body, "name");
     Reply output(event);
     const int status = shell.execute(words, output, name.is_null() ? "<commandline>" : text_of(name, "name"));
@@ -56,11 +56,11 @@ void Connection::State::execute(const Json& body, const std::string& text, bool 
     if (!name.is_null()) text_of(name, "name");
     std::uint32_t number = 1;
     if (const Json& line = member(body, "line"); !line.is_null()) {
-        if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) throw Refusal{"line must be a number from 1"};
+        if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) throw RequestError{"line must be a number, 1 or more"};
         number = line.get<std::uint32_t>();
     }
     if (!env.is_null()) {
-        if (!env.is_object()) throw Refusal{"env must be an object of names and strings"};
+        if (!env.is_object()) throw RequestError{"env must be an object of names and strings"};
         environment.clear();
         for (const auto& [key, value] : env.items()) environment[key] = text_of(value, "a value in env");
         shell.look_up([this](const std::string& key) -> std::optional<std::string> {
@@ -80,9 +80,9 @@ namespace {
 /// The entries of a client's INI file: [SECTION, KEY, VALUE] each.
 Ini ini_of(const Json& entries) {
     Ini ini;
-    if (!entries.is_array()) throw Refusal{"ini must be a list of [SECTION, KEY, VALUE]"};
+    if (!entries.is_array()) throw RequestError{"ini must be a list of [SECTION, KEY, VALUE]"};
     for (const Json& entry : entries) {
-        if (!entry.is_array() || entry.size() != 3) throw Refusal{"an entry of ini must be [SECTION, KEY, VALUE]"};
+        if (!entry.is_array() || entry.size() != 3) throw RequestError{"an entry of ini must be [SECTION, KEY, VALUE]"};
         ini.add(text_of(entry[0], "a section"), text_of(entry[1], "a key"), text_of(entry[2], "a value"));
     }
     return ini;
@@ -96,24 +96,24 @@ void Connection::State::options(const Json& body, std::string&) {
         {"json", &ShellOptions::json}, {"color", &ShellOptions::color}, {"notes", &ShellOptions::notes}};
     static constexpr const char* levels[] = {"nothing", "errors", "results", "debug"};
     const Json& given = body["options"];
-    if (!given.is_object()) throw Refusal{"options must be an object"};
+    if (!given.is_object()) throw RequestError{"options must be an object"};
     ShellOptions wanted = shell.options;
     std::optional<Ini> ini;
     for (const auto& [key, value] : given.items()) {
         const auto flag = std::find_if(std::begin(flags), std::end(flags), [&, k = key](const auto& f) { return k == f.first; });
         if (flag != std::end(flags)) {
-            if (!value.is_boolean()) throw Refusal{key + " must be true or false"};
+            if (!value.is_boolean()) throw RequestError{key + " must be true or false"};
             wanted.*flag->second = value.get<bool>();
         } else if (key == "level") {
             const auto level = std::find(std::begin(levels), std::end(levels), text_of(value, "level"));
-            if (level == std::end(levels)) throw Refusal{"level must be nothing, errors, results or debug"};
+            if (level == std::end(levels)) throw RequestError{"level must be nothing, errors, results or debug"};
             wanted.level = static_cast<Level>(level - std::begin(levels));
         } else if (key == "directory") {
             wanted.directory = text_of(value, "directory");
         } else if (key == "ini") {
             ini = ini_of(value);
         } else {
-            throw Refusal{"there is no option '" + key.substr(0, 60) + "'"};
+            throw RequestError{"unknown option '" + key.substr(0, 60) + "'"};
         }
     }
     shell.options = std::move(wanted);

@@ -79,18 +79,18 @@ const Verb& verb_of(const Json& body) {
         if (verb == std::end(verbs)) continue;
         if (found && listed_in(found->members, verb->name)) continue;  // read is a member of exchange, too
         if (found && !listed_in(verb->members, found->name))
-            throw Refusal{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
+            throw RequestError{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
         found = verb;
     }
     if (!found) {
         std::vector<std::string> names;
         for (const Verb& verb : verbs) names.emplace_back(verb.name);
-        throw Refusal{"there is no verb in this request; the verbs are: " + listed(names, names.size())};
+        throw RequestError{"missing verb; a request has one of: " + listed(names, names.size())};
     }
     for (auto entry = body.begin(); entry != body.end(); ++entry) {
         const std::string& key = entry.key();
         if (key != "id" && key != found->name && !listed_in(found->members, key))
-            throw Refusal{"'" + key.substr(0, 60) + "' is no member of a request to " + found->name};
+            throw RequestError{"'" + key.substr(0, 60) + "' is not a valid member of a request to " + found->name};
     }
     return *found;
 }
@@ -128,12 +128,12 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
     };
     if (too_deep(line)) {
         ++state.rubbish;
-        return refuse("more than " + std::to_string(deepest) + " brackets within each other");
+        return refuse("more than " + std::to_string(deepest) + " nested brackets");
     }
     const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
     if (!body.is_object()) {
         ++state.rubbish;
-        return refuse(body.is_discarded() ? "this is not JSON; a request is one JSON object in one line" : "a request is a JSON object");
+        return refuse(body.is_discarded() ? "invalid JSON; a request is one JSON object on one line" : "a request is a JSON object");
     }
     if (const Json& given = member(body, "id");
         given.is_number() || (given.is_string() && given.get_ref<const std::string&>().size() <= 200))
@@ -152,7 +152,7 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         replies += "{\"id\":" + id + ",\"ok\":true";
         (state.*verb.handle)(body, replies);
         replies += "}\n";
-    } catch (const Refusal& refusal) {
+    } catch (const RequestError& refusal) {
         replies.resize(before);
         return refuse(refusal.sentence);
     } catch (const std::bad_alloc&) {

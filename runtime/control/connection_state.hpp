@@ -37,7 +37,7 @@ struct Connection::State {
     bool stop = false;
     std::function<void(std::string)> event;
 
-    // Each appends the members of its reply after "ok":true, beginning with a comma, or throws Refusal before anything.
+    // Each appends the members of its reply after "ok":true, beginning with a comma, or throws RequestError before anything.
     void run(const Json& body, std::string& reply);
     void script(const Json& body, std::string& reply);
     void options(const Json& body, std::string& reply);
@@ -60,17 +60,17 @@ struct Connection::State {
     void port(const Json& body, std::string& reply) { use_port({shell, session, peer, owner}, body, reply); }
     void stream(const Json& body, std::string& reply) { use_stream({shell, session, peer, owner}, body, reply); }
     void end(const Json& body, std::string&) {
-        if (body["stop"] != true) throw Refusal{"stop must be true"};
+        if (body["stop"] != true) throw RequestError{"stop must be true"};
         stop = true;
     }
     void cancelled(const Json& body, std::string&) {
-        if (body["cancel"] != true) throw Refusal{"cancel must be true"};
+        if (body["cancel"] != true) throw RequestError{"cancel must be true"};
     }
 
     /// A verb that changes the model at once is not for a connection that collects edits.
     void no_begin(const char* verb) const {
         if (shell.collecting())
-            throw Refusal{std::string("'") + verb + "' cannot be part of a transaction; this connection has an open 'begin': commit or abort it first"};
+            throw RequestError{std::string("'") + verb + "' cannot be part of a transaction; this connection has an open 'begin': commit or abort it first"};
     }
     void execute(const Json& body, const std::string& text, bool script, std::string& reply);
 

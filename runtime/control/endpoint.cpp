@@ -23,14 +23,14 @@ std::string system_reason() { return std::strerror(errno); }
 bool private_folder(const std::string& folder, Diagnostics& diagnostics) {
     struct stat about{};
     if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-        diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' cannot be made: " + system_reason(), "",
+        diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' cannot be created: " + system_reason(), "",
                           "set XDG_RUNTIME_DIR to a folder of your own");
         return false;
     }
     if (lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) && about.st_uid == geteuid()) {
         if ((about.st_mode & 0077) == 0 || chmod(folder.c_str(), 0700) == 0) return true;
     }
-    diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' is not yours alone", "",
+    diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' belongs to another user or is accessible to others", "",
                       "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
     return false;
 }
@@ -46,8 +46,8 @@ std::string content_of(int file) {
 
 bool Endpoint::open(std::string_view name, Diagnostics& diagnostics) {
     if (!good_instance_name(name)) {
-        diagnostics.error("no-socket", {}, "'" + std::string(name) + "' is no name for an instance", "",
-                          "up to 64 letters, digits, -, _ and ., not beginning with a dot");
+        diagnostics.error("no-socket", {}, "'" + std::string(name) + "' is not a valid instance name", "",
+                          "use up to 64 letters, digits, -, _ and ., without a leading dot");
         return false;
     }
     path_ = socket_path(name);
@@ -72,13 +72,13 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
             const std::string pid = content_of(lock_);
             diagnostics.error("instance-running", {},
-                              "an instance named '" + std::string(name) + "' runs already" + (pid.empty() ? "" : " (process " + pid + ")"),
-                              "", "give this one another name with --name" + (pid.empty() ? "" : ", or end that one: kill " + pid));
+                              "an instance named '" + std::string(name) + "' is already running" + (pid.empty() ? "" : " (process " + pid + ")"),
+                              "", "choose another name with --name" + (pid.empty() ? "" : ", or end the running instance: kill " + pid));
             close(lock_);
             lock_ = -1;
             return false;
         }
-        // Whoever ended between our open and our lock took the file away: then we hold the lock of nothing.
+        // An instance that ended between our open and our lock has removed the file: then we hold the lock of a deleted file.
         struct stat locked{}, there{};
         if (fstat(lock_, &locked) == 0 && stat(file.c_str(), &there) == 0 && locked.st_ino == there.st_ino) break;
         close(lock_);

@@ -39,7 +39,7 @@ hal_value value_of(const Json& value, hal_type type, const std::string& of) {
     if (word.empty()) parsed.problem = "it must be a number, true, false or a string";
     else if (type == HAL_TYPE_PORT) parsed.problem = "a port has no value";
     else parsed = parse_value(type, word);
-    if (!parsed.problem.empty()) throw Refusal{"the value of '" + of + "': " + parsed.problem};
+    if (!parsed.problem.empty()) throw RequestError{"the value of '" + of + "': " + parsed.problem};
     return parsed.value;
 }
 
@@ -49,35 +49,35 @@ bool good_pin_name(const std::string& name) {
 }
 
 OutsidePin pin_of(const Json& given, const std::string& prefix) {
-    if (!given.is_object()) throw Refusal{"a pin must be an object with name, type and dir"};
+    if (!given.is_object()) throw RequestError{"a pin must be an object with name, type and dir"};
     OutsidePin pin;
     const std::string& name = text_of(member(given, "name"), "the name of a pin");
-    if (!good_pin_name(name)) throw Refusal{"'" + name.substr(0, 60) + "' is no good name for a pin"};
+    if (!good_pin_name(name)) throw RequestError{"'" + name.substr(0, 60) + "' is not a valid pin name"};
     pin.name = prefix + "." + name;
     const auto type = type_named(text_of(member(given, "type"), "the type of a pin"));
-    if (!type) throw Refusal{"the type of '" + pin.name + "' must be bit, float, s32, u32, s64, u64 or port"};
+    if (!type) throw RequestError{"the type of '" + pin.name + "' must be bit, float, s32, u32, s64, u64 or port"};
     pin.type = *type;
     const std::string& dir = text_of(member(given, "dir"), "the dir of a pin");
     const auto direction = std::find_if(std::begin(directions), std::end(directions), [&](const Direction& d) { return dir == d.word; });
     if (direction == std::end(directions))
-        throw Refusal{"the dir of '" + pin.name + "' must be in, out or io, or for a parameter ro or rw"};
+        throw RequestError{"the dir of '" + pin.name + "' must be in, out or io, or for a parameter ro or rw"};
     pin.dir = direction->dir;
     pin.read_only = direction->read_only;
     if (pin.type == HAL_TYPE_PORT && pin.dir != HAL_DIR_IN && pin.dir != HAL_DIR_OUT)
-        throw Refusal{"port pin '" + pin.name + "' must be in or out"};
+        throw RequestError{"port pin '" + pin.name + "' must be in or out"};
     for (const auto& [key, value] : given.items()) {
         if (key == "value") pin.initial = value_of(value, pin.type, pin.name);
         else if (key == "safe") pin.safe = value_of(value, pin.type, pin.name);
         else if (key == "doc") pin.doc = text_of(value, "doc");
         else if (key == "unit") pin.unit = text_of(value, "unit");
-        else if (key != "name" && key != "type" && key != "dir") throw Refusal{"'" + key.substr(0, 60) + "' is no member of a pin"};
+        else if (key != "name" && key != "type" && key != "dir") throw RequestError{"'" + key.substr(0, 60) + "' is not a valid member of a pin"};
     }
     return pin;
 }
 
 Processes::Entry& owned(const Program& by, const std::string& name) {
     Processes::Entry* const entry = by.shell.processes().owned(name, by.owner);
-    if (!entry) throw Refusal{"this connection has no component '" + name.substr(0, 60) + "'; say {\"component\":…} first"};
+    if (!entry) throw RequestError{"this connection has no component '" + name.substr(0, 60) + "'; send {\"component\":…} first"};
     return *entry;
 }
 
@@ -99,7 +99,7 @@ Pin* add_pin(const Program& by, Transaction& transaction, const Processes::Entry
     }
     std::string problem;
     Pin* const made = by.session.add_outside_pin(transaction, entry.name, wanted, problem);
-    if (!made) throw Refusal{problem};
+    if (!made) throw RequestError{problem};
     return made;
 }
 
@@ -126,27 +126,27 @@ void add_pins(const Program& by, Processes::Entry& entry, const std::vector<Outs
         taken.insert(made.back());
     }
     Diagnostics refused;
-    if (!transaction.commit(refused)) throw Refusal{render(refused, by.session.sources)};
+    if (!transaction.commit(refused)) throw RequestError{render(refused, by.session.sources)};
     entry.pins.insert(entry.pins.end(), made.begin(), made.end());
 }
 
 }  // namespace
 
 void declare_component(const Program& by, const Json& body, std::string& reply) {
-    if (by.peer <= 0) throw Refusal{"this process has no process ID here: it runs outside of the machine's PID namespace"};
+    if (by.peer <= 0) throw RequestError{"no process ID: the program runs outside the PID namespace of the machine"};
     const std::string& name = text_of(body["component"], "component");
     const Json &prefix = member(body, "prefix"), &pins = member(body, "pins"), &ready = member(body, "ready"),
                &timeout = member(body, "timeout_ms"), &every = member(body, "every_ms"), &safe = member(body, "safe");
     if (!safe.is_null() && (!safe.is_array() || safe.size() % 2 != 0))
-        throw Refusal{"safe must be an array of numbers of pins and their declared values, in turn"};
-    if (!ready.is_null() && !ready.is_boolean()) throw Refusal{"ready must be true or false"};
+        throw RequestError{"safe must be an array of alternating pin numbers and declared values"};
+    if (!ready.is_null() && !ready.is_boolean()) throw RequestError{"ready must be true or false"};
     const std::string before = prefix.is_null() ? name : text_of(prefix, "prefix");
-    if (!good_pin_name(before)) throw Refusal{"'" + before.substr(0, 60) + "' is no good prefix"};
+    if (!good_pin_name(before)) throw RequestError{"'" + before.substr(0, 60) + "' is not a valid prefix"};
     const std::int64_t timeout_ms = timeout.is_null() ? 0 : whole(timeout, "timeout_ms", -1, 86'400'000);
     const std::int64_t every_ms = every.is_null() ? 0 : whole(every, "every_ms", 0, 86'400'000);
     std::vector<OutsidePin> wanted;
     if (!pins.is_null()) {
-        if (!pins.is_array() || pins.size() > most_pins) throw Refusal{"pins must be an array of at most " + std::to_string(most_pins)};
+        if (!pins.is_array() || pins.size() > most_pins) throw RequestError{"pins must be an array of at most " + std::to_string(most_pins)};
         for (const Json& pin : pins) wanted.push_back(pin_of(pin, before));
     }
 
@@ -157,7 +157,7 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
     const Processes::Entry* const there = processes.find(name);
     const bool was_dead = there && there->dead();
     if (fresh) {
-        if (const std::string why = processes.announce(by.peer, name, by.owner, false); !why.empty()) throw Refusal{why};
+        if (const std::string why = processes.announce(by.peer, name, by.owner, false); !why.empty()) throw RequestError{why};
         entry = processes.owned(name, by.owner);
     }
     const std::size_t first = entry->pins.size();
@@ -168,7 +168,7 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
             pin->safe = value;
             pin->flags |= HAL_PIN_SAFE;
         }
-    } catch (const Refusal&) {
+    } catch (const RequestError&) {
         if (fresh && was_dead) processes.die(*entry, "its pins were rejected");  // it keeps the pins and links it had
         else if (fresh) processes.leave(*entry);
         throw;
@@ -192,10 +192,10 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
 void exchange_values(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["exchange"], "exchange");
     const Json &write = member(body, "write"), &read = member(body, "read"), &alive = member(body, "alive");
-    if (!alive.is_null() && !alive.is_boolean()) throw Refusal{"alive must be true or false"};
+    if (!alive.is_null() && !alive.is_boolean()) throw RequestError{"alive must be true or false"};
     if (!write.is_null() && (!write.is_array() || write.size() % 2 != 0))
-        throw Refusal{"write must be an array of numbers of pins and their values, in turn"};
-    if (!read.is_null() && !read.is_boolean()) throw Refusal{"read must be true or false"};
+        throw RequestError{"write must be an array of alternating pin numbers and values"};
+    if (!read.is_null() && !read.is_boolean()) throw RequestError{"read must be true or false"};
 
     const std::scoped_lock lock(by.session.mutex);
     Processes::Entry& entry = owned(by, name);
@@ -250,9 +250,9 @@ std::string bytes_of(const std::string& hex) {
         if (c >= '0' && c <= '9') return c - '0';
         if (c >= 'a' && c <= 'f') return c - 'a' + 10;
         if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-        throw Refusal{"bytes are written as pairs of hexadecimal digits"};
+        throw RequestError{"bytes are written as pairs of hexadecimal digits"};
     };
-    if (hex.size() % 2 != 0) throw Refusal{"bytes are written as pairs of hexadecimal digits"};
+    if (hex.size() % 2 != 0) throw RequestError{"bytes are written as pairs of hexadecimal digits"};
     for (std::size_t i = 0; i < hex.size(); i += 2) bytes += static_cast<char>(digit(hex[i]) * 16 + digit(hex[i + 1]));
     return bytes;
 }
@@ -269,15 +269,15 @@ void append_hex(std::string& to, std::uint8_t byte) {
 void use_port(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["port"], "port");
     const Json &read = member(body, "read"), &peek = member(body, "peek"), &write = member(body, "write");
-    if (!read.is_null() + !peek.is_null() + !write.is_null() > 1) throw Refusal{"a port is read, peeked into or written, one at a time"};
+    if (!read.is_null() + !peek.is_null() + !write.is_null() > 1) throw RequestError{"a request either reads, peeks into or writes a port"};
     const bool takes = !read.is_null() || !peek.is_null();
     const std::scoped_lock lock(by.session.mutex);
     Pin* const pin = by.session.model().find_pin(name);
-    if (!pin || !pin->instance) throw Refusal{"unknown pin '" + name.substr(0, 60) + "'"};
+    if (!pin || !pin->instance) throw RequestError{"unknown pin '" + name.substr(0, 60) + "'"};
     owned(by, pin->instance->component->name);
-    if (pin->type != HAL_TYPE_PORT) throw Refusal{"pin '" + name + "' is no port"};
-    if (takes && pin->dir != HAL_DIR_IN) throw Refusal{"port '" + name + "' is an output: it is written"};
-    if (!write.is_null() && pin->dir != HAL_DIR_OUT) throw Refusal{"port '" + name + "' is an input: it is read"};
+    if (pin->type != HAL_TYPE_PORT) throw RequestError{"pin '" + name + "' is not a port"};
+    if (takes && pin->dir != HAL_DIR_IN) throw RequestError{"port '" + name + "' is an output: use write"};
+    if (!write.is_null() && pin->dir != HAL_DIR_OUT) throw RequestError{"port '" + name + "' is an input: use read or peek"};
     hal_port* const port = pin->signal ? pin->signal->port.get() : nullptr;
     const std::uint64_t capacity = port ? port->capacity : 0;
     std::uint64_t head = port ? __atomic_load_n(&port->head, __ATOMIC_ACQUIRE) : 0,
@@ -309,16 +309,16 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
 namespace {
 
 void create_stream(const Program& by, const std::string& name, const Json& wanted, const Json& owner) {
-    if (!wanted.is_object()) throw Refusal{"create must be an object with types and depth"};
+    if (!wanted.is_object()) throw RequestError{"create must be an object with types and depth"};
     Processes::Entry& entry = owned(by, text_of(owner, "owner"));
     const std::string& letters = text_of(member(wanted, "types"), "types");
     const auto depth = static_cast<std::uint32_t>(whole(member(wanted, "depth"), "depth", 1, 1'000'000));
-    if (letters.empty() || letters.size() > 100) throw Refusal{"a stream has 1 to 100 columns"};
+    if (letters.empty() || letters.size() > 100) throw RequestError{"a stream has 1..100 columns"};
     for (const char letter : letters)
         if (std::none_of(types.begin(), types.end(), [&](const TypeRow& row) { return row.number && row.letter == letter; }))
-            throw Refusal{std::string("'") + letter + "' is no type of a column; they are: b f s u l k"};
-    if (!good_pin_name(name)) throw Refusal{"'" + name.substr(0, 60) + "' is no good name for a stream"};
-    if (by.session.find_stream(name) || by.shell.processes().find_stream(name)) throw Refusal{"there is a stream '" + name + "' already"};
+            throw RequestError{std::string("'") + letter + "' is not a valid column type; valid types: b f s u l k"};
+    if (!good_pin_name(name)) throw RequestError{"'" + name.substr(0, 60) + "' is not a valid stream name"};
+    if (by.session.find_stream(name) || by.shell.processes().find_stream(name)) throw RequestError{"stream '" + name + "' already exists"};
     auto made = std::make_shared<ProgramStream>();
     made->name = name;
     made->types = letters;
@@ -334,7 +334,7 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["stream"], "stream");
     const Json &take = member(body, "take"), &records = member(body, "records"), &create = member(body, "create");
     if (!take.is_null() + !records.is_null() + !create.is_null() > 1)
-        throw Refusal{"a stream is read (take), fed (records) or made (create), one at a time"};
+        throw RequestError{"a request either reads (take), feeds (records) or creates (create) a stream"};
     const std::scoped_lock lock(by.session.mutex);
     if (!create.is_null()) create_stream(by, name, create, member(body, "owner"));
     hal_stream* stream = by.session.find_stream(name);
@@ -347,25 +347,25 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
         const auto more = by.shell.processes().stream_names();
         names.insert(names.end(), more.begin(), more.end());
         const std::string meant = did_you_mean(name, names);
-        throw Refusal{"there is no stream '" + name.substr(0, 60) + "'; " +
-                      (names.empty()   ? "nothing here has one (sampler and streamer do)"
-                       : meant.empty() ? "there is: " + listed(names)
+        throw RequestError{"unknown stream '" + name.substr(0, 60) + "'; " +
+                      (names.empty()   ? "no loaded component has a stream (sampler and streamer have one)"
+                       : meant.empty() ? "available: " + listed(names)
                                        : meant)};
     }
     std::string why;
     if (!take.is_null()) {
         const auto most = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
-        if (!take_records(*stream, most, reply, why)) throw Refusal{why};
+        if (!take_records(*stream, most, reply, why)) throw RequestError{why};
     } else if (!records.is_null()) {
-        if (!records.is_array()) throw Refusal{"records must be an array of arrays"};
+        if (!records.is_array()) throw RequestError{"records must be an array of arrays"};
         std::vector<std::vector<std::string>> words;
         for (const Json& record : records) {
-            if (!record.is_array()) throw Refusal{"records must be an array of arrays"};
+            if (!record.is_array()) throw RequestError{"records must be an array of arrays"};
             std::vector<std::string> row;
             for (const Json& value : record) row.push_back(value_word(value));
             words.push_back(std::move(row));
         }
-        if (!feed_records(*stream, words, reply, why)) throw Refusal{why};
+        if (!feed_records(*stream, words, reply, why)) throw RequestError{why};
     }
     describe_stream(*stream, reply);
 }

@@ -21,7 +21,7 @@ struct Program {
     std::uint64_t owner;  ///< the connection's number
 };
 
-// Each appends the members of its reply, beginning with a comma, or throws Refusal.
+// Each appends the members of its reply, beginning with a comma, or throws RequestError.
 void declare_component(const Program& by, const nlohmann::json& body, std::string& reply);
 void exchange_values(const Program& by, const nlohmann::json& body, std::string& reply);
 void leave_component(const Program& by, const nlohmann::json& body);

@@ -11,7 +11,7 @@
 namespace hal {
 
 /// Why a request cannot be executed; becomes {"ok":false,"error":…}.
-struct Refusal {
+struct RequestError {
     std::string sentence;
 };
 
@@ -23,14 +23,14 @@ inline const nlohmann::json& member(const nlohmann::json& body, const char* key)
 }
 
 inline const std::string& text_of(const nlohmann::json& value, const char* what) {
-    if (!value.is_string()) throw Refusal{std::string(what) + " must be a string"};
+    if (!value.is_string()) throw RequestError{std::string(what) + " must be a string"};
     return value.get_ref<const std::string&>();
 }
 
 inline std::vector<std::string> names_in(const nlohmann::json& value, const char* what) {
     constexpr std::size_t most = 100'000;
-    if (!value.is_array()) throw Refusal{std::string(what) + " must be an array of names"};
-    if (value.size() > most) throw Refusal{std::string(what) + " has more than " + std::to_string(most) + " names"};
+    if (!value.is_array()) throw RequestError{std::string(what) + " must be an array of names"};
+    if (value.size() > most) throw RequestError{std::string(what) + " has more than " + std::to_string(most) + " names"};
     std::vector<std::string> names;
     for (const nlohmann::json& name : value) names.push_back(text_of(name, "a name"));
     return names;
@@ -38,7 +38,7 @@ inline std::vector<std::string> names_in(const nlohmann::json& value, const char
 
 inline std::int64_t whole(const nlohmann::json& value, const char* what, std::int64_t least, std::int64_t most) {
     if (!value.is_number_integer() || value < least || value > most)
-        throw Refusal{std::string(what) + " must be a whole number from " + std::to_string(least) + " to " + std::to_string(most)};
+        throw RequestError{std::string(what) + " must be a whole number from " + std::to_string(least) + " to " + std::to_string(most)};
     return value.get<std::int64_t>();
 }
 

@@ -210,7 +210,7 @@ void Server::State::accept_clients() {
         socklen_t size = sizeof peer;
         if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 || (peer.uid != geteuid() && peer.uid != 0)) {
             ++refused;
-            log("a client of user " + std::to_string(peer.uid) + " was refused");
+            log("rejected a client of user " + std::to_string(peer.uid));
             close(fd);
             continue;
         }
@@ -255,9 +255,9 @@ void Server::State::close_idle(Client& client) {
     ++reclaimed;
     const std::string idle = std::to_string((steady_ns() - client.active_ns) / 1'000'000'000) + " s";
     client.out += "{\"event\":\"closed\",\"reason\":\"more than " + std::to_string(options.max_clients) +
-                  " clients are connected, and this one made no request for " + idle + "\"}\n";
+                  " clients are connected, and this one sent no request for " + idle + "\"}\n";
     send_out(client);
-    log("closed a client that made no request for " + idle + ": more than " + std::to_string(options.max_clients) + " are connected");
+    log("disconnected a client without a request for " + idle + ": more than " + std::to_string(options.max_clients) + " clients are connected");
     leave(client);
     shutdown(client.fd, SHUT_RDWR);
 }
@@ -383,7 +383,7 @@ void Server::State::send_out(Client& client) {
     if (client.stalled_since == 0) client.stalled_since = now;
     if (now - client.stalled_since < std::int64_t{options.stall_ms} * 1'000'000) return;
     ++dropped;
-    log("a client was dropped: " + std::to_string(client.waiting()) + " bytes of replies waited and it read nothing for " +
+    log("disconnected a client: " + std::to_string(client.waiting()) + " bytes of replies pending, nothing read for " +
         std::to_string(options.stall_ms) + " ms");
     leave(client);
 }

@@ -34,7 +34,7 @@ void describe_stream(const hal_stream& stream, std::string& to) {
 
 bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::string& why) {
     if (stream.to_machine) {
-        why = "this stream is fed, not read: send records";
+        why = "this stream is written, not read: use records";
         return false;
     }
     const auto columns = column_types(stream);
@@ -65,14 +65,14 @@ bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::
 
 bool feed_records(hal_stream& stream, const std::vector<std::vector<std::string>>& records, std::string& to, std::string& why) {
     if (!stream.to_machine) {
-        why = "this stream is read, not fed: ask with take";
+        why = "this stream is read, not written: use take";
         return false;
     }
     const auto columns = column_types(stream);
     std::vector<hal_value> parsed;
     for (std::size_t i = 0; i < records.size(); ++i) {
         if (records[i].size() != columns.size()) {
-            why = "record " + std::to_string(i) + " has " + std::to_string(records[i].size()) + " values, the stream " +
+            why = "record " + std::to_string(i) + " has " + std::to_string(records[i].size()) + " values, the stream has " +
                   std::to_string(columns.size());
             return false;
         }

@@ -27,11 +27,11 @@ void Connection::State::read(const Json& body, std::string& reply) {
 
 void Connection::State::set(const Json& body, std::string& reply) {
     const Json& values = body["set"];
-    if (!values.is_object()) throw Refusal{"set must be an object of names and values"};
+    if (!values.is_object()) throw RequestError{"set must be an object of names and values"};
     std::vector<Command> commands;
     for (const auto& [key, value] : values.items()) {
         const std::string word = value_word(value);
-        if (word.empty()) throw Refusal{"the value of '" + key.substr(0, 60) + "' must be a number, true, false or a string"};
+        if (word.empty()) throw RequestError{"the value of '" + key.substr(0, 60) + "' must be a number, true, false or a string"};
         commands.push_back({{"setp", {}}, {{key, {}}, {word, {}}}, {}});
     }
     if (shell.collecting()) {  // part of what `commit` makes take effect
@@ -48,7 +48,7 @@ void Connection::State::set(const Json& body, std::string& reply) {
         if (!check_lock(row, command, session.lock, session.model(), diagnostics)) break;
         transaction.apply(row.form(), command, diagnostics);
     }
-    if (!transaction.commit(diagnostics)) throw Refusal{render(diagnostics, session.sources) + "nothing was changed"};
+    if (!transaction.commit(diagnostics)) throw RequestError{render(diagnostics, session.sources) + "nothing was changed"};
     reply += ",\"count\":" + std::to_string(commands.size());
 }
 
@@ -57,22 +57,22 @@ void Connection::State::subscribe(const Json& body, std::string& reply) {
     const Json& every = member(body, "every_ms");
     const std::int64_t every_ms = every.is_null() ? 100 : whole(every, "every_ms", 1, 3'600'000);
     const Json& changes = member(body, "changes");
-    if (!changes.is_null() && !changes.is_boolean()) throw Refusal{"changes must be true or false"};
+    if (!changes.is_null() && !changes.is_boolean()) throw RequestError{"changes must be true or false"};
     const std::uint64_t number = subscriptions.add(std::move(names), every_ms * 1'000'000, changes.is_boolean() && changes.get<bool>());
-    if (number == 0) throw Refusal{"a client has at most " + std::to_string(Subscriptions::most) + " subscriptions"};
+    if (number == 0) throw RequestError{"a client has at most " + std::to_string(Subscriptions::most) + " subscriptions"};
     reply += ",\"subscription\":" + std::to_string(number);
 }
 
 void Connection::State::unsubscribe(const Json& body, std::string&) {
     const auto id = static_cast<std::uint64_t>(whole(body["unsubscribe"], "unsubscribe", 1, std::numeric_limits<std::int64_t>::max()));
-    if (!subscriptions.remove(id)) throw Refusal{"there is no subscription " + std::to_string(id)};
+    if (!subscriptions.remove(id)) throw RequestError{"unknown subscription " + std::to_string(id)};
 }
 
 namespace {
 
 Listed kind_of(const Json& value, const char* verb) {
     const auto kind = listed_kind(text_of(value, verb));
-    if (!kind) throw Refusal{std::string(verb) + " knows: comp, pin, sig, param, funct, thread, alias, all"};
+    if (!kind) throw RequestError{std::string(verb) + " must be one of comp, pin, sig, param, funct, thread, alias, all"};
     return *kind;
 }
 
@@ -101,7 +101,7 @@ void Connection::State::describe_kind(const Json& body, std::string& reply) {
     std::optional<hal_type> type;
     if (const Json& wanted = member(body, "type"); !wanted.is_null()) {
         type = type_named(text_of(wanted, "type"));
-        if (!type) throw Refusal{"type must be bit, float, s32, u32, s64, u64 or port"};
+        if (!type) throw RequestError{"type must be bit, float, s32, u32, s64, u64 or port"};
     }
     const std::scoped_lock lock(session.mutex);
     describe(reply += ",\"objects\":", session, shell.processes(), kind, patterns, type);

@@ -376,7 +376,7 @@ class Operator(LifeCase):
         text = b""
         while part := first.recv(4096):
             text += part
-        self.assertIn("more than 256 clients are connected, and this one made no request for", text.decode())
+        self.assertIn("more than 256 clients are connected, and this one sent no request for", text.decode())
         self.say("stop")
         self.say("unloadusr", "all")
         self.assertIsNone(machine.poll())

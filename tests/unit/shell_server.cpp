@@ -319,7 +319,7 @@ TEST_F(ServerTest, idle_clients_are_closed_first_and_are_told_why) {
     auto operator_ = client();
     const Json event = Json::parse(idle.line());
     EXPECT_EQ(event["event"], "closed");
-    EXPECT_NE(event["reason"].get<std::string>().find("more than 3 clients are connected, and this one made no request for"), std::string::npos) << event;
+    EXPECT_NE(event["reason"].get<std::string>().find("more than 3 clients are connected, and this one sent no request for"), std::string::npos) << event;
     EXPECT_EQ(idle.line(), "");
     EXPECT_EQ(operator_->run("getp a.out").out, "FALSE\n");
     EXPECT_EQ(server->counts().clients, 3U) << "those on which something depends stay";
@@ -363,7 +363,7 @@ TEST_F(ServerTest, a_second_instance_of_the_name_is_refused_and_another_name_is_
     Diagnostics diagnostics;
     EXPECT_FALSE(refused.start(diagnostics));
     const std::string said = render(diagnostics, second.session.sources);
-    EXPECT_NE(said.find("an instance named 'test' runs already (process " + std::to_string(getpid()) + ") [instance-running]"), std::string::npos) << said;
+    EXPECT_NE(said.find("an instance named 'test' is already running (process " + std::to_string(getpid()) + ") [instance-running]"), std::string::npos) << said;
     EXPECT_TRUE(alive());
     ShellMachine third({}, shell_session("third"));
     Server other(third.shell);
@@ -372,7 +372,7 @@ TEST_F(ServerTest, a_second_instance_of_the_name_is_refused_and_another_name_is_
     EXPECT_EQ(running_instances(), (std::vector<std::string>{"test", "third"}));
     std::string problem;
     EXPECT_EQ(Client::connect("fourth", problem), nullptr);
-    EXPECT_EQ(problem, "no instance 'fourth' runs here; running: test, third (choose with --name)");
+    EXPECT_EQ(problem, "no instance 'fourth' is running; running: test, third (choose with --name)");
 }
 
 TEST_F(ServerTest, what_a_dead_process_left_is_replaced) {
@@ -395,7 +395,7 @@ TEST_F(ServerTest, what_a_dead_process_left_is_replaced) {
     EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/test.lock"));
     std::string problem;
     EXPECT_EQ(Client::connect("test", problem), nullptr);
-    EXPECT_EQ(problem, "no instance 'test' runs here; start one with `hal run FILE.hal`");
+    EXPECT_EQ(problem, "no instance 'test' is running; start one with `hal run FILE.hal`");
 }
 
 TEST_F(ServerTest, a_folder_that_is_not_ours_is_refused) {
@@ -407,7 +407,7 @@ TEST_F(ServerTest, a_folder_that_is_not_ours_is_refused) {
         return render(diagnostics, other.session.sources);
     };
     std::filesystem::create_directory_symlink("/tmp", folder.path + "/halcyon");
-    EXPECT_NE(said("x").find("is not yours alone [no-socket]"), std::string::npos) << said("x");
+    EXPECT_NE(said("x").find("belongs to another user or is accessible to others [no-socket]"), std::string::npos) << said("x");
     std::filesystem::remove(folder.path + "/halcyon");
     folder.write("halcyon", "a file");
     EXPECT_NE(said("x").find("[no-socket]"), std::string::npos);
