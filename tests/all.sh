@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # shellcheck shell=sh
-# `./hal test [quick]`; read by the script `hal`, whose functions it uses. Runs everything, then says what failed.
-# quick: the release build only, for whoever waits for it.
+# `./hal test [quick]`; read by the script `hal`, whose functions it uses. Runs everything, then lists the failures.
+# quick: the release build only.
 case ${1-} in
     "" | quick) ;;
     *) die "usage: ./hal test [quick]" ;;

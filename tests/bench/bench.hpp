@@ -20,7 +20,7 @@ struct Options {
 struct Goal {
     enum class Kind { none, at_most, not_above, times_less, limit, at_least } kind = Kind::none;
     double value = 0.0;
-    double beside = 0.0;  ///< of `limit` and `at_least`: a machine on which the peer misses the figure is judged by the ratio of times to it
+    double beside = 0.0;  ///< of `limit` and `at_least`: on a machine where the peer misses the limit, the ratio of times to the peer counts
 };
 inline Goal not_above() { return {Goal::Kind::not_above, 1.1}; }
 inline Goal at_most(double ratio) { return {Goal::Kind::at_most, ratio}; }

@@ -237,7 +237,7 @@ static void transfers(const char* name, uint32_t size, int block) {
     began = now_ns(CLOCK_MONOTONIC);
     upload(size, block, back);
     printf("%s_up %.1f\n", name, size * 1e6 / (double)(now_ns(CLOCK_MONOTONIC) - began));
-    if (memcmp(domain, back, size) != 0) fail("other bytes came back");
+    if (memcmp(domain, back, size) != 0) fail("the bytes read differ from those written");
 }
 static int by_size(const void* a, const void* b) {
     return *(const int64_t*)a < *(const int64_t*)b ? -1 : *(const int64_t*)a > *(const int64_t*)b;

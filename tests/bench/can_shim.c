@@ -203,7 +203,7 @@ int sendmmsg(int fd, struct mmsghdr* messages, unsigned count, int flags) {
     return sent;
 }
 
-/* Of what was received into `buffer`: the frame's size; the cookie, where it found room, tells whose it is. */
+/* Of what was received into `buffer`: the frame's size; the cookie, where space allows, names the sender. */
 static size_t frame_size(const struct can_socket* s, size_t got, const void* buffer, int* flags) {
     const size_t frame = got >= CANFD_MTU ? CANFD_MTU : got >= CAN_MTU ? CAN_MTU : got;
     if (s->hears_itself && got == frame + 8 && memcmp((const char*)buffer + frame, &s->cookie, 8) == 0)

@@ -100,7 +100,7 @@ private:
         const Time t = port.last();
         device.poll(t);
         port.send(device.out(), t);
-        // What the bus had no room for goes soon, whatever comes.
+        // Frames that the bus had no space for are sent soon, independent of received frames.
         port.take(device.out().size() > 0 ? millisecond : second, [&](const Frame& f, Time at) { device.handle(f, at); });
     }
 }
@@ -147,7 +147,7 @@ struct Master {
         SdoRequest up{.index = 0x2001, .upload = true, .mode = mode, .room = back};
         run(up);
         std::printf("%s_up %.1f\n", name, static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
-        if (data != back) fail("other bytes came back");
+        if (data != back) fail("the bytes read differ from those written");
     }
 };
 

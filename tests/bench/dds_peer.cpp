@@ -3,7 +3,7 @@
 //   dds_peer write COUNT DOMAIN         a bare Fast DDS writer, 1 kHz, SCHED_FIFO
 //   dds_peer read COUNT DOMAIN          a bare Fast DDS reader
 //   dds_peer halcyon-read COUNT DOMAIN  what dds_subscribe does: decoded and in the mailbox
-// Readers say "ready", and at the end: samples, lost, p50, p99 and greatest time in us from when the sample's cycle was due by the writer's
+// Readers print "ready", and at the end: samples, lost, p50, p99 and greatest time in us from when the sample's cycle was due by the writer's
 // clock. Both writers stamp the time at which their cycle was due.
 #include <sched.h>
 #include <time.h>

@@ -54,7 +54,7 @@ std::string netlist(const Case& c, std::size_t count) {
     return text;
 }
 
-/// The machine of a case, loaded but run by nobody, with a plan for whoever runs it.
+/// The machine of a case, loaded but not running, with a plan to run.
 class Bed {
 public:
     explicit Bed(const Case& c) : runtime_(true), loop_(loop_over(c.component)) {

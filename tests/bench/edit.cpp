@@ -17,7 +17,7 @@ std::string gates(std::size_t count) {
     return text;
 }
 
-/// Every kind of live edit, each undone by the one after it.
+/// Every kind of live edit, each reverted by the next.
 constexpr const char* edits[] = {
     "net live and2.10.out => and2.20.in0\n", "delsig live\n", "delf and2.500 t\n", "addf and2.500 t 500\n", "setp and2.7.in1 1\n", "setp and2.7.in1 0\n",
 };

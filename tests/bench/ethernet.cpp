@@ -213,7 +213,7 @@ void measure(const Options& options, Report& report) {
         bool paced, same_cpu;
         Rounds ours{}, plain{}, our_way{}, plain_way{};
     } cases[] = {
-        {"round trip, both ends looking all the time", "recv without waiting", Wait::spin, false, false},
+        {"round trip, both ends polling", "recv without waiting", Wait::spin, false, false},
         {"round trip, both ends blocking on one CPU", "recv", Wait::block, false, true},
         {"round trip in a 1 ms cycle, both ends hybrid", "sleep, then recv without waiting", Wait::hybrid, true, false},
     };

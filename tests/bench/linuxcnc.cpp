@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // LinuxCNC gives its threads SCHED_FIFO only on a PREEMPT_RT kernel and with CAP_SYS_RESOURCE. To compare like with like
 // on any machine it is started with LINUXCNC_FORCE_REALTIME and, where we are root without that capability (containers,
-// some virtual machines), with permit_realtime.so before its libraries. As root it wants to be told an ordinary user who
+// some virtual machines), with permit_realtime.so before its libraries. As root it needs the name of an ordinary user who
 // then gives the commands.
 #include "linuxcnc.hpp"
 

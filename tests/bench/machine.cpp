@@ -83,7 +83,7 @@ std::vector<std::string> machine_facts(int cpu) {
     bool granted = false;
     std::thread([&] { granted = become_real_time(cpu); }).join();
     facts.push_back(fmt::format("PREEMPT_RT: {}; SCHED_FIFO {}: {}; real-time thread on CPU {}; isolated CPUs: {}; sched_rt_runtime_us: {}",
-                                preempt_rt ? "yes" : "no", priority, granted ? "granted" : "refused, so ordinary threads are measured", cpu,
+                                preempt_rt ? "yes" : "no", priority, granted ? "granted" : "denied, so ordinary threads are measured", cpu,
                                 isolated.empty() ? "none" : isolated, first_line("/proc/sys/kernel/sched_rt_runtime_us")));
     return facts;
 }

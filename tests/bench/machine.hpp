@@ -15,7 +15,7 @@ namespace hal::bench {
 /// The priority of every real-time thread of the bench and of its peers.
 inline constexpr int priority = 98;
 
-/// Lines that say what this machine is: processor, kernel, real-time limits.
+/// Returns lines that describe this machine: processor, kernel, real-time limits.
 std::vector<std::string> machine_facts(int cpu);
 /// The CPU for the real-time thread: the last isolated one, or the last of all; as the runtime chooses.
 int real_time_cpu();
@@ -31,7 +31,7 @@ double stolen_ms();
 /// Runs `work` once in a SCHED_FIFO thread on that CPU (in an ordinary thread where that is not allowed) and waits for it.
 void run_real_time(int cpu, const std::function<void()>& work);
 
-/// Runs `work` in a thread that ordinary programs do not push aside (SCHED_FIFO 1, as are the programs it starts; an ordinary
+/// Runs `work` in a thread that ordinary programs do not preempt (SCHED_FIFO 1, as are the programs it starts; an ordinary
 /// thread where that is not allowed), waits for it, and passes on what it throws. Other work on the machine does not count.
 void run_undisturbed(const std::function<void()>& work);
 

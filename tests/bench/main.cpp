@@ -20,7 +20,7 @@ struct Section {
     const char* name;
     const char* what;
     void (*run)(const Options&, Report&);
-    bool ordinary = false;  ///< measures what ordinary threads do: must not be pushed aside meanwhile
+    bool ordinary = false;  ///< measures ordinary threads: must not run with real-time priority
 };
 
 constexpr Section sections[] = {

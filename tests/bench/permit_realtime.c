@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loaded before a peer's libraries: a program that may use SCHED_FIFO anyway is not refused for lack of a higher limit. */
+/* Loaded before a peer's libraries: a program that may use SCHED_FIFO anyway is not rejected because of a lower limit. */
 #define _GNU_SOURCE
 #include <sys/resource.h>
 #include <sys/syscall.h>

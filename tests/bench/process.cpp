@@ -48,7 +48,7 @@ pid_t spawn(const Start& start, int in, int out) {
         dup2(out >= 0 ? out : null, STDOUT_FILENO);
         dup2(null, STDERR_FILENO);
         if (start.everywhere) sched_setaffinity(0, sizeof all, &all);
-        // not setuid(): glibc's tells all threads, and those are the parent's
+        // not setuid(): glibc's notifies all threads, and those are the parent's
         if (start.user != static_cast<uid_t>(-1) && (syscall(SYS_setgroups, 0, nullptr) != 0 || syscall(SYS_setuid, start.user) != 0)) _exit(126);
         execvpe(arguments[0], arguments.data(), environment.data());
         _exit(127);

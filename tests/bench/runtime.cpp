@@ -37,7 +37,7 @@ Applied Runtime::apply(std::string text) {
     const bool good = transaction.commit(diagnostics);
     cost.commit = committing.ms();
     cost.cpu = cpu.ms();
-    if (!good) throw std::runtime_error(diagnostics.all().empty() ? "an edit was refused" : render(diagnostics.all().front(), session.sources));
+    if (!good) throw std::runtime_error(diagnostics.all().empty() ? "an edit was rejected" : render(diagnostics.all().front(), session.sources));
     return cost;
 }
 

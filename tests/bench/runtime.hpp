@@ -18,7 +18,7 @@ struct Applied {
 class Runtime {
 public:
     explicit Runtime(bool virtual_clock = false);
-    /// The text as one transaction of edits. Throws std::runtime_error with the first diagnostic when it is refused.
+    /// The text as one transaction of edits. Throws std::runtime_error with the first diagnostic when it is rejected.
     Applied apply(std::string text);
 
     Session session;

@@ -13,7 +13,7 @@ namespace hal::bench {
 /// throws. False: no namespace may be made here, and nothing was run.
 bool in_own_network(const std::function<void()>& work);
 
-/// Interfaces `bench0`, `bench1`, … of this namespace, each a cable into one switch. Empty when there is no `ip`, or it was refused.
+/// Interfaces `bench0`, `bench1`, … of this namespace, each a cable into one switch. Empty when `ip` is missing or was denied.
 std::vector<std::string> make_segment(int stations);
 
 void sleep_until(std::int64_t monotonic_ns);

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""How soon a hung thread is made safe: supervision.py HAL [RUNS]. Prints figures, judges nothing.
+"""Measures how soon a hung thread is made safe: supervision.py HAL [RUNS]. Prints figures without limits.
 
 HAL is the program of a build tree that has the test components (`ninja cli_stall`). For each kind of hang: the time from the moment the
-function stops coming back to the call of its component's emergency function, and the same in limits (default 100 ms).
+function hangs to the call of its component's emergency function, and the same in limits (default 100 ms).
 """
 import ctypes
 import os

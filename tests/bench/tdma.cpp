@@ -231,7 +231,7 @@ void axis_meanwhile(const Options& options, Report& report) {
     all << file.rdbuf();
     std::string text = all.str();
     const auto cut = text.find("# the clock is cut off");
-    if (cut == std::string::npos) return report.note("the netlist of the test is not there: " + folder);
+    if (cut == std::string::npos) return report.note("missing netlist of the test: " + folder);
     text = text.substr(0, cut) +
            "loadrt minmax\nnet error => minmax.0.in\naddf minmax.0 servo\nsetp minmax.0.reset TRUE\nadvance 2ms\n"
            "setp minmax.0.reset FALSE\nsetp segment-faults.0.cut TRUE\nadvance 2s\ngetp minmax.0.min\ngetp minmax.0.max\n";

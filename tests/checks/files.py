@@ -9,13 +9,13 @@ import sys
 from pathlib import Path
 
 MAX_LINES = 600
-MAX_README = 40  # a folder's README is read in a minute; the glossary and the root have more to say
+MAX_README = 40  # a folder's README is read in a minute; the glossary and the root's are longer
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
 LONGER_READMES = {"README.md", "runtime/README.md"}
 # Folders whose parent's README speaks for them: data, one folder per case, and what only holds other folders' files.
 NO_README = ("runtime/abi/hal", "runtime/sdk/hal", "tests/netlists/", "tests/errors/", "tests/fuzz/", "tests/cli/", ".ci", "cmake", "docs/")
 
-# What a page says is there: `file.ext` in backticks, and [links](to files).
+# References of a page: `file.ext` in backticks, and [links](to files).
 MENTIONED = re.compile(r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\]\((?!https?:|#)([^)#]+)[^)]*\)")
 
 

@@ -48,7 +48,7 @@ def main(build):
         environment = dict(os.environ, HALCYON_PLUGIN_PATH=str(source / "build"), HOME=folder)
         manual = run(hal, "doc", "mine", env=environment)
         if "twice the input" not in manual:
-            sys.exit(f"hal doc mine says:\n{manual}")
+            sys.exit(f"hal doc mine prints:\n{manual}")
         # What `hal new component` makes passes its test at once.
         path = dict(environment, PATH=f"{prefix}/bin:{os.environ['PATH']}")
         run(hal, "new", "component", "fresh", env=path, cwd=folder)

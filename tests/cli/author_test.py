@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""`hal compile` installs no component that cannot be loaded or whose declarations contradict themselves; it says why to its author."""
+"""`hal compile` rejects a component that cannot be loaded or whose declarations contradict each other, with the reason."""
 import os
 import re
 import subprocess
@@ -26,7 +26,7 @@ REFUSED = {
                            "mine.cpp:9: component 'mine' cannot make 'mine.0': a component's function must not be virtual"),
     "two functions of one name": (IN + OUT + RUN + RUN.replace("run", "again") + STEP,
                                   "component 'mine' cannot make 'mine.0': it declares function 'mine.0' twice; only one of them could be added to a thread"),
-    "a number that is none": (IN + OUT.replace('"the output"', '"the output", {.finite = true}') + RUN + STEP.replace("= in", "= std::nan(\"\")"),
+    "a NaN": (IN + OUT.replace('"the output"', '"the output", {.finite = true}') + RUN + STEP.replace("= in", "= std::nan(\"\")"),
                               "mine.cpp:7: with the initial values of its pins pin 'mine.0.out' (mine) became nan at cycle 0"),
     "a pin's name with a space": (IN + OUT.replace('"out"', '"the out"') + RUN + STEP,
                                   "mine.cpp:7: component 'mine' cannot make 'mine.0': it declares a pin with the invalid name 'the out': letters, digits and - _ . : are valid"),
@@ -63,7 +63,7 @@ class Author(Case):
             with self.subTest(name):
                 done = self.compile(body)
                 self.assertEqual(1, done.returncode)
-                self.assertNotIn("lacks the line", done.stderr)
+                self.assertNotIn("missing line in the component", done.stderr)
                 self.assertRegex(done.stderr, r"mine\.cpp:\d+:\d+: error: ")
         self.write("mine.cpp", (HEAD + GOOD + TAIL).replace("    using Component::Component;\n", ""))
         self.assertIn("missing line in the component: using Component::Component;", self.run_program("compile", "mine.cpp").stderr)
@@ -80,7 +80,7 @@ class Author(Case):
             for body in (GOOD.replace(" noexcept", ""), GOOD.replace(', "the output"', ""), GOOD.replace("hal::Cycle", "int"), GOOD.replace('"the output"', "output")):
                 error = messages(HEAD + body + rest + TAIL)
                 self.assertIn("mine.cpp:", error)
-                self.assertNotIn("lacks the line", error, body)
+                self.assertNotIn("missing line in the component", error, body)
             missing = messages((HEAD + GOOD + rest + TAIL).replace("    using Component::Component;\n", ""))
             self.assertIn("missing line in the component: using Component::Component;", missing)
 

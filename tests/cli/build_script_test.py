@@ -142,12 +142,12 @@ class Script(unittest.TestCase):
         (self.tools / "offline").write_text("")
         self.write("c.hal", "loadrt lqr\n")
         self.hal("run", "c.hal", status=1)
-        self.assertIn("hal: could not install these Debian packages: libsolving-dev (why: ", self.said)
+        self.assertIn("hal: cannot install these Debian packages: libsolving-dev (see ", self.said)
 
     def test_a_failed_build_shows_the_error_and_is_tried_again(self):
         (self.tools / "broken").write_text("")
         self.hal("run", "a.hal", status=1)
-        self.assertEqual("hal: building the program and 2 components in build/release\na.cpp:1: error: no\nhal: could not build build/release\n", self.said)
+        self.assertEqual("hal: building the program and 2 components in build/release\na.cpp:1: error: no\nhal: cannot build build/release\n", self.said)
         (self.tools / "broken").unlink()
         self.assertEqual([self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal"))
 
@@ -155,7 +155,7 @@ class Script(unittest.TestCase):
         (self.tools / "together").write_text("")
         self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal",
                           "cmake --preset release -DHALCYON_QUICK=OFF", self.BUILD + "hal"], self.hal("version"))
-        self.assertIn("hal: compiling source by source, because some sources do not go together (which: ", self.said)
+        self.assertIn("hal: compiling source by source, because some sources cannot be compiled together (see ", self.said)
         self.assertIn("started: version\n", self.printed)
 
     def test_a_long_build_prints_now_and_then_how_long_it_will_take(self):
@@ -236,7 +236,7 @@ class Unbuilt(Case):
 
     def setUp(self):
         super().setUp()
-        (self.folder / "groups").write_text("later math Comes later, as its source says\n")
+        (self.folder / "groups").write_text("later math Comes later, from its source\n")
         (self.folder / "file.hal").write_text("loadrt later\n")
         (self.folder / "build").write_text(f"#!/bin/sh\necho \"built: $*\"\ncp {HAL.parent.parent}/components/sum2.so {self.folder}/later.so\n")
         (self.folder / "build").chmod(0o755)
@@ -252,7 +252,7 @@ class Unbuilt(Case):
         self.assertIn("= help: in the source tree, type: ./hal build later\n", done.stderr)
 
     def test_doc_lists_it(self):
-        self.assertRegex(self.run_hal("doc").stdout, "(?m)^later +Comes later, as its source says$")
+        self.assertRegex(self.run_hal("doc").stdout, "(?m)^later +Comes later, from its source$")
 
     def test_a_program_started_by_the_script_builds_it(self):
         done = self.run_hal("check", "file.hal", HALCYON_BUILD=str(self.folder / "build"))

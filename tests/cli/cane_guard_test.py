@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A stranger on the segment, with raw frames: forged NMT, SYNC and set-points are rejected and named, in every format; syncs of another
+"""A foreign station on the segment, with raw frames: forged NMT, SYNC and set-points are rejected and named, in every format; syncs of another
 schedule from a lower address do not take the segment off; what an event timer of a cycle sends is on the wire in every cycle."""
 import itertools
 import re
@@ -165,7 +165,7 @@ class Stranger(Segment):
         self.stays_operational()
         self.assertIn(f"second master on the segment: {LOWEST} ", self.said("m"))
         self.assertNotIn("stepped down", self.said("m"))
-        wait_until(lambda: f"the second master {LOWEST} is gone" in self.said("m"), "its end is said")
+        wait_until(lambda: f"the second master {LOWEST} is gone" in self.said("m"), "its end is reported")
 
     def test_an_event_timer_of_a_cycle_sends_in_every_cycle(self):
         self.begin()

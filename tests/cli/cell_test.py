@@ -123,8 +123,8 @@ class Running(Case):
         return self.start("run", path or self.path, "--node", name, instance=name)
 
     def until_said(self, pattern, *words):
-        """Runs hal until it has said on standard error what matches: how long two nodes take to meet is up to the machine."""
-        log = open(self.folder / "said", "w+")
+        """Runs hal until its standard error matches: the time two nodes need to discover each other depends on the machine."""
+        log = open(self.folder / "log", "w+")
         self.addCleanup(log.close)
         process = subprocess.Popen(["hal", "run", *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=log)
@@ -133,9 +133,9 @@ class Running(Case):
 
         def said():
             ended = process.poll() is not None
-            text = (self.folder / "said").read_text()
+            text = (self.folder / "log").read_text()
             return text if ended or re.search(pattern, text) else None
-        text = wait_until(said, f"it says '{pattern}'")
+        text = wait_until(said, f"it prints '{pattern}'")
         self.assertRegex(text, pattern)
 
     def until(self, node, pin, good, what):
@@ -148,7 +148,7 @@ class Running(Case):
         sender = self.node("sender")
         self.until("taker", "node.sender.online", lambda v: v == "TRUE", "the sender is there")
         self.until("taker", "twice.in", lambda v: float(v or 0) > 0, "the count comes")
-        self.until("sender", "back.in0", lambda v: float(v or 0) > 0, "twice of it comes back")
+        self.until("sender", "back.in0", lambda v: float(v or 0) > 0, "twice the value returns")
         self.until("sender", "alive.in0", lambda v: v == "TRUE", "a linked online pin")
         self.assertLess(float(self.value("node.sender.age-ms", instance="taker")), 1000 * PATIENCE)
 
@@ -192,7 +192,7 @@ class Running(Case):
         os.mkdir(self.folder / "new")
         path = self.folder / "new" / "cell.hal"
         os.rename(other, path)
-        # on a machine that is very busy the two meet later than in the second that the start waits; then it is said, and nothing passes
+        # on a very busy machine discovery takes longer than the second that the start waits; then it is reported, and nothing is exchanged
         self.until_said(r"node 'taker' \(instance 'taker' on .*\) runs another version of netlist 'cell' than node 'sender': "
                         "signal 'count' is s32 on node 'sender' and float on node 'taker'; run the same file on both", path, "--node", "sender")
         self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))

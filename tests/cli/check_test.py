@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hal check: several files, INI files, what is missing; files that are no regular files, for every command that reads one."""
+"""hal check: several files, INI files, missing parts; special files, for every command that reads a file."""
 import os
 import subprocess
 import unittest
@@ -108,7 +108,7 @@ class Check(Case):
 
 
 class SpecialFiles(Case):
-    """A FIFO without a writer would block whoever opens it; a device may never end; a directory is not a text."""
+    """A FIFO without a writer would block the reader; a device may never end; a directory is not a text file."""
 
     def setUp(self):
         super().setUp()

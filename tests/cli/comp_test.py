@@ -27,7 +27,7 @@ description """
 Two \\\\fBparagraphs\\\\fR.
 .P
 The second.""";
-notes "a note"; see_also "and2"; author "Somebody"; license "MIT";
+notes "a note"; see_also "and2"; author "An Author"; license "MIT";
 ;;
 typedef struct { int calls; } memory;
 char *words[2] = {0, 0};
@@ -111,7 +111,7 @@ class Comp(Case):
         self.compiled("everything", EVERYTHING)
         page = self.good("doc", "everything")
         for line in ("everything: All that the language has", "step=", "added to edges", "everything.N.other-one", "how often it ran (initial 3)",
-                     "Two **paragraphs**.", "in-## (bit in), as many as personality & 0xf and at most 8: the inputs", "Somebody"):
+                     "Two **paragraphs**.", "in-## (bit in), as many as personality & 0xf and at most 8: the inputs", "An Author"):
             self.assertIn(line, page)
 
     def test_what_EXTRA_SETUP_refuses_is_not_made(self):
@@ -138,7 +138,7 @@ class Comp(Case):
         self.assertEqual(["2", "5", "7", "4"], self.values(netlist, "a.out", "a.runs"))
 
     def test_headers_of_helpers(self):
-        self.compiled("helpers", """component helpers; pin in float angle; pin out float forward; pin out float aside; pin out s32 sum; function _; license "MIT";
+        self.compiled("helpers", """component helpers; pin in float angle; pin out float forward; pin out float sideways; pin out s32 sum; function _; license "MIT";
 include <rtapi_list.h>; include <rtapi_io.h>; include <posemath.h>;
 ;;
 struct number { struct rtapi_list_head link; int value; };
@@ -161,11 +161,11 @@ FUNCTION(_) {
     pmPoseCartMult(&both, &point, &point);
     pmPoseCartMult(&pose, &point, &point);
     forward = point.x;
-    aside = point.y;
+    sideways = point.y;
 }
 """)
         netlist = "loadrt helpers\nloadrt threads name1=t period1=1000000\naddf helpers.0 t\nsetp helpers.0.angle 1.5707963267948966\nstart\nadvance 1 cycles\n"
-        x, y, total = map(float, self.values(netlist, "helpers.0.forward", "helpers.0.aside", "helpers.0.sum"))
+        x, y, total = map(float, self.values(netlist, "helpers.0.forward", "helpers.0.sideways", "helpers.0.sum"))
         self.assertEqual((301, 1, 4), (total, round(x, 9), round(y, 9)))
 
     def test_header_of_the_go_functions(self):

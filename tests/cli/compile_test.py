@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""`hal compile`: one source file becomes a plugin; what is wrong with it is said at the user's line."""
+"""`hal compile`: one source file becomes a plugin; errors are reported at the user's line."""
 import unittest
 from pathlib import Path
 

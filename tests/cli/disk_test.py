@@ -54,7 +54,7 @@ class Full(Case):
         return subprocess.run([str(HAL), *map(str, words)], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=120)
 
     def keeps(self, path, *words, content="the old content\n"):
-        """The command fails, says why, and the file is as it was; nothing is left beside it."""
+        """The command fails with the reason, and the file is unchanged; no temporary file remains."""
         before = sorted(p.name for p in self.disk.iterdir())
         done = self.hal(*words)
         self.assertNotEqual(0, done.returncode, words)
@@ -110,7 +110,7 @@ class Full(Case):
         for form in ([], ["--csv"]):
             record = f"loadusr -w hal record {' '.join(form)} -n 20000 {self.disk}/seen.txt\n"
             netlist = self.write("rec.hal", "loadrt threads name1=t period1=1000000\nloadrt sampler cfg=uf depth=30000\nloadrt sum2 names=s\naddf s t\naddf sampler.0 t\n"
-                                            "net beats t.threadbeat => sampler.0.pin.0\nnet sum s.out => sampler.0.pin.1\nsetp s.in0 0.5\nstart\nadvance 20000 cycles\n" + record)
+                                            "net cycles t.threadbeat => sampler.0.pin.0\nnet sum s.out => sampler.0.pin.1\nsetp s.in0 0.5\nstart\nadvance 20000 cycles\n" + record)
             done = self.hal("sim", netlist)
             self.assertNotEqual(0, done.returncode)
             self.assertIn("No space left on device; what was written ends with a whole line, after", done.stderr)

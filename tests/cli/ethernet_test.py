@@ -28,7 +28,7 @@ class Segment(Case):
         return done, {log.stem: log.read_text() for log in logs.glob("*.log")}
 
     def status_is_true(self, done, on):
-        """It fails when the machine is off at the end, and then says so in its last lines: a busy machine may be."""
+        """Fails when the machine is off at the end, with the reason in its last lines: possible on a busy machine."""
         self.assertEqual(0 if re.search(on, done.stdout) else 1, done.returncode, done.stdout)
         if done.returncode != 0:
             self.assertRegex(done.stdout, r"the (motor|machine) is off at the end: the control missed \d+ cycles")

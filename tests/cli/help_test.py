@@ -54,7 +54,7 @@ class WrongWords(Case):
     def test_unknown_command_without_likeness_points_to_help(self):
         self.assertEqual("hal: unknown command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
 
-    def test_a_netlist_as_command_says_how_to_run_it(self):
+    def test_a_netlist_as_command_suggests_hal_run(self):
         self.assertEqual("hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal"))
 
     def test_unknown_option_gets_a_suggestion(self):

@@ -37,7 +37,7 @@ class NewComponent(Case):
         folder = self.follow_the_hint("my-ramp")
         self.assertEqual({"my-ramp.cpp", "CMakeLists.txt", "test.hal", "expected", "build"}, set(os.listdir(folder)))
         self.assertIn(f'HINTS "{BUILD}"', (folder / "CMakeLists.txt").read_text())
-        # a test that fails says what is printed and what was expected
+        # a failing test prints the output and the expectation
         (folder / "expected").write_text("7\n")
         said = self.shell_line("ctest --test-dir build --output-on-failure", folder, status=8)
         self.assertIn("      it prints\n      0.2\n      FALSE\n", said)
@@ -57,7 +57,7 @@ class NewComponent(Case):
         folder = self.follow_the_hint("ramp2", path=f"{prefix}/bin:{os.environ['PATH']}")
         self.assertNotIn("HINTS", (folder / "CMakeLists.txt").read_text())
 
-    def test_bad_names_and_places_are_refused(self):
+    def test_rejects_invalid_names_and_folders(self):
         (self.folder / "there").mkdir()
         (self.folder / "there" / "file").touch()
         for words, why in {

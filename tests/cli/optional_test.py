@@ -48,7 +48,7 @@ class Optional(unittest.TestCase):
         _, offline, online, same = (part.split("\n", 1)[-1] for part in ("\n" + done.stderr).split("=="))
         self.assertEqual("status 1\nstatus 0\nstatus 0\nstatus 0\n", done.stdout, done.stderr)
         self.assertTrue(offline.startswith("hal: installing Debian packages: libopencv-contrib-dev\n"
-                                           "hal: could not install these Debian packages: libopencv-contrib-dev (why: "), offline)
+                                           "hal: cannot install these Debian packages: libopencv-contrib-dev (see "), offline)
         self.assertIn("hal: installing Debian packages: libopencv-contrib-dev\n", online)
         self.assertIn("see.hal: no errors\n", online)
         self.assertEqual("see.hal: no errors\n", same)  # built: nothing is configured or built

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A network of a test's own: what it starts there meets no other test, and no port that somebody else holds."""
+"""A separate network namespace for a test: its programs share no address or port with other tests."""
 import fcntl
 import os
 import shutil

@@ -179,9 +179,9 @@ class PythonTest(Case):
 
     def test_a_child_process_does_not_use_its_parents_component(self):
         self.machine()
-        self.assertEqual("refused\n", self.python(
+        self.assertEqual("rejected\n", self.python(
             "import hal, os\nc = hal.component('x')\nc.newpin('a', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
-            "if os.fork() == 0:\n try: c['a'] = 1\n except hal.error: print('refused', flush=True)\n os._exit(0)\nos.wait()\nassert c['a'] is False\n"))
+            "if os.fork() == 0:\n try: c['a'] = 1\n except hal.error: print('rejected', flush=True)\n os._exit(0)\nos.wait()\nassert c['a'] is False\n"))
 
 
 if __name__ == "__main__":

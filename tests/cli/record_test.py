@@ -7,7 +7,7 @@ import unittest
 
 from harness import Case, HAL, wait_until
 
-# A streamer feeds an adder, the sampler records what came and what became of it. Threads stand still until `start`.
+# A streamer feeds an adder, the sampler records input and output. Threads run no functions until `start`.
 NETLIST = """loadrt threads name1=servo period1=1000000
 loadrt streamer cfg=fb depth=1000
 loadrt sampler cfg=fbsukl depth=1000
@@ -18,7 +18,7 @@ addf sampler.0 servo
 net x streamer.0.pin.0 => twice.in0 twice.in1
 net y twice.out => sampler.0.pin.0
 net flag streamer.0.pin.1 => sampler.0.pin.1
-net beats servo.threadbeat => sampler.0.pin.3
+net cycles servo.threadbeat => sampler.0.pin.3
 """
 
 
@@ -45,7 +45,7 @@ class Sim(Case):
     def test_csv_names_the_linked_signals(self):
         self.write("in.txt", "0.1 0\n0.2 1\n")
         rows = list(csv.reader(self.sim("loadusr -w hal play in.txt", "start", "advance 2 cycles", "loadusr -w hal record --csv -n 2").splitlines()))
-        self.assertEqual(["time_s", "y", "flag", "sampler.0.pin.2", "beats", "sampler.0.pin.4", "sampler.0.pin.5"], rows[0])
+        self.assertEqual(["time_s", "y", "flag", "sampler.0.pin.2", "cycles", "sampler.0.pin.4", "sampler.0.pin.5"], rows[0])
         self.assertEqual([0.2, 0.4], [float(row[1]) for row in rows[1:]])
         self.assertEqual(["0", "1"], [row[2] for row in rows[1:]])
         self.assertAlmostEqual(0.001, float(rows[2][0]) - float(rows[1][0]), 12)

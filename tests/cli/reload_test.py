@@ -45,7 +45,7 @@ struct Part : hal::Component {
         const int made = ::open(file.get().c_str(), O_CREAT | O_EXCL | O_WRONLY, 0600);
         if (made < 0) throw std::runtime_error("the file belongs to another");
         ::close(made);
-        if (REFUSE) {
+        if (FAILS) {
             ::unlink(file.get().c_str());
             throw std::runtime_error("it does not like it");
         }
@@ -123,9 +123,9 @@ class Reload(Case):
             "unasked": counter(t=('hal::Argument offset{*this, "offset", 0, "added"};', "")),
             "state1": STATE.replace("STEP", "1").replace("OTHER", "double").replace("ZERO", "0.5"),
             "state2": STATE.replace("STEP", "1000").replace("OTHER", "std::int32_t").replace("ZERO", "7"),
-            "owner1": OWNER.replace("VERSION", "1").replace("REFUSE", "false"),
-            "owner2": OWNER.replace("VERSION", "2").replace("REFUSE", "false"),
-            "refusing": OWNER.replace("VERSION", "3").replace("REFUSE", "true"),
+            "owner1": OWNER.replace("VERSION", "1").replace("FAILS", "false"),
+            "owner2": OWNER.replace("VERSION", "2").replace("FAILS", "false"),
+            "failing": OWNER.replace("VERSION", "3").replace("FAILS", "true"),
         }
         cls.versions = {name: compiled(cls.built, name, text) for name, text in texts.items()}
         cls.versions["other"] = compiled(cls.built, "other", OTHER_INTERFACE, "c")
@@ -157,7 +157,7 @@ class Reload(Case):
         return done.stderr
 
     def saved(self, what):
-        """What save says, but for what changes by itself."""
+        """The output of save, without what changes by itself."""
         return re.sub(r"setp \S+\.(tmax|count) .*\n", "", self.say("save", what))
 
     def mapped(self, machine):
@@ -228,7 +228,7 @@ class Reload(Case):
         self.install("owner2")
         self.say("reload", "part")
         wait_until(lambda: self.value("p.version") == "2", "the second has it")
-        self.install("refusing")
+        self.install("failing")
         self.assertIn("'p' (part) cannot start in its new version: it does not like it", self.refused("reload", "part"))
         self.assertTrue(owned.exists())
         wait_until(lambda: self.value("p.version") == "2", "the second runs again")

@@ -65,7 +65,7 @@ class Segment(Case):
         ip("-n", "switch", "link", "set", f"to-{name}", "up" if plugged else "down")
 
     def station(self, name, text):
-        """`hal run` of a netlist at a station; what it says goes on in the same log when it is started again."""
+        """`hal run` of a netlist at a station; a restart appends to the same log."""
         self.write(f"{name}.hal", text)
         log = self.logs.setdefault(name, self.folder / f"{name}.log")
         with open(log, "a") as out:
@@ -104,6 +104,6 @@ class Segment(Case):
 
     def wait_for_words(self, name, words, times=1):
         try:
-            wait_until(lambda: self.said(name).count(words) >= times, f"{name} says '{words}'")
+            wait_until(lambda: self.said(name).count(words) >= times, f"{name} prints '{words}'")
         except AssertionError as late:
             raise AssertionError(f"{late}\n{self.all_said()}") from None

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """TDMA between two processes on Ethernet: coming up, processes that die and return, cables that are pulled. Each is named in one line, and
-what can be mended without a person is."""
+what can recover without a user does."""
 import signal
 import unittest
 
 from harness import wait_until
 from segment import Segment, enter
 
-# The sync is lost after a second: a busy machine holds nobody up for so long, and a test can wait for it.
+# The sync is lost after a second: a busy machine does not stall that long, and a test can wait for it.
 CELL = """cycle 5000
 speed 1000
 guard 400

@@ -111,7 +111,7 @@ class Tdma(Case):
         # It is heard no more: its thread does nothing.
         for function in ("receive", "transmit"):
             self.assertEqual(0, self.shell("delf", f"tdma.1.{function}", "servo").returncode)
-        wait_until(lambda: self.value("tdma.0.x.online") == "FALSE", "x is silent")
+        wait_until(lambda: self.value("tdma.0.x.online") == "FALSE", "x is offline")
         done = self.run_program("tdma", "ping", "x", "-c", "2")
         self.assertEqual((1, "x 1: no answer\nx 2: no answer\n2 pings from tdma.0, 0 answered, 2 lost (100 %)\n",
                           "hal tdma ping: x is offline; check its power and its cable\n"),

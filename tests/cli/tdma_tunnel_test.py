@@ -80,7 +80,7 @@ class Tunnel(Segment):
     def ping(self, name, to, *words):
         if not shutil.which("ping"):
             self.skipTest("no ping here; apt install iputils-ping")
-        done = self.at(name, "ping", "-c", "5", "-i", "0.2", "-w", "100", *words, to)  # until five came back
+        done = self.at(name, "ping", "-c", "5", "-i", "0.2", "-w", "100", *words, to)  # until five replies arrived
         print(done.stdout, file=sys.stderr)
         self.assertEqual(0, done.returncode, done.stdout + self.all_said())
 
@@ -114,7 +114,7 @@ class Tunnel(Segment):
         self.assertIn("mtu 196", self.at("x", "ip", "link", "show", "hal0").stdout)
         self.assertIn("tdma.0: ordinary packets pass by hal0, MTU 196, IP 10.9.0.2\n", self.said("x"))
         self.ping("x", "10.9.0.1", "-s", "400")
-        # The interface goes with its station, and comes back with it.
+        # The interface is removed and created with its station.
         ip("-n", "m", "link", "delete", "hal0")
         self.wait_for_words("m", "tdma.0: the interface hal0 was deleted; ordinary packets pass again after unloadrt and loadrt\n")
         self.assertEqual("TRUE", self.pin("m", "running"))
@@ -132,7 +132,7 @@ class Tunnel(Segment):
         self.assertIn("mtu 196", self.at("x", "ip", "link", "show", "hal0").stdout)
 
     def refused(self, tunnel, *before, station="m", cell=CELL):
-        """What the program says that ends because of the tunnel."""
+        """The message of the program that exits because of the tunnel."""
         self.write("cell.tdma", cell.format(size=1500))
         self.write("bad.hal", self.netlist(station, tunnel))
         done = self.at("m", *before, HAL, "run", "--name", "test-bad", "--no-picture", "bad.hal", env=self.environment)

@@ -111,7 +111,7 @@ def check_document(path):
                 good, status, actual = run("hal check block.hal", folder, environment)
                 ran += 1
                 if not good:
-                    problems.append(f"{where}: hal check says\n" + "\n".join(actual))
+                    problems.append(f"{where}: hal check prints\n" + "\n".join(actual))
             elif language == "console":
                 count, found = check_console(body, where, folder, environment)
                 ran += count

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Our side of canopen_peer_test.py: `device ADDRESS NODE` is a node on that bus until it is killed; `client ADDRESS NODE` does what its
-// standard input says to that node, a line each: `write INDEX SUB MODE HEXBYTES`, `read INDEX SUB MODE`, `nmt COMMAND`. One line answers.
+// standard input are commands to that node, one per line: `write INDEX SUB MODE HEXBYTES`, `read INDEX SUB MODE`, `nmt COMMAND`. One line answers.
 // `master ADDRESS NODE` boots that node, prints a line for each of its steps, and goes on until it is killed.
 #include <chrono>
 #include <cstdio>

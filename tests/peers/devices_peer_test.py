@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """devices_peer_test.py HAL: the Python package `canopen` is master of all devices of `hal node`, each described by its own EDS, on the
-`udp:` bus. 77: the package, or multicast, is not there."""
+`udp:` bus. 77: the package or multicast is missing."""
 import os
 import struct
 import subprocess
@@ -99,12 +99,12 @@ def io(network):
         check("io: outputs", wait_for(lambda: node.sdo[0x6320][1].raw == 0x08040201), hex(node.sdo[0x6320][1].raw))
         heard = []
         node.tpdo[1].add_callback(heard.append)
-        node.sdo[0x6002][1].raw = 0x0F  # polarity: the inputs change, and TPDO 1 says so
+        node.sdo[0x6002][1].raw = 0x0F  # polarity: the inputs change, and TPDO 1 sends them
         check("io: TPDO on change", wait_for(lambda: heard) and node.tpdo[1].map[0].raw == 0x0F, heard)
         node.sdo[0x1016][1].raw = 0x007F0000 | 200  # the master's heartbeat, 200 ms
         node.sdo[0x6207][1].raw = 0xA5
         network.send_message(0x77F, b"\x05")
-        check("io: EMCY when the master falls silent", wait_for(lambda: [e.code for e in node.emcy.log] == [0x8130]), node.emcy.log)
+        check("io: EMCY when the master is offline", wait_for(lambda: [e.code for e in node.emcy.log] == [0x8130]), node.emcy.log)
         check("io: error values", node.sdo[0x6200][1].raw == 0xA5, node.sdo[0x6200][1].raw)
         check("io: pre-operational", wait_for(lambda: node.nmt.state == "PRE-OPERATIONAL"), node.nmt.state)
 

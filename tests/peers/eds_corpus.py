@@ -4,7 +4,7 @@
 
 eds_corpus.py FOLDER [--table]
 
-The files belong to their vendors and are no part of this project. Nothing may crash; a file is read, or refused with a
+The files belong to their vendors and are not part of this project. Nothing may crash; a file is read, or rejected with a
 reason that names a line. --table prints a line per file (Markdown), without it there is a summary and what stands out.
 Needs $HAL_BIN or a built program; the package: pip install canopen, in an environment of its own.
 """
@@ -23,7 +23,7 @@ SUMMARY = re.compile(r"(\d+) objects?, (\d+) entr(?:y|ies), .*; (\d+) warnings?,
 
 
 def ours(hal, path):
-    """(objects, entries, warnings, notes, milliseconds), or the reason it was refused, or how the program ended."""
+    """(objects, entries, warnings, notes, milliseconds), or the reason of its rejection, or how the program ended."""
     start = time.monotonic()
     done = subprocess.run([hal, "can", "eds", "check", path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, timeout=60)
@@ -33,7 +33,7 @@ def ours(hal, path):
     if done.returncode == 0 and found:
         return (*map(int, found.groups()), took)
     if done.returncode == 1 and lines and "refused" in lines[-1]:
-        return next((line for line in lines if " error: " in line), "refused without a reason")
+        return next((line for line in lines if " error: " in line), "rejected without a reason")
     return f"CRASH: status {done.returncode}"
 
 

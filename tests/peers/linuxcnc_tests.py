@@ -4,7 +4,7 @@
 
 TESTS_FOLDER is the `tests` folder of a LinuxCNC source tree the user has; nothing of it is part of this project. A test
 is a folder with test.hal, test.sh or test, run in a copy of it as upstream's runner does: `halrun -f test.hal`,
-`bash -x test.sh`, `./test`. Then `checkresult`, or a comparison of standard output with `expected`, judges.
+`bash -x test.sh`, `./test`. Then `checkresult`, or a comparison of standard output with `expected`, decides.
 
 A test is run when all it needs is in its folder, beside our program, or a plain system utility; a LinuxCNC that is
 installed is not looked at. Every other test is listed with what it needs, and is not counted as passed; a test.sh that is
@@ -47,7 +47,7 @@ esac
 
 
 def shell_programs(text):
-    """The programs a shell script starts: first words of commands, as far as they can be told without running it."""
+    """The programs a shell script starts: first words of commands, as far as they are known without running it."""
     text = re.sub(r"<<-?\s*['\"]?(\w+)['\"]?(.*)\n(?:.*\n)*?\s*\1\s*$", r"\2", text, flags=re.M)  # here-documents
     text = re.sub(r"(^|\s)#.*", r"\1", text).replace("\\\n", " ")
     text = re.sub(r"'[^']*'|\"(?:[^\"\\]|\\.)*\"", "Q", text)
@@ -83,7 +83,7 @@ def missing(test, components):
         elif file.suffix == ".sh" or first.startswith("#!") and "sh" in first:
             for name in shell_programs(text):
                 program(name)
-    # A skip that looks for LinuxCNC's own Tcl package says nothing about a test that runs `halrun FILE.ini`.
+    # A skip that looks for LinuxCNC's own Tcl package does not concern a test that runs `halrun FILE.ini`.
     if (test / "skip").is_file() and not list(test.glob("*.ini")):
         asked = subprocess.run(["bash", "skip"], cwd=test, env=CLEAN, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE, text=True, timeout=60)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """master_peer_test.py HAL: two devices of the Python package `canopen` under our master component in a running netlist, on the `udp:` bus
-and over a serial line (slcan). 77: the package is not there. A transport that this machine lacks is left out, and said."""
+and over a serial line (slcan). 77: the package is missing. A transport that this machine does not have is left out with a message."""
 import os
 import shutil
 import subprocess
@@ -98,7 +98,7 @@ class Device:
         network.subscribe(0x80, self.on_sync)
         network.subscribe(0x200 + node_id, self.on_wish)
         self.wish = None
-        self.node.nmt.send_command(0)  # the package says by that that it booted
+        self.node.nmt.send_command(0)  # the package's boot-up message
 
     def on_wish(self, _, data, __):
         self.wish = int.from_bytes(data, "little")
@@ -150,7 +150,7 @@ def run(what, network, link):
         check(f"{what}: the error is gone", wait_for(lambda: int(pin("first.emcy"), 0) == 0))
         second.node.nmt.stop_heartbeat()
         check(f"{what}: silence is a fault", wait_for(lambda: int(pin("second.retries"), 0) > 0))
-        check(f"{what}: it is said", "node 11 (second) silent for" in (text := shell("show", "fault")), text)
+        check(f"{what}: the fault is reported", "node 11 (second) silent for" in (text := shell("show", "fault")), text)
         check(f"{what}: and the device is brought back", wait_for(lambda: pin("second.operational") == "TRUE"))
         first.node.nmt.state = "PRE-OPERATIONAL"
         check(f"{what}: who leaves operational is brought back",
@@ -158,7 +158,7 @@ def run(what, network, link):
     finally:
         machine.terminate()
         check(f"{what}: the machine ends in order", machine.wait(60) == 0, machine.stdout.read())
-    check(f"{what}: and told its nodes so", wait_for(lambda: [d.node.nmt.state for d in devices] == ["PRE-OPERATIONAL"] * 2, 5),
+    check(f"{what}: its nodes are pre-operational", wait_for(lambda: [d.node.nmt.state for d in devices] == ["PRE-OPERATIONAL"] * 2, 5),
           [d.node.nmt.state for d in devices])
 
 

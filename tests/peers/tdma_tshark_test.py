@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """tdma_tshark_test.py TDMA_FRAMES: tshark decodes the frames of TDMA (0x9021) and RTcfg (0x9022) as we make them; every field that the
-program TDMA_FRAMES says it wrote must be what tshark reads. Skipped (77) where there is no tshark."""
+program TDMA_FRAMES prints must equal what tshark reads. Skipped (77) without tshark."""
 import json
 import shutil
 import subprocess
@@ -22,7 +22,7 @@ def fields_of(layers, found):
 
 
 def number(text):
-    """An integer, however it is written; None: it is none."""
+    """Returns an integer in any notation, None for other text."""
     try:
         return int(text, 0)
     except ValueError:

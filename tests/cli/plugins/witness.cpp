@@ -43,4 +43,4 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Witness, "witness", "Tells a test what happened at the end")
+HAL_COMPONENT(Witness, "witness", "Reports to a test what happened at the end")

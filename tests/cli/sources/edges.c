@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A component as LinuxCNC hands write it: counts rising edges; for each channel a pin by pointer, one by handle, a parameter
- * of each kind, and a function. More than four channels are refused. */
+ * of each kind, and a function. More than four channels are rejected. */
 #include "hal.h"
 #include "rtapi.h"
 #include "rtapi_app.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A program that declares a rate and what its output takes, and hangs when it is told to. */
+/* A program that declares a rate and a safe value of its output, and hangs on request. */
 #include <unistd.h>
 
 #include "hal.h"
