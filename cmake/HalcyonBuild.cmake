@@ -133,7 +133,7 @@ function(halcyon_folder name)
         set(scope INTERFACE)
         add_library(halcyon_${name} INTERFACE)
     endif()
-    target_include_directories(halcyon_${name} ${scope} "${PROJECT_SOURCE_DIR}/runtime")
+    target_include_directories(halcyon_${name} ${scope} "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/runtime>" "$<INSTALL_INTERFACE:include>")
     target_link_libraries(halcyon_${name} ${scope} ${with_UNPARSED_ARGUMENTS})
 endfunction()
 

@@ -5,13 +5,15 @@ include(CMakePackageConfigHelpers)
 
 set(HALCYON_PACKAGE_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/Halcyon")
 install(DIRECTORY runtime/abi/hal runtime/sdk/hal runtime/sdk/linuxcnc runtime/sdk/check DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "*.c")
-install(TARGETS halcyon_abi halcyon_sdk EXPORT HalcyonTargets)
+set_target_properties(halcyon_text PROPERTIES EXPORT_NAME text)
+install(TARGETS halcyon_abi halcyon_sdk halcyon_text EXPORT HalcyonTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+install(DIRECTORY runtime/text DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
 install(EXPORT HalcyonTargets NAMESPACE Halcyon:: DESTINATION "${HALCYON_PACKAGE_DIR}")
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" COMPATIBILITY SameMajorVersion)
 set(HALCYON_PACKAGE_FILES cmake/HalcyonConfig.cmake cmake/HalcyonComponent.cmake cmake/HalcyonTest.cmake cmake/plugin.map)
 install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" DESTINATION "${HALCYON_PACKAGE_DIR}")
 
-add_dependencies(installed halcyon_link halcyon_cia402 halcyon_canopen halcyon_tdma)
+add_dependencies(installed halcyon_text halcyon_link halcyon_cia402 halcyon_canopen halcyon_tdma)
 
 # Pages, and the machines to start from, in the order of the tree, so that links between them are right.
 install(FILES LICENSE README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
@@ -20,7 +22,7 @@ install(DIRECTORY components drivers runtime tests tools DESTINATION "${CMAKE_IN
 install(DIRECTORY tests/netlists/semantics DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/netlists")
 
 set(package "${PROJECT_BINARY_DIR}/lib/cmake/Halcyon")
-export(TARGETS halcyon_abi halcyon_sdk halcyon_link halcyon_cia402 halcyon_canopen NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
+export(TARGETS halcyon_abi halcyon_sdk halcyon_text halcyon_link halcyon_cia402 halcyon_canopen NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
 foreach(file IN LISTS HALCYON_PACKAGE_FILES ITEMS "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake")
     cmake_path(GET file FILENAME name)
     configure_file("${file}" "${package}/${name}" COPYONLY)

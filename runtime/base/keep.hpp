@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What can never be given back, because a thread that hangs in a component may still use it.
+// Objects that are never freed, because a hung thread may still use them.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace hal {
 
-/// Never frees what it is given, and remembers where it is, so that a leak checker can tell it from what was lost. [any]
+/// Keeps an object for ever. Its address stays reachable, so that a leak checker does not report it. [any]
 template <class T>
 void keep_for_good(std::unique_ptr<T> object) noexcept {
     static std::array<std::atomic<void*>, 64> kept;

@@ -10,20 +10,13 @@
 
 #include <locale.h>
 
+#include "text/characters.hpp"
+
 namespace hal {
 
 namespace {
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-bool same_word(std::string_view text, std::string_view lower_word) {
-    if (text.size() != lower_word.size()) return false;
-    for (std::size_t i = 0; i < text.size(); ++i)
-        if (lower(text[i]) != lower_word[i]) return false;
-    return true;
-}
-
-/// The text as a message shows it: a book-length value is cut.
+/// Cuts a value that is too long for a message.
 std::string shown(std::string_view text) {
     constexpr std::size_t most = 60;
     return text.size() <= most ? std::string(text) : std::string(text.substr(0, most)) + "…";
@@ -99,12 +92,6 @@ std::string decimal(double value) {
     return {text, end};
 }
 
-struct Unit {
-    const char* name;
-    double ns;
-};
-constexpr Unit units[] = {{"ns", 1}, {"us", 1e3}, {"µs", 1e3}, {"ms", 1e6}, {"s", 1e9}, {"min", 60e9}, {"h", 3600e9}};
-
 }  // namespace
 
 std::optional<hal_type> type_named(std::string_view name) {
@@ -133,7 +120,7 @@ Parsed parse_value(hal_type type, std::string_view text) {
 
 namespace {
 
-/// `real` words a double; everything else has one form only.
+/// `real` formats a double; every other type has one form only.
 template <class Real>
 std::string format_with(hal_type type, const hal_value& value, Real&& real) {
     if (type == HAL_TYPE_PORT) return std::to_string(value.port == nullptr ? 0 : value.port->capacity);
@@ -154,35 +141,6 @@ std::string format_exact(hal_type type, const hal_value& value) {
         char text[32];
         return std::string(text, std::to_chars(text, text + sizeof text, real).ptr);
     });
-}
-
-std::optional<std::int64_t> parse_duration_ns(std::string_view text, bool bare_ns) {
-    double number = 0;
-    const auto [stop, status] = std::from_chars(text.begin(), text.end(), number);
-    if (status != std::errc{} || !(number >= 0)) return std::nullopt;
-    const std::string_view unit(stop, text.end());
-    double factor = bare_ns ? 1 : 1e9;
-    if (!unit.empty()) {
-        factor = 0;
-        for (const Unit& candidate : units)
-            if (unit == candidate.name) factor = candidate.ns;
-    }
-    const double ns = number * factor;
-    if (factor == 0 || !(ns < 9.2e18)) return std::nullopt;
-    return std::llround(ns);
-}
-
-std::string format_duration(double ns) {
-    static constexpr Unit shown_units[] = {{" s", 1e9}, {" ms", 1e6}, {" us", 1e3}, {" ns", 1}};
-    const Unit* unit = shown_units;
-    // 999.7 us is already 1.00 ms at three digits.
-    while (unit->ns > 1 && std::fabs(ns) < 0.9995 * unit->ns) ++unit;
-    const double number = ns / unit->ns, digits = std::fabs(number);
-    const bool whole = number == std::floor(number);
-    const int places = whole || digits >= 99.95 ? 0 : digits >= 9.995 ? 1 : 2;
-    char text[400];
-    const auto end = std::to_chars(text, text + sizeof text, number, std::chars_format::fixed, places).ptr;
-    return std::string(text, end) + unit->name;
 }
 
 }  // namespace hal

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "hal/abi.h"
+#include "text/numbers.hpp"
 
 namespace hal {
 
@@ -32,7 +33,7 @@ inline constexpr std::array<TypeRow, 7> types{{
 
 inline constexpr const TypeRow& row(hal_type type) { return types[static_cast<std::size_t>(type)]; }
 inline constexpr const char* name(hal_type type) { return row(type).name; }
-/// The type of either dialect's name, or nothing.
+/// Returns the type of either dialect's name.
 std::optional<hal_type> type_named(std::string_view name);
 
 /// Calls `action` with a reference to the member of `value` that `type` selects (a hal_port* for port).
@@ -55,22 +56,17 @@ inline const char* name(hal_dir dir) {
     return names[static_cast<std::size_t>(dir)];
 }
 
-/// The value a text stands for. On failure a clause says why: "'abc' is not a number", "3000000000 is out of range for
-/// s32 (-2147483648 to 2147483647)".
 struct Parsed {
     hal_value value{};
-    std::string problem;  ///< empty: good
+    std::string problem;  ///< empty: none
 };
+/// Parses a value of `type`. On failure `problem` is the reason: "'abc' is not a number", "3000000000 is out of range for
+/// s32 (-2147483648 to 2147483647)".
 Parsed parse_value(hal_type type, std::string_view text);
 
-/// As `getp` prints it: decimal, floats `%.7g`, bits TRUE/FALSE.
+/// Formats a value as `getp` prints it: decimal, floats `%.7g`, bits TRUE/FALSE.
 std::string format_value(hal_type type, const hal_value& value);
-/// So that reading it back gives the same value: floats with all digits (`save`).
+/// Formats a value so that reading it back gives the same value: floats with all digits (`save`).
 std::string format_exact(hal_type type, const hal_value& value);
-
-/// Durations as people type them: "10s", "250ms", "50us", "100ns", "1000" (ns when `bare_ns`, else seconds), "2min".
-std::optional<std::int64_t> parse_duration_ns(std::string_view text, bool bare_ns);
-/// "1.50 ms", "12 us", "10 s"
-std::string format_duration(double ns);
 
 }  // namespace hal

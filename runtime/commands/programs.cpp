@@ -29,7 +29,7 @@ struct Plan {
 /// The time behind `-t` at argument i, or 0 after reporting.
 std::int64_t timeout_option(Context& context, std::size_t i) {
     if (i < context.count())
-        if (const auto time = parse_duration_ns(context.argument(i), false); time && *time >= 1'000'000 && *time <= 86'400'000'000'000)
+        if (const auto time = parse_duration_ns(context.argument(i)); time && *time >= 1'000'000 && *time <= 86'400'000'000'000)
             return *time;
     context.diagnostics.error("unknown-option", context.span(i), "-t requires a duration of 1ms..24h, such as -t 10s");
     return 0;
@@ -48,7 +48,7 @@ bool restart_option(Context& context, Plan& plan, std::size_t i, const std::stri
         return true;
     }
     if (key != "--restart-delay") return false;
-    if (const auto delay = parse_duration_ns(value, false); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000)
+    if (const auto delay = parse_duration_ns(value); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000)
         plan.restart.delay_ns = *delay;
     else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay must be a duration of 10ms..1h", "", context.usage());
     return true;

@@ -98,7 +98,7 @@ void command_advance(Context& context) {
         const auto cycles = whole_number(amount);
         if (cycles && context.argument(1).starts_with("cycle")) return advance_cycles(context, *cycles);
     } else if (!whole_number(amount)) {
-        if (const auto ns = parse_duration_ns(amount, false)) return advance_ns(context, *ns);
+        if (const auto ns = parse_duration_ns(amount)) return advance_ns(context, *ns);
     }
     context.diagnostics.error("bad-duration", context.span(0), "'" + amount + "' has no valid unit", "",
                               "write `advance 10 cycles`, or a time with its unit: `advance 250ms`");

@@ -18,7 +18,7 @@ bool whole(std::string_view text, std::int64_t& value) {
 
 bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& diagnostics) {
     thread.period_at = at;
-    const auto ns = parse_duration_ns(text, true);
+    const auto ns = parse_duration_ns(text, 1.0);
     if (ns && *ns >= shortest_period_ns && *ns <= longest_period_ns) {
         thread.options.period_ns = *ns;
         return true;
@@ -50,11 +50,11 @@ bool set_option(NewThread& thread, std::string_view key, std::string_view value,
         else if (value == "other") o.policy = Policy::other;
         else return bad("policy is fifo, deadline or other");
     } else if (key == "spin" || key == "budget") {
-        const auto ns = parse_duration_ns(value, true);
+        const auto ns = parse_duration_ns(value, 1.0);
         if (!ns || *ns < 0) return bad("a time in ns, or with a unit: 20us");
         (key == "spin" ? o.spin_ns : o.budget_ns) = *ns;
     } else if (key == "supervise") {
-        const auto ns = value == "off" ? std::optional<std::int64_t>(0) : parse_duration_ns(value, true);
+        const auto ns = value == "off" ? std::optional<std::int64_t>(0) : parse_duration_ns(value, 1.0);
         if (!ns || *ns < 0) return bad("a time: supervise=200ms, or supervise=off");
         o.supervise_ns = *ns;
         thread.supervise_at = at;

@@ -4,6 +4,7 @@
 #include "hal/read_file.hpp"
 #include "netlist/line.hpp"
 #include "netlist/netlist.hpp"
+#include "text/config_text.hpp"
 
 namespace hal {
 
@@ -11,12 +12,6 @@ namespace {
 
 constexpr std::size_t largest_file = std::size_t{1} << 30;  // spans count bytes in 32 bits
 constexpr int deepest_include = 16, most_includes = 1000;
-
-std::string_view trimmed(std::string_view text) {
-    while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-    while (!text.empty() && (is_blank(text.back()) || text.back() == '\r')) text.remove_suffix(1);
-    return text;
-}
 
 }  // namespace
 
@@ -47,39 +42,42 @@ public:
 
 private:
     void entry(const Line& line, const std::string& path, int depth) {
-        const std::string_view text = trimmed(line.text());
-        if (text.empty() || text[0] == ';') return;
-        const auto begin = static_cast<std::size_t>(text.data() - line.text().data());
-        const Span span = line.span(begin, begin + text.size());
-        constexpr std::string_view include = "#INCLUDE";
-        if (text.starts_with(include) && text.size() > include.size() && is_blank(text[include.size()])) {
-            if (depth == deepest_include || ++includes_ > most_includes)
-                return diagnostics_.error("bad-ini-line", span, "INI files include each other more than 16 deep or 1000 times", "",
-                                          "does a file include itself?");
-            const std::filesystem::path named{trimmed(text.substr(include.size()))};
-            return read(named.is_absolute() ? named : std::filesystem::path(path).parent_path() / named, span, depth + 1);
+        using Kind = text::IniLine::Kind;
+        const text::IniLine ini = text::ini_line(line.text());
+        if (ini.kind == Kind::empty) return;
+        const auto begin = static_cast<std::size_t>(ini.whole.data() - line.text().data());
+        const Span span = line.span(begin, begin + ini.whole.size());
+        switch (ini.kind) {
+        case Kind::empty: return;
+        case Kind::comment: return include(ini.whole, span, path, depth);
+        case Kind::section: section_ = ini.name; return;
+        case Kind::open_section: return warn(span, "section name without ']'");
+        case Kind::entry: return ini_.add(section_, ini.name, ini.value);
+        case Kind::other: return warn(span, "invalid line, ignored: neither [SECTION] nor KEY = value");
         }
-        if (text[0] == '#') return;
-        if (text[0] == '[') {
-            const std::size_t close = text.find(']');
-            if (close == text.npos) return odd(span, "this section name has no ]");
-            section_ = text.substr(1, close - 1);
-            return;
-        }
-        const std::size_t equals = text.find('=');
-        if (equals == text.npos || equals == 0) return odd(span, "this line is neither [SECTION] nor KEY = value, and is ignored");
-        ini_.add(section_, trimmed(text.substr(0, equals)), trimmed(text.substr(equals + 1)));
     }
 
-    void odd(Span at, std::string message) {
-        if (++odd_ <= 20) diagnostics_.warning("bad-ini-line", at, std::move(message));
+    /// Reads the file that the comment `#INCLUDE FILE` names.
+    void include(std::string_view comment, Span span, const std::string& path, int depth) {
+        constexpr std::string_view word = "#INCLUDE";
+        if (!comment.starts_with(word) || comment.size() == word.size() || !is_blank(comment[word.size()])) return;
+        if (depth == deepest_include || ++includes_ > most_includes)
+            return diagnostics_.error("bad-ini-line", span, "INI files include each other more than 16 deep or 1000 times", "",
+                                      "does a file include itself?");
+        const std::filesystem::path named{trimmed(comment.substr(word.size()))};
+        read(named.is_absolute() ? named : std::filesystem::path(path).parent_path() / named, span, depth + 1);
+    }
+
+    void warn(Span at, std::string message) {
+        if (++warned_ <= text::most_errors + 1) diagnostics_.warning("bad-ini-line", at, std::move(message));
     }
 
     Ini& ini_;
     Sources& sources_;
     Diagnostics& diagnostics_;
     std::string section_;
-    int odd_ = 0, includes_ = 0;
+    std::size_t warned_ = 0;
+    int includes_ = 0;
 };
 
 Ini Ini::read(Sources& sources, const std::string& path, Diagnostics& diagnostics) {

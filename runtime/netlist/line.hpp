@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 #include "text/source.hpp"
 
@@ -68,8 +69,6 @@ private:
     bool continued_ = false;
     std::optional<Span> dos_ending_;
 };
-
-inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
 /// What quotes and `#` do to a line: where its comment starts (its size when there is none), and the quote that is
 /// never closed.

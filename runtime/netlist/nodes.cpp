@@ -33,7 +33,7 @@ bool read_option(const Token& token, std::size_t equals, Line& line, Diagnostics
                           to_string(node_usage));
         return false;
     }
-    const auto ns = parse_duration_ns(value, false);
+    const auto ns = parse_duration_ns(value);
     if (!ns || *ns < shortest_ns || *ns > longest_ns) {
         diagnostics.error("bad-argument", token.span, "'" + value + "' is not a valid interval", "",
                           "the range is 100us..60s; for example 5ms or 0.1s");

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "text/codes.hpp"
+#include "text/severity.hpp"
 #include "text/source.hpp"
+#include "text/suggest.hpp"
 
 namespace hal {
-
-enum class Severity { note, warning, error };
 
 /// A place with a word about it. The first label of a diagnostic is its main place (`^^^^`), others are `----`.
 struct Label {
@@ -54,14 +54,5 @@ std::string render(const Diagnostic& diagnostic, const Sources& sources, bool co
 /// All of them in order of place (files in order of first mention), a blank line between two; past
 /// the hundredth only how many more there are.
 std::string render(const Diagnostics& diagnostics, const Sources& sources, bool color = false);
-
-/// The names of `candidates` close to `name` (edit distance, prefixes, swapped separators), best first, at most `most`.
-std::vector<std::string> similar(std::string_view name, const std::vector<std::string>& candidates, std::size_t most = 3);
-
-/// "did you mean 'x'?" or "did you mean 'x' or 'y'?"; empty when nothing is close.
-std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates);
-
-/// "a, b, c" cut to a line's width: "a, b, c, … (17 more)".
-std::string listed(const std::vector<std::string>& names, std::size_t most = 12);
 
 }  // namespace hal

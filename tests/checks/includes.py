@@ -10,8 +10,8 @@ from pathlib import Path
 ROWS = {
     "runtime/abi": [],
     "runtime/sdk": ["runtime/abi"],
-    "runtime/text": ["runtime/abi", "runtime/sdk"],
-    "runtime/base": ["runtime/text"],
+    "runtime/text": ["runtime/abi"],
+    "runtime/base": ["runtime/text", "runtime/sdk"],
     "runtime/netlist": ["runtime/base"],
     "runtime/plan": ["runtime/abi"],
     "runtime/model": ["runtime/base", "runtime/plan"],
@@ -33,8 +33,8 @@ ROWS = {
     "drivers/discipline": ["drivers/link"],
     "drivers/capture": ["drivers/link"],
     "drivers/netlink": ["drivers/link"],
-    "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink"],
-    "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk"],
+    "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink", "runtime/text"],
+    "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "components/logic": ["components"],
     "components/math": ["components"],
     "components/control": ["components"],
@@ -45,15 +45,15 @@ ROWS = {
     "components/estimation": ["components"],
     "components/vision": ["components"],
     "components/dds": ["components"],
-    "components": ["runtime/sdk"],
+    "components": ["runtime/sdk", "runtime/text"],
     "components/cia402": ["runtime/sdk"],
-    "components/canopen/protocol": ["runtime/sdk", "drivers/link", "components/cia402"],  # cia402: the error codes
+    "components/canopen/protocol": ["runtime/sdk", "runtime/text", "drivers/link", "components/cia402"],  # cia402: the error codes
     "components/canopen/eds": ["components/canopen/protocol"],
     "components/canopen/master": ["components/canopen/eds"],
     "components/canopen/device": ["components/canopen/eds", "components/sim"],  # sim: the plants behind simulated devices
     "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
     "components/fieldbus/segment": ["runtime/sdk", "drivers/link"],
-    "components/fieldbus/tdma/wire": ["runtime/sdk", "drivers/link"],
+    "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],
     "components/fieldbus/tdma/config": ["components/fieldbus/tdma/station"],
     "components/fieldbus/tdma/rtcfg": ["components/fieldbus/tdma/config"],
@@ -66,7 +66,7 @@ BANS = {
     ("runtime/execute", "runtime/model"): "execute never includes model: real-time code cannot reach a name or a string",
     ("components/canopen/master", "components/canopen/device"): "master and device never include each other",
     ("components/canopen/device", "components/canopen/master"): "master and device never include each other",
-    ("components", None): "components include only the sdk (bus components also drivers/link)",
+    ("components", None): "components include only the sdk and text (bus components also drivers/link)",
     (None, "runtime/machine"): "only commands, control, cells, tools and tests include machine",
 }
 

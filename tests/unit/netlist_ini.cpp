@@ -65,15 +65,15 @@ TEST_F(Ini_file, stops_when_it_includes_itself) {
 
 TEST_F(Ini_file, warns_of_lines_that_are_nothing) {
     read("[S]\nnothing\n[T\n= 3\n");
-    EXPECT_EQ(said_of_ini(), R"(test.ini:2:1: warning: this line is neither [SECTION] nor KEY = value, and is ignored [bad-ini-line]
+    EXPECT_EQ(said_of_ini(), R"(test.ini:2:1: warning: invalid line, ignored: neither [SECTION] nor KEY = value [bad-ini-line]
     2 | nothing
       | ^^^^^^^
 
-test.ini:3:1: warning: this section name has no ] [bad-ini-line]
+test.ini:3:1: warning: section name without ']' [bad-ini-line]
     3 | [T
       | ^^
 
-test.ini:4:1: warning: this line is neither [SECTION] nor KEY = value, and is ignored [bad-ini-line]
+test.ini:4:1: warning: invalid line, ignored: neither [SECTION] nor KEY = value [bad-ini-line]
     4 | = 3
       | ^^^
 )");

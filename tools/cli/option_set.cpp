@@ -50,7 +50,7 @@ void OptionSet::values(const char* names, std::vector<std::string>& to, const ch
 
 void OptionSet::duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns, const char* examples) {
     const auto take = [name, &to, least_ns, examples](const std::string& text) {
-        const auto ns = parse_duration_ns(text, false);
+        const auto ns = parse_duration_ns(text);
         if (!ns || *ns < least_ns) throw CLI::ValidationError(name, fmt::format("invalid duration '{}'; use {}", text, examples));
         to = *ns;
     };

@@ -42,6 +42,15 @@ public:
         const hal_text_message message{sizeof message, severity, code, begin, end, sentence.c_str(), label.c_str(), help.c_str()};
         if (texts_) texts_->say(detail::creating, &message);
     }
+    /// Reports all problems of a file at their spans and ends the constructor, if there are any. [setup]
+    template <class Problems>
+    void reject(const std::string& file, std::string_view text, const char* code, const Problems& problems) const {
+        if (problems.empty()) return;
+        begin(file, text);
+        for (const auto& p : problems) say(HAL_SEVERITY_ERROR, code, p.begin, p.end, p.sentence, "", p.help);
+        if (offered()) refuse();
+        throw std::invalid_argument(file + ": " + problems.front().sentence + "; " + problems.front().help);
+    }
     /// Ends the constructor after an error was said. [setup]
     [[noreturn]] static void refuse() { detail::refused(); }
 

@@ -167,7 +167,7 @@ bool DriveShell::command(HandAxis& a, const std::string& verb, Words arguments) 
     const auto usage = [&] { return wrong(shown); };
     std::int64_t within = settings_.within_ns;
     if (const auto at = std::find(arguments.begin(), arguments.end(), "within"); at != arguments.end()) {
-        const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1], false);
+        const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1]);
         if (!ns || *ns <= 0) return wrong(fmt::format("{} within what? type: {} {} within 30s", verb, a.letter(), verb));
         within = *ns;
         arguments.erase(at, at + 2);
@@ -253,7 +253,7 @@ Completion DriveShell::complete(std::string_view line, std::size_t cursor) {
 namespace {
 
 bool duration_of(const Options& options, const std::string& text, std::int64_t& to) {
-    const auto ns = parse_duration_ns(text, false);
+    const auto ns = parse_duration_ns(text);
     if (!ns || *ns <= 0) return fail(options, fmt::format("'{}' is not a duration; write 200ms or 1s", text)), false;
     return to = *ns, true;
 }
@@ -285,7 +285,7 @@ bool supervision_of(const DriveOptions& options, SupervisionSettings& settings) 
     if (!options.heartbeat_id.empty() && !node_of(options, options.heartbeat_id, settings.own_node)) return false;
     if (options.supervise.empty()) return true;
     if (options.supervise == "off") return settings.limit_ns = 0, true;
-    const auto ns = parse_duration_ns(options.supervise, false);
+    const auto ns = parse_duration_ns(options.supervise);
     if (!ns || *ns < 50'000'000 || *ns > 65'000'000'000)
         return fail(options, fmt::format("invalid --supervise '{}'; write 50ms to 65s, or off", options.supervise)), false;
     return settings.limit_ns = *ns, true;

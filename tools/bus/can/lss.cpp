@@ -118,7 +118,7 @@ int bit_rate(Lss& l) {
 }
 
 int activate(Lss& l) {
-    const auto ns = parse_duration_ns(l.arguments[0], false);
+    const auto ns = parse_duration_ns(l.arguments[0]);
     if (!ns || *ns < 0 || *ns > 65'535'000'000)
         return fail(l.options, fmt::format("'{}' is no delay; write how long all are silent before and after: 1s, 500ms", l.arguments[0]));
     l.station.lss.activate_bit_timing(static_cast<std::uint16_t>(*ns / 1'000'000));

@@ -35,7 +35,7 @@ struct Setting {
 /// Reads NAME=VALUE or NAME=VALUE@TIME.
 bool parse_setting(const std::string& text, Setting& setting, std::string& problem) {
     const auto equals = text.find('='), at = text.find('@');
-    const auto ns = at == text.npos ? std::optional<std::int64_t>(0) : parse_duration_ns(text.substr(at + 1), false);
+    const auto ns = at == text.npos ? std::optional<std::int64_t>(0) : parse_duration_ns(text.substr(at + 1));
     if (equals != text.npos && equals != 0 && (at == text.npos || at > equals) && ns && *ns >= 0) {
         const std::string digits = text.substr(equals + 1, at == text.npos ? text.npos : at - equals - 1);
         const auto [end, wrong] = std::from_chars(digits.data(), digits.data() + digits.size(), setting.value);
