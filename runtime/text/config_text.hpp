@@ -37,6 +37,7 @@ struct Message {
     std::string sentence;  ///< no final stop; names quoted '…'
     std::string help{};    ///< what to type; may be empty
     std::string label{};   ///< shown at the caret; may be empty
+    std::string argument{};  ///< the load argument it is about, if no file was read
 };
 
 /// Errors kept per file. One more is kept, so that the host reports that there are more.
@@ -58,6 +59,11 @@ public:
     }
     void note(Topic topic, Span at, std::string sentence, std::string help = {}, std::string label = {}) {
         add(Severity::note, topic, at, std::move(sentence), std::move(help), std::move(label));
+    }
+    /// Reports an invalid load argument.
+    void argument(Topic topic, std::string name, std::string sentence, std::string help) {
+        error(topic, {}, std::move(sentence), std::move(help));
+        all.back().argument = std::move(name);
     }
     bool failed() const { return errors_ != 0; }
 

@@ -26,7 +26,8 @@ TEST(ConfigMasters, One_that_follows_takes_its_phase_and_may_keep_its_own_clock)
     EXPECT_TRUE(led.config.sync_clock);
     EXPECT_EQ(led.config.sync_phase, 300 * microsecond);
     EXPECT_FALSE(read_bus("sync = follow\nclock = own\n").config.sync_clock);
-    EXPECT_EQ(errors_of("sync = cycle\nclock = sync\n"), (Errors{"3: 'clock' is for those who follow the SYNC of another node"}));
+    EXPECT_EQ(errors_of("sync = cycle\nclock = sync\n"),
+              (Errors{"3: 'clock' applies only when the master follows the SYNC of another node"}));
 }
 
 TEST(ConfigMasters, A_flying_master_has_the_times_of_its_keys) {
@@ -44,9 +45,10 @@ TEST(ConfigMasters, A_flying_master_has_the_times_of_its_keys) {
 }
 
 TEST(ConfigMasters, What_cannot_be_of_several_masters_is_said_at_its_place) {
-    EXPECT_EQ(errors_of("flying-timeout = 5ms\n"), (Errors{"2: 'flying-timeout' is for flying masters"}));
-    EXPECT_EQ(errors_of("flying-master = best\nflying-timeout = 5ms\n"), (Errors{"2: 'flying-master' cannot be 'best'"}));
-    EXPECT_EQ(errors_of("flying-master = low\nheartbeat = none\n"), (Errors{"2: a flying master without a heartbeat would not be missed"}));
+    EXPECT_EQ(errors_of("flying-timeout = 5ms\n"), (Errors{"2: 'flying-timeout' applies to flying masters only"}));
+    EXPECT_EQ(errors_of("flying-master = best\nflying-timeout = 5ms\n"), (Errors{"2: invalid flying-master 'best'"}));
+    EXPECT_EQ(errors_of("flying-master = low\nheartbeat = none\n"),
+              (Errors{"2: a flying master needs a heartbeat: without one, its loss goes undetected"}));
     EXPECT_EQ(errors_of("flying-master = low\nflying-priority-slot = 1270ms\n").size(), 1u);
 }
 

@@ -73,32 +73,32 @@ TEST(ConfigSafety, Both_frames_are_in_the_plan) {
 TEST(ConfigSafety, Says_what_is_wrong) {
     const std::pair<std::string, const char*> rows[] = {
         {"tsrdo1 = 0x2300:1 u8\n",
-         "4: '0x2300:1 u8' is not an object and the one that holds it inverted; write OBJECT / INVERTED, as in 0x2300:1 / 0x2301:1"},
-        {"tsrdo1 = 0x2300:1 u8 / 0x2301:1 u16\n", "4: '0x2301:1 u16' cannot be '0x2300:1 u8' inverted; they are objects of one length"},
-        {"tsrdo1 = 0x2300:1 u8 / 0x2300:1 u8\n", "4: '0x2300:1 u8' cannot be '0x2300:1 u8' inverted; it is the same object"},
+         "4: invalid pair '0x2300:1 u8': expected an object and its inverted object; write OBJECT / INVERTED, as in 0x2300:1 / 0x2301:1"},
+        {"tsrdo1 = 0x2300:1 u8 / 0x2301:1 u16\n", "4: '0x2301:1 u16' cannot hold '0x2300:1 u8' inverted; both must have the same length"},
+        {"tsrdo1 = 0x2300:1 u8 / 0x2300:1 u8\n", "4: '0x2300:1 u8' cannot hold '0x2300:1 u8' inverted; both are the same object"},
         {"tsrdo2 = " + pair + "\n",
-         "4: tsrdo2 has no identifier by rule; give it an odd one from 0x101 to 0x17F that no other has: tsrdo2.cob-id = 0x151"},
+         "4: tsrdo2 has no default identifier; assign a free odd one of 0x101..0x17F: tsrdo2.cob-id = 0x151"},
         {"tsrdo1 = " + pair + "\ntsrdo1.cob-id = 0x102\n",
-         "5: 'tsrdo1.cob-id' cannot be '0x102'; write an odd identifier from 0x101 to 0x17F; the next one is that of the second frame"},
+         "5: invalid tsrdo1.cob-id '0x102'; write an odd identifier of 0x101..0x17F; the second frame has the next one"},
         {"tsrdo1 = " + pair + "\ntsrdo1.sct = 20ms\ntsrdo1.refresh = 20ms\n",
-         "4: tsrdo1 would be late every time: it is sent every 20ms and missed after 20ms; write tsrdo1.sct = 40ms, or a shorter refresh"},
-        {"tsrdo1 = " + pair + "\ntsrdo1.srvt = 256ms\n", "5: 'tsrdo1.srvt' cannot be '256ms'; write whole milliseconds up to 255ms"},
-        {"tsrdo1 = " + pair + "\ntsrdo1.inhibit = 1ms\n", "5: an SRDO has no 'inhibit'; there are refresh, sct, srvt, cob-id"},
-        {"tsrdo65 = " + pair + "\n", "4: there is no SRDO 65; SRDOs are numbered from 1 to 64"},
-        {"tsrdo1.sct = 20ms\n", "4: tsrdo1 is not used; name its objects: tsrdo1 = OBJECT / INVERTED, OBJECT / INVERTED"},
+         "4: tsrdo1 always times out: it is sent every 20ms, its timeout is 20ms; write tsrdo1.sct = 40ms, or a shorter refresh"},
+        {"tsrdo1 = " + pair + "\ntsrdo1.srvt = 256ms\n", "5: invalid tsrdo1.srvt '256ms'; write whole milliseconds up to 255ms"},
+        {"tsrdo1 = " + pair + "\ntsrdo1.inhibit = 1ms\n", "5: unknown SRDO option 'inhibit'; the options are refresh, sct, srvt, cob-id"},
+        {"tsrdo65 = " + pair + "\n", "4: invalid SRDO number 65; SRDOs are numbered 1..64"},
+        {"tsrdo1.sct = 20ms\n", "4: tsrdo1 has options but no objects; name its objects: tsrdo1 = OBJECT / INVERTED, OBJECT / INVERTED"},
         {"tsrdo1 = " + pair + "\nrsrdo1 = 0x2310:1 u8 / 0x2311:1 u8\n",
-         "5: SRDO 1 of a node is sent by it or received, not both; call one of them rsrdo2"},
+         "5: SRDO 1 of a node is either sent or received, not both; renumber one of them: rsrdo2"},
         {"tpdo1 = 0x2300:1 u8\ntpdo1.transmission = event\ntsrdo1 = " + pair + "\n",
-         "6: object 0x2300:1 of tsrdo1 is carried by another PDO or SRDO, too; a safety-related object comes by its SRDO alone"},
+         "6: object 0x2300:1 of tsrdo1 is also in another PDO or SRDO; map a safety-related object to one SRDO only"},
         {"tsrdo1 = " + pair + "\nrsrdo2 = 0x2310:1 u8 / 0x2311:1 u8\nrsrdo2.cob-id = 0x10d\n",
-         "5: rsrdo2 of 'gate' has the identifier of tsrdo1 of 'gate', 0x010d; an SRDO has its identifiers alone"},
+         "5: rsrdo2 of 'gate' and tsrdo1 of 'gate' have the same identifier 0x010d; an SRDO cannot share its identifiers"},
     };
     for (const auto& [keys, said] : rows) EXPECT_EQ(first(read_node(keys)), said) << keys;
 }
 
 TEST(ConfigSafety, Nodes_above_64_have_no_identifier_by_rule) {
     EXPECT_EQ(first(read_node("tsrdo1 = " + pair + "\n", "65")),
-              "4: tsrdo1 has no identifier by rule; give it an odd one from 0x101 to 0x17F that no other has: tsrdo1.cob-id = 0x151");
+              "4: tsrdo1 has no default identifier; assign a free odd one of 0x101..0x17F: tsrdo1.cob-id = 0x151");
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ struct Table {
 Table table_of(const config::Schedule& schedule) {
     Table table{schedule.bus, {}, {}};
     for (std::size_t i = 0; i < schedule.messages.size(); ++i)
-        table.rows.push_back({schedule.messages[i], schedule.names[i], schedule.places[i].line});
+        table.rows.push_back({schedule.messages[i], schedule.names[i], schedule.spans[i].line});
     std::stable_sort(table.rows.begin(), table.rows.end(), [](const Row& a, const Row& b) { return plan::before(a.message, b.message); });
     if (schedule.sync > 0)
         table.per_sync = fmt::format("{} frames with each SYNC of {:g} ms take {:.3f} ms at most: {:.1f} %\n", schedule.per_sync,
@@ -210,7 +210,7 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
     if (const std::string& link = reading.config.link; !can::describe(link).has_bit_rate)
         return fail(options, fmt::format("the frames of {} travel on Ethernet ({}), where no identifier waits for another; who sends when says: "
                                          "hal tdma plan FILE.tdma", file, link));
-    const auto cycle = parse_duration_ns(options.cycle, false);
+    const auto cycle = parse_duration_ns(options.cycle);
     if (!cycle || *cycle < 1000) return fail(options, fmt::format("'{}' is no period of a thread; write --cycle 1ms", options.cycle));
     const Table table = table_of(config::schedule_of(reading.config, *cycle));
     std::vector<plan::Message> messages;

@@ -32,13 +32,13 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
     out.bus = {config.bit_rate, config.data_rate};
     const Time sync = config.sync == SyncMode::none ? 0 : config.sync_period != 0 ? config.sync_period : cycle;
     out.sync = sync;
-    const auto add = [&](std::uint32_t cob, unsigned bytes, Time period, std::string name, Place at, bool of_sync) {
+    const auto add = [&](std::uint32_t cob, unsigned bytes, Time period, std::string name, Span at, bool of_sync) {
         plan::Message m;
         m.id = cob_id(cob), m.extended = (cob & cob_extended) != 0, m.bytes = static_cast<std::uint8_t>(bytes), m.period = period;
         if (of_sync) m.deadline = sync, ++out.per_sync;
         out.messages.push_back(m);
         out.names.push_back(std::move(name));
-        out.places.push_back(at);
+        out.spans.push_back(at);
         out.assumed.push_back(false);
     };
     if (sync != 0) add(config.sync_cob, config.sync_counter != 0 ? 1 : 0, sync, "SYNC", config.at, true);
@@ -87,7 +87,7 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
         plan::Message m{f.id, f.extended, f.remote, f.fd, f.bit_rate_switch, f.bytes, f.period, f.deadline, f.jitter};
         out.messages.push_back(m);
         out.names.push_back(f.name);
-        out.places.push_back(f.at);
+        out.spans.push_back(f.at);
         out.assumed.push_back(false);
     }
     const auto analysis = plan::analyse(out.messages, out.bus);
@@ -99,9 +99,9 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
 }
 
 std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const std::string& path) {
-    if (!can::describe(config.link).has_bit_rate) return {};  // there messages share Ethernet frames, not a bit rate
+    if (!can::describe(config.link).has_bit_rate) return {};  // messages on Ethernet share frames, not a bit rate
     Schedule schedule = schedule_of(config, cycle);
-    // A warning is only about what is known: a PDO that is sent on a change may be as rare as its changes.
+    // Only known periods count: a PDO that is sent on a change may be rare.
     for (std::size_t i = schedule.messages.size(); i-- > 0;) {
         if (!schedule.assumed[i]) continue;
         const auto at = static_cast<std::ptrdiff_t>(i);
@@ -115,17 +115,17 @@ std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const
     if (analysis.fits || late == schedule.messages.size()) return {};
     char share[40];
     std::snprintf(share, sizeof share, "%.1f", 100 * analysis.load);
-    std::string sentence = "the bus cannot carry this in time: it is in use for " + std::string(share) + " % at worst";
+    std::string sentence = "bus overload: deadlines are missed at a worst-case load of " + std::string(share) + " %";
     if (schedule.sync != 0) {
         std::snprintf(share, sizeof share, "%.3f", schedule.sync_share * static_cast<double>(schedule.sync) / 1e6);
         sentence +=
             ", and " + std::to_string(schedule.per_sync) + " frames with a SYNC take " + share + " ms of its " + ms(schedule.sync) + " ms";
     }
-    std::string help = "hal canopen plan " + path + " shows the arithmetic and what to change";
+    std::string help = "hal canopen plan " + path + " shows the calculation and what to change";
     if (const auto rate = plan::sufficient_bit_rate(schedule.messages, schedule.bus))
-        help = "bitrate = " + (*rate == 1'000'000 ? "1M" : std::to_string(*rate / 1000) + "k") + " would do; " + help;
-    return {{Severity::warning, Topic::load, config.at, std::move(sentence), "the first that may be late is " + schedule.names[late],
-             std::move(help)}};
+        help = "bitrate = " + (*rate == 1'000'000 ? "1M" : std::to_string(*rate / 1000) + "k") + " is sufficient; " + help;
+    return {{Severity::warning, Topic::load, config.at, std::move(sentence), std::move(help),
+             "first late message: " + schedule.names[late]}};
 }
 
 }  // namespace hal::canopen::config

@@ -14,17 +14,17 @@ struct Schedule {
     plan::Bus                  bus;
     std::vector<plan::Message> messages;
     std::vector<std::string>   names;  ///< of each message
-    std::vector<Place>         places;       ///< where the file says it
-    std::vector<bool> assumed;       ///< nothing says how often it comes at most: counted once a SYNC or cycle
+    std::vector<Span>         spans;   ///< of their lines
+    std::vector<bool> assumed;       ///< its period is not given: counted once per SYNC or cycle
     unsigned                   per_sync = 0;           ///< frames that belong to one SYNC
     Time                       sync = 0;                   ///< its period; 0: none
     double                     sync_share = 0;           ///< share of the SYNC's period that these frames take, at worst
 };
 
-/// `cycle`: the period of the master's thread. Emergencies, SDO and NMT are not in it: they have what is left.
+/// Lists all messages. `cycle` is the period of the master's thread. Emergencies, SDO and NMT are not in it: they use the remaining time.
 Schedule schedule_of(const MasterConfig&, Time cycle);
 
-/// Where the bus does not fit, one message about it; nothing when it fits.
+/// Returns one warning if the bus is overloaded, else nothing.
 std::vector<Message> load_messages(const MasterConfig&, Time cycle, const std::string& path);
 
 }  // namespace hal::canopen::config

@@ -20,8 +20,8 @@ void Keys::take(Section& section) {
     for (Line& line : section.lines) {
         const auto [before, fresh] = own.emplace(line.key.text, &line);
         if (!fresh) {
-            report_.error(Topic::line, line.key.at, "'" + line.key.text + "' is given twice in this section",
-                          "line " + std::to_string(before->second->key.at.line) + " has it, too; keep one of them", "second time");
+            report_.error(Topic::line, line.key.at, "duplicate key '" + line.key.text + "' in this section",
+                          "first in line " + std::to_string(before->second->key.at.line) + "; delete one of them", "duplicate");
             continue;
         }
         lines_[line.key.text] = &line;
@@ -49,8 +49,8 @@ std::vector<Line*> Keys::rest() const {
     return out;
 }
 
-void Keys::refuse(const Line& line, const std::string& can_be) {
-    report_.error(Topic::value, line.value.at, "'" + line.key.text + "' cannot be '" + line.value.text + "'", "write " + can_be);
+void Keys::reject(const Line& line, const std::string& instead) {
+    report_.error(Topic::value, line.value.at, "invalid " + line.key.text + " '" + line.value.text + "'", "write " + instead);
 }
 
 void Keys::take_text(const char* key, std::string& to) {
@@ -61,7 +61,7 @@ void Keys::take_flag(const char* key, bool& to) {
     const Line* line = find(key);
     if (line == nullptr) return;
     if (const auto value = yes_or_no(line->value.text)) to = *value;
-    else refuse(*line, "yes or no");
+    else reject(*line, "yes or no");
 }
 
 bool Keys::take_time(const char* key, Time& to, Time least, Time most, bool none) {
@@ -71,8 +71,7 @@ bool Keys::take_time(const char* key, Time& to, Time least, Time most, bool none
     if (none && (word == "no" || word == "none" || word == "0")) return to = 0, true;
     const auto value = duration(line->value.text);
     if (!value || *value < least || *value > most) {
-        refuse(*line, std::string(none ? "none, or " : "") + "a time from " + time_text(least) + " to " + time_text(most) +
-                          ", as in 10ms or 0.5s");
+        reject(*line, std::string(none ? "none, or " : "") + "a time of " + time_text(least) + ".." + time_text(most) + ", as in 10ms or 0.5s");
         return false;
     }
     return to = *value, true;
@@ -81,9 +80,9 @@ bool Keys::take_time(const char* key, Time& to, Time least, Time most, bool none
 bool Keys::take_number(const char* key, std::uint64_t& to, std::uint64_t least, std::uint64_t most) {
     const Line* line = find(key);
     if (line == nullptr) return false;
-    const auto value = natural(line->value.text);
+    const auto value = parse_natural(line->value.text);
     if (!value || *value < least || *value > most) {
-        refuse(*line, "a number from " + std::to_string(least) + " to " + std::to_string(most) + ", decimal or with 0x");
+        reject(*line, "a number of " + std::to_string(least) + ".." + std::to_string(most) + ", decimal or with 0x");
         return false;
     }
     return to = *value, true;

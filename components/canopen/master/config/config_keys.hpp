@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Keys of a section read by name: what each one may be, and what is said when it is not.
+// Reads the keys of a section by name and reports invalid values.
 #pragma once
 
 #include <map>
@@ -10,29 +10,29 @@
 
 namespace hal::canopen::config {
 
-/// A word of a value and what it stands for.
+/// A word of a value and its meaning.
 template <class T>
 struct Choice {
     const char* word;
     T           value;
 };
 
-/// The keys that hold for one thing: of several sections, the later ones winning.
+/// The keys that apply to one node or bus; a later section overrides an earlier one.
 class Keys {
 public:
     explicit Keys(Report& report) : report_(report) {}
-    /// Takes a section's keys on top of those so far.
+    /// Adds the keys of a section; they override those added before.
     void take(Section& section);
 
     const Line* find(const std::string& key);
-    /// Every line whose key begins with `beginning`, in order of place.
+    /// Returns every line whose key begins with `beginning`, in the order of the file.
     std::vector<Line*> all_of(std::string_view beginning) const;
-    /// All lines nobody has asked for.
+    /// Returns all lines that were not read yet.
     std::vector<Line*> rest() const;
 
     void take_text(const char* key, std::string& to);
     void take_flag(const char* key, bool& to);
-    /// Of 0 or more; `least` and `most` in ns. "no" and "none" are 0 where that is allowed.
+    /// Reads a time of `least` to `most` ns; with `none`, "no" and "none" are 0. Returns whether the key has a valid value.
     bool take_time(const char* key, Time& to, Time least, Time most, bool none = false);
     bool take_number(const char* key, std::uint64_t& to, std::uint64_t least, std::uint64_t most);
     template <class T>
@@ -47,14 +47,14 @@ public:
         if (line == nullptr) return false;
         std::vector<std::string> words;
         for (const auto& c : choices) {
-            if (lower(line->value.text) == c.word) return to = c.value, true;
+            if (same_word(line->value.text, c.word)) return to = c.value, true;
             words.push_back(c.word);
         }
-        refuse(*line, listed(words));
+        reject(*line, listed(words));
         return false;
     }
-    /// "'KEY' cannot be 'VALUE'", and what it can be.
-    void refuse(const Line& line, const std::string& can_be);
+    /// Reports "invalid KEY 'VALUE'" and what to write instead.
+    void reject(const Line& line, const std::string& instead);
 
     Report& report() { return report_; }
 

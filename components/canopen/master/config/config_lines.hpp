@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The text below a configuration: sections and keys, each with its place; and what values are spelled like.
+// The text below a configuration: sections and keys, each with its span, and how values are spelled.
 #pragma once
 
 #include <deque>
@@ -8,65 +8,44 @@
 #include <vector>
 
 #include "master_config.hpp"
+#include "text/characters.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::canopen::config {
 
-/// A word of the file and where it stands.
-struct Word {
-    std::string text;
-    Place       at;
-    bool        empty() const { return text.empty(); }
-};
+using text::list_of;
+using text::Word;
+using text::words_of;
+using Report = text::Messages<Topic>;
 
 struct Line {
-    Word        key, value;          ///< key: lower case, dashes; value: as it is
-    std::string written{};    ///< the key as it is
+    Word        key, value;  ///< key: lower case, dashes; value: as written
+    std::string written{};   ///< the key as written
     bool        used = false;
 };
 
 struct Section {
     std::vector<Word> words;  ///< of its header
-    Place             at;
+    Span              at;
     std::deque<Line>  lines;
 };
 
-/// Collects messages.
-class Report {
-public:
-    void error(Topic topic, Place at, std::string sentence, std::string help = {}, std::string label = {}) {
-        messages.push_back({Severity::error, topic, at, std::move(sentence), std::move(label), std::move(help)});
-    }
-    void warning(Topic topic, Place at, std::string sentence, std::string help = {}, std::string label = {}) {
-        messages.push_back({Severity::warning, topic, at, std::move(sentence), std::move(label), std::move(help)});
-    }
-    void note(Topic topic, Place at, std::string sentence, std::string help = {}) {
-        messages.push_back({Severity::note, topic, at, std::move(sentence), {}, std::move(help)});
-    }
-    std::vector<Message> messages;
-};
-
+/// Splits a configuration into its sections. [setup]
 std::vector<Section> split(std::string_view text, Report&);
 
-/// "a, b, c" in its parts, each with its place.
-std::vector<Word> list_of(const Word& value, char by = ',');
-std::vector<Word> words_of(const Word& value);
-
-/// Lower case; what is neither letter nor digit becomes one dash.
-std::string dashed(std::string_view name);
-std::string lower(std::string_view text);
-/// Decimal, or hexadecimal with 0x.
-std::optional<std::uint64_t> natural(std::string_view text);
-/// 1M, 500k, 125000
+/// Parses a bit rate of 5 kbit/s to 20 Mbit/s: 1M, 500k, 125000. [setup]
 std::optional<std::uint32_t> rate(std::string_view text);
-/// 1ms, 250us, 2s, 0.5s; none without a unit, except 0.
+/// Parses a time with a unit, or 0: 1ms, 250us, 2s, 0.5s. [setup]
 std::optional<Time> duration(std::string_view text);
 std::optional<bool> yes_or_no(std::string_view text);
-/// "0x6040", "0x6099:1"
+/// Returns the data type of u8, i16, real32, text and the like. [setup]
+std::optional<Type> type_named(std::string_view word);
+inline constexpr const char* type_words = "u8, u16, u32, u64, i8, i16, i32, i64, real32, real64 or bool";
+/// Parses INDEX or INDEX:SUB with a hexadecimal index. [setup]
+std::optional<std::pair<std::uint16_t, std::uint8_t>> address(std::string_view text, bool& has_sub);
+/// Formats an object's address: "0x6040:0", "0x6099:1"; a `single` one has no sub-index: "0x6040". [setup]
 std::string object_label(std::uint16_t index, unsigned sub, bool single = false);
-
-/// "did you mean 'x'?", or empty. `candidates` are compared as they are.
-std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
-/// "a, b, c, … (12 more)"
-std::string listed(const std::vector<std::string>& names, std::size_t most = 12);
 
 }  // namespace hal::canopen::config

@@ -13,36 +13,25 @@
 #include "canopen/master/boot/flying_master.hpp"
 #include "canopen/master/boot/node_setup.hpp"
 #include "canopen/protocol/description.hpp"
+#include "text/config_text.hpp"
 
 namespace hal::canopen::config {
 
-/// Lines and columns from 1, columns in characters; offset and length in bytes of the file.
-struct Place {
-    std::uint32_t line = 0, column = 0, offset = 0, length = 0;
-};
+using hal::Severity;
+using text::Span;
 
-enum class Severity : std::uint8_t { note, warning, error };
-
-/// What a message is about; the program has a page on each.
+/// Subject of a message: its diagnostic code, with a page each (`hal explain`).
 enum class Topic : std::uint8_t {
-    line,    ///< a line, section or key that means nothing
-    value,   ///< a value that cannot be
-    object,  ///< an object that is not there, or that a PDO cannot carry
-    node,    ///< nodes or messages that are in each other's way, or a node that lacks something
-    load,    ///< the bus cannot carry it in time
+    line,    ///< an invalid line, section or key
+    value,   ///< an invalid value
+    object,  ///< an unknown object, or one that a PDO cannot carry
+    node,    ///< conflicting nodes or messages, or an incomplete node
+    load,    ///< bus overload
 };
 /// "canopen-line", …: the diagnostic's code.
 const char* code_of(Topic);
 
-struct Message {
-    Severity    severity = Severity::error;
-    Topic       topic = Topic::line;
-    Place       at;
-    std::string sentence;  ///< no final stop; names quoted '…'
-    std::string label{};   ///< a word under the place; may be empty
-    std::string help{};    ///< what to type; may be empty
-    std::string argument{};  ///< the load argument it is about, when no file was read
-};
+using Message = text::Message<Topic>;
 
 enum class PinType : std::uint8_t { none, bit, s32, u32, s64, u64, real };
 
@@ -65,8 +54,8 @@ struct Object {
     std::string                  unit{};
     std::vector<BitPin>          bit_pins{};
     std::optional<std::uint64_t> safe{};  ///< the object's bits while the node is not operational; none: the last ones stay
-    bool                         safe_given = false;  ///< by the file
-    int                          bits_wanted = 0;  ///< by the file: 1 bits as pins, -1 not, 0 nothing said
+    bool                         safe_given = false;  ///< in the file
+    int                          bits_wanted = 0;  ///< by the file: 1 bits as pins, -1 not, 0 not given
 
     bool same(const Object& o) const { return !filler && !o.filler && index == o.index && sub == o.sub; }
 };
@@ -85,12 +74,12 @@ struct Pdo {
     std::uint8_t        transmission = 255;
     std::uint16_t       inhibit_100us = 0, event_ms = 0;
     std::uint8_t        sync_start = 0;
-    Multiplex           multiplex = Multiplex::none;  ///< what the node sends from itself, or receives for its objects, one in each frame
-    Time                request = 0;  ///< one the node sends: how often it is asked for by a remote frame; 0: it is not
-    Time                limit = 0;  ///< one the node sends: silence that is a fault; 0: none
+    Multiplex           multiplex = Multiplex::none;  ///< MPDO: one object per frame
+    Time                request = 0;  ///< TPDO: period of the remote requests; 0: none
+    Time                limit = 0;  ///< TPDO: timeout; 0: none
     std::vector<Object> objects;
-    Place               at{};
-    std::optional<Safety> safety{};  ///< an SRDO: `number` is that of the SRDO, `cob` of its first frame, and what is of PDOs only means nothing
+    Span               at{};
+    std::optional<Safety> safety{};  ///< an SRDO: `number` is that of the SRDO, `cob` of its first frame; the PDO timing is unused
 
     bool     synchronous() const { return transmission <= 240; }
     unsigned bits() const;
@@ -102,23 +91,23 @@ struct Node {
     NodeSetup        setup;
     std::string      name;  ///< of its pins
     std::vector<Pdo> pdos;
-    bool             dated_by_content = false;  ///< 1020h gets a number made of what is written instead of a date
-    Place            at{};
+    bool             dated_by_content = false;  ///< 1020h is derived from what is written to the node
+    Span            at{};
 };
 
-/// A message on the bus that is not of this network, of [messages]; it counts for the schedule only.
+/// A message of another network on the same bus, from [messages]; it counts for the schedule only.
 struct Foreign {
     std::uint32_t id = 0;
     bool          extended = false, remote = false, fd = false, bit_rate_switch = false;
     std::uint8_t  bytes = 8;
     Time          period = 0, deadline = 0, jitter = 0;
     std::string   name;
-    Place         at{};
+    Span         at{};
 };
 
 enum class SyncMode : std::uint8_t { none, cycle, timed, follow };
 
-/// What the master tells the nodes when it stops.
+/// NMT state that the master commands when it stops.
 enum class AtStop : std::uint8_t { nothing, pre_operational, stopped };
 
 struct MasterConfig {
@@ -126,27 +115,27 @@ struct MasterConfig {
     std::uint32_t        bit_rate = 1'000'000, data_rate = 0;
     std::uint8_t         node_id = 127;
     SyncMode             sync = SyncMode::none;
-    Time                 sync_period = 0;  ///< timed, or as it is expected when followed
+    Time                 sync_period = 0;  ///< timed: its period; follow: its expected period
     std::uint32_t        sync_cob = 0x80;
     std::uint8_t         sync_counter = 0;  ///< 1019h
     Time                 sync_window = 0;  ///< 1007h
-    bool                 sync_at_boot = false;  ///< from the first cycle on; else once all mandatory nodes are configured
-    bool                 sync_clock = true;  ///< followed: the threads follow it, too
-    Time                 sync_phase = -1;    ///< followed: how long after it a cycle begins; < 0: half the thread's period
+    bool                 sync_at_boot = false;  ///< from the first cycle; else after all mandatory nodes are configured
+    bool                 sync_clock = true;  ///< follow: the threads are synchronised to it
+    Time                 sync_phase = -1;    ///< follow: time from the SYNC to the next cycle; < 0: half the period of the thread
     Time                 time_period = 0;  ///< TIME; 0: none
     std::uint16_t        heartbeat_ms = 100;  ///< of the master; 0: none
     AtStop               at_stop = AtStop::pre_operational;
-    MasterSetup          master;  ///< without its nodes, which are in `nodes`
+    MasterSetup          master;  ///< without its nodes: see `nodes`
     FlyingSetup          flying;
     std::vector<Node>    nodes;
     std::vector<Foreign> foreign;
-    Place                at{};  ///< of [bus]
+    Span                at{};  ///< of [bus]
 
     /// `master` with all nodes in it.
     MasterSetup setup() const;
 };
 
-/// The bytes of a file, or false and the reason in `bytes`.
+/// Reads a whole file. Returns false and sets `bytes` to the reason.
 using ReadFile = std::function<bool(const std::string& path, std::string& bytes)>;
 bool read_from_disk(const std::string& path, std::string& bytes);
 
@@ -156,10 +145,10 @@ struct Reading {
     bool                 good() const;  ///< no error among them
 };
 
-/// Reads a configuration. `path` is that of the file: others are found beside it.
+/// Reads a configuration. Relative paths in it start at the folder of `path`.
 Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
 
-/// "file:12:7: error: sentence; help" of each error, a line each, for those without a renderer.
+/// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
 std::string to_string(const Reading&, const std::string& path);
 
 /// The network of a single node of which only object indices are known: `loadrt canopen inputs=24831 outputs=24675,25600 …`.
@@ -168,7 +157,7 @@ struct ByIndex {
     std::string eds;  ///< may be empty
     unsigned    slave = 0, master = 0;
 };
-/// The places in the messages are of no use.
+/// Reads it; the messages have no spans.
 Reading read(const ByIndex&, const ReadFile& = read_from_disk);
 
 }  // namespace hal::canopen::config

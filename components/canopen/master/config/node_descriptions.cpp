@@ -9,8 +9,8 @@ std::string Descriptions::path(const Word& file) const { return file.text.front(
 bool Descriptions::read(const Word& file, std::string& bytes, Report& report) {
     const bool whole = file.text.front() == '/';
     if (read_(path(file), bytes)) return true;
-    report.error(Topic::value, file.at, "the file '" + file.text + "' cannot be read: " + bytes,
-                 whole ? "" : "a name without / at its beginning is looked for beside this file");
+    report.error(Topic::value, file.at, "cannot read '" + file.text + "': " + bytes,
+                 whole ? "" : "a relative path starts at the folder of this file");
     return false;
 }
 
@@ -21,16 +21,16 @@ const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report
     if (!read(file, text, report)) return nullptr;
     eds::Reading reading = eds::read_description(text);
     if (!reading.description) {
-        std::string why = "it is no device description";
+        std::string why = "not a device description";
         for (const auto& m : reading.messages)
             if (m.severity == eds::Severity::error) why = "line " + std::to_string(m.at.line) + ": " + m.sentence;
-        report.error(Topic::value, file.at, "the device description '" + file.text + "' cannot be used: " + why,
-                     "hal can eds check " + path(file) + " says more");
+        report.error(Topic::value, file.at, "cannot use device description '" + file.text + "': " + why,
+                     "see: hal can eds check " + path(file));
         return nullptr;
     }
     if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0)
-        report.note(Topic::value, file.at, "'" + file.text + "' has " + std::to_string(warnings) + (warnings == 1 ? " warning" : " warnings"),
-                    "hal can eds check " + path(file) + " says which; what it says of an object that is used here counts");
+        report.note(Topic::value, file.at, "'" + file.text + "' has " + counted(warnings, "warning"),
+                    "list them with hal can eds check " + path(file) + "; those about objects used here matter");
     std::vector<eds::Message> ignored;
     eds::connect_modules(*reading.description, ignored);
     description = std::make_unique<eds::DeviceDescription>(std::move(*reading.description));

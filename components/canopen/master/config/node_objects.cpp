@@ -26,13 +26,9 @@ std::optional<double> real(std::string_view text) {
         const auto above = real(text.substr(0, slash)), below = real(text.substr(slash + 1));
         return above && below && *below != 0 ? std::optional(*above / *below) : std::nullopt;
     }
-    while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
-    while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-    if (const auto number = natural(text)) return static_cast<double>(*number);
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (text.empty() || error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
-    return value;
+    text = trimmed(text);
+    if (const auto number = parse_natural(text)) return static_cast<double>(*number);
+    return parse_real(text);
 }
 
 PinType usual(Type type) {
@@ -47,12 +43,12 @@ bool is_lines(std::uint16_t index) {
     return index == 0x6000 || index == 0x6100 || index == 0x6120 || index == 0x6200 || index == 0x6300 || index == 0x6320;
 }
 
-/// What an output goes to when its node or the machine stops, if nobody says: standing still, without voltage where that is safe.
+/// The default safe value of an output when its node or the machine stops: standstill, voltage removed where that is safe.
 std::optional<std::uint64_t> usual_safe(const Object& o, bool to_node) {
     const std::uint16_t drive =
         o.index >= 0x6000 && o.index < 0xa000 ? static_cast<std::uint16_t>(0x6000 + (o.index - 0x6000) % 0x800) : std::uint16_t{0};
     if (!to_node) return drive == 0x6041 ? std::optional<std::uint64_t>(0) : std::nullopt;
-    if (drive == 0x6040) return 0x0002;  // quick stop: brakes, then takes the voltage away
+    if (drive == 0x6040) return 0x0002;  // quick stop: brakes, then removes the voltage
     if (drive == 0x60ff || drive == 0x6071 || drive == 0x6042) return 0;
     if (is_lines(o.index) || (o.index >= 0x6410 && o.index <= 0x6413)) return 0;
     return {};
@@ -100,8 +96,8 @@ void NodeReader::object_options() {
         if (std::find_if(std::begin(properties), std::end(properties), [&](const char* p) { return property == p; }) ==
             std::end(properties)) {
             line->used = true;
-            report_.error(Topic::line, line->key.at, "an object has no '" + property + "'",
-                          "there are scale, offset, unit, type, bits, name, safe");
+            report_.error(Topic::line, line->key.at, "unknown object option '" + property + "'",
+                          suggestion(property, {std::begin(properties), std::end(properties)}, "the options are"));
             continue;
         }
         line->used = true;
@@ -122,7 +118,7 @@ void NodeReader::object_options() {
                 if (!o.filler && std::find(mapped.begin(), mapped.end(), o.pin) == mapped.end()) mapped.push_back(o.pin);
         std::string near = did_you_mean(object, mapped);
         report_.error(Topic::object, line->key.at, "no PDO of this node carries '" + object + "'",
-                      near.empty() ? "carried are: " + listed(mapped) : near);
+                      near.empty() ? "its PDOs carry " + listed(mapped) : near);
     }
     for (const bool types : {true, false})
         for (const auto& [o, wish] : wishes)
@@ -134,8 +130,8 @@ void NodeReader::option(Object& o, const std::string& property, const Line& line
     if (property == "scale" || property == "offset") {
         const auto value = real(text);
         if (!value || (property == "scale" && *value == 0))
-            return keys_.refuse(
-                line, property == "scale" ? "how many of the object's units are one of the pin's, as in 10000 or 65536/360" : "a number");
+            return keys_.reject(
+                line, property == "scale" ? "the object units per pin unit, as in 10000 or 65536/360" : "a number");
         (property == "scale" ? o.scale : o.offset) = *value;
         o.as = PinType::real;
     } else if (property == "unit") {
@@ -146,7 +142,7 @@ void NodeReader::option(Object& o, const std::string& property, const Line& line
             return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.' || c == '_' ||
                    c == '#';
         };
-        if (!std::all_of(text.begin(), text.end(), usable)) return keys_.refuse(line, "letters, digits, - and .");
+        if (!std::all_of(text.begin(), text.end(), usable)) return keys_.reject(line, "letters, digits, - and .");
         o.pin = text;
     } else if (property == "type") {
         keys_.take_choice(line.key.text.c_str(), o.as, pin_types);
@@ -159,15 +155,15 @@ void NodeReader::option(Object& o, const std::string& property, const Line& line
         const auto names = list_of(line.value);
         if (names.size() > o.bits) {
             report_.error(Topic::value, line.value.at,
-                          "these are " + std::to_string(names.size()) + " names for " + std::to_string(o.bits) + " bits",
-                          "bit 0 comes first; - leaves one out");
+                          std::to_string(names.size()) + " names for " + std::to_string(o.bits) + " bits",
+                          "the first name is that of bit 0; - skips a bit");
             return;
         }
         for (unsigned bit = 0; bit < names.size(); ++bit)
             if (!names[bit].empty() && names[bit].text != "-") o.bit_pins.push_back({bit, dashed(names[bit].text)});
         o.bits_wanted = 1;
     } else if (!set_safe(o, line)) {
-        keys_.refuse(line, "a value of the pin, or hold");
+        keys_.reject(line, "a value of the pin, or hold");
     }
 }
 
@@ -181,7 +177,7 @@ bool NodeReader::set_safe(Object& o, const Line& line) {
     return true;
 }
 
-/// An object that the node is sent and sends back has two pins: the input keeps the name.
+/// An object that the node both receives and sends has two pins: the input keeps the name.
 void NodeReader::name_feedback() {
     for (const Pdo& sent : node_.pdos) {
         if (!sent.to_node) continue;
@@ -204,7 +200,7 @@ void NodeReader::finish_objects() {
         bool          to_node;
     };
     std::vector<Seen> seen;
-    std::vector<std::string>   told_alone;  // by multiplexed PDOs
+    std::vector<std::string>   multiplexed_pins;  // by multiplexed PDOs
     for (Pdo& pdo : node_.pdos)
         for (Object& o : pdo.objects) {
             if (o.filler) continue;
@@ -219,19 +215,19 @@ void NodeReader::finish_objects() {
             if (o.filler) continue;
             // A second PDO with the same object shares its pins.
             const bool again = std::any_of(seen.begin(), seen.end(), [&](const Seen& s) { return s.to_node == pdo.to_node && s.object->same(o); });
-            if (again && (pdo.multiplexed() || std::find(told_alone.begin(), told_alone.end(), o.pin) != told_alone.end()))
-                report_.error(Topic::object, pdo.at, "object '" + o.pin + "' is in two PDOs, and one of them is a multiplexed one",
-                              "leave it in one of the two");
-            if (pdo.multiplexed()) told_alone.push_back(o.pin);
+            if (again && (pdo.multiplexed() || std::find(multiplexed_pins.begin(), multiplexed_pins.end(), o.pin) != multiplexed_pins.end()))
+                report_.error(Topic::object, pdo.at, "object '" + o.pin + "' is in two PDOs, one of them multiplexed",
+                              "remove it from one of them");
+            if (pdo.multiplexed()) multiplexed_pins.push_back(o.pin);
             if (again) continue;
             seen.push_back({&o, pdo.to_node});
             const auto claim = [&](const std::string& name) {
                 if (std::find(std::begin(node_pins), std::end(node_pins), name) != std::end(node_pins))
-                    report_.error(Topic::object, pdo.at, "every node has a pin '" + name + "' of its own",
-                                  "give the object another name: " + object_label(o.index, o.sub) + ".name = NAME");
+                    report_.error(Topic::object, pdo.at, "pin '" + name + "' exists on every node",
+                                  "rename the object: " + object_label(o.index, o.sub) + ".name = NAME");
                 else if (!pins.insert(name).second)
-                    report_.error(Topic::object, pdo.at, "two objects would have the pin '" + name + "'",
-                                  "give one another name: " + object_label(o.index, o.sub) + ".name = NAME");
+                    report_.error(Topic::object, pdo.at, "duplicate pin '" + name + "': two objects have this name",
+                                  "rename one of them: " + object_label(o.index, o.sub) + ".name = NAME");
             };
             if (o.bit_pins.empty()) claim(o.pin);
             for (const BitPin& b : o.bit_pins) claim(b.name);
@@ -249,9 +245,8 @@ void NodeReader::leftover() {
         "configured",   "write OBJECT", "command OBJECT"};
     for (Line* line : keys_.rest()) {
         line->used = true;
-        const std::string near = did_you_mean(line->key.text, all);
-        report_.error(Topic::line, line->key.at, "a node has no '" + line->key.text + "'",
-                      near.empty() ? "there are " + listed(all, 40) : near);
+        report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' of a node",
+                      suggestion(line->key.text, all, "the keys are"));
     }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A node's keys to a Node: its description, its settings, its PDOs, its writes.
+// Reads a node from its keys: description, settings, PDOs, writes.
 #pragma once
 
 #include <map>
@@ -16,11 +16,11 @@ namespace hal::canopen::config {
 class Descriptions {
 public:
     Descriptions(const ReadFile& read, std::string folder) : read_(read), folder_(std::move(folder)) {}
-    /// nullptr after saying why, at the value that names the file.
+    /// Returns nullptr after reporting an error at the value that names the file.
     const eds::DeviceDescription* get(const Word& file, Report& report);
-    /// The bytes of a file named beside the configuration; false after saying why.
+    /// Reads a file that the configuration names. Returns false after reporting an error.
     bool bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report);
-    /// The same of a file that another one names: false, and why.
+    /// Reads a file that another file names. Returns false and sets `why`.
     bool bytes(const std::string& file, std::vector<std::uint8_t>& to, std::string& why);
 
 private:
@@ -81,16 +81,16 @@ private:
     Node&                         node_;
     const eds::DeviceDescription* eds_ = nullptr;
     std::unique_ptr<Catalog>      catalog_;
-    bool undescribed_ = false;  // its description was no good, which was said: what is not known without it need not be
+    bool undescribed_ = false;  // its description is invalid, which was reported: unknown objects are not
 };
 
-/// What the node is told of a PDO that has its identifier. [setup]
+/// Adds the writes that configure a PDO whose identifier is known. [setup]
 void configure_pdo(NodeSetup&, const Pdo&);
 
-/// An SRDO as the node has to be configured. [setup]
+/// Returns the configuration of an SRDO in the node. [setup]
 SrdoDescription node_srdo(const Pdo&);
 
-/// The object's bits for a value of its pin. The value is cut off at the object's limits.
+/// Converts the value of a pin to the bits of its object, limited to the range of the object's type.
 std::uint64_t raw_of(const Object&, double pin_value);
 
 }  // namespace hal::canopen::config

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is known of a device's objects: from its EDS, DCF or XDD, or from the profile it follows.
+// The objects of a device: from its EDS, DCF or XDD, or from its profile.
 #pragma once
 
 #include <map>
@@ -18,8 +18,8 @@ struct Known {
     std::uint16_t             index = 0;
     std::uint8_t              sub = 0;
     bool                      single = true;            ///< the object has no sub-indices
-    std::string               name;              ///< as pins are called
-    std::string               about;             ///< as the description has it
+    std::string               name;              ///< as in names of pins
+    std::string               about;             ///< as in the description
     Type                      type = Type::none;
     bool                      to_node = false, from_node = false, writable = true, readable = true;
     std::vector<std::uint8_t> value{};  ///< at power-on, or what a DCF configures; for the node-id asked for
@@ -27,19 +27,19 @@ struct Known {
 
 class Catalog {
 public:
-    /// Of a device description, for the node with this id.
+    /// Reads a device description, for the node with this ID.
     Catalog(const eds::DeviceDescription&, unsigned node_id);
-    /// Of a profile: "cia401", "cia402" with that many axes, "jr3"; nothing known when the name is empty.
+    /// Takes the objects of a profile: "cia401", "cia402" with that many axes, "jr3"; none if the name is empty.
     Catalog(std::string_view profile, unsigned axes);
     static std::vector<std::string> profiles() { return {"cia401", "cia402", "jr3"}; }
 
     const Known* find(std::uint16_t index, std::uint8_t sub) const;
     const Known* find(std::string_view name) const;
-    /// Whether there is any sub-index of it.
+    /// Returns whether the object has any sub-index.
     bool          has(std::uint16_t index) const;
     bool          empty() const { return all_.empty(); }
     std::uint64_t number(std::uint16_t index, std::uint8_t sub, std::uint64_t otherwise) const;
-    /// Names of objects that a PDO in this direction may carry.
+    /// Returns the names of the objects that a PDO in this direction may carry.
     std::vector<std::string> names(bool to_node) const;
     std::vector<std::string> names() const;
 
