@@ -138,12 +138,12 @@ class Tdma(Case):
 
     def test_bad_plan(self):
         self.write("cell.tdma", CELL.replace("slot 0 200", "slot 0 110"))
-        self.assertEqual("cell.tdma:9:1: error: slot 0 of spare begins at 110 us, before slot 0 of master is over: 60 bytes take 6.72 us at 100 Mbit/s: "
-                         "100 us + 6.72 us + guard 10 us = 116.72 us [tdma-schedule]\n    9 | slot 0 110 1/1 46\n      | ^^^^^^^^^^^^^^^^^ line 3 is in the way\n"
-                         "      = help: the earliest offset for it is 116.72 us\n", self.bad("tdma", "plan", "cell.tdma"))
+        self.assertEqual("cell.tdma:9:1: error: slot 0 of spare begins at 110 us, before the end of slot 0 of master: 60 bytes take 6.72 us at 100 Mbit/s: "
+                         "100 us + 6.72 us + guard 10 us = 116.72 us [tdma-schedule]\n    9 | slot 0 110 1/1 46\n      | ^^^^^^^^^^^^^^^^^ conflicts with line 3\n"
+                         "      = help: its earliest offset is 116.72 us\n", self.bad("tdma", "plan", "cell.tdma"))
         self.assertEqual("hal tdma plan: cannot read 'none.tdma': No such file or directory\n", self.bad("tdma", "plan", "none.tdma"))
         self.write("empty.tdma", "# nobody\n")
-        self.assertIn("empty.tdma:1:1: error: there is no station [tdma-line]", self.bad("tdma", "plan", "empty.tdma"))
+        self.assertIn("empty.tdma:1:1: error: the file has no station [tdma-line]", self.bad("tdma", "plan", "empty.tdma"))
 
 
 if __name__ == "__main__":

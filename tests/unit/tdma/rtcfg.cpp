@@ -243,7 +243,7 @@ TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
     for (int i = 0; i < 5; ++i) cell.inject(m, 9, 10 * ms + i * 5 * ms);
     cell.run(100 * ms);
     EXPECT_EQ(
-        "tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:3:1: error: there is no key 'slott'; "
+        "tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:3:1: error: unknown key 'slott'; "
         "did you mean 'slot'?; this station waits for another\n",
         said.text());
     EXPECT_EQ(State::unconfigured, cell.x.status().state);

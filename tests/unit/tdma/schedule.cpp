@@ -79,14 +79,14 @@ TEST(Schedule_block, is_read_again_as_it_was) {
 TEST(Schedule_that_cannot_work, is_refused_with_the_arithmetic) {
     const auto refusal = [](const char* text) { return said(config::read(text)); };
     EXPECT_EQ(
-        "f:5:1: error: slot 0 of slave-1 begins at 35 us, before slot 0 of master is over: 60 bytes take 6.72 us at 100 Mbit/s: "
-        "30 us + 6.72 us + guard 10 us = 46.72 us; the earliest offset for it is 46.72 us",
+        "f:5:1: error: slot 0 of slave-1 begins at 35 us, before the end of slot 0 of master: 60 bytes take 6.72 us at 100 Mbit/s: "
+        "30 us + 6.72 us + guard 10 us = 46.72 us; its earliest offset is 46.72 us",
         refusal("cycle 100\nmaster:\nslot 0 30 1/1 46\nslave:\nslot 0 35 1/1 46\n"));
     EXPECT_NE(std::string::npos,
-              refusal("cycle 100\nmaster:\nslot 0 90 1/1 200\n").find("reaches into the next cycle: 90 us + 214 bytes take 19.04 us"));
+              refusal("cycle 100\nmaster:\nslot 0 90 1/1 200\n").find("extends into the next cycle: 90 us + 214 bytes take 19.04 us"));
     EXPECT_NE(std::string::npos, refusal("cycle 1000\nmaster:\nbackup-master:\nbackup-offset 20\nslot 0 300\n")
                                      .find("the smallest backup-offset that works is 50.88 us"));
-    EXPECT_NE(std::string::npos, refusal("cycle 1000\nmaster:\nbackup-master:\nbackup-offset 200\n").find("cannot be calibrated"));
+    EXPECT_NE(std::string::npos, refusal("cycle 1000\nmaster:\nbackup-master:\nbackup-offset 200\n").find("has no slot for the calibration"));
     EXPECT_NE(std::string::npos, refusal("cycle 1000\nmaster:\nslot 1 100 1/1 60\n").find("60 bytes are too few: IP needs 68"));
     EXPECT_NE(std::string::npos, refusal("cycle 1000\nmaster:\nphase 600\nlead 400\n").find("phase + lead must be less than the cycle"));
     EXPECT_EQ("", refusal("cycle 100\nmaster:\nslot 0 30 1/2\nslave:\nslot 0 30 2/2\n")) << "never in the same cycle";

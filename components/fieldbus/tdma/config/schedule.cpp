@@ -23,9 +23,7 @@ const StationEntry* Schedule::master() const {
     return found == stations.end() ? nullptr : &*found;
 }
 
-bool Reading::good() const {
-    return std::none_of(messages.begin(), messages.end(), [](const Message& m) { return m.severity == Severity::error; });
-}
+bool Reading::good() const { return text::good(messages); }
 
 StationSetup setup_of(const Schedule& s, std::size_t index) {
     const StationEntry& e = s.stations.at(index);
@@ -106,18 +104,11 @@ std::string block_of(const Schedule& s, std::size_t index) {
 bool read_from_disk(const std::string& path, std::string& bytes) {
     if (!read_regular_file(path, 16'000'000, bytes)) return false;
     if (!bytes.empty()) return true;
-    bytes = "it is empty";
+    bytes = "the file is empty";
     return false;
 }
 
-std::string to_string(const Reading& reading, const std::string& path) {
-    std::string text;
-    for (const Message& m : reading.messages)
-        if (m.severity == Severity::error)
-            text += (text.empty() ? "" : "\n") + path + ":" + std::to_string(m.at.line) + ":" + std::to_string(m.at.column) +
-                    ": error: " + m.sentence + (m.help.empty() ? "" : "; " + m.help);
-    return text;
-}
+std::string to_string(const Reading& reading, const std::string& path) { return text::errors_text(reading.messages, path); }
 
 std::string to_string(const Ip& ip) {
     return std::to_string(ip[0]) + "." + std::to_string(ip[1]) + "." + std::to_string(ip[2]) + "." + std::to_string(ip[3]);

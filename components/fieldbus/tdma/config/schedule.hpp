@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The schedule of a segment as its configuration file says it: RTnet's tdma.conf blocks, and a few keys more. All of it [setup].
+// The schedule of a segment as read from its configuration file: the blocks of RTnet's tdma.conf and some more keys. Everything is [setup].
 #pragma once
 
 #include <array>
@@ -10,66 +10,56 @@
 #include <vector>
 
 #include "fieldbus/tdma/station/station_setup.hpp"
+#include "text/config_text.hpp"
 
 namespace hal::tdma::config {
 
-/// Lines and columns from 1, columns in characters; offset and length in bytes of the file.
-struct Place {
-    std::uint32_t line = 0, column = 0, offset = 0, length = 0;
-};
+using hal::Severity;
+using text::Span;
 
-enum class Severity : std::uint8_t { note, warning, error };
-
-/// What a message is about; the program has a page on each.
+/// Subject of a message: its diagnostic code, with a page each (`hal explain`).
 enum class Topic : std::uint8_t {
-    line,      ///< a line or key that means nothing
-    value,     ///< a value that cannot be
-    schedule,  ///< slots that cannot work
+    line,      ///< an invalid line or key
+    value,     ///< an invalid value
+    schedule,  ///< a conflict between slots
 };
 const char* code_of(Topic);  ///< "tdma-line", …: the diagnostic's code
 
-struct Message {
-    Severity    severity = Severity::error;
-    Topic       topic = Topic::line;
-    Place       at;
-    std::string sentence;  ///< no final stop; names quoted '…'
-    std::string label{};
-    std::string help{};
-};
+using Message = text::Message<Topic>;
 
 using Ip = std::array<std::uint8_t, 4>;
 
 struct SlotEntry {
     SlotSetup setup;
-    bool      sized = false;  ///< by the file; else the size is what fits before the next frame of anybody
-    Place     at;
+    bool      sized = false;  ///< its size is in the file; else it extends to the next frame on the segment
+    Span     at;
 };
 
 struct StationEntry {
     Role                   role = Role::slave;
-    std::string            name;  ///< of the file, or master, backup-1, slave-1 …
+    std::string            name;  ///< given, or master, backup-1, slave-1 …
     std::optional<Ip>      ip;
     std::optional<Address> mac;
     std::vector<SlotEntry> slots;
     Time                   backup_offset = 0;
     Time                   phase = -1, lead = -1;  ///< -1: not given
-    std::string            stage_2;  ///< a file that RTcfg sends to it
-    Place                  at;       ///< of the block's first line
-    Place                  backup_at{};
+    std::string            stage_2;  ///< file that RTcfg sends to it in stage 2
+    Span                  at;       ///< of the block's first line
+    Span                  backup_at{};
 };
 
 struct Schedule {
     Time                      cycle = 0;
     std::uint32_t             speed = 100;        ///< Mbit/s
-    Time                      guard = 10'000;     ///< between the end of a frame and the next, for the jitter of both
-    Time                      forward = 2'000;    ///< in the switch; 0: there is none
-    std::uint32_t             lost = 4;           ///< cycles without a sync until the outputs are safe
+    Time                      guard = 10'000;     ///< minimum gap between two frames, for the jitter of both
+    Time                      forward = 2'000;    ///< delay of the switch; 0: no switch
+    std::uint32_t             lost = 4;           ///< cycles without a sync until outputs go to their safe values
     std::uint32_t             rounds = 100;
     std::uint16_t             heartbeat_ms = 1000;///< of RTcfg
     std::vector<StationEntry> stations;           ///< as in the file
 
-    Time wire(std::size_t length) const;  ///< how long a frame without check sequence occupies the line
-    Time path(std::size_t length) const;  ///< from the moment it leaves to its arrival: two lines and a switch
+    Time wire(std::size_t length) const;  ///< time that a frame (length without check sequence) occupies the line
+    Time path(std::size_t length) const;  ///< time from sending to reception: two lines and the switch
     const StationEntry* master() const;
 };
 
@@ -79,27 +69,24 @@ struct Reading {
     bool                 good() const;
 };
 
-/// Messages kept of one file; one more is, so that who prints them knows of it.
-constexpr std::size_t most_messages = 100;
-
-/// Reads and judges it.
+/// Reads and checks a schedule.
 Reading read(std::string_view text);
-/// Judges it: every way in which it cannot work, with the arithmetic and what to change. read() has done so.
-void judge(const Schedule&, std::vector<Message>&);
+/// Checks a schedule and reports every conflict with its calculation and a fix. read() includes it.
+void check(const Schedule&, text::Messages<Topic>&);
 
-/// What station `index` has to be told.
+/// Returns the setup of station `index`.
 StationSetup setup_of(const Schedule&, std::size_t index);
-/// By name, IP ("10.0.0.2") or MAC address; nothing: there is none.
+/// Finds a station by name, IP ("10.0.0.2") or MAC address.
 std::optional<std::size_t> find(const Schedule&, std::string_view which);
-/// The names of all, for a help text: "master, x, y".
+/// Lists the names of all stations: "master, x, y".
 std::string names(const Schedule&);
 
-/// The part of a file that one station needs, complete in itself: what RTcfg's stage 1 carries.
+/// Returns the part of a file that one station needs, complete in itself: the payload of RTcfg stage 1.
 std::string block_of(const Schedule&, std::size_t index);
 
-/// The bytes of a file, or false and the reason in `bytes`.
+/// Reads a whole file. Returns false and sets `bytes` to the reason.
 bool read_from_disk(const std::string& path, std::string& bytes);
-/// "file:12:7: error: sentence; help" of each error, a line each, for those without a renderer.
+/// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
 std::string to_string(const Reading&, const std::string& path);
 
 std::string to_string(const Ip&);

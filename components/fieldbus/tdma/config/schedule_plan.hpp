@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A schedule worked out: what is on the wire when, how full it is, how long an input takes to become an output. All of it [setup].
+// The timing of a schedule: when each frame is on the wire, the load, the latency from an input to an output. Everything is [setup].
 #pragma once
 
 #include "schedule.hpp"
@@ -15,7 +15,7 @@ struct Entry {
     Time          at = 0, until = 0;
     std::size_t   bytes = 60;     ///< of the longest frame, without check sequence
     std::uint32_t period = 1, phasing = 0;
-    config::Place place{};
+    config::Span at_line{};
 };
 
 /// By their times.

@@ -1,93 +1,27 @@
 // SPDX-License-Identifier: MIT
-// A line is a block's head (`master:`, `backup-master:`, `slave:`) or KEY VALUE…; # begins a comment. Times are in microseconds, as RTnet
-// writes them, or have a unit.
+// A line is the head of a block (`master:`, `backup-master:`, `slave:`) or KEY VALUE…; `#` or `;` begins a comment. Times without a unit are
+// in microseconds, as in RTnet.
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <map>
 
 #include "schedule_plan.hpp"
+#include "text/numbers.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::tdma::config {
 
 namespace {
 
-struct Word {
-    std::string text;
-    Place       at;
-};
-
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-
-std::vector<Word> words_of(std::string_view line, std::uint32_t number, std::size_t offset) {
-    std::vector<Word> words;
-    line = line.substr(0, line.find('#'));
-    std::uint32_t column = 1;
-    for (std::size_t i = 0; i < line.size();) {
-        if (is_space(line[i])) {
-            ++i, ++column;
-            continue;
-        }
-        const std::size_t begin = i;
-        const auto        at = column;
-        for (; i < line.size() && !is_space(line[i]); ++i)
-            if ((static_cast<unsigned char>(line[i]) & 0xc0) != 0x80) ++column;  // characters, not bytes
-        words.push_back({std::string(line.substr(begin, i - begin)),
-                         {number, at, static_cast<std::uint32_t>(offset + begin), static_cast<std::uint32_t>(i - begin)}});
-    }
-    return words;
-}
-
-std::optional<std::uint64_t> natural(std::string_view text) {
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size() && !text.empty() ? std::optional(value) : std::nullopt;
-}
-
-/// 50, 50us, 12.5us, 1ms, 800ns; a number alone is in microseconds.
-std::optional<Time> duration(std::string_view text) {
-    double factor = 1e3;
-    for (const auto& [unit, ns] : {std::pair<std::string_view, double>{"ns", 1}, {"us", 1e3}, {"ms", 1e6}, {"s", 1e9}})
-        if (text.ends_with(unit)) {
-            text.remove_suffix(unit.size());
-            factor = ns;
-            break;
-        }
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
-    if (error != std::errc() || end != text.data() + text.size() || text.empty() || !(value >= 0 && value * factor <= 1e12)) return {};
-    return std::llround(value * factor);
-}
-
-/// How many letters have to be changed, for "did you mean".
-std::size_t distance(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    for (std::size_t k = 0; k <= b.size(); ++k) row[k] = k;
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t before = row[0];
-        row[0] = i;
-        for (std::size_t k = 1; k <= b.size(); ++k) {
-            const std::size_t above = row[k];
-            row[k] = std::min({row[k] + 1, row[k - 1] + 1, before + (a[i - 1] == b[k - 1] ? 0 : 1)});
-            before = above;
-        }
-    }
-    return row[b.size()];
-}
+using text::Word;
 
 class Reader {
 public:
-    Reading read(std::string_view text) {
-        std::uint32_t number = 0;
-        for (std::size_t at = 0; at <= text.size();) {
-            const std::size_t end = std::min(text.find('\n', at), text.size());
-            const auto        words = words_of(text.substr(at, end - at), ++number, at);
-            if (!words.empty()) line(words);
-            at = end + 1;
-        }
+    Reading read(std::string_view file) {
+        text::Lines lines(file);
+        while (const auto one = lines.next()) line(text::words_of(*one));
         finish();
-        std::stable_sort(out_.messages.begin(), out_.messages.end(),
-                         [](const Message& a, const Message& b) { return a.at.offset < b.at.offset; });
+        out_.messages = std::move(report_.all);
+        text::sort(out_.messages);
         return std::move(out_);
     }
 
@@ -121,9 +55,8 @@ private:
         return all;
     }
 
-    void error(Topic topic, const Place& at, std::string sentence, std::string help = {}, std::string label = {}) {
-        if (out_.messages.size() > most_messages) return;
-        out_.messages.push_back({Severity::error, topic, at, std::move(sentence), std::move(label), std::move(help)});
+    void error(Topic topic, const Span& at, std::string sentence, std::string help = {}) {
+        report_.error(topic, at, std::move(sentence), std::move(help));
     }
 
     void line(const std::vector<Word>& words) {
@@ -134,34 +67,26 @@ private:
         }
         const auto key = keys().find(first.text);
         if (key == keys().end()) {
-            std::string best;
-            for (const char* block : {"master", "backup-master", "slave"})
-                if (first.text == block) best = first.text + ":";
-            for (const auto& [name, of] : keys())
-                if (distance(first.text, name) <= 2 && (best.empty() || distance(first.text, name) < distance(first.text, best)))
-                    best = name;
-            error(Topic::line, first.at, "there is no key '" + first.text + "'",
-                  best.empty()
-                      ? "blocks are master:, backup-master:, slave:; keys are cycle, slot, ip, mac, name, backup-offset, stage2, phase, "
-                        "lead, guard, speed, forward, lost, rounds, heartbeat"
-                      : "did you mean '" + best + "'?");
+            std::vector<std::string> names{"master:", "backup-master:", "slave:"};
+            for (const auto& [name, of] : keys()) names.push_back(name);
+            error(Topic::line, first.at, "unknown key '" + first.text + "'", suggestion(first.text, names, "blocks and keys are"));
             return;
         }
         if (key->second.of_station && station_ == nullptr) {
-            error(Topic::line, first.at, "'" + first.text + "' belongs to a station", "write it below master:, backup-master: or slave:");
+            error(Topic::line, first.at, "'" + first.text + "' outside a station block", "write it below master:, backup-master: or slave:");
             return;
         }
         const std::size_t most = first.text == "slot" ? 5 : 2, least = first.text == "slot" ? 3 : 2;
         if (words.size() < least || words.size() > most) {
-            const Place& at = words.size() > most ? words[most].at : first.at;
-            error(Topic::line, at, words.size() > most ? "nothing is expected here" : "'" + first.text + "' lacks its value",
-                  std::string("it is written ") + key->second.usage);
+            const Span& at = words.size() > most ? words[most].at : first.at;
+            error(Topic::line, at, words.size() > most ? "unexpected text" : "'" + first.text + "' has no value",
+                  std::string("write ") + key->second.usage);
             return;
         }
         if (first.text != "slot" && first.text != "cycle") {
             const auto [before, is_new] = (key->second.of_station ? given_ : given_to_all_).emplace(first.text, first.at.line);
             if (!is_new) {
-                error(Topic::line, first.at, "'" + first.text + "' is given already, in line " + std::to_string(before->second));
+                error(Topic::line, first.at, "duplicate key '" + first.text + "'", "first in line " + std::to_string(before->second) + "; delete one of them");
                 return;
             }
         }
@@ -175,21 +100,21 @@ private:
             {"master:", Role::master}, {"backup-master:", Role::backup}, {"slave:", Role::slave}};
         const auto* block = std::find_if(std::begin(blocks), std::end(blocks), [&](const auto& b) { return b.first == first.text; });
         if (block == std::end(blocks)) {
-            error(Topic::line, first.at, "there is no block '" + first.text + "'", "blocks are master:, backup-master:, slave:");
+            error(Topic::line, first.at, "unknown block '" + first.text + "'", "the blocks are master:, backup-master:, slave:");
             station_ = &ignored_;
             return;
         }
         if (words.size() > 1)
-            error(Topic::line, words[1].at, "nothing is expected here", "a name is written below it: name " + words[1].text);
+            error(Topic::line, words[1].at, "unexpected text", "write the name below it: name " + words[1].text);
         if (block->second == Role::master)
             if (const StationEntry* other = out_.schedule.master()) {
-                error(Topic::line, first.at, "there is a master already, in line " + std::to_string(other->at.line),
+                error(Topic::line, first.at, "duplicate master: the first is in line " + std::to_string(other->at.line),
                       "write backup-master: and a backup-offset");
                 station_ = &ignored_;
                 return;
             }
         if (out_.schedule.stations.size() >= 256) {
-            error(Topic::line, first.at, "there are more than 256 stations");
+            error(Topic::line, first.at, "more than 256 stations", "split the segment");
             station_ = &ignored_;
             return;
         }
@@ -200,24 +125,24 @@ private:
     }
 
     bool time(const Word& w, Time& out, Time least, Time most, const char* example) {
-        const auto value = duration(w.text);
-        if (!value) error(Topic::value, w.at, "'" + w.text + "' is no time", std::string("in microseconds, or with a unit: ") + example);
+        const auto value = parse_duration_ns(w.text, 1e3);
+        if (!value) error(Topic::value, w.at, "invalid time '" + w.text + "'", std::string("write microseconds, or a number with a unit: ") + example);
         else if (*value < least || *value > most)
-            error(Topic::value, w.at, "'" + w.text + "' is outside " + microseconds(least) + " to " + microseconds(most));
+            error(Topic::value, w.at, "'" + w.text + "' is out of range (" + microseconds(least) + ".." + microseconds(most) + ")");
         else out = *value;
         return value && *value >= least && *value <= most;
     }
     template <class T>
     bool number(const Word& w, T& out, std::uint64_t least, std::uint64_t most) {
-        const auto value = natural(w.text);
+        const auto value = parse_natural(w.text);
         const bool good = value && *value >= least && *value <= most;
         if (good) out = static_cast<T>(*value);
-        else error(Topic::value, w.at, "'" + w.text + "' is no number from " + std::to_string(least) + " to " + std::to_string(most));
+        else error(Topic::value, w.at, "invalid number '" + w.text + "': expected " + std::to_string(least) + ".." + std::to_string(most));
         return good;
     }
 
     void take_cycle(const std::vector<Word>& w) {
-        if (out_.schedule.cycle != 0) error(Topic::line, w[0].at, "the cycle is given already", "all stations of a segment have the same");
+        if (out_.schedule.cycle != 0) error(Topic::line, w[0].at, "duplicate key 'cycle'", "all stations of a segment share one cycle");
         time(w[1], out_.schedule.cycle, 20'000, 1'000'000'000, "cycle 1000");
     }
     void take_speed(const std::vector<Word>& w) { number(w[1], out_.schedule.speed, 10, 100'000); }
@@ -234,42 +159,42 @@ private:
             return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
         };
         if (!std::all_of(w[1].text.begin(), w[1].text.end(), good) || w[1].text.size() > 40) {
-            error(Topic::value, w[1].at, "'" + w[1].text + "' is no name", "letters, digits, '-', '_' and '.', at most 40");
+            error(Topic::value, w[1].at, "invalid name '" + w[1].text + "'", "use at most 40 letters, digits, '-', '_' and '.'");
             return;
         }
         if (w[1].text == "auto") {
-            error(Topic::value, w[1].at, "'auto' is no name",
-                  "station=auto is a station that gets its block from the master; call it something else");
+            error(Topic::value, w[1].at, "reserved name 'auto'",
+                  "station=auto selects a station that gets its block from the master; choose another name");
             return;
         }
         for (const StationEntry& s : out_.schedule.stations)
             if (&s != station_ && s.name == w[1].text) {
-                error(Topic::value, w[1].at, "the station of line " + std::to_string(s.at.line) + " has this name, too");
+                error(Topic::value, w[1].at, "duplicate name: the station in line " + std::to_string(s.at.line) + " has it");
                 break;
             }
         station_->name = w[1].text;
     }
     void take_ip(const std::vector<Word>& w) {
         station_->ip = parse_ip(w[1].text);
-        if (!station_->ip) error(Topic::value, w[1].at, "'" + w[1].text + "' is no IPv4 address", "it is written 10.0.0.2");
+        if (!station_->ip) error(Topic::value, w[1].at, "invalid IPv4 address '" + w[1].text + "'", "write it as in 10.0.0.2");
         for (const StationEntry& s : out_.schedule.stations)
             if (&s != station_ && station_->ip && s.ip == station_->ip) {
-                error(Topic::value, w[1].at, "the station of line " + std::to_string(s.at.line) + " has this address, too");
+                error(Topic::value, w[1].at, "duplicate address: the station in line " + std::to_string(s.at.line) + " has it");
                 break;
             }
     }
     void take_mac(const std::vector<Word>& w) {
         station_->mac = ethernet::parse_address(w[1].text);
-        if (!station_->mac) error(Topic::value, w[1].at, "'" + w[1].text + "' is no MAC address", "it is written 02:00:00:00:00:07");
+        if (!station_->mac) error(Topic::value, w[1].at, "invalid MAC address '" + w[1].text + "'", "write it as in 02:00:00:00:00:07");
         for (const StationEntry& s : out_.schedule.stations)
             if (&s != station_ && station_->mac && s.mac == station_->mac) {
-                error(Topic::value, w[1].at, "the station of line " + std::to_string(s.at.line) + " has this address, too");
+                error(Topic::value, w[1].at, "duplicate address: the station in line " + std::to_string(s.at.line) + " has it");
                 break;
             }
     }
     void take_backup(const std::vector<Word>& w) {
         if (station_->role != Role::backup && station_ != &ignored_) {
-            error(Topic::line, w[0].at, "only a backup-master: has a backup offset");
+            error(Topic::line, w[0].at, "only a backup-master: has a backup offset", "delete the line");
             return;
         }
         station_->backup_at = w[1].at;
@@ -283,11 +208,11 @@ private:
         if (w.size() > 3) {
             const std::string& text = w[3].text;
             const auto         slash = text.find('/');
-            const auto         phasing = natural(text.substr(0, slash));
-            const auto         period = slash == std::string::npos ? std::nullopt : natural(text.substr(slash + 1));
+            const auto         phasing = parse_natural(text.substr(0, slash));
+            const auto         period = slash == std::string::npos ? std::nullopt : parse_natural(text.substr(slash + 1));
             if (!phasing || !period || *period == 0 || *period > 1'000'000 || *phasing == 0 || *phasing > *period)
-                error(Topic::value, w[3].at, "'" + text + "' is no PHASING/PERIOD",
-                      "1/2 is every first of two cycles, 2/2 every second; phasing goes from 1 to the period");
+                error(Topic::value, w[3].at, "invalid PHASING/PERIOD '" + text + "'",
+                      "1/2 is the first of every two cycles, 2/2 the second; phasing is 1..PERIOD");
             else slot.setup.period = static_cast<std::uint32_t>(*period), slot.setup.phasing = static_cast<std::uint32_t>(*phasing - 1);
         }
         if (w.size() > 4) {
@@ -296,21 +221,21 @@ private:
         }
         for (const SlotEntry& other : station_->slots)
             if (numbered && other.setup.id == slot.setup.id)
-                return error(Topic::line, w[1].at, "the station has a slot " + w[1].text + " already, in line " + std::to_string(other.at.line));
+                return error(Topic::line, w[1].at, "duplicate slot " + w[1].text, "first in line " + std::to_string(other.at.line) + "; use another number");
         if (station_->slots.size() >= most_slots)
-            return error(Topic::line, w[0].at, "a station has at most " + std::to_string(most_slots) + " slots");
+            return error(Topic::line, w[0].at, "more than " + std::to_string(most_slots) + " slots in one station", "delete some");
         station_->slots.push_back(slot);
     }
 
     void finish() {
         Schedule& s = out_.schedule;
-        if (!out_.good()) return;
-        const Place beginning{1, 1, 0, 0};
+        if (report_.failed()) return;
+        const Span beginning{1, 1, 0, 0};
         if (s.stations.empty())
-            return error(Topic::line, beginning, "there is no station", "write master:, below it cycle 1000 and slot 0 100");
+            return error(Topic::line, beginning, "the file has no station", "write master: and below it cycle 1000 and slot 0 100");
         if (s.cycle == 0) {
             const StationEntry* m = s.master();
-            return error(Topic::line, m != nullptr ? m->at : s.stations.front().at, "the cycle is not given",
+            return error(Topic::line, m != nullptr ? m->at : s.stations.front().at, "missing cycle",
                          "write cycle 1000 below master:");
         }
         unsigned backups = 0, slaves = 0;
@@ -319,16 +244,16 @@ private:
             if (e.name.empty())
                 e.name = e.role == Role::master ? "master" : (e.role == Role::backup ? "backup-" : "slave-") + std::to_string(which);
             if (e.role == Role::backup && e.backup_offset == 0)
-                error(Topic::line, e.at, "the backup offset is not given", "write backup-offset 200 below it");
+                error(Topic::line, e.at, "missing backup-offset", "write backup-offset 200 below it");
             if (e.phase < 0) e.phase = e.role == Role::backup ? e.backup_offset - std::min<Time>(e.backup_offset / 2, 100'000) : 0;
             if (e.lead < 0) e.lead = 0;
         }
-        if (!out_.good()) return;
+        if (report_.failed()) return;
         sizes();
-        judge(s, out_.messages);
+        check(s, report_);
     }
 
-    /// A slot without a size is as long as fits before the next frame of anybody, or before the end of the cycle.
+    /// A slot without a size extends to the next frame on the segment, or to the end of the cycle.
     void sizes() {
         Schedule& s = out_.schedule;
         for (StationEntry& e : s.stations)
@@ -351,9 +276,10 @@ private:
     }
 
     Reading                              out_;
+    text::Messages<Topic>                report_;
     StationEntry                         ignored_;
     StationEntry*                        station_ = nullptr;
-    std::map<std::string, std::uint32_t> given_, given_to_all_;  // keys that are there once: of the block, of the segment; their lines
+    std::map<std::string, std::uint32_t> given_, given_to_all_;  // lines of the keys that may occur once: in a block, in the file
 };
 
 }  // namespace
