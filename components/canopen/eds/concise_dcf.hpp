@@ -21,22 +21,21 @@ struct Write {
 };
 
 struct Configuration {
-    std::vector<Write>   writes;         ///< in the order they have to be made
-    std::vector<Message> messages;     ///< what was left out, and why
+    std::vector<Write>   writes;         ///< in the order in which they must be made
+    std::vector<Message> messages;     ///< omitted values and the reasons
 };
 
-/// The writes that make a node which holds the defaults of `dcf` hold its parameter values: only what differs, or with `all` every
-/// parameter value. PDOs are switched off, mapped and switched on again in the order CiA 301 demands. `node_id` replaces that of the file
-/// unless it is 0.
+/// Returns the writes that configure a node with the parameter values of `dcf`: those that differ from the defaults, or with `all` every one.
+/// PDOs are disabled, mapped and enabled again in the order of CiA 301. `node_id` replaces that of the file unless it is 0.
 Configuration configuration_of(const DeviceDescription& dcf, unsigned node_id = 0, bool all = false);
 
-/// u32 count, then per write u16 index, u8 sub-index, u32 size and the data, all little endian.
+/// Encodes a concise DCF: u32 count, then per write u16 index, u8 sub-index, u32 size and the data, all little endian.
 std::vector<std::uint8_t> concise(std::span<const Write> writes);
 
-/// The opposite; none when the bytes are no concise DCF.
+/// Decodes a concise DCF. Returns nothing if the bytes are invalid.
 std::optional<std::vector<Write>> parse_concise(std::span<const std::uint8_t> bytes);
 
-/// A value of the file as bytes: its parameter value, else its default. Empty when it has none that can be encoded.
+/// Encodes the parameter value of an entry, else its default. Returns nothing if there is none or it is invalid.
 std::vector<std::uint8_t> value_of(const Entry& entry, unsigned node_id);
 
 }  // namespace hal::canopen::eds

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Electronic data sheets (EDS) and device configuration files (DCF) of CiA 306: what a file says, as plain data.
+// Electronic data sheets (EDS) and device configuration files (DCF) of CiA 306 as plain data.
 //
-// Reading never throws and never stops at a defect: every defect is a message with its line, the rest is read. Nothing is lost: keys
-// and sections that are not known are kept, comment lines too. `write` gives a file that reads back equal.
+// Reading never throws and does not stop at a defect: each defect is a message with its line, the rest is read. Nothing is lost: unknown keys,
+// unknown sections and comment lines are kept. `write_eds` writes a file that reads back equal.
 #pragma once
 
 #include <array>
@@ -25,25 +25,25 @@ enum class Category : std::uint8_t { mandatory, optional, manufacturer };
 std::string_view name_of(ObjectType type);
 std::string_view name_of(Access access);
 
-/// Keys no field stands for, in file order, and comment lines (an empty key).
+/// Unknown keys in file order, and comment lines (with an empty key).
 using Extras = std::vector<std::pair<std::string, std::string>>;
 
-/// One value the device has: a sub-index of an object, or the whole of a VAR or DOMAIN (sub-index 0).
+/// One value of the device: a sub-index of an object, or a VAR or DOMAIN as a whole (sub-index 0).
 struct Entry {
     std::uint8_t  sub = 0;
     std::string   name;
-    std::string   denotation;           ///< DCF: what the user calls it
+    std::string   denotation;           ///< DCF: the name given by the user
     ObjectType    type = ObjectType::var;
     std::uint16_t data_type = 0;      ///< 0: not given
     Access        access = Access::rw;
     bool          pdo_mapping = false;
-    std::string   default_value;        ///< as written, `$NODEID` and all; see `encode`
+    std::string   default_value;        ///< as written, including `$NODEID`; see `encode`
     std::string   low_limit, high_limit;
     std::string   parameter_value;      ///< DCF: the value to configure
     std::string   upload_file, download_file;  ///< DCF, of domains
-    std::uint32_t flags = 0;          ///< ObjFlags: bit 0 is refused by scan and restore, bit 1 has an effect on writing
+    std::uint32_t flags = 0;          ///< ObjFlags: bit 0 excludes it from scanning and restoring, bit 1: writing it has side effects
     Extras        extras = {};
-    Place         at = {};
+    Span         at = {};
 
     bool operator==(const Entry&) const = default;
     bool readable() const { return access != Access::wo; }
@@ -56,13 +56,13 @@ struct Object {
     std::string                denotation;
     ObjectType                 type = ObjectType::var;
     Category                   category = Category::optional;
-    std::uint16_t              data_type = 0;      ///< of a DEFSTRUCT, RECORD or ARRAY, where a file gives it
-    unsigned                   compact = 0;             ///< CompactSubObj: its entries 1..compact were described once
+    std::uint16_t              data_type = 0;      ///< of a DEFSTRUCT, RECORD or ARRAY, if given
+    unsigned                   compact = 0;             ///< CompactSubObj: entries 1..compact were described once
     std::uint32_t              flags = 0;
     std::vector<std::uint16_t> links = {};  ///< [xxxxObjectLinks]
     std::vector<Entry>         entries = {};  ///< by sub-index, ascending; one of a VAR
     Extras                     extras = {};
-    Place                      at = {};
+    Span                      at = {};
 
     bool         operator==(const Object&) const = default;
     bool         single() const { return type != ObjectType::array && type != ObjectType::record && type != ObjectType::defstruct; }
@@ -89,15 +89,15 @@ struct DeviceInfo {
     bool                                boot_up_master = false, boot_up_slave = false;
     std::uint8_t                        granularity = 0;     ///< of mapping, in bits; 0: mapping is fixed
     bool                                dynamic_channels = false, group_messaging = false, lss = false;
-    std::uint8_t  compact_pdo = 0;     ///< bit n-1: sub-index n of the communication parameters that are not described one by one
+    std::uint8_t  compact_pdo = 0;     ///< bit n-1: sub-index n exists in communication parameters that are not described individually
     std::uint16_t rx_pdos = 0, tx_pdos = 0;
-    Place         rx_pdos_at = {1, 1, 0, 0}, tx_pdos_at = {1, 1, 0, 0};  ///< the beginning, where the file does not say them
+    Span         rx_pdos_at = {1, 1, 0, 0}, tx_pdos_at = {1, 1, 0, 0};  ///< the beginning, if the file does not have them
     Extras        extras = {};
 
     bool operator==(const DeviceInfo&) const = default;
 };
 
-/// DCF: [DeviceComissioning], in CiA's own spelling.
+/// DCF: [DeviceComissioning], in the spelling of CiA 306.
 struct Commissioning {
     std::uint8_t  node_id = 0;
     std::string   node_name, node_reference, network_name, network_reference;
@@ -110,9 +110,9 @@ struct Commissioning {
     bool operator==(const Commissioning&) const = default;
 };
 
-/// Objects a module adds to, as [MnSubExtxxxx] says: `count` of them, or counts by sub-index ranges in the extras.
+/// Sub-indices that a module adds to an object ([MnSubExtxxxx]): `count` of them, or counts by sub-index ranges in the extras.
 struct SubExtension {
-    Object      object;                    ///< one entry: what each new one is
+    Object      object;                    ///< one entry, the pattern of each new one
     std::string count, object_extend;
 
     bool operator==(const SubExtension&) const = default;
@@ -129,7 +129,7 @@ struct Module {
     bool operator==(const Module&) const = default;
 };
 
-/// A range of [DynamicChannels]: objects a programmable device makes as its program wants them.
+/// A segment of [DynamicChannels]: objects that the program of a programmable device creates.
 struct DynamicSegment {
     std::uint16_t type = 0;
     Access        access = Access::rw;
@@ -149,14 +149,14 @@ struct OtherSection {
 struct DeviceDescription {
     FileInfo                                    file;
     DeviceInfo                                  device;
-    std::optional<Commissioning>                commissioning;        ///< with it the file is a DCF
+    std::optional<Commissioning>                commissioning;        ///< present: the file is a DCF
     std::vector<std::pair<std::uint16_t, bool>> dummies;  ///< [DummyUsage]: data type, may be mapped
     std::vector<std::string>                    comments;
     std::vector<Object>                         objects;                       ///< by index, ascending
     std::vector<Module>                         modules;
     std::vector<unsigned>                       connected_modules;           ///< DCF: numbers of modules, by slot
     std::vector<DynamicSegment>                 dynamic_channels;
-    std::vector<OtherSection>                   others;                  ///< sections CiA 306 does not know
+    std::vector<OtherSection>                   others;                  ///< sections unknown to CiA 306
     std::vector<std::string>                    preamble;                 ///< comment lines before the first section
 
     bool          operator==(const DeviceDescription&) const = default;
@@ -164,28 +164,28 @@ struct DeviceDescription {
     Object*       find(std::uint16_t index);
     const Entry*  find(std::uint16_t index, std::uint8_t sub) const;
     std::size_t   entries() const;
-    /// DCF: the node-id it was written for; else `otherwise`.
+    /// Returns the node ID of a DCF, else `otherwise`.
     unsigned node_id(unsigned otherwise = 0) const;
 };
 
-/// What came of a file.
+/// The result of reading a file.
 struct Reading {
-    std::optional<DeviceDescription> description;  ///< none: refused, and the last message says why
-    std::vector<Message>             messages;                 ///< in order of place
-    std::string                      text;                              ///< the decoded text the places point into
+    std::optional<DeviceDescription> description;  ///< none: rejected, the last message is the reason
+    std::vector<Message>             messages;                 ///< in the order of the file
+    std::string                      text;                              ///< the decoded text that the spans refer to
     std::size_t                      count(Severity severity) const;
 };
 
 /// Reads the bytes of an EDS or DCF file. [any, not real time]
 Reading read_eds(std::string_view bytes);
 
-/// The text of an EDS, or of a DCF when there is a commissioning. UTF-8, lines end with CR LF as CiA 306 has it.
+/// Writes an EDS, or a DCF if there is a commissioning. UTF-8; lines end with CR LF, as in CiA 306.
 std::string write_eds(const DeviceDescription& description);
 
-/// Adds the objects of the connected modules: what the device with this set of modules really has.
+/// Adds the objects of the connected modules.
 void connect_modules(DeviceDescription& description, std::vector<Message>& messages);
 
-/// The rules between objects (mapping, limits, counts of PDOs); read_eds has called it.
+/// Checks the rules between objects (mapping, limits, counts of PDOs). read_eds() includes it.
 void check_objects(const DeviceDescription& description, std::vector<Message>& messages);
 
 }  // namespace hal::canopen::eds

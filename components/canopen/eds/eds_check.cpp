@@ -24,7 +24,7 @@ public:
     }
 
 private:
-    void say(Severity severity, Topic topic, const Place& at, std::string sentence, std::string help = "") {
+    void say(Severity severity, Topic topic, const Span& at, std::string sentence, std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
 
@@ -46,7 +46,7 @@ private:
             const Entry* entry = object.find(static_cast<std::uint8_t>(sub));
             if (entry == nullptr) {
                 say(Severity::warning, Topic::object, object.at,
-                    label(object.index) + " maps " + std::to_string(*mapped) + " objects, yet sub-index " + hex(sub, 1).substr(2) +
+                    label(object.index) + " maps " + std::to_string(*mapped) + " objects, but sub-index " + hex(sub, 1).substr(2) +
                         " is not described");
                 break;
             }
@@ -56,13 +56,13 @@ private:
         }
         if (sum > most_pdo_bits)
             say(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
-                "no frame has so many");
+                "that exceeds every frame");
         else if (sum > 64)
             say(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
-                "a CAN frame has 64; only CAN FD frames have more");
+                "a classic CAN frame carries 64, only CAN FD carries more");
     }
 
-    /// The bits this one takes.
+    /// Returns the number of bits mapped by this entry.
     unsigned one(const Object& object, const Entry& entry, std::uint32_t word, bool receive) {
         const auto        index = static_cast<std::uint16_t>(word >> 16);
         const auto        sub = static_cast<std::uint8_t>(word >> 8);
@@ -76,8 +76,8 @@ private:
             const bool told = std::any_of(d_.dummies.begin(), d_.dummies.end(), [&](const auto& dummy) { return dummy.first == index; });
             const bool may =
                 std::any_of(d_.dummies.begin(), d_.dummies.end(), [&](const auto& dummy) { return dummy.first == index && dummy.second; });
-            if (type == nullptr || type->bits == 0) warn(", which is no data type with a length");
-            else if (!may && told) warn(", which [DummyUsage] does not allow", "Dummy" + label(index) + "=1 allows it");
+            if (type == nullptr || type->bits == 0) warn(", which is not a data type with a length");
+            else if (!may && told) warn(", which [DummyUsage] does not allow", "write Dummy" + label(index) + "=1");
             return bits;
         }
         const Entry* target = d_.find(index, sub);
@@ -96,13 +96,13 @@ private:
         return bits;
     }
 
-    void count(std::uint16_t base, unsigned said, const Place& at, const char* key) {
+    void count(std::uint16_t base, unsigned said, const Span& at, const char* key) {
         const auto there =
             std::count_if(d_.objects.begin(), d_.objects.end(), [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
         if (said == static_cast<unsigned>(there) || d_.objects.empty()) return;
         if (said == 0 && d_.file.eds_version.empty()) return;  // a DCF made by hand
         say(Severity::note, Topic::count, at,
-            "'" + std::string(key) + "' is " + std::to_string(said) + ", " + std::to_string(there) + " are described",
+            "'" + std::string(key) + "' is " + std::to_string(said) + ", but " + std::to_string(there) + " are described",
             "write " + std::string(key) + "=" + std::to_string(there) + " in [DeviceInfo]");
     }
 
@@ -137,7 +137,7 @@ void connect_modules(DeviceDescription& d, std::vector<Message>& messages) {
     };
     for (const unsigned number : d.connected_modules) {
         const auto module = std::find_if(d.modules.begin(), d.modules.end(), [&](const Module& m) { return m.number == number; });
-        if (module == d.modules.end()) continue;  // said by the reader
+        if (module == d.modules.end()) continue;  // reported by the reader
         for (const Object& fixed : module->fixed) {
             Object& there = object_of(fixed.index, fixed);
             if (there.entries.size() <= 1 && there.type == ObjectType::array) there = fixed;
@@ -156,12 +156,12 @@ void connect_modules(DeviceDescription& d, std::vector<Message>& messages) {
             const auto    next = parse_number(extension.object_extend);
             for (std::uint64_t i = 0; i < count->magnitude; ++i) {
                 Object* object = &object_of(index, extension.object);
-                // Full: the next object of the row, when the module says that there are more.
+                // Full: continue with the next object, if the module has ObjExtend.
                 while (object->entries.back().sub >= 0xFE && next && next->magnitude != 0 && index < 0xFFFF)
                     object = &object_of(++index, extension.object);
                 if (object->entries.back().sub >= 0xFE) {
                     messages.push_back({Severity::warning, Topic::count, extension.object.at,
-                                        "object " + label(index) + " has no room for what module " + std::to_string(number) + " adds", ""});
+                                        "object " + label(index) + " has no free sub-index for module " + std::to_string(number), ""});
                     break;
                 }
                 Entry made = each;

@@ -7,9 +7,8 @@
 
 namespace hal::canopen::eds {
 
-/// The entries of the device with their values at power-on: the defaults or, with `configured`, the parameter values of a DCF where it
-/// has some. Values with `$NODEID` stay relative to the node-id. Entries whose data type is not known, and the definitions of types, are
-/// left out. [setup]
+/// Returns the entries of the device with their values at power-on: the defaults or, with `configured`, the parameter values of a DCF.
+/// Values with `$NODEID` stay relative to the node ID. Entries of unknown data types and type definitions are omitted. [setup]
 Description dictionary_of(const DeviceDescription& device, bool configured = false);
 
 }  // namespace hal::canopen::eds

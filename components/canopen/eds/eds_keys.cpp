@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "eds_reader.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::canopen::eds {
 
@@ -29,24 +30,6 @@ std::string hex(std::uint64_t value, int digits) {
 std::string label(std::uint16_t index) { return hex(index).substr(2); }
 
 std::string label(std::uint16_t index, unsigned sub) { return label(index) + "sub" + hex(sub, 1).substr(2); }
-
-unsigned distance(std::string_view a, std::string_view b) {
-    constexpr std::size_t longest = 32;
-    if (a.size() > longest || b.size() > longest || a.size() > b.size() + 2 || b.size() > a.size() + 2) return 3;
-    const std::string                 x = lower(a), y = lower(b);
-    std::array<unsigned, longest + 1> row{};
-    for (unsigned j = 0; j <= y.size(); ++j) row[j] = j;
-    for (unsigned i = 1; i <= x.size(); ++i) {
-        unsigned diagonal = row[0];
-        row[0] = i;
-        for (unsigned j = 1; j <= y.size(); ++j) {
-            const unsigned above = row[j];
-            row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (x[i - 1] != y[j - 1] ? 1u : 0u)});
-            diagonal = above;
-        }
-    }
-    return std::min(row[y.size()], 3u);
-}
 
 SectionName section_name(std::string_view name) {
     SectionName out;
@@ -91,11 +74,11 @@ void Keys::cut_comment(IniKey& key) {
     for (std::size_t i = 1; i < key.value.size(); ++i) {
         if ((key.value[i] != ';' && key.value[i] != '#') || (key.value[i - 1] != ' ' && key.value[i - 1] != '\t' && key.value[i] != ';'))
             continue;
-        Place at = key.value_at;
+        Span at = key.value_at;
         at.offset += static_cast<std::uint32_t>(i), at.length -= static_cast<std::uint32_t>(i), at.column += static_cast<std::uint32_t>(i);
         const std::string value(trimmed(std::string_view(key.value).substr(0, i)));
-        say(Severity::note, Topic::syntax, at, "a comment behind the value of '" + key.name + "' was left out",
-            "give comments a line of their own, with ';'");
+        say(Severity::note, Topic::syntax, at, "comment after the value of '" + key.name + "' ignored",
+            "write comments on lines of their own, with ';'");
         key.value = value;
         key.value_at.length = static_cast<std::uint32_t>(value.size());
         return;
@@ -125,20 +108,20 @@ std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::
     if (!number || number->node_id) {
         // 0007 as in a section's name, 1A00 without 0x
         const bool bare_hex = !key.value.empty() && key.value.size() <= 8 && std::all_of(key.value.begin(), key.value.end(), is_hex);
-        say(Severity::warning, Topic::value, key.value_at, in + " is no number: '" + key.value.substr(0, 60) + "'",
-            bare_hex ? "write 0x" + key.value : "numbers are 12 or 0x0C");
+        say(Severity::warning, Topic::value, key.value_at, in + " is not a number: '" + key.value.substr(0, 60) + "'",
+            bare_hex ? "write 0x" + key.value : "write it as in 12 or 0x0C");
         return {};
     }
     if (number->spelling == Spelling::octal)
         say(Severity::warning, Topic::value, key.value_at,
-            in + " begins with 0: read as the octal number it is, " + std::to_string(number->magnitude),
-            "write " + hex(number->magnitude, 1) + ", or leave the 0 out");
+            in + " begins with 0 and is read as octal: " + std::to_string(number->magnitude),
+            "write " + hex(number->magnitude, 1) + ", or remove the 0");
     if (number->spelling == Spelling::decimal_with_zero)
         say(Severity::warning, Topic::value, key.value_at,
-            in + " begins with 0, yet is no octal number; read as " + std::to_string(number->magnitude), "leave the 0 out");
+            in + " begins with 0 but is not octal; read as decimal " + std::to_string(number->magnitude), "remove the 0");
     if ((number->negative && number->magnitude != 0) || number->magnitude > most) {
         say(Severity::warning, Topic::value, key.value_at, in + " is out of range: '" + key.value + "'",
-            "0 to " + std::to_string(most) + " is possible");
+            "the range is 0.." + std::to_string(most));
         return {};
     }
     return number->magnitude;
@@ -169,9 +152,9 @@ bool Keys::flag(IniSection& section, std::string_view key, bool otherwise) {
     }
     const bool yes = number && number->magnitude != 0;
     say(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value.substr(0, 60) + "'",
-        yes         ? "taken as 1"
-        : otherwise ? "taken as 1, which it is when nothing is said"
-                    : "taken as 0");
+        yes         ? "read as 1"
+        : otherwise ? "read as 1, the default"
+                    : "read as 0");
     return number ? yes : otherwise;
 }
 
@@ -183,15 +166,15 @@ std::map<unsigned, IniKey*> Keys::list(IniSection& section, const char* count_ke
         if (!number || number->magnitude > 0xFFFF) continue;
         const auto [at, fresh] = out.emplace(static_cast<unsigned>(number->magnitude), &key);
         if (!fresh)
-            say(Severity::warning, Topic::count, key.at, "number " + key.name + " of [" + section.name + "] is given twice",
-                "the first counts");
+            say(Severity::warning, Topic::count, key.at, "duplicate number " + key.name + " in [" + section.name + "]",
+                "the first one is used");
         key.used = true;
     }
     if (count_key == nullptr) return out;
     IniKey* count = section.find(count_key);
     if (count == nullptr) {
         say(Severity::warning, Topic::missing, section.at, "'" + std::string(count_key) + "' is missing in [" + section.name + "]",
-            "it lists " + std::to_string(out.size()));
+            "write " + std::string(count_key) + "=" + std::to_string(out.size()));
         return out;
     }
     count->used = true;
@@ -213,16 +196,15 @@ Extras Keys::rest(IniSection& section, std::initializer_list<std::string_view> k
     section.used = true;
     Extras out;
     for (const std::string& comment : section.comments) out.emplace_back("", comment);
+    std::vector<std::string> missing;
+    for (const std::string_view name : known)
+        if (section.find(name) == nullptr) missing.emplace_back(name);
     for (IniKey& key : section.keys) {
         if (key.used) continue;
         key.used = true;
-        for (const std::string_view name : known)
-            if (const unsigned apart = distance(name, key.name);
-                apart > 0 && apart <= (name.size() > 5 ? 2u : 1u) && section.find(name) == nullptr) {
-                say(Severity::warning, Topic::missing, key.at, "'" + key.name + "' is no key of [" + section.name + "]",
-                    "did you mean '" + std::string(name) + "'? It was kept as it is");
-                break;
-            }
+        if (const auto close = similar(key.name, missing, 1); !close.empty())
+            say(Severity::warning, Topic::missing, key.at, "unknown key '" + key.name + "' in [" + section.name + "]",
+                "did you mean '" + close[0] + "'? The key was kept unchanged");
         out.emplace_back(key.name, key.value);
     }
     return out;

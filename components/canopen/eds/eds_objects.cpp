@@ -1,55 +1,12 @@
 // SPDX-License-Identifier: MIT
 // The object sections: [1018], [1018sub1], [1018Name], [1018Value], [1018Denotation], [1018ObjectLinks].
 #include <algorithm>
-#include <array>
 
 #include "eds_reader.hpp"
 
 namespace hal::canopen::eds {
 
 namespace {
-
-struct AccessWord {
-    std::string_view word;
-    Access           access;
-    bool             proper;
-};
-constexpr AccessWord access_words[] = {
-    {"ro", Access::ro, true},
-    {"wo", Access::wo, true},
-    {"rw", Access::rw, true},
-    {"rwr", Access::rwr, true},
-    {"rww", Access::rww, true},
-    {"const", Access::constant, true},
-    {"constant", Access::constant, false},
-    {"cons", Access::constant, false},
-    {"r", Access::ro, false},
-    {"read", Access::ro, false},
-    {"readonly", Access::ro, false},
-    {"read-only", Access::ro, false},
-    {"r/o", Access::ro, false},
-    {"w", Access::wo, false},
-    {"write", Access::wo, false},
-    {"writeonly", Access::wo, false},
-    {"w/o", Access::wo, false},
-    {"r/w", Access::rw, false},
-    {"wr", Access::rw, false},
-    {"readwrite", Access::rw, false},
-    {"read/write", Access::rw, false},
-    {"read-write", Access::rw, false},
-    {"rw/r", Access::rwr, false},
-    {"rw/w", Access::rww, false},
-    {"c", Access::constant, false},
-};
-
-struct TypeWord {
-    std::string_view word;
-    ObjectType       type;
-};
-constexpr TypeWord object_types[] = {
-    {"NULL", ObjectType::null}, {"DOMAIN", ObjectType::domain}, {"DEFTYPE", ObjectType::deftype}, {"DEFSTRUCT", ObjectType::defstruct},
-    {"VAR", ObjectType::var},   {"ARRAY", ObjectType::array},   {"RECORD", ObjectType::record},
-};
 
 const std::initializer_list<std::string_view> known_keys{"ParameterName",  "ObjectType", "DataType",     "AccessType", "PDOMapping",
                                                          "DefaultValue",   "LowLimit",   "HighLimit",    "SubNumber",  "CompactSubObj",
@@ -59,137 +16,6 @@ constexpr std::size_t longest_name = 241;
 
 }  // namespace
 
-std::string_view name_of(ObjectType type) {
-    for (const TypeWord& row : object_types)
-        if (row.type == type) return row.word;
-    return "?";
-}
-
-std::string_view name_of(Access access) {
-    for (const AccessWord& row : access_words)
-        if (row.access == access) return row.word;
-    return "?";
-}
-
-ObjectType ObjectReader::object_type(IniSection& section, const std::string& what, bool& given) {
-    IniKey* key = section.find("ObjectType");
-    given = key != nullptr;
-    if (key == nullptr) return ObjectType::var;
-    key->used = true;
-    keys_.cut_comment(*key);
-    if (key->value.empty()) {
-        given = false;
-        keys_.say(Severity::warning, Topic::missing, key->value_at, "'ObjectType' of " + what + " is empty", "taken for 0x7, a VAR");
-        return ObjectType::var;
-    }
-    for (const TypeWord& row : object_types)
-        if (same_word(row.word, key->value)) {
-            keys_.say(Severity::warning, Topic::object, key->value_at, "'ObjectType' of " + what + " is a word",
-                      "write " + hex(static_cast<unsigned>(row.type), 1));
-            return row.type;
-        }
-    const auto number = keys_.parse(section, *key, 0xFF);
-    for (const TypeWord& row : object_types)
-        if (number && static_cast<unsigned>(row.type) == *number) return row.type;
-    if (number)
-        keys_.say(Severity::warning, Topic::object, key->value_at, "there is no object type " + key->value,
-                  "0x2 DOMAIN, 0x5 DEFTYPE, 0x6 DEFSTRUCT, 0x7 VAR, 0x8 ARRAY, 0x9 RECORD; taken for a VAR");
-    given = false;
-    return ObjectType::var;
-}
-
-std::uint16_t ObjectReader::type_of(IniSection& section, const std::string& what, bool needed) {
-    IniKey* key = section.find("DataType");
-    if (key != nullptr) key->used = true, keys_.cut_comment(*key);
-    if (key == nullptr || key->value.empty()) {
-        if (needed)
-            keys_.say(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
-                      "'DataType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
-                      "such an object can be sent and received as bytes only; write for example DataType=0x0007 for UNSIGNED32");
-        return 0;
-    }
-    if (const DataType* named = data_type(std::string_view(key->value)); named != nullptr) {
-        keys_.say(Severity::warning, Topic::object, key->value_at, "'DataType' of " + what + " is a word", "write " + hex(named->code));
-        return named->code;
-    }
-    const auto number = keys_.parse(section, *key, 0xFFFF);
-    if (!number) return 0;
-    const auto code = static_cast<std::uint16_t>(*number);
-    if (data_type(code) == nullptr && (code < 0x20 || code > 0x25F))
-        keys_.say(Severity::warning, Topic::object, key->value_at, "there is no data type " + hex(code),
-                  "0x0001 to 0x001B are the simple ones, 0x0005 is UNSIGNED8");
-    return code;
-}
-
-Access ObjectReader::access_of(IniSection& section, const std::string& what, bool needed) {
-    IniKey* key = section.find("AccessType");
-    if (key != nullptr) key->used = true, keys_.cut_comment(*key);
-    if (key == nullptr || key->value.empty()) {
-        if (needed)
-            keys_.say(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
-                      "'AccessType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
-                      "taken for rw; ro, wo, rw, rwr, rww and const are possible");
-        return Access::rw;
-    }
-    for (const AccessWord& row : access_words) {
-        if (!same_word(row.word, key->value)) continue;
-        if (!row.proper)
-            keys_.say(Severity::warning, Topic::object, key->value_at, "there is no access type '" + key->value + "'",
-                      "taken for " + std::string(name_of(row.access)));
-        return row.access;
-    }
-    keys_.say(Severity::warning, Topic::object, key->value_at, "there is no access type '" + key->value.substr(0, 40) + "'",
-              "taken for rw; ro, wo, rw, rwr, rww and const are possible");
-    return Access::rw;
-}
-
-void ObjectReader::value(IniSection& section, const char* name, std::string& out, std::uint16_t type, const std::string& what) {
-    IniKey* key = section.find(name);
-    if (key == nullptr) return;
-    key->used = true;
-    const DataType* known = data_type(type);
-    const bool      number = known != nullptr && known->kind < Kind::text;
-    if (number) keys_.cut_comment(*key);
-    out = key->value;
-    if (out.empty() || known == nullptr || known->kind == Kind::structure || known->kind == Kind::domain) return;
-    const Encoded     encoded = encode(out, type, 1);
-    const std::string it = "'" + key->name + "' of " + what;
-    if (!encoded) {
-        const auto parsed = parse_number(out);
-        const bool bare_hex = number && !parsed && out.size() <= 8 && out.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
-        keys_.say(Severity::warning, Topic::value, key->value_at, it + ": " + encoded.error,
-                  bare_hex ? "write 0x" + out : "the object counts as one without this value");
-        return;
-    }
-    const auto odd = [&](Severity severity, std::string sentence, std::string help) {
-        keys_.say(severity, Topic::value, key->value_at, std::move(sentence), std::move(help));
-    };
-    switch (encoded.spelling) {
-    case Spelling::octal:
-        odd(Severity::warning, it + " begins with 0 and is read as an octal number: " + spell(encoded.bytes, type),
-            "leave the 0 out if it is decimal, write 0x if it is hexadecimal");
-        break;
-    case Spelling::decimal_with_zero:
-        odd(Severity::warning, it + " begins with 0, yet is no octal number; read as decimal", "leave the 0 out");
-        break;
-    case Spelling::unsigned_for_negative:
-        if (known->kind == Kind::integer)
-            odd(Severity::note, it + " is the bit pattern of a negative number: " + spell(encoded.bytes, type),
-                "write " + spell(encoded.bytes, type));
-        else
-            odd(Severity::warning, it + " is negative, " + std::string(known->name) + " is not; read as " + spell(encoded.bytes, type),
-                "write " + spell(encoded.bytes, type));
-        break;
-    case Spelling::number_as_real: odd(Severity::warning, it + " is written as a fraction", "write " + spell(encoded.bytes, type)); break;
-    case Spelling::real_as_bits:
-        odd(Severity::warning, it + " is taken for the bits of " + spell(encoded.bytes, type),
-            "other tools take it for a number; write " + spell(encoded.bytes, type));
-        break;
-    case Spelling::words: odd(Severity::warning, it + " is a word", "write " + spell(encoded.bytes, type)); break;
-    case Spelling::plain: break;
-    }
-}
-
 Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_sub) {
     Entry out;
     section.used = true;
@@ -198,16 +24,16 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
     if (out.name.empty())
         keys_.say(Severity::warning, Topic::missing, section.at,
                   "'ParameterName' of " + what + " is " + (section.find("ParameterName") != nullptr ? "empty" : "missing"),
-                  "every object has a name");
+                  "give the object a name");
     if (out.name.size() > longest_name)
         keys_.say(Severity::note, Topic::value, section.find("ParameterName")->value_at,
-                  "the name of " + what + " has " + std::to_string(out.name.size()) + " characters", "241 are allowed");
+                  "the name of " + what + " has " + std::to_string(out.name.size()) + " characters", "the limit is 241");
     bool given = false;
     out.type = object_type(section, what, given);
     if (is_sub && (out.type == ObjectType::array || out.type == ObjectType::record || out.type == ObjectType::defstruct)) {
         keys_.say(Severity::warning, Topic::object, section.find("ObjectType")->value_at,
                   what + " is a sub-index and cannot be of type " + std::string(name_of(out.type)),
-                  "taken for a VAR; write ObjectType=0x7");
+                  "read as VAR; write ObjectType=0x7");
         out.type = ObjectType::var;
     }
     const bool is_value = out.type == ObjectType::var;
@@ -215,7 +41,7 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
     if (out.data_type == 0 && out.type == ObjectType::domain) out.data_type = 0x0F;
     if (const DataType* type = data_type(out.data_type); is_value && type != nullptr && type->kind == Kind::structure)
         keys_.say(Severity::warning, Topic::object, section.find("DataType")->value_at,
-                  "data type " + hex(out.data_type) + " of " + what + " is a record, not that of a single value", "");
+                  "data type " + hex(out.data_type) + " of " + what + " is a record, but a single value is required", "");
     out.access = access_of(section, what, is_value);
     out.pdo_mapping = keys_.flag(section, "PDOMapping");
     value(section, "DefaultValue", out.default_value, out.data_type, what);
@@ -229,22 +55,22 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
     if (is_sub) {
         if (keys_.number(section, "SubNumber", 0xFF).value_or(0) != 0)
             keys_.say(Severity::note, Topic::object, section.find("SubNumber")->at,
-                      "a sub-index has no sub-indices: 'SubNumber' of " + what + " was left out", "");
+                      "'SubNumber' of " + what + " ignored: a sub-index has no sub-indices", "");
         out.extras = keys_.rest(section, known_keys);
     }
     const auto low = comparable(out.low_limit, out.data_type, 1), high = comparable(out.high_limit, out.data_type, 1);
     if (low && high && *low > *high) {
         keys_.say(Severity::warning, Topic::value, section.find("LowLimit")->value_at,
-                  "the limits of " + what + " leave no value: " + out.low_limit + " to " + out.high_limit,
-                  "exchange LowLimit and HighLimit?");
+                  "empty range of " + what + ": " + out.low_limit + ".." + out.high_limit,
+                  "are LowLimit and HighLimit exchanged?");
     } else {
         for (const auto& [key, text] :
              {std::pair<const char*, const std::string*>{"DefaultValue", &out.default_value}, {"ParameterValue", &out.parameter_value}}) {
             const auto number = comparable(*text, out.data_type, 1);
             if (number && ((low && *number < *low) || (high && *number > *high)))
                 keys_.say(Severity::warning, Topic::value, section.find(key)->value_at,
-                          "'" + std::string(key) + "' of " + what + " is outside of its limits: " + *text,
-                          "allowed is " + (low ? out.low_limit : "any") + " to " + (high ? out.high_limit : "any"));
+                          "'" + std::string(key) + "' of " + what + " is out of range: " + *text,
+                          "the range is " + (low ? out.low_limit : "any") + ".." + (high ? out.high_limit : "any"));
         }
     }
     return out;
@@ -259,7 +85,7 @@ void ObjectReader::spread(Object& out, IniSection* list, std::string Entry::* fi
             keys_.say(Severity::warning, Topic::count, key->at,
                       "[" + list->name + "] has a " + what + " for sub-index " + key->name + ", which object " + label(out.index) +
                           " does not have",
-                      "sub-indices here are decimal numbers");
+                      "sub-indices in this section are decimal");
             out.extras.emplace_back(list->name + "." + key->name, key->value);
             continue;
         }
@@ -303,23 +129,23 @@ void ObjectReader::check_entries(const Object& out, IniSection& section) {
     if (out.compact != 0) return;
     if (count == 0) {
         keys_.say(Severity::warning, Topic::count, section.at,
-                  "object " + label(out.index) + " is of type " + std::string(name_of(out.type)) + " and has no sub-indices",
-                  "describe them in sections [" + label(out.index) + "sub0] and so on, or by CompactSubObj");
+                  "object " + label(out.index) + " is of type " + std::string(name_of(out.type)) + " but has no sub-indices",
+                  "describe them in sections [" + label(out.index) + "sub0] and so on, or with CompactSubObj");
         return;
     }
     if (key == nullptr || key->value.empty()) {
         keys_.say(Severity::warning, Topic::missing, section.at,
                   "'SubNumber' of " + label(out.index) + " is " + (key != nullptr ? "empty" : "missing"),
-                  "there are " + std::to_string(count) + " sub-indices; write SubNumber=" + hex(count, 1));
+                  "the file describes " + std::to_string(count) + " sub-indices; write SubNumber=" + hex(count, 1));
     } else if (const auto said = parse_number(key->value); said && said->magnitude != count) {
         keys_.say(Severity::warning, Topic::count, key->value_at,
                   "'SubNumber' of " + label(out.index) + " is " + std::to_string(said->magnitude) + ", the file describes " +
                       std::to_string(count),
-                  "it counts sub-index 0, too: write SubNumber=" + hex(count, 1));
+                  "sub-index 0 counts as well: write SubNumber=" + hex(count, 1));
     }
     if (out.entries.front().sub != 0) {
-        keys_.say(Severity::warning, Topic::missing, section.at, "sub-index 0 of " + label(out.index) + " is missing",
-                  "it holds the highest sub-index of every ARRAY and RECORD");
+        keys_.say(Severity::warning, Topic::missing, section.at, "missing sub-index 0 of " + label(out.index),
+                  "it holds the highest sub-index of an ARRAY or RECORD");
         return;
     }
     const Entry& first = out.entries.front();
@@ -329,8 +155,8 @@ void ObjectReader::check_entries(const Object& out, IniSection& section) {
     const Encoded highest = encode(first.default_value, 0x05, 1);
     if (highest && !highest.bytes.empty() && highest.bytes[0] != out.entries.back().sub)
         keys_.say(Severity::note, Topic::count, first.at,
-                  "sub-index 0 of " + label(out.index) + " says that " + std::to_string(highest.bytes[0]) +
-                      " is the highest, the file describes " + std::to_string(out.entries.back().sub),
+                  "highest sub-index of " + label(out.index) + " is " + std::to_string(highest.bytes[0]) +
+                      " by sub-index 0, but the file describes " + std::to_string(out.entries.back().sub),
                   "");
 }
 
@@ -340,9 +166,9 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
     const std::string what = label(index);
     if (draft.object == nullptr) {
         out.type = ObjectType::record;
-        out.at = !draft.subs.empty() ? draft.subs.begin()->second->at : Place{};
-        keys_.say(Severity::warning, Topic::missing, out.at, "section [" + prefix_ + what + "] is missing; there are only its sub-indices",
-                  "the object was taken for a RECORD");
+        out.at = !draft.subs.empty() ? draft.subs.begin()->second->at : Span{};
+        keys_.say(Severity::warning, Topic::missing, out.at, "missing section [" + prefix_ + what + "]: only its sub-indices are described",
+                  "read as RECORD");
     } else {
         IniSection& section = *draft.object;
         section.used = true;
@@ -364,7 +190,7 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
             out.data_type = out.entries.back().data_type;
             if (!draft.subs.empty())
                 keys_.say(Severity::note, Topic::object, section.at,
-                          "object " + what + " has CompactSubObj and sections of its own for some sub-indices", "the sections count");
+                          "object " + what + " has CompactSubObj and sections for some sub-indices", "the sections take precedence");
         } else if (written == ObjectType::var && said == 0) {
             Entry only = entry(section, what, false);
             out.type = only.type == ObjectType::array || only.type == ObjectType::record || only.type == ObjectType::defstruct
@@ -379,7 +205,7 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
                     keys_.say(Severity::warning, Topic::count, section.find("SubNumber")->value_at,
                               "'SubNumber' of " + what + " is " + std::to_string(*subs) + ", but it is a " +
                                   std::string(name_of(only.type)) + " without sub-indices",
-                              "leave SubNumber out, or write ObjectType=0x9 and the sub-indices");
+                              "delete SubNumber, or write ObjectType=0x9 and the sub-indices");
                 out.name = only.name;
                 out.denotation = only.denotation;
                 only.denotation.clear();
@@ -391,12 +217,12 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
             out.name = keys_.text(section, "ParameterName");
             if (out.name.empty())
                 keys_.say(Severity::warning, Topic::missing, section.at, "'ParameterName' of " + what + " is missing or empty",
-                          "every object has a name");
+                          "give the object a name");
             out.type = object_type(section, what, given);
             if (out.single()) {
                 keys_.say(Severity::warning, Topic::object, given ? section.find("ObjectType")->value_at : section.at,
-                          "object " + what + " is a " + std::string(name_of(out.type)) + ", yet the file describes sub-indices",
-                          "taken for a RECORD; write ObjectType=0x9");
+                          "object " + what + " is a " + std::string(name_of(out.type)) + ", but the file describes sub-indices",
+                          "read as RECORD; write ObjectType=0x9");
                 out.type = ObjectType::record;
             }
             out.data_type = type_of(section, what, false);
@@ -415,7 +241,7 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
     if (draft.object != nullptr) {
         if (!out.single()) check_entries(out, *draft.object);
         out.extras = keys_.rest(*draft.object, known_keys);
-        if (!out.single() && out.compact == 0)  // what a RECORD repeats of its entries means nothing
+        if (!out.single() && out.compact == 0)  // keys of a RECORD that repeat those of its entries have no meaning
             std::erase_if(out.extras, [](const auto& extra) {
                 return same_word(extra.first, "AccessType") || same_word(extra.first, "PDOMapping") ||
                        (same_word(extra.first, "DefaultValue") && extra.second.empty());
@@ -442,11 +268,11 @@ std::vector<Object> ObjectReader::read() {
         using What = SectionName::What;
         if (means.what == What::other) continue;
         if (means.odd)
-            keys_.say(Severity::warning, Topic::syntax, section.at, "[" + section.name + "] is a misspelt object section",
+            keys_.say(Severity::warning, Topic::syntax, section.at, "misspelt object section [" + section.name + "]",
                       "write [" + prefix_ + (means.what == What::sub ? label(means.index, means.sub) : label(means.index)) + "]");
         if (means.what == What::sub && means.sub > 0xFF) {
-            keys_.say(Severity::warning, Topic::object, section.at, "there is no sub-index " + hex(means.sub, 1),
-                      "0 to FF are possible; the section was kept as it is");
+            keys_.say(Severity::warning, Topic::object, section.at, "invalid sub-index " + hex(means.sub, 1),
+                      "the range is 0..FF; the section was kept unchanged");
             continue;
         }
         Draft&       draft = drafts[means.index];
@@ -461,8 +287,8 @@ std::vector<Object> ObjectReader::read() {
         }
         if (*place != nullptr) {
             keys_.say(Severity::warning, Topic::syntax, section.at,
-                      "[" + section.name + "] describes what line " + std::to_string((*place)->at.line) + " has described",
-                      "the first counts, this one was kept as it is");
+                      "duplicate section [" + section.name + "]: line " + std::to_string((*place)->at.line) + " describes the same",
+                      "the first one is used, this one was kept unchanged");
             continue;
         }
         *place = &section;
@@ -474,7 +300,7 @@ std::vector<Object> ObjectReader::read() {
                 if (section != nullptr)
                     keys_.say(Severity::warning, Topic::missing, section->at,
                               "[" + section->name + "] belongs to an object that is not described",
-                              "there is no section [" + prefix_ + label(index) + "]; it was kept as it is");
+                              "missing section [" + prefix_ + label(index) + "]; this one was kept unchanged");
             continue;
         }
         out.push_back(object(index, draft));

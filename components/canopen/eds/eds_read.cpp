@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The sections around the objects, and what the file says of itself.
+// The sections other than those of objects: file and device information, lists of objects, commissioning.
 #include <algorithm>
 #include <charconv>
-#include <set>
 
 #include "eds_reader.hpp"
 
@@ -20,11 +19,11 @@ public:
         device_info();
         commissioning();
         dummies();
-        comments(ini_.find("Comments"), out_.comments);
+        read_comments(keys_, ini_.find("Comments"), out_.comments, out_.others);
         out_.objects = ObjectReader(ini_, keys_, "").read();
         lists();
-        compact_pdos();
-        modules();
+        add_compact_pdos(out_);
+        read_modules(ini_, keys_, out_);
         dynamic_channels();
         for (IniSection& section : ini_.sections()) {
             if (section.used) continue;
@@ -35,7 +34,7 @@ public:
 
 private:
     void missing(const char* section, Severity severity) {
-        keys_.say(severity, Topic::missing, {1, 1, 0, 0}, "section [" + std::string(section) + "] is missing");
+        keys_.say(severity, Topic::missing, {1, 1, 0, 0}, "missing section [" + std::string(section) + "]");
     }
 
     void date(IniSection& section, const char* key, std::string& out) {
@@ -50,7 +49,7 @@ private:
         };
         const bool shape = out.size() == 10 && out[2] == '-' && out[5] == '-';
         if (shape && number(0, 2) >= 1 && number(0, 2) <= 12 && number(3, 2) >= 1 && number(3, 2) <= 31 && number(6, 4) >= 0) return;
-        keys_.say(Severity::note, Topic::value, at->value_at, "'" + out.substr(0, 40) + "' is no date of CiA 306",
+        keys_.say(Severity::note, Topic::value, at->value_at, "invalid date '" + out.substr(0, 40) + "'",
                   "write it as mm-dd-yyyy");
     }
 
@@ -74,15 +73,15 @@ private:
                                          "CreationDate", "CreatedBy", "ModificationTime", "ModificationDate", "ModifiedBy", "LastEDS"});
     }
 
-    /// FileVersion=1.2 occurs: what stands before the point counts, the whole is kept.
+    /// FileVersion=1.2 occurs in files: the digits before the point are the value, the whole text is kept.
     std::uint64_t loose(IniSection& section, const char* name) {
         IniKey* key = section.find(name);
         if (key == nullptr || key->value.empty() || parse_number(key->value)) return keys_.number(section, name, 0xFF).value_or(0);
         unsigned value = 0;
         const auto [end, error] = std::from_chars(key->value.data(), key->value.data() + key->value.size(), value);
         keys_.say(Severity::note, Topic::value, key->value_at,
-                  "'" + key->name + "' is a number from 0 to 255, not '" + key->value.substr(0, 40) + "'",
-                  error == std::errc() && value <= 0xFF ? "taken as " + std::to_string(value) : "taken as 0");
+                  "'" + key->name + "' is a number of 0..255, not '" + key->value.substr(0, 40) + "'",
+                  error == std::errc() && value <= 0xFF ? "read as " + std::to_string(value) : "read as 0");
         return error == std::errc() && value <= 0xFF ? value : 0;
     }
 
@@ -108,14 +107,14 @@ private:
             d.supports[i] = keys_.flag(*section, key);
         }
         if (!any)
-            keys_.say(Severity::note, Topic::missing, section->at, "no bit rate is given in [DeviceInfo]",
-                      "BaudRate_1000=1 says that the device knows 1 Mbit/s");
+            keys_.say(Severity::note, Topic::missing, section->at, "no bit rate in [DeviceInfo]",
+                      "write BaudRate_1000=1 for a device that supports 1 Mbit/s");
         d.boot_up_master = keys_.flag(*section, "SimpleBootUpMaster");
         d.boot_up_slave = keys_.flag(*section, "SimpleBootUpSlave");
         d.granularity = static_cast<std::uint8_t>(keys_.number(*section, "Granularity", 0xFF).value_or(0));
         if (d.granularity > 64)
             keys_.say(Severity::note, Topic::value, section->find("Granularity")->value_at,
-                      "a granularity of " + std::to_string(d.granularity) + " bits", "0 to 64 are possible");
+                      "invalid granularity of " + std::to_string(d.granularity) + " bits", "the range is 0..64");
         d.dynamic_channels = keys_.number(*section, "DynamicChannelsSupported", 0xFFFF).value_or(0) != 0;
         d.group_messaging = keys_.flag(*section, "GroupMessaging");
         d.lss = keys_.flag(*section, "LSS_Supported");
@@ -133,7 +132,7 @@ private:
     }
 
     void commissioning() {
-        IniSection* section = ini_.find("DeviceComissioning");  // CiA 306 spells it so
+        IniSection* section = ini_.find("DeviceComissioning");  // the spelling of CiA 306
         if (section == nullptr) section = ini_.find("DeviceCommissioning");
         if (section == nullptr) return;
         Commissioning c;
@@ -142,8 +141,8 @@ private:
         if (!id || *id < 1 || *id > 127) {
             IniKey* key = section->find("NodeID");
             keys_.say(Severity::warning, key == nullptr ? Topic::missing : Topic::value, key == nullptr ? section->at : key->value_at,
-                      key == nullptr ? "'NodeID' is missing in [" + section->name + "]" : "there is no node-id '" + key->value + "'",
-                      "1 to 127 are possible");
+                      key == nullptr ? "missing 'NodeID' in [" + section->name + "]" : "invalid node ID '" + key->value + "'",
+                      "the range is 1..127");
             c.node_id = 0;
         }
         c.node_name = keys_.text(*section, "NodeName");
@@ -151,7 +150,7 @@ private:
         c.baud_rate = static_cast<std::uint16_t>(keys_.number(*section, "Baudrate", 0xFFFF).value_or(0));
         if (c.baud_rate != 0 && std::find(baud_rates.begin(), baud_rates.end(), c.baud_rate) == baud_rates.end())
             keys_.say(Severity::warning, Topic::value, section->find("Baudrate")->value_at,
-                      std::to_string(c.baud_rate) + " kbit/s is no bit rate of CiA 301", "10, 20, 50, 125, 250, 500, 800 and 1000 are");
+                      std::to_string(c.baud_rate) + " kbit/s is not a bit rate of CiA 301", "the rates are 10, 20, 50, 125, 250, 500, 800 and 1000");
         c.network = static_cast<std::uint32_t>(keys_.number(*section, "NetNumber", 0xFFFFFFFF).value_or(0));
         c.network_name = keys_.text(*section, "NetworkName");
         c.network_reference = keys_.text(*section, "NetRefd");
@@ -176,36 +175,6 @@ private:
         }
         std::sort(out_.dummies.begin(), out_.dummies.end());
         if (const Extras more = keys_.rest(*section, {"Dummy0001"}); !more.empty()) out_.others.push_back({section->name, more});
-    }
-
-    void comments(IniSection* section, std::vector<std::string>& out) {
-        if (section == nullptr) return;
-        section->used = true;
-        std::map<unsigned, IniKey*> lines;
-        for (IniKey& key : section->keys) {
-            if (key.name.size() < 5 || !same_word(key.name.substr(0, 4), "Line") || same_word(key.name, "Lines")) continue;
-            const auto number = parse_number(std::string_view(key.name).substr(4));
-            if (!number || number->magnitude == 0 || number->magnitude > 0xFFFF) continue;
-            lines.emplace(static_cast<unsigned>(number->magnitude), &key);
-            key.used = true;
-        }
-        IniKey*    key = section->find("Lines");
-        const auto count = keys_.number(*section, "Lines", 0xFFFF);
-        if (key == nullptr)
-            keys_.say(Severity::note, Topic::missing, section->at, "'Lines' is missing in [" + section->name + "]",
-                      "there are " + std::to_string(lines.size()));
-        else if (count && *count != lines.size())
-            keys_.say(Severity::note, Topic::count, key->value_at,
-                      "'Lines' of [" + section->name + "] is " + std::to_string(*count) + ", there are " + std::to_string(lines.size()),
-                      "write Lines=" + std::to_string(lines.size()));
-        unsigned next = 1;
-        for (const auto& [number, line] : lines) {
-            // A line left out in the middle is an empty one; a far jump is not.
-            for (; next < number && number - next < 16; ++next) out.emplace_back();
-            out.push_back(line->value);
-            next = number + 1;
-        }
-        if (const Extras more = keys_.rest(*section); !more.empty()) out_.others.push_back({section->name, more});
     }
 
     void lists() {
@@ -237,8 +206,8 @@ private:
                 Object* object = out_.find(static_cast<std::uint16_t>(*index));
                 if (object == nullptr) {
                     keys_.say(Severity::warning, Topic::missing, key->value_at,
-                              "object " + label(static_cast<std::uint16_t>(*index)) + " is listed and not described",
-                              "there is no section [" + label(static_cast<std::uint16_t>(*index)) + "]");
+                              "object " + label(static_cast<std::uint16_t>(*index)) + " is listed but not described",
+                              "missing section [" + label(static_cast<std::uint16_t>(*index)) + "]");
                     continue;
                 }
                 object->category = list.category;
@@ -246,8 +215,8 @@ private:
                 if (usual != list.category && (usual == Category::manufacturer || list.category == Category::manufacturer))
                     keys_.say(
                         Severity::note, Topic::count, key->value_at,
-                        "object " + label(object->index) + " does not belong into [" + section->name + "]",
-                        usual == Category::manufacturer ? "2000 to 5FFF are the manufacturer's" : "the manufacturer's are 2000 to 5FFF");
+                        "object " + label(object->index) + " does not belong in [" + section->name + "]",
+                        "manufacturer-specific objects are 2000..5FFF");
             }
             if (const Extras more = keys_.rest(*section); !more.empty()) out_.others.push_back({section->name, more});
         }
@@ -255,12 +224,12 @@ private:
             if (listed.count(object.index) != 0) continue;
             object.category = category_of(object.index);
             if (any && object.index >= 0x1000)
-                keys_.say(Severity::warning, Topic::count, object.at, "object " + label(object.index) + " is described and in no list",
-                          "it was used all the same; add it to [" + std::string(list_of(object.category)) + "]");
+                keys_.say(Severity::warning, Topic::count, object.at, "object " + label(object.index) + " is described but not listed",
+                          "it was read all the same; add it to [" + std::string(list_of(object.category)) + "]");
         }
         for (const std::uint16_t index : {std::uint16_t{0x1000}, std::uint16_t{0x1001}, std::uint16_t{0x1018}})
             if (out_.find(index) == nullptr && any)
-                keys_.say(Severity::warning, Topic::missing, {1, 1, 0, 0}, "the mandatory object " + label(index) + " is missing");
+                keys_.say(Severity::warning, Topic::missing, {1, 1, 0, 0}, "missing mandatory object " + label(index));
     }
 
     static Category category_of(std::uint16_t index) {
@@ -271,164 +240,6 @@ private:
         return category == Category::mandatory  ? "MandatoryObjects"
                : category == Category::optional ? "OptionalObjects"
                                                 : "ManufacturerObjects";
-    }
-
-    /// CompactPDO: PDOs that are counted and not described are all alike.
-    void compact_pdos() {
-        const std::uint8_t mask = out_.device.compact_pdo;
-        if (mask == 0) return;
-        for (const bool receive : {true, false}) {
-            const std::uint16_t base = receive ? 0x1400 : 0x1800, wanted = receive ? out_.device.rx_pdos : out_.device.tx_pdos;
-            const auto          described = std::count_if(out_.objects.begin(), out_.objects.end(),
-                                                          [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
-            unsigned            missing_pdos = described < wanted ? static_cast<unsigned>(wanted - described) : 0;
-            for (std::uint16_t n = 0; missing_pdos > 0 && n < 0x200; ++n) {
-                if (out_.find(static_cast<std::uint16_t>(base + n)) != nullptr) continue;
-                --missing_pdos;
-                insert(communication(static_cast<std::uint16_t>(base + n), mask, receive, n));
-                if (out_.find(static_cast<std::uint16_t>(base + 0x200 + n)) == nullptr)
-                    insert(mapping(static_cast<std::uint16_t>(base + 0x200 + n), receive));
-            }
-        }
-    }
-
-    static Object communication(std::uint16_t index, std::uint8_t mask, bool receive, unsigned n) {
-        Object object;
-        object.index = index;
-        object.name = receive ? "RPDO communication parameter" : "TPDO communication parameter";
-        object.type = ObjectType::record;
-        struct Sub {
-            const char*   name;
-            std::uint16_t type;
-        };
-        constexpr Sub subs[] = {{"COB-ID used by PDO", 7}, {"Transmission type", 5}, {"Inhibit time", 6},
-                                {"Reserved", 5},           {"Event timer", 6},       {"SYNC start value", 5}};
-        Entry         entry;
-        entry.data_type = 5;
-        entry.access = Access::constant;
-        entry.name = "Highest sub-index supported";
-        object.entries.push_back(entry);
-        for (unsigned i = 0; i < std::size(subs); ++i) {
-            if ((mask >> i & 1) == 0) continue;
-            entry.sub = static_cast<std::uint8_t>(i + 1);
-            entry.name = subs[i].name;
-            entry.data_type = subs[i].type;
-            entry.access = Access::rw;
-            entry.default_value = i == 0 ? n < 4 ? "$NODEID+" + hex((receive ? 0x200u : 0x180u) + 0x100u * n, 3) : "0x80000000" : "";
-            object.entries.push_back(entry);
-        }
-        object.entries.front().default_value = std::to_string(object.entries.back().sub);
-        return object;
-    }
-
-    static Object mapping(std::uint16_t index, bool receive) {
-        Object object;
-        object.index = index;
-        object.name = receive ? "RPDO mapping parameter" : "TPDO mapping parameter";
-        object.type = ObjectType::record;
-        Entry entry;
-        entry.data_type = 5;
-        entry.name = "Number of mapped objects";
-        entry.default_value = "0";
-        object.entries.push_back(entry);
-        entry.data_type = 7;
-        for (unsigned i = 1; i <= 64; ++i) {
-            entry.sub = static_cast<std::uint8_t>(i);
-            entry.name = "Mapped object " + std::to_string(i);
-            object.entries.push_back(entry);
-        }
-        return object;
-    }
-
-    void insert(Object object) {
-        const auto at = std::lower_bound(out_.objects.begin(), out_.objects.end(), object.index,
-                                         [](const Object& o, std::uint16_t index) { return o.index < index; });
-        out_.objects.insert(at, std::move(object));
-    }
-
-    void modules() {
-        std::set<unsigned> numbers;
-        if (IniSection* supported = ini_.find("SupportedModules")) {
-            supported->used = true;
-            const auto count = keys_.number(*supported, "NrOfEntries", 0xFFFF).value_or(0);
-            for (unsigned n = 1; n <= count; ++n) {
-                if (ini_.find("M" + std::to_string(n) + "ModuleInfo") != nullptr) numbers.insert(n);
-                else if (n <= 1000)
-                    keys_.say(Severity::warning, Topic::missing, supported->at,
-                              "module " + std::to_string(n) + " is counted and not described",
-                              "there is no section [M" + std::to_string(n) + "ModuleInfo]");
-            }
-        }
-        for (const IniSection& section : ini_.sections()) {  // not counted, but there
-            unsigned    n = 0;
-            const char *begin = section.name.data() + 1, *end = section.name.data() + section.name.size();
-            if (section.name.size() < 2 || (section.name[0] | 0x20) != 'm') continue;
-            const auto [rest, error] = std::from_chars(begin, end, n);
-            if (error == std::errc() && same_word(std::string_view(rest, static_cast<std::size_t>(end - rest)), "ModuleInfo") &&
-                numbers.insert(n).second)
-                keys_.say(Severity::warning, Topic::count, section.at,
-                          "module " + std::to_string(n) + " is described and not counted in [SupportedModules]");
-        }
-        for (const unsigned n : numbers) out_.modules.push_back(module(n));
-        if (IniSection* connected = ini_.find("ConnectedModules")) {
-            for (const auto& [slot, key] : keys_.list(*connected, "NrOfEntries")) {
-                const auto n = keys_.parse(*connected, *key, 0xFFFF);
-                if (!n) continue;
-                if (numbers.count(static_cast<unsigned>(*n)) == 0)
-                    keys_.say(Severity::warning, Topic::missing, key->value_at,
-                              "slot " + std::to_string(slot) + " holds module " + std::to_string(*n) + ", which is not described");
-                out_.connected_modules.push_back(static_cast<unsigned>(*n));
-            }
-            connected->used = true;
-        }
-    }
-
-    Module module(unsigned n) {
-        Module out;
-        out.number = n;
-        const std::string prefix = "M" + std::to_string(n);
-        IniSection&       info = *ini_.find(prefix + "ModuleInfo");
-        out.product_name = keys_.text(info, "ProductName");
-        out.order_code = keys_.text(info, "OrderCode");
-        out.version = keys_.text(info, "ProductVersion");
-        out.revision = keys_.text(info, "ProductRevision");
-        out.extras = keys_.rest(info);
-        comments(ini_.find(prefix + "Comments"), out.comments);
-        out.fixed = ObjectReader(ini_, keys_, prefix).read();
-        if (IniSection* fixed = ini_.find(prefix + "FixedObjects")) {
-            for (const auto& [number, key] : keys_.list(*fixed, "NrOfEntries")) {
-                const auto index = keys_.parse(*fixed, *key, 0xFFFF);
-                if (index && std::none_of(out.fixed.begin(), out.fixed.end(), [&](const Object& o) { return o.index == *index; }))
-                    keys_.say(Severity::warning, Topic::missing, key->value_at,
-                              "object " + label(static_cast<std::uint16_t>(*index)) + " of module " + std::to_string(n) +
-                                  " is listed and not described");
-            }
-            fixed->used = true;
-        }
-        const std::string extension = prefix + "SubExt";
-        if (IniSection* list = ini_.find(extension + "ends")) {
-            for (const auto& [number, key] : keys_.list(*list, "NrOfEntries")) {
-                const auto index = keys_.parse(*list, *key, 0xFFFF);
-                if (!index) continue;
-                IniSection* section = ini_.find(extension + label(static_cast<std::uint16_t>(*index)));
-                if (section == nullptr) {
-                    keys_.say(Severity::warning, Topic::missing, key->value_at,
-                              "there is no section [" + extension + label(static_cast<std::uint16_t>(*index)) + "]");
-                    continue;
-                }
-                if (section->used) continue;
-                SubExtension one;
-                one.object.index = static_cast<std::uint16_t>(*index);
-                one.count = keys_.bare(*section, "Count");
-                one.object_extend = keys_.bare(*section, "ObjExtend");
-                one.object.entries.push_back(ObjectReader(ini_, keys_, prefix).entry(*section, section->name, true));
-                one.object.name = one.object.entries[0].name;
-                one.object.at = section->at;
-                out.extensions.push_back(std::move(one));
-            }
-            list->used = true;
-        }
-        return out;
     }
 
     void dynamic_channels() {
@@ -477,21 +288,20 @@ Reading read_eds(std::string_view bytes) {
     ini.parse(out.text, out.messages);
     const auto refuse = [&](std::string sentence, std::string help) {
         out.messages.erase(out.messages.begin() + static_cast<std::ptrdiff_t>(of_decoding),
-                           out.messages.end());  // lines of a text that is something else
+                           out.messages.end());  // messages about a file of another kind
         out.messages.push_back({Severity::error, Topic::unreadable, {1, 1, 0, 0}, std::move(sentence), std::move(help)});
         return std::move(out);
     };
     if (trimmed(out.text).empty()) return refuse("the file is empty", "");
-    if (trimmed(out.text)[0] == '<') return refuse("this is an XML file", "device descriptions in XML have the ending .xdd or .xdc");
+    if (trimmed(out.text)[0] == '<') return refuse("the file is XML", "device descriptions in XML are named .xdd or .xdc");
     const bool objects = std::any_of(ini.sections().begin(), ini.sections().end(),
                                      [](const IniSection& s) { return section_name(s.name).what == SectionName::What::object; });
     if (!objects && ini.find("DeviceInfo") == nullptr)
-        return refuse("the file describes no object and no device",
-                      "an EDS has [FileInfo], [DeviceInfo] and a section for each object, as [1000]");
+        return refuse("the file describes neither a device nor an object",
+                      "an EDS has [FileInfo], [DeviceInfo] and a section for each object, as in [1000]");
     out.description = File(ini, out.messages).read();
     check_objects(*out.description, out.messages);
-    std::stable_sort(out.messages.begin(), out.messages.end(),
-                     [](const Message& a, const Message& b) { return a.at.offset < b.at.offset; });
+    std::stable_sort(out.messages.begin(), out.messages.end(), [](const Message& a, const Message& b) { return a.at.offset < b.at.offset; });
     return out;
 }
 

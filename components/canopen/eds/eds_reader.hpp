@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the parts of the EDS reader share; not for others.
+// Shared by the parts of the EDS reader; internal.
 #pragma once
 
 #include <cstdint>
@@ -17,35 +17,35 @@ std::string hex(std::uint64_t value, int digits = 4);   ///< "0x1018"
 std::string label(std::uint16_t index);                 ///< "1018"
 std::string label(std::uint16_t index, unsigned sub);   ///< "1018sub1"
 
-/// What the name of a section means.
+/// The meaning of a section name.
 struct SectionName {
     enum class What : std::uint8_t { other, object, sub, names, values, denotations, links };
     What          what = What::other;
     std::uint16_t index = 0;
     unsigned      sub = 0;
-    bool          odd = false;  ///< understood, but not spelled as CiA 306 has it
+    bool          odd = false;  ///< understood, but not in the spelling of CiA 306
 };
 SectionName section_name(std::string_view name);
 
-/// Reads keys and says what is wrong with them.
+/// Reads keys and reports invalid ones.
 class Keys {
 public:
     explicit Keys(std::vector<Message>& messages) : messages_(messages) {}
 
-    void say(Severity severity, Topic topic, Place at, std::string sentence, std::string help = "") {
+    void say(Severity severity, Topic topic, Span at, std::string sentence, std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
-    /// The value as it is; empty when the key is not there.
+    /// Returns the value as written; empty if the key is missing.
     std::string text(IniSection& section, std::string_view key);
-    /// The value without a comment behind it.
+    /// Returns the value without a trailing comment.
     std::string bare(IniSection& section, std::string_view key);
-    /// None when the key is missing, empty or no number up to `most`; only the last two are said.
+    /// Returns nothing if the key is missing, empty or not a number of 0..`most`; reports only the last.
     std::optional<std::uint64_t> number(IniSection& section, std::string_view key, std::uint64_t most);
     bool                         flag(IniSection& section, std::string_view key, bool otherwise = false);
-    /// Keys 1=, 2=, … of a list whose length is in `count_key`. A null `count_key`: nobody counts.
+    /// Returns the keys 1=, 2=, … of a list whose length is in `count_key`; without one the length is not checked.
     std::map<unsigned, IniKey*>  list(IniSection& section, const char* count_key);
     std::optional<std::uint64_t> parse(IniSection& section, IniKey& key, std::uint64_t most);
-    /// What nobody has read: comment lines and unknown keys. A key close to one of `known` is said.
+    /// Returns what was not read: comment lines and unknown keys. Warns of a key that is close to one of `known`.
     Extras rest(IniSection& section, std::initializer_list<std::string_view> known = {});
     /// Cuts " ; comment" or " # comment" off the key's value.
     void cut_comment(IniKey& key);
@@ -59,9 +59,9 @@ class ObjectReader {
 public:
     ObjectReader(Ini& ini, Keys& keys, std::string prefix) : ini_(ini), keys_(keys), prefix_(std::move(prefix)) {}
 
-    /// All objects whose sections begin with the prefix.
+    /// Reads all objects whose sections begin with the prefix.
     std::vector<Object> read();
-    /// A section as a value: of a VAR or of a sub-index. `what` names it in messages.
+    /// Reads a section as a value: a VAR or a sub-index. `what` names it in messages.
     Entry entry(IniSection& section, const std::string& what, bool is_sub);
 
 private:
@@ -83,10 +83,13 @@ private:
     std::string prefix_;
 };
 
-/// CompactSubObj can say it: entries 1..n are alike but for name and what a DCF adds, and sub-index 0 is the one everybody expects.
-bool compactable(const Object& object);
+/// Reads a section of comment lines. What else it has goes to `others`.
+void read_comments(Keys& keys, IniSection* section, std::vector<std::string>& out, std::vector<OtherSection>& others);
+void read_modules(Ini& ini, Keys& keys, DeviceDescription& out);
+/// Adds the PDOs that CompactPDO describes.
+void add_compact_pdos(DeviceDescription& out);
 
-/// Levenshtein distance up to 2; 3 when it is more.
-unsigned distance(std::string_view a, std::string_view b);
+/// Returns whether CompactSubObj can describe the object: entries 1..n differ only in names and DCF values, and sub-index 0 is the usual one.
+bool compactable(const Object& object);
 
 }  // namespace hal::canopen::eds

@@ -11,9 +11,6 @@ namespace {
 constexpr std::size_t most_bytes = 32u << 20;
 constexpr std::size_t most_line = 65536;
 
-char small(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; }
-bool blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\r'; }
-
 void append_utf8(std::string& out, std::uint32_t c) {
     const auto add = [&](std::uint32_t byte) { out += static_cast<char>(byte); };
     if (c < 0x80) return add(c);
@@ -96,22 +93,6 @@ std::uint32_t line_of(std::string_view text, std::size_t at) {
 
 }  // namespace
 
-std::string_view trimmed(std::string_view text) {
-    while (!text.empty() && (blank(text.front()) || text.front() == '\n')) text.remove_prefix(1);
-    while (!text.empty() && (blank(text.back()) || text.back() == '\n')) text.remove_suffix(1);
-    return text;
-}
-
-std::string lower(std::string_view text) {
-    std::string out(text);
-    std::transform(out.begin(), out.end(), out.begin(), small);
-    return out;
-}
-
-bool same_word(std::string_view a, std::string_view b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return small(x) == small(y); });
-}
-
 std::string to_string(const Message& message) {
     constexpr std::array<const char*, 3> words{"note", "warning", "error"};
     std::string                          text;
@@ -130,39 +111,39 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
     };
     text.clear();
     if (bytes.size() > most_bytes)
-        return refuse("the file has more than 32 MiB", "no device description is that long; is it the right file?");
+        return refuse("the file is larger than 32 MiB", "is it the right file?");
     std::string          plain;
     const auto           starts = [&](std::string_view mark) { return bytes.substr(0, mark.size()) == mark; };
     std::vector<Message> later;  // their offsets are those of the translated text
     if (starts("\xFF\xFE") || starts("\xFE\xFF")) {
         bool whole = true;
         plain = from_utf16(bytes.substr(2), starts("\xFE\xFF"), whole);
-        say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text", "most tools want plain ASCII; save it as such");
-        if (!whole) say(Severity::warning, Topic::syntax, 1, "some of its characters are cut in two", "");
+        say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text", "save it as ASCII: most tools read nothing else");
+        if (!whole) say(Severity::warning, Topic::syntax, 1, "truncated UTF-16 characters", "");
     } else if (bytes.size() >= 4 && bytes[1] == 0 && bytes[3] == 0 && bytes[0] != 0) {
         bool whole = true;
         plain = from_utf16(bytes, false, whole);
         say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text without a byte order mark",
-            "most tools want plain ASCII; save it as such");
+            "save it as ASCII: most tools read nothing else");
     } else {
         if (starts("\xEF\xBB\xBF")) {
             bytes.remove_prefix(3);
             say(Severity::note, Topic::syntax, 1, "the file begins with a byte order mark",
-                "some tools do not find the first section then");
+                "some tools then miss the first section; save it without");
         }
         const std::size_t bad = first_bad_utf8(bytes);
         if (bad == std::string_view::npos) {
             plain = bytes;
         } else {
             plain = from_windows(bytes);
-            say(Severity::note, Topic::syntax, line_of(bytes, bad), "a character that is not UTF-8; the file was read as Windows-1252",
-                "CiA 306 wants ASCII");
+            say(Severity::note, Topic::syntax, line_of(bytes, bad), "invalid UTF-8; the file was read as Windows-1252",
+                "CiA 306 requires ASCII");
         }
     }
     const auto zeros = static_cast<std::size_t>(std::count(plain.begin(), plain.end(), '\0'));
-    if (zeros > plain.size() / 16 + 4) return refuse("this is no text file", "an EDS is a text of [sections] and Key=Value lines");
+    if (zeros > plain.size() / 16 + 4) return refuse("not a text file", "an EDS consists of [sections] and Key=Value lines");
     if (zeros != 0) {
-        say(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')), "a zero byte in the text was left out", "");
+        say(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')), "zero byte in the text ignored", "");
         std::erase(plain, '\0');
     }
     text.reserve(plain.size());
@@ -181,8 +162,8 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
             lone = true;
         }
     }
-    if (lone) say(Severity::note, Topic::syntax, 1, "lines that end with a carriage return only", "");
-    // The places point to the start of their lines.
+    if (lone) say(Severity::note, Topic::syntax, 1, "lines end with a carriage return only", "");
+    // The spans point to the start of their lines.
     for (Message& message : messages) {
         std::size_t at = 0;
         for (std::uint32_t line = 1; line < message.at.line && at != std::string::npos; ++line) {
@@ -221,7 +202,7 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
             const auto    offset = static_cast<std::size_t>(part.data() - text.data());
             std::uint32_t column = 1;
             for (std::size_t i = line_start; i < offset; ++i) column += (text[i] & 0xC0) != 0x80;
-            return Place{number, column, static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(part.size())};
+            return Span{number, column, static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(part.size())};
         };
         const auto say = [&](Severity severity, std::string_view part, std::string sentence, std::string help = "") {
             messages.push_back({severity, Topic::syntax, place(part), std::move(sentence), std::move(help)});
@@ -229,50 +210,50 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         const auto keep = [&](std::string comment) { (section != nullptr ? section->comments : preamble_).push_back(std::move(comment)); };
 
         if (line.size() > most_line) {
-            say(Severity::warning, line.substr(0, 1), "a line of " + std::to_string(line.size()) + " bytes was left out",
-                "255 characters are allowed");
+            say(Severity::warning, line.substr(0, 1), "line of " + std::to_string(line.size()) + " bytes ignored",
+                "the limit is 255 characters");
             continue;
         }
-        if (line[0] == ';' || line[0] == '#') {
+        using Parts = text::IniLine::Kind;
+        const text::IniLine    parts = text::ini_line(line);
+        const std::string_view name = trimmed(parts.name), value = parts.value;
+        if (parts.kind == Parts::comment) {
             if (line[0] == '#' && line.find('=') != std::string_view::npos)
-                say(Severity::note, line.substr(0, 1), "a line that begins with '#' was taken for a comment",
+                say(Severity::note, line.substr(0, 1), "line that begins with '#' read as a comment",
                     "comments of an EDS begin with ';'");
             keep(std::string(line));
             continue;
         }
-        if (line[0] == '[') {
-            const std::size_t close = line.find(']');
-            std::string_view  name = trimmed(line.substr(1, std::min(close, line.size()) - 1));
-            if (close == std::string_view::npos) {
-                say(Severity::warning, line, "the section's ']' is missing", "write [" + std::string(name) + "]");
-            } else if (const std::string_view rest = trimmed(line.substr(close + 1)); !rest.empty() && rest[0] != ';') {
-                say(rest[0] == '#' ? Severity::note : Severity::warning, rest, "text behind the section's name was left out",
-                    "give comments a line of their own");
+        if (parts.kind == Parts::section || parts.kind == Parts::open_section) {
+            const bool closed = parts.kind == Parts::section;
+            if (!closed) {
+                say(Severity::warning, line, "section name without ']'", "write [" + std::string(name) + "]");
+            } else if (!value.empty() && value[0] != ';') {
+                say(value[0] == '#' ? Severity::note : Severity::warning, value, "text after the section name ignored",
+                    "write comments on lines of their own");
             }
             keys.clear();
             const auto [at, fresh] = by_name_.try_emplace(lower(name), sections_.size());
             if (fresh) {
-                sections_.push_back({std::string(name), place(close == std::string_view::npos ? line : line.substr(0, close + 1)), {}, {}});
+                sections_.push_back({std::string(name), place(closed ? line.substr(0, line.find(']') + 1) : line), {}, {}});
                 section = &sections_.back();
             } else {
                 section = &sections_[at->second];
-                say(Severity::warning, line, "section [" + std::string(name) + "] is here for the second time",
-                    "the first is in line " + std::to_string(section->at.line) + "; what this one says again replaces it");
+                say(Severity::warning, line, "duplicate section [" + std::string(name) + "]",
+                    "first in line " + std::to_string(section->at.line) + "; keys that are here again replace those");
                 for (std::size_t i = 0; i < section->keys.size(); ++i) keys.emplace(lower(section->keys[i].name), i);
             }
             continue;
         }
-        const std::size_t equal = line.find('=');
-        if (equal == std::string_view::npos || equal == 0) {
-            say(Severity::warning, line, equal == 0 ? "nothing stands before '='" : "neither a [section] nor Key=Value",
+        if (parts.kind == Parts::other) {
+            say(Severity::warning, line, line[0] == '=' ? "missing key before '='" : "invalid line: neither a [section] nor Key=Value",
                 "the line was kept as a comment; comments begin with ';'");
             keep("; " + std::string(line));
             continue;
         }
-        const std::string_view name = trimmed(line.substr(0, equal)), value = trimmed(line.substr(equal + 1));
         if (section == nullptr) {
             if (!said_outside)
-                say(Severity::warning, line, "a key before the first section", "the lines up to the first section were kept as comments");
+                say(Severity::warning, line, "key before the first section", "the lines before the first section were kept as comments");
             said_outside = true;
             keep("; " + std::string(line));
             continue;
@@ -284,9 +265,9 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         } else {
             IniKey&    old = section->keys[at->second];
             const bool same = old.value == key.value;
-            say(same ? Severity::note : Severity::warning, name, "key '" + key.name + "' is given twice in [" + section->name + "]",
-                same ? "with the same value"
-                     : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; this one, '" + key.value + "', counts");
+            say(same ? Severity::note : Severity::warning, name, "duplicate key '" + key.name + "' in [" + section->name + "]",
+                same ? "both have the same value"
+                     : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" + key.value + "' is used");
             old = std::move(key);
         }
     }

@@ -91,7 +91,7 @@ Encoded integer(std::string_view text, const DataType& type, unsigned node_id) {
         // 12.0 is 12
         const auto real = parse_real(text);
         if (!real || *real != std::floor(*real) || std::fabs(*real) > 9e15) {
-            out.error = quoted(text) + " is no number of type " + std::string(type.name);
+            out.error = quoted(text) + " is not a number of type " + std::string(type.name);
             return out;
         }
         number = Number{*real < 0, static_cast<std::uint64_t>(std::fabs(*real)), false, false, Spelling::number_as_real};
@@ -139,7 +139,7 @@ Encoded octets(std::string_view text) {
         if (c == ' ' || c == '\t' || c == ',') continue;
         const int digit = c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
         if (digit < 0) {
-            out.error = quoted(text) + " is no row of hexadecimal bytes";
+            out.error = quoted(text) + " is not a sequence of hexadecimal bytes";
             out.bytes.clear();
             return out;
         }
@@ -280,7 +280,7 @@ Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id) {
         }
         const auto value = parse_real(text);
         if (!value) {
-            out.error = quoted(text) + " is no number of type " + std::string(type->name);
+            out.error = quoted(text) + " is not a number of type " + std::string(type->name);
         } else if (type->bits == 32) {
             const double largest = 3.4028234663852886e38;
             if (std::isfinite(*value) && std::fabs(*value) > largest) {

@@ -31,7 +31,7 @@ Node descendant(const Node& from, std::string_view name) {
 
 std::string attribute(const Node& node, const char* name) { return std::string(trimmed(node.attribute(name).value())); }
 
-/// What ApplicationProcess says of a parameter that an object refers to.
+/// A parameter of ApplicationProcess that an object refers to.
 struct Parameter {
     Node          node;
     std::string   name, default_value, actual_value, low, high, denotation;
@@ -63,11 +63,11 @@ public:
     }
 
 private:
-    Place place(const Node& node) const {
+    Span place(const Node& node) const {
         const auto        debug = node.offset_debug();
         const std::size_t at = debug < 0 ? 0 : std::min(static_cast<std::size_t>(debug), text_.size());
         const std::size_t start = text_.substr(0, at).rfind('\n') + 1;  // npos + 1 is 0
-        Place             out{1, 1, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(std::string_view(node.name()).size())};
+        Span             out{1, 1, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(std::string_view(node.name()).size())};
         out.line += static_cast<std::uint32_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
         for (std::size_t i = start; i < at; ++i) out.column += (text_[i] & 0xC0) != 0x80;
         return out;
@@ -82,7 +82,7 @@ private:
         auto value = parse_number(hexadecimal && text.find_first_of("xX") == std::string::npos ? "0x" + text : text);
         if (!value || value->node_id || value->negative || value->magnitude > most) {
             say(Severity::warning, Topic::value, node,
-                "'" + std::string(name) + "' is no number from 0 to " + std::to_string(most) + ": '" + text.substr(0, 60) + "'");
+                "'" + std::string(name) + "' is not a number of 0.." + std::to_string(most) + ": '" + text.substr(0, 60) + "'");
             return {};
         }
         return value->magnitude;
@@ -141,7 +141,7 @@ private:
             const auto        parsed = parse_number(value);
             if (!value.empty() && (!parsed || parsed->magnitude > 0xFFFFFFFF))
                 say(Severity::warning, Topic::value, descendant(who, name),
-                    "'" + std::string(name) + "' is no number of 32 bits: '" + value.substr(0, 60) + "'");
+                    "'" + std::string(name) + "' is not a 32-bit number: '" + value.substr(0, 60) + "'");
             return parsed && parsed->magnitude <= 0xFFFFFFFF ? std::optional<std::uint32_t>(static_cast<std::uint32_t>(parsed->magnitude))
                                                              : std::nullopt;
         };
@@ -168,8 +168,8 @@ private:
         if (same_word(text, "readWriteOutput")) return Access::rww;
         if (same_word(text, "constant")) return Access::constant;
         say(Severity::warning, text.empty() ? Topic::missing : Topic::object, node,
-            text.empty() ? "'accessType' of " + what + " is missing" : "there is no access type '" + text.substr(0, 40) + "'",
-            "taken for rw; ro, wo, rw, rwr, rww and const are possible");
+            text.empty() ? "'accessType' of " + what + " is missing" : "unknown access type '" + text.substr(0, 40) + "'",
+            "read as rw; the access types are ro, wo, rw, rwr, rww, const");
         return Access::rw;
     }
 
@@ -190,7 +190,7 @@ private:
                                         ? "read" : either("accessType", &Parameter::access);
         out.name = either("name", &Parameter::name);
         if (out.name.empty())
-            say(Severity::warning, Topic::missing, node, "the name of " + what + " is missing", "every object has a name");
+            say(Severity::warning, Topic::missing, node, "the name of " + what + " is missing", "give the object a name");
         const auto type = number(node, "objectType", 9);
         out.type = type ? static_cast<ObjectType>(*type) : ObjectType::var;
         if (name_of(out.type) == "?") {
@@ -222,7 +222,7 @@ private:
                                          {"upper limit", &out.high_limit}})
             if (const Encoded encoded = encode(*text, out.data_type, 1); !encoded)
                 say(Severity::warning, Topic::value, node, std::string(name) + " of " + what + ": " + encoded.error,
-                    "the object counts as one without this value");
+                    "the value was ignored");
         return out;
     }
 
@@ -301,7 +301,7 @@ private:
             const auto        at = std::find(baud_rates.begin(), baud_rates.end(), rate ? rate->magnitude : 0);
             if (at != baud_rates.end()) d.supports[static_cast<std::size_t>(at - baud_rates.begin())] = true;
             else if (text != "auto-baudRate")
-                say(Severity::note, Topic::value, one, "'" + text.substr(0, 40) + "' is no bit rate of CiA 301");
+                say(Severity::note, Topic::value, one, "'" + text.substr(0, 40) + "' is not a bit rate of CiA 301");
         }
         for (Node usage = descendant(root_, "dummyUsage"), one = usage.first_child(); one; one = one.next_sibling()) {
             const std::string text = attribute(one, "entry");  // Dummy0001=0
@@ -338,7 +338,7 @@ private:
 Reading read_xdd(std::string_view bytes) {
     Reading out;
     if (!decode(bytes, out.text, out.messages)) return out;
-    const auto refuse = [&](std::string sentence, std::string help, Place at = {1, 1, 0, 0}) {
+    const auto refuse = [&](std::string sentence, std::string help, Span at = {1, 1, 0, 0}) {
         out.messages.push_back({Severity::error, Topic::unreadable, at, std::move(sentence), std::move(help)});
         return std::move(out);
     };

@@ -8,10 +8,10 @@
 
 namespace hal::canopen::eds {
 
-/// Reads the bytes of an XDD or XDC file; refuses with the reason when this build has no XML library. [any, not real time]
+/// Reads the bytes of an XDD or XDC file. A build without the XML library rejects them with the reason. [setup]
 Reading read_xdd(std::string_view bytes);
 
-/// By the first character that counts: XML, or else an EDS or DCF.
+/// Reads XML if the first character that is not blank is <, else an EDS or DCF. [setup]
 Reading read_description(std::string_view bytes);
 
 }  // namespace hal::canopen::eds

@@ -95,7 +95,7 @@ TEST_F(Xdd, Defects_are_named_with_their_line) {
     const Reading reading = read_xdd(text);
     const std::string all = complaints(reading);
     for (const auto& [at, message] : {std::pair{"index=\"2000\"", "'300' does not fit into UNSIGNED8"},
-                                      {"readable", "there is no access type 'readable'"},
+                                      {"readable", "unknown access type 'readable'"},
                                       {"name=\"z\"", "object 2001 is described twice"},
                                       {"name=\"q\"", "without an index"},
                                       {"P9", "parameter 'P9', which is not described"}}) {
