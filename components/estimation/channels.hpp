@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The measurements of a filter: pins, ages, and what is done with bad ones.
+// The measurements of a filter: pins, ages, and the handling of invalid ones.
 #pragma once
 
 #include <cmath>
@@ -16,13 +16,13 @@ class Channels {
 public:
     /// `z-N`, `age-N`, `new-N`; with names NAME, `NAME-age`, `NAME-new`. In a component's constructor.
     Channels(hal::Component& component, Eigen::Index count, const std::vector<std::string>& names = {})
-        : gate(component, "gate", "a measurement farther off than so many standard deviations is left out; 0: none is"),
-          timeout(component, "timeout", "valid falls when no measurement was used for so long; 0: never", {.unit = "s"}),
-          valid(component, "valid", "a measurement was used, and within timeout", {.safe = false}),
-          skipped(component, "skipped", "measurements that were no number"),
-          late(component, "late", "measurements older than the history"),
-          outliers(component, "outliers", "measurements beyond the gate"),
-          renewals(component, "renewals", "times the covariance was lost and started again") {
+        : gate(component, "gate", "measurements with a larger deviation, in standard deviations, are ignored; 0: no gate"),
+          timeout(component, "timeout", "time without a used measurement after which valid becomes FALSE; 0: no timeout", {.unit = "s"}),
+          valid(component, "valid", "TRUE: a measurement was used within timeout", {.safe = false}),
+          skipped(component, "skipped", "number of measurements that were NaN or infinite"),
+          late(component, "late", "number of measurements older than the history"),
+          outliers(component, "outliers", "number of measurements beyond the gate"),
+          renewals(component, "renewals", "number of times the covariance became invalid and was reset") {
         for (Eigen::Index i = 0; i < count; ++i) {
             const std::string number = std::to_string(i),
                               what = names.empty() ? "measurement " + number : names[static_cast<std::size_t>(i)];
@@ -81,8 +81,8 @@ private:
         Row(hal::Component& component, const std::string& z_name, const std::string& age_name, const std::string& new_name,
             const std::string& what)
             : z(component, z_name.c_str(), what.c_str()),
-              age(component, age_name.c_str(), ("how old " + what + " is").c_str(), {.unit = "s"}),
-              fresh(component, new_name.c_str(), ("TRUE: there is a " + what + " in this cycle").c_str(), {.initial = true}) {}
+              age(component, age_name.c_str(), ("age of " + what).c_str(), {.unit = "s"}),
+              fresh(component, new_name.c_str(), ("TRUE: " + what + " is new in this cycle").c_str(), {.initial = true}) {}
         hal::In<double> z, age;
         hal::In<bool>   fresh;
     };

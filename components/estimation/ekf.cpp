@@ -104,15 +104,15 @@ public:
     explicit Ekf(const hal_host* host)
         : Component(host),
           texts_(*this),
-          file_(*this, "model", "", "file with the model, beside the netlist; without it a pendulum of 0.3 m"),
-          history_(*this, "history", 32, "moments that are kept: a measurement may be that many cycles old, less two",
+          file_(*this, "model", "", "model file, relative to the netlist; default: a pendulum of 0.3 m"),
+          history_(*this, "history", 32, "length of the history in cycles; measurements may be up to history - 2 cycles old",
                    {.min = 3, .max = 4096}),
           plant_(read()),
           past_(plant_, static_cast<std::size_t>(history_), start(), covariance(), count(plant_.model().inputs),
                 count(plant_.model().measures)),
           channels_(*this, count(plant_.model().measures), names()) {
         for (const auto& name : plant_.model().inputs)
-            inputs_.emplace_back(*this, dashed(name).c_str(), "input of the model since the cycle before");
+            inputs_.emplace_back(*this, dashed(name).c_str(), "input of the model since the previous cycle");
         for (const Model::State& s : plant_.model().states) {
             x_.emplace_back(*this, ("x-" + dashed(s.name)).c_str(), ("state " + s.name + ", estimated").c_str(),
                             hal::PinOptions<double>{.finite = true});
@@ -188,13 +188,13 @@ private:
     std::deque<hal::Out<double>> x_, sigma_;
 
 public:
-    hal::In<bool> reset{*this, "reset", "while TRUE the estimate is that of the start, corrected by the measurements of now"};
-    hal::Function run{*this, "update", &Ekf::update, "moves the estimate on by one period and corrects it"};
+    hal::In<bool> reset{*this, "reset", "TRUE resets the estimate to its initial value, corrected by the current measurements"};
+    hal::Function run{*this, "update", &Ekf::update, "predicts one period and applies the measurements"};
 };
 
 }  // namespace
 
-HAL_COMPONENT(Ekf, "ekf", "Extended Kalman filter of a plant that is written as formulas", R"(
+HAL_COMPONENT(Ekf, "ekf", "Extended Kalman filter of a plant given by formulas", R"(
 The model is a file of lines:
 
     # pendulum.model
@@ -208,13 +208,13 @@ The model is a file of lines:
     measure camera  = l * sin(angle)  sigma 0.005
 
 At most 8 states, 8 inputs, 12 measurements. Formulas have + - * / ^, brackets, pi and sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max.
-`wrap` behind a measurement says that it is an angle: 359 degrees are 1 degree off from 0; `wrap 65536` that it is a counter of 16 bits. Pins are
-named as in the file (`_` is a dash): here `torque`, `encoder`, `encoder-age`, `encoder-new`, `camera` and so on, and `x-angle`, `sigma-angle`,
+`wrap` after a measurement declares an angle: 359 degrees are 1 degree from 0; `wrap 65536` declares a 16-bit counter. Pins are
+named as in the file (with `-` for `_`): here `torque`, `encoder`, `encoder-age`, `encoder-new`, `camera` and so on, and `x-angle`, `sigma-angle`,
 `x-speed`, `sigma-speed`.
 
-A period is one step of Runge and Kutta's; the derivatives of everything by the states are exact, by forward differentiation. Late and bad measurements
-are treated as in kalman: see its manual for age, new, gate, timeout and the counters. A formula that has no value where the
-estimate is (the root of a negative number) makes its measurement an outlier.
+A period is one Runge-Kutta step; the derivatives with respect to the states are exact (forward differentiation). Late and invalid measurements
+are handled as in kalman: see its manual for age, new, gate, timeout and the counters. If a formula has no value at the
+estimate (the root of a negative number), its measurement counts as an outlier.
 
     loadrt ekf names=swing
     addf swing.update servo

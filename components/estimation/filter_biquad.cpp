@@ -13,33 +13,33 @@ using namespace hal::estimation;
 struct FilterBiquad : hal::Component {
     explicit FilterBiquad(const hal_host* host)
         : Component(host),
-          type(*this, "type", "lowpass", "lowpass, highpass (both Butterworth's), bandpass, notch or peak"),
-          order(*this, "order", 2, "lowpass and highpass: even, 2 to 12; of the others the number of equal sections in a row",
+          type(*this, "type", "lowpass", "lowpass, highpass (both Butterworth), bandpass, notch or peak"),
+          order(*this, "order", 2, "order of lowpass and highpass: even, 2..12; otherwise the number of equal sections in series",
                 {.min = 1, .max = 12}) {
         constexpr const char* names[] = {"lowpass", "highpass", "bandpass", "notch", "peak"};
         std::size_t           found = 0;
         while (found < std::size(names) && type.get() != names[found]) ++found;
         if (found == std::size(names))
-            throw hal::ArgumentError("type", "type=" + type.get() + " is none of lowpass highpass bandpass notch peak");
+            throw hal::ArgumentError("type", "type=" + type.get() + " is not lowpass, highpass, bandpass, notch or peak");
         shape_ = static_cast<Shape>(found);
         const bool passes = shape_ == Shape::low_pass || shape_ == Shape::high_pass;
         if (passes && order % 2 != 0)
-            throw hal::ArgumentError("order", "order=" + std::to_string(order) + " is odd; take " + std::to_string(order + 1));
+            throw hal::ArgumentError("order", "order=" + std::to_string(order) + " is odd; use " + std::to_string(order + 1));
         sections_.resize(static_cast<std::size_t>(passes ? order / 2 : static_cast<std::int64_t>(order)));
         coefficients_.resize(sections_.size());
     }
 
     hal::TextArgument       type;
     hal::Argument           order;
-    hal::In<double>         in{*this, "in", "the input"};
-    hal::Out<double>        out{*this, "out", "the filtered input", {.finite = true}};
-    hal::In<bool>           enable{*this, "enable", "FALSE: out is in", {.initial = true}};
-    hal::In<double>         frequency{*this, "frequency", "corner or centre; may change at any time", {.initial = 100.0, .unit = "Hz"}};
+    hal::In<double>         in{*this, "in", "input"};
+    hal::Out<double>        out{*this, "out", "filtered input", {.finite = true}};
+    hal::In<bool>           enable{*this, "enable", "FALSE copies in to out", {.initial = true}};
+    hal::In<double>         frequency{*this, "frequency", "corner or centre frequency; may change at any time", {.initial = 100.0, .unit = "Hz"}};
     hal::In<double>         quality{*this, "Q", "bandpass, notch and peak: centre frequency divided by bandwidth, of each section", {.initial = 2.0}};
-    hal::In<double>         gain{*this, "gain", "of a peak, or of a notch at its deepest", {.initial = 0.0}};
+    hal::In<double>         gain{*this, "gain", "gain of a peak, or at the centre of a notch", {.initial = 0.0}};
     hal::Out<bool>          valid{*this, "valid",
-                         "FALSE: frequency is not between 0 and half the thread's rate, or Q or gain make no filter; out is in"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "inputs that were no number: out stays"};
+                         "FALSE: frequency is not between 0 and half the thread's rate, or Q or gain is invalid; in is copied to out"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "number of NaN or infinite inputs; out keeps its value"};
     hal::Function           run{*this, "", &FilterBiquad::update, "filters"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -70,7 +70,7 @@ private:
         valid = f > 0.0 && f < 0.5 && (passes || (q > 0.0 && q < 1e6 && g >= 0.0 && g < 1e6 && (shape_ != Shape::peak || g > 0.0)));
         if (!valid) return;
         for (std::size_t i = 0; i < sections_.size(); ++i) {
-            // Butterworth's poles lie evenly on a half circle: a pair at the angle pi (2i + 1) / (2 order) has Q = 1 / (2 sin)
+            // Butterworth poles are evenly spaced on a half circle: a pair at the angle pi (2i + 1) / (2 order) has Q = 1 / (2 sin)
             const double angle = std::numbers::pi * static_cast<double>(2 * i + 1) / (4.0 * static_cast<double>(sections_.size()));
             coefficients_[i] = section(shape_, f, passes ? 0.5 / std::sin(angle) : q, g);
         }
@@ -86,13 +86,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(FilterBiquad, "filter_biquad", "Butterworth low and high pass of any even order, band pass, notch, peak", R"(
-A row of second-order sections. `lowpass` and `highpass` are Butterworth's of the given `order`, 3 dB down at `frequency`; the others are `order`
-equal sections with the centre `frequency` and the quality `Q` = `frequency` / bandwidth, each. The bandwidth of one section lies between the
-frequencies at which a band pass or a notch (of `gain` 0) is 3 dB down, and a peak has half of its gain in dB; of two band passes in a row it
-is 0.64 of that. `lowpass` and `highpass` do not use `Q`: their sections have those of Butterworth. `frequency` may be moved while the filter works, within a cycle: for a resonance
-that changes with a speed. The filter starts as if its first input had always been there, so nothing jumps.
+A series of second-order sections. `lowpass` and `highpass` are Butterworth filters of the given `order`, 3 dB down at `frequency`; the others are `order`
+equal sections with the centre `frequency` and the quality `Q` = `frequency` / bandwidth each. The bandwidth of one section is between the
+frequencies at which a band pass or a notch (with `gain` 0) is 3 dB down, and a peak has half of its gain in dB; that of two band passes in series
+is 0.64 of it. `lowpass` and `highpass` ignore `Q`. `frequency` may change in every cycle, for example to track a resonance
+that depends on a speed. The filter starts in the steady state of its first input, so its output does not jump.
 
-LinuxCNC's `biquad` is there too; this one needs no edge to start, has more shapes and does not stop at order 2.
+Compared to LinuxCNC's `biquad`, which is also available, this filter starts without an edge and supports more shapes and higher orders.
 
     loadrt filter_biquad names=quiet type=lowpass order=4
     addf quiet servo

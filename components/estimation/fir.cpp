@@ -12,9 +12,9 @@ namespace {
 struct Fir : hal::Component {
     explicit Fir(const hal_host* host)
         : Component(host),
-          taps(*this, "taps", "", "coefficients, the newest sample's first: 0.25,0.5,0.25"),
-          length(*this, "length", 0, "without taps: a low pass of so many", {.min = 0, .max = 1024}),
-          corner(*this, "corner", 0.1, "without taps: where it passes half, as a part of the thread's rate, below 0.5") {
+          taps(*this, "taps", "", "coefficients, that of the newest sample first: 0.25,0.5,0.25"),
+          length(*this, "length", 0, "without taps: number of coefficients of a low pass", {.min = 0, .max = 1024}),
+          corner(*this, "corner", 0.1, "without taps: corner (gain 0.5) as a fraction of the thread's rate, below 0.5") {
         design();
         past_.assign(weights_.size(), 0.0);
     }
@@ -22,10 +22,10 @@ struct Fir : hal::Component {
     hal::TextArgument       taps;
     hal::Argument           length;
     hal::RealArgument       corner;
-    hal::In<double>         in{*this, "in", "the input"};
-    hal::Out<double>        out{*this, "out", "the sum of the last inputs, each times its coefficient", {.finite = true}};
-    hal::In<bool>           reset{*this, "reset", "while TRUE the past is filled with the input of now"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "inputs that were no number: the one before was taken"};
+    hal::In<double>         in{*this, "in", "input"};
+    hal::Out<double>        out{*this, "out", "weighted sum of the last inputs", {.finite = true}};
+    hal::In<bool>           reset{*this, "reset", "TRUE fills the history with the current input"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "number of NaN or infinite inputs; the previous input is used"};
     hal::Function           run{*this, "", &Fir::update, "filters"};
 
     void update(hal::Cycle) noexcept {
@@ -67,7 +67,7 @@ private:
             return;
         }
         if (!(corner > 0.0 && corner < 0.5))
-            throw hal::ArgumentError("corner", "corner= is not between 0 and 0.5; it is a part of the thread's rate, 0.05 for 50 Hz in a thread of 1 ms");
+            throw hal::ArgumentError("corner", "corner= is not between 0 and 0.5; write it as a fraction of the thread's rate, 0.05 for 50 Hz in a thread of 1 ms");
         const auto n = static_cast<std::size_t>(length > 0 ? static_cast<std::int64_t>(length) : 31);
         // the ideal low pass, cut off by Hamming's window, 1 at frequency 0 (A. Oppenheim, R. Schafer, *Discrete-Time Signal Processing*, 7.2)
         double sum = 0.0;
@@ -89,11 +89,11 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Fir, "fir", "Filter with a finite impulse response: your coefficients, or a low pass", R"(
+HAL_COMPONENT(Fir, "fir", "Filter with a finite impulse response: given coefficients, or a low pass", R"(
     out(k) = taps[0] in(k) + taps[1] in(k-1) + ...
 
-Up to 1024 `taps`; or `length` and `corner` for a low pass by Hamming's window, whose delay is (length - 1) / 2 cycles at every frequency. The past is
-filled with the first input, so nothing jumps at the start. An input that is no number is replaced by the one before.
+Up to 1024 `taps`; or `length` and `corner` for a low pass with a Hamming window, whose delay is (length - 1) / 2 cycles at every frequency. The history is
+filled with the first input, so the output does not jump at the start. A NaN or infinite input is replaced by the previous one.
 
     loadrt fir names=smooth length=41 corner=0.05
     addf smooth servo

@@ -9,39 +9,39 @@ namespace {
 struct ForceControl : hal::Component {
     using Component::Component;
 
-    hal::In<bool>          enable{*this, "enable", "FALSE: effort 0, position-out is position-command, all memories empty"};
+    hal::In<bool>          enable{*this, "enable", "FALSE sets effort to 0 and position-out to position-command, and clears all state"};
     hal::In<std::uint32_t> mode{
         *this, "mode",
-        "0 direct: a PID on the force; 1 indirect: an admittance in front of a position loop; 2 impedance; else: as if not enabled"};
-    hal::In<double>        command{*this, "force-command", "force wanted on the surroundings", {.unit = "N"}};
-    hal::In<double>        force{*this, "force", "force measured on the surroundings", {.unit = "N"}};
-    hal::In<double>        position_command{*this, "position-command", "where the path is", {.unit = "m"}};
-    hal::In<double>        position{*this, "position", "measured, for impedance", {.unit = "m"}};
-    hal::In<double>        velocity{*this, "velocity", "measured, for direct and impedance", {.unit = "m/s"}};
+        "0 direct: PID on the force; 1 indirect: admittance in front of a position loop; 2 impedance; other values disable the controller"};
+    hal::In<double>        command{*this, "force-command", "commanded contact force", {.unit = "N"}};
+    hal::In<double>        force{*this, "force", "measured contact force", {.unit = "N"}};
+    hal::In<double>        position_command{*this, "position-command", "commanded position (path)", {.unit = "m"}};
+    hal::In<double>        position{*this, "position", "measured position, for impedance", {.unit = "m"}};
+    hal::In<double>        velocity{*this, "velocity", "measured velocity, for direct and impedance", {.unit = "m/s"}};
 
     hal::In<double> pgain{*this, "Pgain", "direct: effort per error", {.initial = 0.5}};
     hal::In<double> igain{*this, "Igain", "direct: effort per error and second", {.initial = 20.0, .unit = "1/s"}};
     hal::In<double> dgain{*this, "Dgain", "direct: effort per rate of the error", {.unit = "s"}};
     hal::In<double> feed{*this, "FF0", "direct: effort per force-command", {.initial = 1.0}};
     hal::In<double> brake{
-        *this, "velocity-damping", "direct: effort against the velocity; limits the speed before the contact", {.unit = "N*s/m"}};
-    hal::In<double> mass{*this, "m", "admittance: the mass it moves like", {.initial = 1.0, .unit = "kg"}};
+        *this, "velocity-damping", "direct: damping of the velocity; limits the speed before contact", {.unit = "N*s/m"}};
+    hal::In<double> mass{*this, "m", "admittance: virtual mass", {.initial = 1.0, .unit = "kg"}};
     hal::In<double> damping{*this, "c", "admittance and impedance: damping", {.initial = 200.0, .unit = "N*s/m"}};
     hal::In<double> stiffness{
         *this, "k", "admittance and impedance: spring to the path; 0 in an admittance leaves no error of the force", {.unit = "N/m"}};
 
-    hal::In<double> max_effort{*this, "max-effort", "limit of effort; 0: none", {.unit = "N"}};
-    hal::In<double> max_offset{*this, "max-offset", "admittance: limit of the way from the path; 0: none", {.unit = "m"}};
+    hal::In<double> max_effort{*this, "max-effort", "limit of effort; 0: no limit", {.unit = "N"}};
+    hal::In<double> max_offset{*this, "max-offset", "admittance: limit of the offset from the path; 0: no limit", {.unit = "m"}};
 
-    hal::Out<double>        effort{*this, "effort", "for the actuator; direct and impedance", {.unit = "N", .safe = 0.0, .finite = true}};
-    hal::Out<double>        position_out{*this, "position-out", "for the position loop; admittance", {.unit = "m", .finite = true}};
-    hal::Out<double>        velocity_out{*this, "velocity-out", "its derivative", {.unit = "m/s", .finite = true}};
+    hal::Out<double>        effort{*this, "effort", "command for the actuator; direct and impedance", {.unit = "N", .safe = 0.0, .finite = true}};
+    hal::Out<double>        position_out{*this, "position-out", "command for the position loop; admittance", {.unit = "m", .finite = true}};
+    hal::Out<double>        velocity_out{*this, "velocity-out", "derivative of position-out", {.unit = "m/s", .finite = true}};
     hal::Out<double>        error{*this, "error", "force-command - force", {.unit = "N"}};
-    hal::Out<bool>          saturated{*this, "saturated", "effort or offset is at its limit"};
+    hal::Out<bool>          saturated{*this, "saturated", "TRUE: effort or offset is at its limit"};
     hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs",
-                                       "cycles with an input that was no number: no effort, position-out stands still"};
+                                       "cycles with a NaN or infinite input: effort is 0 and position-out is held"};
 
-    hal::Function run{*this, "update", &ForceControl::update, "one step of the loop"};
+    hal::Function run{*this, "update", &ForceControl::update, "runs one step of the controller"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds(), path = position_command, e = command - force;
@@ -71,16 +71,16 @@ private:
         const double next = integral_ + e * dt;
         const double wanted = feed * command + pgain * e + igain * next + dgain * rate - brake * velocity;
         const double given = within(wanted, max_effort);
-        // while it is at the limit it integrates only what leads back
+        // anti-windup: at the limit, integrate only away from it
         if (std::isfinite(next) && (given == wanted || (wanted - given) * igain * e < 0.0)) integral_ = next;
         give(given, path, 0.0, given != wanted);
     }
 
-    /// The place and the speed of an admittance.
+    /// Position and speed of an admittance.
     struct Motion {
         double place = 0.0, speed = 0.0;
     };
-    /// m x" + c x' + k x = e after dt, with e constant during dt: the exact solution, whatever m, c, k >= 0 are.
+    /// Solves m x" + c x' + k x = e over dt exactly, with e constant during dt, for any m, c, k >= 0.
     static Motion after(Motion now, double e, double m, double c, double k, double dt) noexcept {
         if (k > 0.0 && k * dt * dt < 1e-10 * (m + c * dt)) e -= k * now.place, k = 0.0;  // e / k would lose digits
         if (m <= 0.0) {
@@ -91,7 +91,7 @@ private:
         }
         if (k <= 0.0) {
             if (c <= 0.0) return {now.place + (now.speed + 0.5 * e / m * dt) * dt, now.speed + e / m * dt};
-            const double end = e / c, gone = -std::expm1(-c / m * dt);  // the share of the way to the end speed
+            const double end = e / c, gone = -std::expm1(-c / m * dt);  // fraction of the change to the final speed
             return {now.place + end * dt + (now.speed - end) * (m / c) * gone, now.speed + (end - now.speed) * gone};
         }
         const double rest = e / k, y = now.place - rest, a = 0.5 * c / m, square = k / m, gap = a * a - square;
@@ -140,7 +140,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(ForceControl, "force_control", "Force control of one axis: direct, by an admittance, or as an impedance", R"(
-**0, explicit direct.** effort = FF0 command + PID(command - force) - velocity-damping velocity. The fastest; needs an actuator that takes a force.
+**0, explicit direct.** effort = FF0 command + PID(command - force) - velocity-damping velocity. The fastest mode; needs an actuator with a force input.
 The integral adds error × period in every cycle, this one's error included (backward rectangles); the derivative is the difference of this
 error and the last, divided by the period.
 
@@ -148,17 +148,17 @@ error and the last, divided by the period.
 
     A(s) = 1 / (m s² + c s + k)
 
-and `position-out` = position-command + offset. Works with any position-controlled drive. With `k` 0 the admittance integrates and no error
-remains; with `k` the error is shared with the spring. It is stable against a wall of stiffness K when the inner loop is fast
-against K / c. The admittance is solved exactly for an error that is constant during the cycle (zero-order hold): no period makes it
-unstable, and it does not depend on the period how fast it moves.
+and `position-out` = position-command + offset. Works with any position-controlled drive. With `k` 0 the admittance integrates and the error
+converges to 0; with `k` an error remains that is proportional to the offset. It is stable against a wall of stiffness K if the inner loop is fast
+compared to K / c. The admittance is solved exactly for an error that is constant during the cycle (zero-order hold): it is stable for any
+period, and its speed does not depend on the period.
 
-**2, impedance.** effort = k (path - position) + c (path' - velocity) + command: the axis is a spring about the path; force follows from how far the
-path lies inside the wall, and is as good as that is known. Needs no force sensor.
+**2, impedance.** effort = k (path - position) + c (path' - velocity) + command: the axis behaves like a spring around the path; the force depends on the
+distance of the path inside the wall, and is as accurate as that distance. Needs no force sensor.
 
-(N. Hogan, *Impedance Control*, ASME J. Dynamic Systems 107, 1985; B. Siciliano, L. Villani, *Robot Force Control*, 1999.) While effort or offset are at
-their limits the integrators stand still. A change of `mode` starts with empty memories. An input that is no number takes the effort
-away and lets `position-out` stand still, for as long as it is none.
+(N. Hogan, *Impedance Control*, ASME J. Dynamic Systems 107, 1985; B. Siciliano, L. Villani, *Robot Force Control*, 1999.) While effort or offset is at
+its limit the integrators are held. A change of `mode` clears all state. While an input is NaN or infinite, effort is 0
+and `position-out` is held.
 
     loadrt force_control names=finger
     addf finger.update servo

@@ -18,17 +18,17 @@ constexpr Six         full_scale{100.0, 100.0, 200.0, 5.0, 5.0, 5.0}, overload_l
 class FtSensor : public hal::Component {
 public:
     explicit FtSensor(const hal_host* host)
-        : Component(host), decoupling_(read()), raw(*this, "raw-#", 6, "channel # of the sensor, in whatever the matrix takes") {
+        : Component(host), decoupling_(read()), raw(*this, "raw-#", 6, "channel # of the sensor, in the input unit of the matrix") {
         for (std::size_t i = 0; i < 6; ++i) {
             const std::string axis = axes[i];
             const char*       kind = i < 3 ? "force" : "torque";
-            out_.emplace_back(*this, axis.c_str(), (std::string(kind) + " of the contact: decoupled, without tool and tare").c_str(),
+            out_.emplace_back(*this, axis.c_str(), (std::string("contact ") + kind + ": decoupled, without tool weight and tare").c_str(),
                               hal::PinOptions<double>{.unit = units[i], .finite = true});
-            offset_.emplace_back(*this, (axis + "-offset").c_str(), "what the last tare takes off",
+            offset_.emplace_back(*this, (axis + "-offset").c_str(), "offset of the last tare",
                                  hal::PinOptions<double>{.unit = units[i]});
-            full_.emplace_back(*this, (axis + "-full-scale").c_str(), "beyond it the reading is no longer good",
+            full_.emplace_back(*this, (axis + "-full-scale").c_str(), "full scale; beyond it readings are not valid",
                                hal::PinOptions<double>{.initial = full_scale[i], .unit = units[i]});
-            limit_.emplace_back(*this, (axis + "-overload").c_str(), "beyond it the sensor breaks",
+            limit_.emplace_back(*this, (axis + "-overload").c_str(), "overload limit; beyond it the sensor may be damaged",
                                 hal::PinOptions<double>{.initial = overload_limit[i], .unit = units[i]});
         }
     }
@@ -42,7 +42,7 @@ public:
         if (!numbers) bad_inputs = bad_inputs + 1;
         valid = numbers;
         if (reset) overload = false, overload_axis = 0;
-        if (!numbers) return;  // the last wrench stays
+        if (!numbers) return;  // hold the last wrench
 
         supervise(load);
         const Six tool = weight_on_sensor();
@@ -61,7 +61,7 @@ private:
         const Dense    m = given.at("decoupling", 6, 6, "a row for each of fx fy fz mx my mz, a column for each channel");
         if (const Eigen::Index r = rank(m); r < 6)
             given.refuse("decoupling", "the decoupling matrix is singular: its rank is " + std::to_string(r),
-                         "some force would never show; look for equal or empty rows");
+                         "a force would not be measured; look for equal or empty rows");
         return m;
     }
     using Dense = Eigen::MatrixXd;
@@ -81,13 +81,13 @@ private:
         }
         return found;
     }
-    /// The sensor carries tool, tare and contact: what breaks it is all of them.
+    /// The overload check uses the total load: tool, tare and contact.
     void supervise(const Six& load) noexcept {
         bool   beyond = false;
         double highest = 0.0;
         for (std::size_t i = 0; i < 6; ++i) {
             const double size = std::fabs(load[i]);
-            beyond = beyond || !(size <= full_[i]);  // a limit that is no number is one that is exceeded
+            beyond = beyond || !(size <= full_[i]);  // a NaN limit counts as exceeded
             if (limit_[i] > 0.0) highest = std::fmax(highest, size / limit_[i]);
             if (!(size <= limit_[i]) && !overload) overload = true, overload_axis = static_cast<std::uint32_t>(i + 1);
         }
@@ -116,32 +116,32 @@ private:
 
     Matrix                         decoupling_;
     Six                            sum_{};
-    std::uint32_t                  count_ = 0;  // samples of the tare so far, plus one; 0: none is going on
+    std::uint32_t                  count_ = 0;  // samples of the tare so far, plus one; 0: no tare in progress
     bool                           asked_ = false;
     std::deque<hal::Out<double>>   out_, offset_;
     std::deque<hal::Param<double>> full_, limit_;
 
 public:
     hal::Ins<double>          raw;
-    hal::In<bool>             tare{*this, "tare", "rising edge: what is there now, averaged over tare-samples, counts as nothing"};
-    hal::In<bool>             reset{*this, "reset", "takes overload back and starts peak-ratio anew"};
-    hal::In<double>           gravity_x{*this, "gravity-x", "direction of gravity in the sensor's frame, of any length"};
-    hal::In<double>           gravity_y{*this, "gravity-y", "direction of gravity in the sensor's frame, of any length"};
-    hal::In<double>           gravity_z{*this, "gravity-z", "direction of gravity in the sensor's frame, of any length", {.initial = -1.0}};
-    hal::Param<double>        tool_weight{*this, "tool-weight", "of what hangs on the sensor; 0 for none", {.unit = "N"}};
-    hal::Param<double>        centre_x{*this, "tool-centre-x", "its centre of mass in the sensor's frame", {.unit = "m"}};
-    hal::Param<double>        centre_y{*this, "tool-centre-y", "its centre of mass in the sensor's frame", {.unit = "m"}};
-    hal::Param<double>        centre_z{*this, "tool-centre-z", "its centre of mass in the sensor's frame", {.unit = "m"}};
-    hal::Param<std::uint32_t> tare_samples{*this, "tare-samples", "cycles that a tare averages", {.initial = 100}};
-    hal::Out<bool>            taring{*this, "taring", "a tare is going on: do not touch"};
-    hal::Out<bool>            valid{*this, "valid", "all six channels are numbers", {.safe = false}};
-    hal::Out<bool>            beyond_scale{*this, "beyond-scale", "an axis is beyond its full scale"};
-    hal::Out<bool>            overload{*this, "overload", "an axis was beyond its overload limit; stays until reset"};
-    hal::Out<std::uint32_t>   overload_axis{*this, "overload-axis", "which was the first: 1 to 6 for fx fy fz mx my mz; 0 none"};
-    hal::Out<double>          load_ratio{*this, "load-ratio", "largest load as a part of its overload limit, tool and tare included"};
+    hal::In<bool>             tare{*this, "tare", "a rising edge sets the current load, averaged over tare-samples, as zero"};
+    hal::In<bool>             reset{*this, "reset", "TRUE clears overload and restarts peak-ratio"};
+    hal::In<double>           gravity_x{*this, "gravity-x", "direction of gravity in the sensor frame (any length), x"};
+    hal::In<double>           gravity_y{*this, "gravity-y", "direction of gravity in the sensor frame (any length), y"};
+    hal::In<double>           gravity_z{*this, "gravity-z", "direction of gravity in the sensor frame (any length), z", {.initial = -1.0}};
+    hal::Param<double>        tool_weight{*this, "tool-weight", "weight of the tool on the sensor; 0: no tool", {.unit = "N"}};
+    hal::Param<double>        centre_x{*this, "tool-centre-x", "tool's centre of mass in the sensor frame, x", {.unit = "m"}};
+    hal::Param<double>        centre_y{*this, "tool-centre-y", "tool's centre of mass in the sensor frame, y", {.unit = "m"}};
+    hal::Param<double>        centre_z{*this, "tool-centre-z", "tool's centre of mass in the sensor frame, z", {.unit = "m"}};
+    hal::Param<std::uint32_t> tare_samples{*this, "tare-samples", "number of cycles averaged for a tare", {.initial = 100}};
+    hal::Out<bool>            taring{*this, "taring", "TRUE: tare in progress; do not touch"};
+    hal::Out<bool>            valid{*this, "valid", "TRUE: all six channels are valid numbers", {.safe = false}};
+    hal::Out<bool>            beyond_scale{*this, "beyond-scale", "TRUE: an axis is beyond its full scale"};
+    hal::Out<bool>            overload{*this, "overload", "TRUE after an axis exceeded its overload limit, until reset"};
+    hal::Out<std::uint32_t>   overload_axis{*this, "overload-axis", "first axis in overload: 1..6 for fx fy fz mx my mz; 0: none"};
+    hal::Out<double>          load_ratio{*this, "load-ratio", "largest load as a fraction of its overload limit, including tool and tare"};
     hal::Out<double>          peak_ratio{*this, "peak-ratio", "largest load-ratio since the start or reset"};
-    hal::Out<std::uint32_t>   bad_inputs{*this, "bad-inputs", "cycles with a channel that was no number; the wrench of before stays"};
-    hal::Function             run{*this, "update", &FtSensor::update, "makes the wrench of the six channels"};
+    hal::Out<std::uint32_t>   bad_inputs{*this, "bad-inputs", "cycles with a NaN or infinite channel; the wrench is held"};
+    hal::Function             run{*this, "update", &FtSensor::update, "computes the wrench from the six channels"};
 };
 
 }  // namespace
@@ -151,13 +151,13 @@ HAL_COMPONENT(FtSensor, "ft_sensor", "Six-axis force/torque sensor: decoupling, 
 
 `decoupling` is the 6 x 6 matrix of the sensor's calibration, a load argument (a comma between numbers, a `;` between rows) or `decoupling = ...` in a
 `file=` (see state_space); without it the channels count as N and N*m. The tool's weight acts in its centre of mass along the direction of
-gravity in the sensor's frame, which changes when a wrist turns: link `gravity-x y z` to the kinematics then. A tare takes off what remains.
+gravity in the sensor frame; if a wrist rotates the sensor, link `gravity-x y z` to the kinematics. A tare removes the remaining offset.
 
-**Overload** looks at what the sensor carries in all, before tool and tare are taken off. The limits are those of a JR3 50M31A-I25, the sensor of
+**Overload** monitors the total load of the sensor, including tool and tare. The default limits are those of a JR3 50M31A-I25, the sensor of
 the source system: full scale 100, 100, 200 N and 5 N*m, overload 471.4, 471.4, 1862.2 N and 20.31, 20.31, 15.8 N*m. Link `overload` to the
 safety chain.
 
-A channel that is no number makes `valid` fall; the wrench of before stays. A singular matrix is refused.
+While a channel is NaN or infinite, `valid` is FALSE and the wrench is held. A singular matrix is rejected.
 
     loadrt ft_sensor names=wrist decoupling="diag 0.01 0.01 0.02 5e-4 5e-4 5e-4"
     addf wrist.update servo

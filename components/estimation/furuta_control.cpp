@@ -13,18 +13,18 @@ enum class Phase : std::uint32_t { off, swing_up, balance };
 struct FurutaControl : hal::Component {
     using Component::Component;
 
-    hal::In<bool>   enable{*this, "enable", "FALSE: no torque"};
-    hal::In<bool>   gains_valid{*this, "gains-valid", "TRUE: the gains may be used; without that it never balances", {.initial = true}};
-    hal::In<double> arm_angle{*this, "arm-angle", "of the arm", {.unit = "rad"}};
-    hal::In<double> arm_velocity{*this, "arm-velocity", "of the arm", {.unit = "rad/s"}};
-    hal::In<double> pendulum_angle{*this, "pendulum-angle", "of the pendulum; 0 hangs", {.unit = "rad"}};
-    hal::In<double> pendulum_velocity{*this, "pendulum-velocity", "of the pendulum", {.unit = "rad/s"}};
-    hal::In<double> pendulum_age{*this, "pendulum-age", "how old the pendulum's values are; they are led on by so much", {.unit = "s"}};
+    hal::In<bool>   enable{*this, "enable", "FALSE sets the torque to 0"};
+    hal::In<bool>   gains_valid{*this, "gains-valid", "TRUE: the gains are valid; FALSE prevents balancing", {.initial = true}};
+    hal::In<double> arm_angle{*this, "arm-angle", "arm angle", {.unit = "rad"}};
+    hal::In<double> arm_velocity{*this, "arm-velocity", "arm velocity", {.unit = "rad/s"}};
+    hal::In<double> pendulum_angle{*this, "pendulum-angle", "pendulum angle; 0 hanging down", {.unit = "rad"}};
+    hal::In<double> pendulum_velocity{*this, "pendulum-velocity", "pendulum velocity", {.unit = "rad/s"}};
+    hal::In<double> pendulum_age{*this, "pendulum-age", "age of the pendulum's measurements; they are predicted by this time", {.unit = "s"}};
     hal::In<bool>   identify{*this,
                            "identify",
-                           "TRUE: the rig's parameters are identified while it moves; FALSE: they are exactly those given below",
+                           "TRUE: the rig's parameters are identified during motion; FALSE: the parameters below are used",
                              {.initial = true}};
-    hal::In<double> arm_command{*this, "arm-command", "where the arm is wanted", {.unit = "rad"}};
+    hal::In<double> arm_command{*this, "arm-command", "commanded arm angle", {.unit = "rad"}};
 
     hal::In<double> gain_arm{*this, "gain-arm", "balance: torque per angle of the arm", {.unit = "N*m/rad"}};
     hal::In<double> gain_pendulum{*this, "gain-pendulum", "balance: torque per angle of the pendulum from upright", {.unit = "N*m/rad"}};
@@ -32,65 +32,65 @@ struct FurutaControl : hal::Component {
     hal::In<double> gain_pendulum_velocity{
         *this, "gain-pendulum-velocity", "balance: torque per speed of the pendulum", {.unit = "N*m*s/rad"}};
 
-    hal::Out<double> voltage{*this, "voltage", "for the motor", {.unit = "V", .safe = 0.0, .finite = true}};
-    hal::Out<double> torque{*this, "torque", "that the voltage is to make", {.unit = "N*m", .safe = 0.0, .finite = true}};
+    hal::Out<double> voltage{*this, "voltage", "motor voltage", {.unit = "V", .safe = 0.0, .finite = true}};
+    hal::Out<double> torque{*this, "torque", "commanded torque", {.unit = "N*m", .safe = 0.0, .finite = true}};
     hal::Out<double> from_upright{
-        *this, "from-upright", "angle of the pendulum from upright, -pi to pi, led on", {.unit = "rad", .finite = true}};
-    hal::Out<double>        energy{*this, "energy", "of the pendulum, as a part of what it has upright at rest", {.finite = true}};
+        *this, "from-upright", "predicted angle of the pendulum from upright, -pi..pi", {.unit = "rad", .finite = true}};
+    hal::Out<double>        energy{*this, "energy", "energy of the pendulum relative to that upright at standstill", {.finite = true}};
     hal::Out<std::uint32_t> phase{*this, "phase", "0 off, 1 swinging up, 2 balancing"};
-    hal::Out<bool>          balanced{*this, "balanced", "upright within upright-angle for upright-time"};
-    hal::Out<std::uint32_t> catches{*this, "catches", "how often it went from swinging up to balancing"};
+    hal::Out<bool>          balanced{*this, "balanced", "TRUE: upright within upright-angle for upright-time"};
+    hal::Out<std::uint32_t> catches{*this, "catches", "number of transitions from swing-up to balancing"};
     hal::Out<bool>          homed{
         *this,
         "homed",
-        "FALSE: the pendulum swings about another angle than 0, as after a start with a pendulum that did not hang still; no torque",
+        "FALSE: the pendulum oscillates around an angle other than 0, because it was moving at the start; the torque is 0",
                  {.initial = true}};
     hal::Out<double> zero_offset{
-        *this, "zero-offset", "the angle about which the pendulum swings, as identified", {.unit = "rad", .finite = true}};
+        *this, "zero-offset", "identified angle around which the pendulum oscillates", {.unit = "rad", .finite = true}};
     hal::Out<double> identified_frequency{
-        *this, "identified-frequency", "of small swings with the arm held, as identified", {.unit = "rad/s", .finite = true}};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles in which an angle or a speed was no number; the torque is 0 then"};
+        *this, "identified-frequency", "identified frequency of small oscillations with the arm fixed", {.unit = "rad/s", .finite = true}};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles with a NaN or infinite angle or speed; the torque is 0"};
 
-    hal::Param<double> max_acceleration{*this, "max-acceleration", "swing-up: of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
+    hal::Param<double> max_acceleration{*this, "max-acceleration", "swing-up: maximum acceleration of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
     hal::Param<double> energy_gain{
-        *this, "energy-gain", "swing-up: how many times max-acceleration is asked for when all the energy is missing", {.initial = 20.0}};
+        *this, "energy-gain", "swing-up: requested acceleration, in multiples of max-acceleration, at zero energy", {.initial = 20.0}};
     hal::Param<double> energy_target{
-        *this, "energy-target", "swing-up: of energy; above 1, so that it arrives in spite of friction", {.initial = 1.15}};
+        *this, "energy-target", "swing-up: target for energy; above 1 to compensate friction", {.initial = 1.15}};
     hal::Param<double> centre_gain{
         *this, "centre-gain", "swing-up: acceleration per angle of the arm from arm-command", {.initial = 15.0, .unit = "1/s^2"}};
     hal::Param<double> centre_damping{
         *this, "centre-damping", "swing-up: acceleration per speed of the arm", {.initial = 0.0, .unit = "1/s"}};
     hal::Param<double> max_velocity{*this,
                                     "max-arm-velocity",
-                                    "swing-up: an arm that turns faster is braked before anything else; a quarter faster ends a balance",
+                                    "swing-up: maximum speed of the arm; balancing ends at 1.25 times this speed",
                                     {.initial = 6.5, .unit = "rad/s"}};
     hal::Param<double> catch_angle{
-        *this, "catch-angle", "nearer to upright than this it balances, if that is going to succeed", {.initial = 0.4, .unit = "rad"}};
+        *this, "catch-angle", "maximum angle from upright at which balancing starts, if the prediction succeeds", {.initial = 0.4, .unit = "rad"}};
     hal::Param<double> lose_angle{
-        *this, "lose-angle", "farther from upright than this it swings up again", {.initial = 0.6, .unit = "rad"}};
+        *this, "lose-angle", "angle from upright at which balancing ends", {.initial = 0.6, .unit = "rad"}};
     hal::Param<double> arm_reach{
-        *this, "arm-reach", "balance: an arm farther off than this counts as so far", {.initial = 1.0, .unit = "rad"}};
-    hal::Param<double> upright_angle{*this, "upright-angle", "of balanced", {.initial = 0.1, .unit = "rad"}};
-    hal::Param<double> upright_time{*this, "upright-time", "of balanced", {.initial = 0.5, .unit = "s"}};
+        *this, "arm-reach", "balance: limit of the arm's deviation from arm-command", {.initial = 1.0, .unit = "rad"}};
+    hal::Param<double> upright_angle{*this, "upright-angle", "maximum angle from upright for balanced", {.initial = 0.1, .unit = "rad"}};
+    hal::Param<double> upright_time{*this, "upright-time", "time within upright-angle for balanced", {.initial = 0.5, .unit = "s"}};
 
     hal::Param<double> max_torque{
-        *this, "max-torque", "of motor and amplifier: torque constant times current limit", {.initial = 0.2708, .unit = "N*m"}};
+        *this, "max-torque", "maximum torque of motor and amplifier: torque constant times current limit", {.initial = 0.2708, .unit = "N*m"}};
     hal::Param<double> torque_constant{
         *this, "torque-constant", "motor: torque per current, and voltage per speed", {.initial = 0.0677, .unit = "N*m/A"}};
-    hal::Param<double> resistance{*this, "resistance", "motor: of the winding", {.initial = 0.68, .unit = "Ohm"}};
+    hal::Param<double> resistance{*this, "resistance", "motor: winding resistance", {.initial = 0.68, .unit = "Ohm"}};
     hal::Param<double> friction{
-        *this, "friction", "Coulomb friction of the arm that is pushed against while swinging up", {.initial = 0.008, .unit = "N*m"}};
+        *this, "friction", "Coulomb friction of the arm, compensated during swing-up", {.initial = 0.008, .unit = "N*m"}};
     hal::Param<double> arm_inertia{*this,
                                    "arm-inertia",
-                                   "of arm, rotor and the pendulum's mass at the arm's end, about the motor's axis",
+                                   "inertia of arm, rotor and the pendulum's mass at the arm's end about the motor axis",
                                    {.initial = 6.7417e-3, .unit = "kg*m^2"}};
-    hal::Param<double> swing_inertia{*this, "pendulum-inertia", "of the pendulum about its pivot", {.initial = 3e-3, .unit = "kg*m^2"}};
+    hal::Param<double> swing_inertia{*this, "pendulum-inertia", "inertia of the pendulum about its pivot", {.initial = 3e-3, .unit = "kg*m^2"}};
     hal::Param<double> coupling{
-        *this, "coupling", "mass of the pendulum times arm length times pivot to centre of mass", {.initial = 3e-3, .unit = "kg*m^2"}};
+        *this, "coupling", "pendulum mass times arm length times distance from pivot to centre of mass", {.initial = 3e-3, .unit = "kg*m^2"}};
     hal::Param<double> weight_moment{
-        *this, "weight-moment", "weight of the pendulum times pivot to centre of mass", {.initial = 0.147099750, .unit = "N*m"}};
+        *this, "weight-moment", "pendulum weight times distance from pivot to centre of mass", {.initial = 0.147099750, .unit = "N*m"}};
 
-    hal::Function run{*this, "update", &FurutaControl::update, "one step of swing-up or balance"};
+    hal::Function run{*this, "update", &FurutaControl::update, "runs one step of swing-up or balancing"};
 
     void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
@@ -108,7 +108,7 @@ struct FurutaControl : hal::Component {
         learn(s, dt);
         lead(s);
         const double tilt = std::remainder(s.pendulum - std::numbers::pi, 2.0 * std::numbers::pi);
-        // seen from the turning arm: what the pendulum would have upright if the arm went on at this speed
+        // in the frame of the turning arm: the energy upright at a constant arm speed
         const double spread = s.arm_speed * std::sin(tilt),
                      kinetic = 0.5 * rig_.pendulum_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
         const double weight = rig_.weight_moment;
@@ -132,8 +132,8 @@ private:
         double arm, pendulum, arm_speed, pendulum_speed;
     };
 
-    /// The rig as given, or as identified from its motion. A pendulum that turns out to hang elsewhere than at 0 is not driven: every
-    /// torque would be for another angle. Turning `enable` off and on begins anew.
+    /// Returns the rig as given, or as identified from its motion. A pendulum that does not hang at 0 is not driven, because every
+    /// torque would be computed for a wrong angle. A rising edge of `enable` restarts the identification.
     void learn(const State& s, double dt) noexcept {
         const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling, weight_moment, friction};
         const bool usable = given.arm_inertia > 0.0 && given.pendulum_inertia > 0.0 && given.coupling > 0.0 && given.weight_moment > 0.0;
@@ -156,8 +156,8 @@ private:
             if (faults_ != nullptr)
                 faults_->raise(
                     faults_, this,
-                    "not homed: the pendulum swings about {} rad instead of 0; no torque until it hangs still, its encoder is zeroed, and "
-                    "enable is turned off and on",
+                    "not homed: the pendulum oscillates around {} rad, expected 0; the torque is 0; let it hang at rest, zero its encoder, then "
+                    "set enable to FALSE and TRUE",
                     identification_.zero_offset());
         }
         zero_offset = identification_.zero_offset();
@@ -180,8 +180,8 @@ private:
                  gain_pendulum_velocity * s.pendulum_speed);
     }
 
-    /// True when a prediction says that the balance brings the pendulum upright: with less torque than there is, as the amplifier may give less,
-    /// and with the arm below the speed that ends a balance.
+    /// Predicts whether balancing succeeds: with less than the available torque, as the amplifier may limit it further,
+    /// and with the arm below the speed that ends balancing.
     bool succeeds(double tilt, State s) const noexcept {
         constexpr double dt = 0.005, part_of_torque = 0.8, part_of_speed = 0.95;
         constexpr int    steps = 120;  // 0.6 s
@@ -198,7 +198,7 @@ private:
     }
 
     /// Energy flows into the pendulum as -(c cos a a' + K sin²a q') q" (K. Åström, K. Furuta, *Swinging up a pendulum by energy control*,
-    /// Automatica 36, 2000, and the centrifugal part), so the arm is accelerated against the sign of that; from rest either way does.
+    /// Automatica 36, 2000, and the centrifugal part), so the arm is accelerated against the sign of that; from rest in either direction.
     double pumped(double part, const State& s) const noexcept {
         const double limit = std::fabs(max_acceleration), sin = std::sin(s.pendulum), cos = std::cos(s.pendulum);
         const double wanted = std::clamp(energy_gain * (energy_target - part), -1.0, 1.0) * limit;
@@ -214,7 +214,7 @@ private:
         const double drive = (rig_.arm_inertia + K * sin * sin - c * c / K) * acceleration + c / K * on_pendulum +
                              2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed -
                              rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed + rig_.friction * std::tanh(s.arm_speed / 0.05);
-        // what the pendulum itself does to the arm in the wanted direction is not braked: that would take energy out of both
+        // do not brake the arm when the pendulum itself moves it in the commanded direction: that would remove energy from both
         return !fast && wanted > 0.0 && drive * acceleration < 0.0 ? 0.0 : drive;
     }
 
@@ -261,29 +261,29 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(FurutaControl, "furuta_control", "Swings a Furuta pendulum up, catches it and balances it", R"(
-**Swinging up.** The arm is accelerated so that energy flows into the pendulum until it has what it needs upright (K. Åström, K. Furuta, *Swinging
-up a pendulum by energy control*, Automatica 36, 2000), while weak springs hold the arm about `arm-command`. The torque for the
-acceleration comes from the rig's equations (see the manual of furuta), so the parameters are those of the rig.
+HAL_COMPONENT(FurutaControl, "furuta_control", "Swing-up and balancing of a Furuta pendulum", R"(
+**Swing-up.** The arm is accelerated so that energy flows into the pendulum until it has the energy of the upright position (K. Åström, K. Furuta, *Swinging
+up a pendulum by energy control*, Automatica 36, 2000), while a weak virtual spring holds the arm around `arm-command`. The torque for the
+acceleration is computed by the rig's equations (see the manual of furuta), so the parameters are those of the rig.
 
-**Identification.** While the pendulum swings, recursive least squares on both equations of motion find the ratios of the rig's inertias, its
-weight and its friction from the measured motion and the commanded torque (L. Ljung, *System Identification*, 2nd edition, 11.2); energy, torques and
-prediction use them. `identified-frequency` shows the result. So parameters that are 20 % off do not matter. `identify` FALSE uses the parameters as they are.
+**Identification.** During swing-up, recursive least squares on both equations of motion identifies the ratios of the rig's inertias, its
+weight and its friction from the measured motion and the commanded torque (L. Ljung, *System Identification*, 2nd edition, 11.2); energy, torque and
+prediction use them. `identified-frequency` is a result. Parameter errors of 20 % are tolerated. `identify` FALSE uses the given parameters.
 
-**Homing.** An incremental encoder counts from where it was switched on. If the pendulum did not hang still then, every angle is wrong, and a swing-up
-spins the arm up. The identification also finds the angle about which the pendulum swings, `zero-offset`. Beyond 0.3 rad `homed` becomes FALSE, a fault
-is raised, and there is no torque. Let the pendulum hang still, zero its encoder, and turn `enable` off and on.
+**Homing.** An incremental encoder counts from its position at power-on. If the pendulum was not hanging at rest then, every angle is wrong, and a swing-up
+makes the arm spin. The identification also determines the angle around which the pendulum oscillates, `zero-offset`. Beyond 0.3 rad `homed` becomes FALSE, a fault
+is raised, and the torque is 0. Let the pendulum hang at rest, zero its encoder, and set `enable` to FALSE and TRUE.
 
-**Catching.** Within `catch-angle` of upright, and when the rig's equations, solved 0.6 s ahead with the torque that there is, say that the balance
-succeeds: what comes too fast, or with the arm too fast, swings on and comes again.
+**Catching.** Balancing starts within `catch-angle` of upright, if a simulation of the rig 0.6 s ahead with the available torque
+succeeds. A pendulum or an arm that is too fast swings through and tries again.
 
 **Balancing.** torque = -(gain-arm arm + gain-pendulum tilt + gain-arm-velocity arm' + gain-pendulum-velocity tilt'); link the gains to an lqr with these
-states and the torque as input. Beyond `lose-angle` it swings up again. A step of `arm-command` farther than `arm-reach` is taken at the speed of
-one of `arm-reach`.
+states and the torque as input. Beyond `lose-angle` the swing-up starts again. The deviation from `arm-command` is limited to `arm-reach`, which limits the speed
+of larger steps.
 
-`pendulum-age` is the delay of the pendulum's encoder: angle and speed are led on by so much with the rig's equations. The voltage makes up
-for the winding and the speed of the motor; the amplifier may limit it further. A measurement that is no number takes the
-torque away for that cycle.
+`pendulum-age` is the latency of the pendulum encoder: angle and speed are predicted by this time with the rig's equations. The voltage compensates
+the resistance and the back-EMF of the motor; the amplifier may limit it further. While a measurement is NaN or infinite, the
+torque is 0.
 
     loadrt furuta_control names=swing
     addf swing.update servo

@@ -15,13 +15,13 @@
 
 namespace hal::estimation {
 
-/// The quantities of the rig that a controller needs, in SI units; torques as the controller commands them.
+/// The rig parameters for a controller, in SI units; torques are commanded torques.
 struct FurutaParameters {
     double arm_inertia = 0, pendulum_inertia = 0, coupling = 0, weight_moment = 0, friction = 0;
     bool   operator==(const FurutaParameters&) const = default;
 };
 
-/// The average of a signal over the last 60 ms with triangular weights: two moving averages of half the length in a row.
+/// The average of a signal over the last 60 ms with triangular weights: two moving averages of half the length in series.
 class TriangularFilter {
 public:
     static constexpr std::size_t most = 64;
@@ -46,7 +46,7 @@ private:
     std::size_t          length_ = 1, at_ = 0;
 };
 
-/// Least squares in three unknowns with an estimate to begin with. A residual far beyond the noise counts by its size, not by its square.
+/// Recursive least squares with three unknowns and an initial estimate. The weight of a residual far beyond the noise is linear, not quadratic.
 class RecursiveLeastSquares {
 public:
     using Vector = Eigen::Vector3d;

@@ -8,7 +8,7 @@
 
 namespace hal::estimation {
 
-/// Exponentials of matrices, in memory of its own. One costs about 20 products of such matrices. [realtime]
+/// Matrix exponentials in fixed memory. One costs about 20 products of such matrices. [realtime]
 class Hold {
 public:
     /// Turns x' = Ax + Bu into x(k+1) = Ax + Bu for inputs held over a period: the exponential of [A B; 0 0].

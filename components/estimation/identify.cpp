@@ -11,46 +11,46 @@
 namespace {
 
 enum class Phase : std::uint32_t { idle, settling, step, relay, done, failed };
-enum class Trouble : std::uint32_t { none, not_a_number, no_answer, noisy, too_long, no_oscillation };
+enum class Failure : std::uint32_t { none, not_a_number, no_answer, noisy, too_long, no_oscillation };
 
 struct Identify : hal::Component {
     explicit Identify(const hal_host* host)
         : Component(host),
-          samples(*this, "samples", 4000, "cycles of the step that are kept; a longer one is thinned", {.min = 100, .max = 1'000'000}) {
+          samples(*this, "samples", 4000, "samples kept of a step; a longer step is decimated", {.min = 100, .max = 1'000'000}) {
         kept_.assign(static_cast<std::size_t>(samples), 0.0);
     }
 
     hal::Argument   samples;
-    hal::In<bool>   step{*this, "step", "rising edge: starts a step experiment"};
-    hal::In<bool>   relay{*this, "relay", "rising edge: starts a relay experiment"};
-    hal::In<bool>   cancel{*this, "cancel", "TRUE: ends an experiment, output back to bias"};
-    hal::In<double> value{*this, "value", "what the plant does"};
-    hal::In<double> setpoint{*this, "setpoint", "relay: about where it is to swing"};
-    hal::In<double> bias{*this, "bias", "output while nothing is going on, and the middle of the relay"};
-    hal::In<double> amplitude{*this, "amplitude", "height of the step; the relay goes so far to both sides", {.initial = 1.0}};
-    hal::In<double> hysteresis{*this, "hysteresis", "relay: must be above the noise"};
+    hal::In<bool>   step{*this, "step", "a rising edge starts a step experiment"};
+    hal::In<bool>   relay{*this, "relay", "a rising edge starts a relay experiment"};
+    hal::In<bool>   cancel{*this, "cancel", "TRUE ends an experiment and sets output to bias"};
+    hal::In<double> value{*this, "value", "measured output of the plant"};
+    hal::In<double> setpoint{*this, "setpoint", "relay: centre of the oscillation of value"};
+    hal::In<double> bias{*this, "bias", "idle value of output, and centre of the relay"};
+    hal::In<double> amplitude{*this, "amplitude", "height of the step; amplitude of the relay", {.initial = 1.0}};
+    hal::In<double> hysteresis{*this, "hysteresis", "relay: hysteresis; must exceed the noise"};
     hal::In<double> settle_time{
-        *this, "settle-time", "before a step, output at bias: how long the plant needs to come to rest", {.initial = 1.0, .unit = "s"}};
+        *this, "settle-time", "time at bias before a step, for the plant to settle", {.initial = 1.0, .unit = "s"}};
     hal::In<double> step_time{
-        *this, "step-time", "how long a step is watched; the plant must be at rest again", {.initial = 10.0, .unit = "s"}};
-    hal::In<double> closed_loop{*this, "closed-loop-time", "of the proposal: time constant wanted; 0: the dead time", {.unit = "s"}};
+        *this, "step-time", "duration of a step; the plant must settle within it", {.initial = 10.0, .unit = "s"}};
+    hal::In<double> closed_loop{*this, "closed-loop-time", "target time constant of the closed loop for the proposed gains; 0: the dead time", {.unit = "s"}};
 
-    hal::Out<double>        output{*this, "output", "for the plant", {.finite = true}};
+    hal::Out<double>        output{*this, "output", "input of the plant", {.finite = true}};
     hal::Out<std::uint32_t> phase{*this, "phase", "0 idle, 1 settling, 2 step, 3 relay, 4 done, 5 failed"};
-    hal::Out<std::uint32_t> trouble{
-        *this, "trouble",
-        "why it failed: 1 value is no number, 2 no answer, 3 answer not above the noise, 4 the step was still going on, 5 no oscillation"};
-    hal::Out<double> gain{*this, "gain", "of K e^(-L s) / (T s + 1)"};
-    hal::Out<double> time_constant{*this, "time-constant", "T of it", {.unit = "s"}};
-    hal::Out<double> dead_time{*this, "dead-time", "L of it", {.unit = "s"}};
-    hal::Out<double> fit{*this, "fit", "step: how much of the answer the model explains; 1 is all"};
-    hal::Out<double> ultimate_gain{*this, "ultimate-gain", "relay: gain of the loop at which it swings for ever"};
-    hal::Out<double> ultimate_period{*this, "ultimate-period", "relay: period of that", {.unit = "s"}};
+    hal::Out<std::uint32_t> failure{
+        *this, "failure",
+        "reason of a failure: 1 value is NaN or infinite, 2 no response, 3 response below the noise, 4 not settled, 5 no oscillation"};
+    hal::Out<double> gain{*this, "gain", "K of K e^(-L s) / (T s + 1)"};
+    hal::Out<double> time_constant{*this, "time-constant", "T of K e^(-L s) / (T s + 1)", {.unit = "s"}};
+    hal::Out<double> dead_time{*this, "dead-time", "L of K e^(-L s) / (T s + 1)", {.unit = "s"}};
+    hal::Out<double> fit{*this, "fit", "step: part of the response explained by the model, at most 1"};
+    hal::Out<double> ultimate_gain{*this, "ultimate-gain", "relay: gain of the loop at its stability limit"};
+    hal::Out<double> ultimate_period{*this, "ultimate-period", "relay: period of the oscillation at that gain", {.unit = "s"}};
     hal::Out<double> pgain{*this, "Pgain", "proposed for pid"};
     hal::Out<double> igain{*this, "Igain", "proposed for pid"};
     hal::Out<double> dgain{*this, "Dgain", "proposed for pid"};
 
-    hal::Function run{*this, "update", &Identify::update, "carries the experiment on by one period"};
+    hal::Function run{*this, "update", &Identify::update, "runs one period of the experiment"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds(), y = value;
@@ -60,7 +60,7 @@ struct Identify : hal::Component {
         else if (step_asked) enter(Phase::settling);
         else if (relay_asked) enter(Phase::relay), high_ = y < setpoint, last_switch_ = -1.0, swings_ = 0, even_ = 0, top_ = bottom_ = y;
         const bool active = now_ == Phase::settling || now_ == Phase::step || now_ == Phase::relay;
-        if (active && !std::isfinite(y)) fail(Trouble::not_a_number);
+        if (active && !std::isfinite(y)) fail(Failure::not_a_number);
         time_ += dt;
         switch (now_) {
         case Phase::settling: rest(y); break;
@@ -80,13 +80,13 @@ private:
         time_ = 0.0;
         count_ = 0, thin_ = 1, skip_ = 0;
         quiet_sum_ = quiet_square_ = 0.0, quiet_count_ = 0.0;
-        if (next != Phase::done && next != Phase::failed) trouble = 0;
+        if (next != Phase::done && next != Phase::failed) failure = 0;
     }
-    void fail(Trouble why) noexcept {
+    void fail(Failure why) noexcept {
         enter(Phase::failed);
-        trouble = static_cast<std::uint32_t>(why);
+        failure = static_cast<std::uint32_t>(why);
     }
-    /// The second half of the settling time says where the plant rests, and its noise.
+    /// The second half of the settling time gives the steady state and the noise.
     void rest(double y) noexcept {
         if (time_ > 0.5 * settle_time) quiet_sum_ += y - first_, quiet_square_ += (y - first_) * (y - first_), quiet_count_ += 1.0;
         else first_ = y;
@@ -113,12 +113,12 @@ private:
     ///     A0 = integral of y1 - y = y1 (T + L),   A1 = integral of y up to T + L = y1 T / e
     void judge(double h) noexcept {
         const std::size_t n = count_, tail = std::max<std::size_t>(n / 10, 1);
-        if (n < 20 || amplitude == 0.0) return fail(Trouble::no_answer);
+        if (n < 20 || amplitude == 0.0) return fail(Failure::no_answer);
         double end = 0.0, before = 0.0;
         for (std::size_t i = n - tail; i < n; ++i) end += kept_[i] / static_cast<double>(tail);
         for (std::size_t i = n - 2 * tail; i < n - tail; ++i) before += kept_[i] / static_cast<double>(tail);
-        if (!(std::fabs(end) > 4.0 * noise_) || end == 0.0) return fail(end == 0.0 ? Trouble::no_answer : Trouble::noisy);
-        if (std::fabs(end - before) > 0.02 * std::fabs(end) + 3.0 * noise_) return fail(Trouble::too_long);
+        if (!(std::fabs(end) > 4.0 * noise_) || end == 0.0) return fail(end == 0.0 ? Failure::no_answer : Failure::noisy);
+        if (std::fabs(end - before) > 0.02 * std::fabs(end) + 3.0 * noise_) return fail(Failure::too_long);
         double a0 = 0.0, a1 = 0.0, at = 0.0;
         for (std::size_t i = 0; i < n; ++i) a0 += (end - kept_[i]) * h;
         const double both = a0 / end;
@@ -142,7 +142,7 @@ private:
         dgain = 0.0;
         enter(Phase::done);
     }
-    /// The relay makes the loop swing near the frequency where the plant turns the phase by half a turn (K. Åström, T. Hägglund, *Automatic
+    /// The relay makes the loop oscillate near the frequency where the plant shifts the phase by 180 degrees (K. Åström, T. Hägglund, *Automatic
     /// Tuning of Simple Regulators with Specifications on Phase and Amplitude Margins*, Automatica 20, 1984).
     void swing(double y, double dt) noexcept {
         top_ = std::fmax(top_, y), bottom_ = std::fmin(bottom_, y);
@@ -153,7 +153,7 @@ private:
         high_ = up;
         if (now_ != Phase::relay) return;
         keep(y - setpoint);
-        if (time_ > std::fmax(step_time, 0.0)) fail(Trouble::no_oscillation);
+        if (time_ > std::fmax(step_time, 0.0)) fail(Failure::no_oscillation);
     }
     /// Once a period; the first three are left out, four that agree within 10 % make the result.
     void turned(double y, double dt) noexcept {
@@ -176,7 +176,7 @@ private:
     void conclude(double h) noexcept {
         using Complex = std::complex<double>;
         const double begin = ups_[0], span = time_ - begin, w = 2.0 * std::numbers::pi * periods / span;
-        if (!(0.5 * (top_ - bottom_) > std::fabs(hysteresis))) return fail(Trouble::noisy);
+        if (!(0.5 * (top_ - bottom_) > std::fabs(hysteresis))) return fail(Failure::noisy);
         const auto    turn = [&](double t) noexcept { return Complex(std::cos(w * t), -std::sin(w * t)); };
         Complex       in = 0.0, out = 0.0, at = 1.0;
         const Complex by = turn(h);
@@ -190,7 +190,7 @@ private:
         const double response = std::abs(out) / std::abs(in), late = -std::arg(-out / in), quarter = 0.5 * std::numbers::pi;
         const double farther = std::clamp(quarter / (quarter + late), 0.5, 2.0);
         const double ku = farther / response, tu = 2.0 * std::numbers::pi / (w * farther);
-        if (!(std::isfinite(ku) && ku > 0.0)) return fail(Trouble::no_oscillation);
+        if (!(std::isfinite(ku) && ku > 0.0)) return fail(Failure::no_oscillation);
         ultimate_gain = ku, ultimate_period = tu;
         // B. Tyreus, W. Luyben, 1992: calmer than Ziegler's and Nichols' rule
         pgain = ku / 3.2, igain = pgain / (2.2 * tu), dgain = 0.0;
@@ -206,26 +206,26 @@ private:
     bool                step_was_ = false, relay_was_ = false, high_ = false;
     double              last_switch_ = -1.0, top_ = 0.0, bottom_ = 0.0;
     int                 swings_ = 0;
-    std::size_t         even_ = 0;  // periods so far that are judged
+    std::size_t         even_ = 0;  // periods so far that are compared
     double              shortest_ = 0.0, longest_ = 0.0;  // of them
     std::array<double, periods> ups_{}, downs_{};  // when the output was switched
 };
 
 }  // namespace
 
-HAL_COMPONENT(Identify, "identify", "Finds a plant's gain, time constant and dead time by experiment, and proposes PID gains", R"(
-The plant is taken for K e^(-L s) / (T s + 1), a first order with a dead time.
+HAL_COMPONENT(Identify, "identify", "Identifies a plant's gain, time constant and dead time by experiment, and proposes PID gains", R"(
+The plant is modelled as K e^(-L s) / (T s + 1), first order with dead time.
 
-**Step.** The output rests at `bias` for `settle-time`, then steps by `amplitude` for `step-time`. K, T and L follow from the areas under the answer,
-which forgive noise; `fit` says how well the model explains the answer. The proposal is Skogestad's SIMC rule: a PI with the closed loop's time constant
+**Step.** The output remains at `bias` for `settle-time`, then steps by `amplitude` for `step-time`. K, T and L follow from the areas under the response,
+which are insensitive to noise; `fit` is the quality of the model. The proposed gains follow Skogestad's SIMC rule: a PI with the closed-loop time constant
 `closed-loop-time`, or the dead time.
 
-**Relay.** The output switches between bias + amplitude and bias - amplitude whenever `value` passes `setpoint`; the plant swings, four even periods
-give `ultimate-gain` and `ultimate-period`, and Tyreus' and Luyben's rule the proposal. The first harmonics of output and answer are compared, not the
-heights of the swing, so the gain is right to 3 %, and to 6 % for a plant that is nearly all dead time (4 d / (pi a) is 18 % off for K = 2, T = 0.5 s,
-L = 0.1 s). It ends with failure when nothing swings within `step-time`.
+**Relay.** The output switches between bias + amplitude and bias - amplitude whenever `value` passes `setpoint`; the plant oscillates, four equal periods
+give `ultimate-gain` and `ultimate-period`, and the Tyreus-Luyben rule the proposed gains. The first harmonics of output and response are compared, not their
+amplitudes, so the error of the gain is below 3 %, or 6 % for a plant with dominant dead time (4 d / (pi a) has an error of 18 % for K = 2, T = 0.5 s,
+L = 0.1 s). The experiment fails if there is no oscillation within `step-time`.
 
-Nothing is changed but `output`: put a mux2 before the plant, and set the gains by hand. `trouble` says why an experiment failed.
+The component changes only `output`: connect it to the plant by a mux2, and set the gains of the controller yourself. `failure` is the reason of a failure.
 
     loadrt identify names=oven
     addf oven.update servo

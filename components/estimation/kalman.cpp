@@ -14,7 +14,7 @@ namespace {
 
 using namespace hal::estimation;
 
-/// x(k+1) = Ax + Bu + w, z = Cx + v. The measurements were made independent of each other when they were read.
+/// x(k+1) = Ax + Bu + w, z = Cx + v. The measurements are decorrelated when the matrices are read.
 struct Linear {
     Matrix a, b, q, c;
     Vector r;
@@ -40,11 +40,11 @@ public:
         : Component(host),
           plant_(*this, "plant", "discrete",
                  "discrete: x(k+1) = Ax + Bu, a step per cycle; continuous: x' = Ax + Bu, QN is the density of its noise"),
-          history_(*this, "history", 32, "moments that are kept: a measurement may be that many cycles old, less two",
+          history_(*this, "history", 32, "length of the history in cycles; measurements may be up to history - 2 cycles old",
                    {.min = 3, .max = 4096}),
           model_(read()),
           past_(model_, static_cast<std::size_t>(history_), x0_, p0_, model_.b.cols(), model_.c.rows()),
-          u(*this, "u-#", model_.b.cols(), "input # of the plant since the cycle before"),
+          u(*this, "u-#", model_.b.cols(), "input # of the plant since the previous cycle"),
           channels_(*this, model_.c.rows()),
           x(*this, "x-#", model_.a.rows(), "state #, estimated", {.finite = true}),
           sigma(*this, "sigma-#", model_.a.rows(), "standard deviation of state #", {.finite = true}) {
@@ -80,13 +80,13 @@ private:
         continuous_ = plant_.get() == "continuous";
         if (!continuous_ && plant_.get() != "discrete")
             throw hal::ArgumentError("plant", "plant=" + plant_.get() + " is neither continuous nor discrete");
-        const Matrices given(*this, {{"A", "1,0.001;0,1", "n x n: how the states drive each other"},
-                                     {"B", "0;0.001", "n x m: how the inputs drive the states; without it there are none"},
-                                     {"C", "1,0", "p x n: how the states show in the measurements"},
+        const Matrices given(*this, {{"A", "1,0.001;0,1", "n x n: system matrix"},
+                                     {"B", "0;0.001", "n x m: input matrix; default: no inputs"},
+                                     {"C", "1,0", "p x n: measurement matrix"},
                                      {"QN", "1e-12,0;0,1e-6", "n x n: covariance of the noise on the states"},
                                      {"RN", "1e-6", "p x p: covariance of the noise on the measurements"},
-                                     {"P0", "", "n x n: covariance of the states at the start; 1 on the diagonal without it"},
-                                     {"x0", "", "n: the states at the start; 0 without it"}});
+                                     {"P0", "", "n x n: initial covariance of the states; default: identity"},
+                                     {"x0", "", "n: initial states; default: 0"}});
         Linear         model;
         model.a = a_ = given.square("A");
         const Eigen::Index n = model.a.rows();
@@ -104,7 +104,7 @@ private:
                 "C",
                 "the plant is undetectable: no measurement shows its mode at " + text(mode->value) + ", strongest in state " +
                     std::to_string(mode->state),
-                "that mode does not die out by itself, so its estimate would get worse for ever; measure it, or leave the state out");
+                "that mode is unstable, so its estimate would diverge; measure it, or remove the state");
         shown_ = c.transpose() * r.inverse();
         if (!r.isDiagonal(1e-14)) whole_ = &whole_matrix_, whole_matrix_ = independent(r);
         if (whole_ != nullptr) c = Dense(whole_matrix_) * c;
@@ -115,10 +115,10 @@ private:
     static Dense covariance(const Matrices& given, const char* name, Eigen::Index n, const char* why, bool semi) {
         const Dense m = given.at(name, n, n, why);
         if ((m - m.transpose()).norm() > 1e-12 * m.norm())
-            given.refuse(name, std::string(name) + " is not symmetric", "a covariance is the same both ways round");
+            given.refuse(name, std::string(name) + " is not symmetric", "a covariance matrix is symmetric");
         if (!positive(m, semi) && !(semi && m.isZero()))
             given.refuse(name, std::string(name) + (semi ? " has a negative eigenvalue" : " is not positive"),
-                         semi ? "a covariance has none" : "each measurement has some noise: its variance on the diagonal");
+                         semi ? "a covariance matrix is positive semidefinite" : "give each measurement's variance on the diagonal, above 0");
         return m;
     }
     /// L^-1 of R = L D L', so that the noise of L^-1 z is independent, with the variances D in spread_.
@@ -174,9 +174,9 @@ private:
 
 public:
     hal::Outs<double> x, sigma;
-    hal::In<bool>     reset{*this, "reset", "while TRUE the estimate is that of the start, corrected by the measurements of now"};
-    hal::Param<bool>  show_gains{*this, "show-gains", "TRUE: gain-I-J are computed in each cycle"};
-    hal::Function     run{*this, "update", &Kalman::update, "moves the estimate on by one period and corrects it"};
+    hal::In<bool>     reset{*this, "reset", "TRUE resets the estimate to its initial value, corrected by the current measurements"};
+    hal::Param<bool>  show_gains{*this, "show-gains", "TRUE computes gain-I-J in each cycle"};
+    hal::Function     run{*this, "update", &Kalman::update, "predicts one period and applies the measurements"};
 
 private:
     std::deque<hal::Out<double>> gains_;
@@ -184,26 +184,26 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Kalman, "kalman", "Kalman filter of a linear plant; late measurements are taken where they belong", R"(
+HAL_COMPONENT(Kalman, "kalman", "Kalman filter of a linear plant, with late measurements", R"(
     x(k+1) = A x + B u + w,  z = C x + v,   w with covariance QN, v with RN
 
-(R. Kalman, *A New Approach to Linear Filtering and Prediction Problems*, 1960.) Up to 12 states, inputs and measurements; how many follows from
-the matrices, which are load arguments or stand in a `file=` (see state_space). With `plant=continuous` A and B are those of x' = Ax + Bu and QN is
-the density of its noise; all three are turned into those of the thread's period in its first cycle.
+(R. Kalman, *A New Approach to Linear Filtering and Prediction Problems*, 1960.) Up to 12 states, inputs and measurements; their numbers follow from
+the matrices, which are load arguments or in a `file=` (see state_space). With `plant=continuous` A and B are those of x' = Ax + Bu and QN is
+the density of its noise; all three are converted to the thread's period in its first cycle.
 
-`x-N` is the estimate at the end of the cycle, `sigma-N` its standard deviation. Run it behind what measures and before the controller; `u-N` is then
-the controller's output of the cycle before, which is what acted in between.
+`x-N` is the estimate at the end of the cycle, `sigma-N` its standard deviation. Add the function after the measurements and before the controller; `u-N` is then
+the controller's output of the previous cycle, which acted in between.
 
-**Late measurements.** `age-N` says how old `z-N` is, in seconds. The filter keeps the last `history` cycles; an old measurement is put where it belongs and
-everything after it is done again, so the estimate is as good as if it had come in time and then been predicted. A cycle costs as many steps as
-the oldest measurement in it is cycles old, plus one. `new-N` says whether there is a measurement in this cycle at all: for sensors slower than the thread.
+**Late measurements.** `age-N` is the age of `z-N` in seconds. The filter keeps the last `history` cycles; a late measurement is applied at its own time and
+all later steps are repeated, so the estimate is as good as with a measurement in time. A cycle runs one step plus
+one per cycle of age of its oldest measurement. `new-N` is TRUE if the cycle has a measurement: for sensors slower than the thread.
 
-**Bad measurements.** What is no number is left out and counted in `skipped`; older than the history: `late`; farther off than `gate` standard
-deviations: `outliers` (0: no gate). `valid` falls when none was used for `timeout` (0: never). The covariance is corrected by Joseph's form, which keeps
-it symmetric and positive; should it be lost all the same, it starts again at P0 and `renewals` counts. When RN says that the noises of
-measurements depend on each other, measurements are taken together or not at all.
+**Invalid measurements** are ignored and counted: NaN and infinity in `skipped`; older than the history in `late`; a deviation above `gate` standard
+deviations in `outliers` (0: no gate). `valid` becomes FALSE if no measurement was used for `timeout` (0: no timeout). The covariance is updated by Joseph's form, which keeps
+it symmetric and positive; should it become invalid nevertheless, it is reset to P0 and `renewals` increases. If RN has correlated
+noise, measurements are used only if all of them are present.
 
-A plant with a lasting mode that no measurement shows is refused with its name.
+A plant with an unstable mode that is not observable is rejected; the error names the mode.
 
     # position measured each millisecond, 3 ms late; speed wanted
     loadrt kalman names=sled a=1,0.001;0,1 b=0;0.001 c=1,0 qn=1e-12,0;0,1e-6 rn=1e-6

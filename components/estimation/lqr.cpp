@@ -31,7 +31,7 @@ struct Problem {
     }
 };
 
-/// The weights of now, from the cycle to the helper thread, and what came of them.
+/// The current weights, from the cycle to the helper thread, and the resulting gain.
 struct Order {
     Vector        q, r;
     std::int64_t  period_ns = 0;
@@ -43,7 +43,7 @@ struct Delivery {
     std::uint32_t number = 0;
 };
 
-/// Solves Riccati's equation outside of the cycle, which is the one writer of the orders and the one reader of the deliveries.
+/// Solves the Riccati equation outside of the cycle. The cycle is the only writer of orders and the only reader of deliveries.
 class Designer {
 public:
     explicit Designer(Problem problem) : problem_(std::move(problem)) {}
@@ -54,7 +54,7 @@ public:
     hal::Mailbox<Delivery> deliveries;
 
 private:
-    static constexpr auto look_every = std::chrono::milliseconds(2);  // a cycle may not wake a thread, so this one looks
+    static constexpr auto look_every = std::chrono::milliseconds(2);  // a cycle must not wake a thread, so this thread polls
 
     void turn(bool may_wait) noexcept {
         bool         fresh = false;
@@ -85,14 +85,13 @@ public:
     explicit Lqr(const hal_host* host)
         : Component(host),
           plant_(*this, "plant", "continuous",
-                 "continuous: x' = Ax + Bu, the gain of a continuous controller; sampled: the same plant, the gain for a u that is held "
-                 "over a "
+                 "continuous: x' = Ax + Bu, gain of a continuous controller; sampled: the same plant, gain for a u held for a "
                  "period; discrete: x(k+1) = Ax + Bu"),
-          period_(*this, "period", 0.001, "sampled: the thread's period in s, so that the gain is there before the first cycle"),
+          period_(*this, "period", 0.001, "sampled: the thread's period in s, so that the gain is available in the first cycle"),
           problem_(read()),
           x(*this, "x-#", problem_.a.rows(), "state #"),
-          target(*this, "target-#", problem_.a.rows(), "where state # is wanted"),
-          u(*this, "u-#", problem_.b.cols(), "what the gain makes of it for input #", {.safe = 0.0, .finite = true}),
+          target(*this, "target-#", problem_.a.rows(), "target of state #"),
+          u(*this, "u-#", problem_.b.cols(), "command for input #", {.safe = 0.0, .finite = true}),
           designer_(problem_) {
         for (Eigen::Index i = 0; i < problem_.a.rows(); ++i)
             q_.emplace_back(*this, name("q", i).c_str(),
@@ -105,7 +104,7 @@ public:
         const auto solved = problem_.solve();
         if (!solved)
             throw std::runtime_error(
-                "no gain was found for these matrices; the plant can be steered, but only with numbers beyond what a double holds");
+                "no gain was found for these matrices; the plant is controllable, but the numbers are out of range");
         gain_ = solved->gain;
         order_.q = problem_.q.diagonal();
         order_.r = problem_.r.diagonal();
@@ -127,7 +126,7 @@ public:
         order(cycle);
         bool fresh = false;
         if (const Delivery& delivery = designer_.deliveries.get(&fresh); fresh) {
-            refused = !delivery.good;
+            rejected = !delivery.good;
             designing = delivery.number != order_.number;
             if (delivery.good) {
                 gain_ = delivery.gain;
@@ -167,10 +166,10 @@ private:
         p.period = period_;
         if (!(p.period > 0.0 && p.period <= 3600.0))
             throw hal::ArgumentError("period", "period= is not between 0 and 3600 s; write the thread's period in s, 0.001 for one of 1 ms");
-        const Matrices given(*this, {{"A", "0,1;0,0", "n x n: how the states drive each other"},
-                                     {"B", "0;1", "n x m: how the inputs drive the states"},
-                                     {"Q", "1,0;0,1", "n x n: what states cost; symmetric, not negative"},
-                                     {"R", "1", "m x m: what inputs cost; symmetric, positive"}});
+        const Matrices given(*this, {{"A", "0,1;0,0", "n x n: system matrix"},
+                                     {"B", "0;1", "n x m: input matrix"},
+                                     {"Q", "1,0;0,1", "n x n: cost of the states; symmetric, positive semidefinite"},
+                                     {"R", "1", "m x m: cost of the inputs; symmetric, positive definite"}});
         p.a = given.square("A");
         const Eigen::Index n = p.a.rows();
         p.b = given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has");
@@ -179,21 +178,21 @@ private:
         for (const char* symmetric : {"Q", "R"})
             if (const Dense& m = given.at(symmetric).value; (m - m.transpose()).norm() > 1e-12 * m.norm())
                 given.refuse(symmetric, std::string(symmetric) + " is not symmetric",
-                             "what two states cost together is the same both ways round");
+                             "a cost matrix is symmetric");
         if (!positive(p.q, true))
-            given.refuse("Q", "Q has a negative eigenvalue", "states cost something or nothing: as a start, diag with a number per state");
-        if (!positive(p.r)) given.refuse("R", "R is not positive", "each input costs something: as a start, diag with 1 per input");
+            given.refuse("Q", "Q has a negative eigenvalue", "start with diag and a number per state, 0 or above");
+        if (!positive(p.r)) given.refuse("R", "R is not positive", "start with diag and 1 per input");
         const Time time = p.plant == Plant::discrete ? Time::discrete : Time::continuous;
         if (const auto mode = unreachable(p.a, p.b, time))
             given.refuse("B",
                          "the plant is uncontrollable: no input reaches its mode at " + text(mode->value) + ", strongest in state " +
                              std::to_string(mode->state),
-                         "that mode does not die out by itself; look at row " + std::to_string(mode->state + 1) + " of A and B");
+                         "that mode is unstable; look at row " + std::to_string(mode->state + 1) + " of A and B");
         if (const auto mode = unseen(p.a, p.q, time))
             given.refuse(
                 "Q",
-                "the cost does not see the plant's mode at " + text(mode->value) + ", strongest in state " + std::to_string(mode->state),
-                "give that state a weight in Q, or nothing will hold it");
+                "the cost does not observe the plant's mode at " + text(mode->value) + ", strongest in state " + std::to_string(mode->state),
+                "give that state a weight in Q");
         return p;
     }
     void order(hal::Cycle cycle) noexcept {
@@ -206,7 +205,7 @@ private:
         designer_.orders.put(order_);
         designing = true;
     }
-    /// True when it is another; NaN is one value.
+    /// True if the values differ; NaN equals NaN.
     static bool take(double& last, double now) noexcept {
         const bool other = std::isnan(now) ? !std::isnan(last) : last != now;
         last = now;
@@ -224,17 +223,17 @@ private:
 public:
     hal::Ins<double>  x, target;
     hal::Outs<double> u;
-    hal::In<bool>     enable{*this, "enable", "FALSE: all u are 0", {.initial = true}};
-    hal::In<double>   max_output{*this, "max-output", "limit of each u; 0: none"};
-    hal::Out<bool>    saturated{*this, "saturated", "a u is at its limit"};
-    hal::Out<bool>    designing{*this, "designing", "a new gain is being computed; the old one is at work"};
-    hal::Out<bool>    refused{*this, "refused", "the weights of now make no gain: negative, or no number; the last good one is at work"};
-    hal::Out<std::uint32_t> designs{*this, "designs", "gains swapped in since the start"};
-    hal::Out<bool> valid{*this, "valid", "FALSE: a state was no number for longer than hold-cycles, and all u are 0", {.safe = false}};
-    hal::Out<std::uint32_t>   bad_inputs{*this, "bad-inputs", "states that were no number"};
+    hal::In<bool>     enable{*this, "enable", "FALSE sets all u to 0", {.initial = true}};
+    hal::In<double>   max_output{*this, "max-output", "limit of each u; 0: no limit"};
+    hal::Out<bool>    saturated{*this, "saturated", "TRUE: a u is at its limit"};
+    hal::Out<bool>    designing{*this, "designing", "TRUE: a new gain is being computed; the old one is in use"};
+    hal::Out<bool>    rejected{*this, "rejected", "TRUE: the weights are invalid (negative or NaN); the last valid gain is in use"};
+    hal::Out<std::uint32_t> designs{*this, "designs", "number of gains applied since the start"};
+    hal::Out<bool> valid{*this, "valid", "FALSE: a state was NaN or infinite for longer than hold-cycles; all u are 0", {.safe = false}};
+    hal::Out<std::uint32_t>   bad_inputs{*this, "bad-inputs", "number of states that were NaN or infinite"};
     hal::Param<std::uint32_t> hold_cycles{
-        *this, "hold-cycles", "for so many cycles in a row the last number of a state that is none stays", {.initial = 10}};
-    hal::Function run{*this, "update", &Lqr::update, "takes a new gain, if there is one, and applies it"};
+        *this, "hold-cycles", "number of consecutive cycles for which the last valid value replaces a NaN or infinite state", {.initial = 10}};
+    hal::Function run{*this, "update", &Lqr::update, "applies the gain, after taking a new one"};
 
 private:
     std::deque<hal::In<double>>  q_, r_;
@@ -242,27 +241,27 @@ private:
     Matrix                       gain_;
     Vector                       state_;
     Order                        order_;
-    std::uint32_t                blind_ = 0;  // cycles in a row with a state that is no number
+    std::uint32_t                blind_ = 0;  // consecutive cycles with a NaN or infinite state
     Designer                     designer_;
 };
 
 }  // namespace
 
-HAL_COMPONENT(Lqr, "lqr", "Linear-quadratic regulator: plant and weights in, gain and control out", R"(
+HAL_COMPONENT(Lqr, "lqr", "Linear-quadratic regulator, designed from plant and weights", R"(
     u = -K (x - target),  K minimises the sum of x'Qx + u'Ru for
     plant=continuous   x' = Ax + Bu
     plant=sampled      x' = Ax + Bu with u held over a period; the cost is integrated, not summed (C. Van Loan, 1978)
     plant=discrete     x(k+1) = Ax + Bu
 
-`sampled` is what a thread is: the gain suits its period, and is made anew when the thread has another one than `period=` says. Matrices are load
+`sampled` matches a thread: the gain is for its period, and is computed again if the thread has a period other than `period=`. Matrices are load
 arguments, a comma between numbers and a `;` between rows, or stand in a `file=` (see state_space). Riccati's equation is solved by
 structure-preserving doubling (E. Chu, H. Fan, W. Lin, 2004 and 2005) when the component is loaded, and later in a thread of its own: a change of
 the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the cycle swaps the gain in when it is done. Under `hal sim` that is the
 next cycle, so that each run comes out the same.
 
-A plant with an unstable mode that no input reaches, or that Q does not see, is refused with its name. A state that is no number is left
-out: for `hold-cycles` its last number stays, then `valid` falls and all u are 0 until it is a number again. `gain-I-J` can be linked to a
-component with a control law of its own, such as furuta_control.
+A plant with an unstable mode that is not controllable, or that Q does not observe, is rejected; the error names the mode. A NaN or infinite state is
+replaced by its last valid value for `hold-cycles`; then `valid` becomes FALSE and all u are 0 until it is valid again. Link `gain-I-J` to a
+component with its own control law, such as furuta_control.
 
     loadrt lqr names=sled plant=sampled a=0,1;0,0 b=0;0.5 q=100,0;0,1 r=0.01
     addf sled.update servo

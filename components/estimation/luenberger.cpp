@@ -15,10 +15,10 @@ public:
     explicit Luenberger(const hal_host* host)
         : Component(host),
           model_(read()),
-          u(*this, "u-#", model_.b.cols(), "input # of the plant since the cycle before"),
+          u(*this, "u-#", model_.b.cols(), "input # of the plant since the previous cycle"),
           z(*this, "z-#", model_.c.rows(), "measurement #"),
-          x(*this, "x-#", model_.a.rows(), "state #, observed", {.finite = true}),
-          innovation(*this, "innovation-#", model_.c.rows(), "measurement # less what was expected") {
+          x(*this, "x-#", model_.a.rows(), "state #, estimated", {.finite = true}),
+          innovation(*this, "innovation-#", model_.c.rows(), "measurement # minus its expected value") {
         state_ = start_;
     }
 
@@ -55,12 +55,12 @@ private:
         const Matrices given(
             *this,
             {{"A", "1,0.001;0,1", "n x n: x(k+1) = Ax + Bu"},
-             {"B", "0;0.001", "n x m; without it there are no inputs"},
+             {"B", "0;0.001", "n x m; default: no inputs"},
              {"C", "1,0", "p x n: z = Cx"},
-             {"L", "", "n x p: the gain; or poles"},
+             {"L", "", "n x p: gain; alternatively poles"},
              {"poles", "0.95,0.9",
-              "n: where the poles of the error are to lie; real, inside of the unit circle; none twice when one measurement is there"},
-             {"x0", "", "n: the states at the start; 0 without it"}});
+              "n: poles of the error; real, inside of the unit circle; distinct if there is one measurement"},
+             {"x0", "", "n: initial states; default: 0"}});
         const Dense&       a = given.square("A");
         const Eigen::Index n = a.rows();
         const Dense        b =
@@ -68,21 +68,21 @@ private:
         const Dense c = given.at("C", given.at("C").value.rows(), n, "it has a column per state, as A has");
         start_ = given.has("x0") ? Vector(given.vector("x0", n, "it has a number per state")) : Vector(Vector::Zero(n));
         if (given.has("L")) {
-            // the estimate is corrected behind the step: its error is multiplied by (I - LC) A
+            // the estimate is corrected after the prediction: its error is multiplied by (I - LC) A
             const Dense l = given.at("L", n, c.rows(), "it has a row per state and a column per measurement");
             if (const double radius = spectral_radius(a - l * c * a); radius >= 1.0)
                 given.refuse("L", "with this gain the observer is unstable: its largest pole is " + std::to_string(radius),
-                             "give poles= instead of L=");
+                             "use poles= instead of L=");
             return {a, b, c, l};
         }
         const Eigen::VectorXd poles = given.vector("poles", n, "one for each state");
         if (poles.cwiseAbs().maxCoeff() >= 1.0)
-            given.refuse("poles", "a pole lies outside of the unit circle",
-                         "poles between 0 and 1: 0 forgets at once, 0.99 in some hundred cycles");
+            given.refuse("poles", "a pole is outside of the unit circle",
+                         "use poles between 0 and 1: 0 settles in one cycle, 0.99 in some hundred");
         const auto l = place_observer(a, c * a, poles.cast<std::complex<double>>());
         if (!l)
             given.refuse("C", "the plant is not observable, or a pole of the observer is one of its own",
-                         "look at C; or move the poles a little");
+                         "look at C, or change the poles slightly");
         return {a, b, c, *l};
     }
 
@@ -92,22 +92,22 @@ private:
 public:
     hal::Ins<double>        u, z;
     hal::Outs<double>       x, innovation;
-    hal::In<bool>           reset{*this, "reset", "while TRUE the states are those of x0"};
-    hal::Out<std::uint32_t> skipped{*this, "skipped", "measurements that were no number: the model alone was followed"};
-    hal::Out<std::uint32_t> restarts{*this, "restarts", "times the states grew beyond all numbers and went back to x0"};
-    hal::Function           run{*this, "update", &Luenberger::update, "moves the observer on by one period and corrects it"};
+    hal::In<bool>           reset{*this, "reset", "TRUE sets the states to x0"};
+    hal::Out<std::uint32_t> skipped{*this, "skipped", "number of NaN or infinite measurements; they are ignored"};
+    hal::Out<std::uint32_t> restarts{*this, "restarts", "number of times the states overflowed and were reset to x0"};
+    hal::Function           run{*this, "update", &Luenberger::update, "predicts one period and applies the measurements"};
 };
 
 }  // namespace
 
-HAL_COMPONENT(Luenberger, "luenberger", "Observer with a gain of its own, or poles where you want them", R"(
+HAL_COMPONENT(Luenberger, "luenberger", "Luenberger observer with a given gain or given poles", R"(
     xm = A x + B u,   x = xm + L (z - C xm)
 
 (D. Luenberger, *Observing the State of a Linear System*, 1964, in the form that uses the newest measurement at once.) The error of the estimate is
-multiplied by (I - LC) A in each cycle; `poles` are the eigenvalues of that, and L follows from them. A plant that cannot be observed
-with these measurements is refused, and so is an L that makes the observer unstable. Matrices as in state_space.
+multiplied by (I - LC) A in each cycle; `poles` are the eigenvalues of that matrix, and L follows from them. A plant that is not observable
+with these measurements is rejected, and so is an L that makes the observer unstable. Matrices are given as in state_space.
 
-Cheaper than a kalman, and without its noises: for when the poles are what you know. A measurement that is no number is left out.
+Use it instead of kalman if poles are known rather than noise; it also needs less time. NaN and infinite measurements are ignored.
 
     loadrt luenberger names=sled a=1,0.001;0,1 b=0;0.001 c=1,0 poles=0.9,0.95
     addf sled.update servo

@@ -11,20 +11,20 @@ using namespace hal::estimation;
 
 struct Notch : hal::Component {
     explicit Notch(const hal_host* host)
-        : Component(host), harmonics(*this, "harmonics", 1, "notches at so many multiples of the frequency", {.min = 1, .max = 16}) {
+        : Component(host), harmonics(*this, "harmonics", 1, "number of notches: at the frequency and its multiples", {.min = 1, .max = 16}) {
         sections_.resize(static_cast<std::size_t>(harmonics));
         coefficients_.resize(sections_.size());
     }
 
     hal::Argument           harmonics;
-    hal::In<double>         in{*this, "in", "the input"};
-    hal::Out<double>        out{*this, "out", "the input without the frequency", {.finite = true}};
-    hal::In<bool>           enable{*this, "enable", "FALSE: out is in", {.initial = true}};
-    hal::In<double>         frequency{*this, "frequency", "to take out; may follow a speed", {.initial = 50.0, .unit = "Hz"}};
-    hal::In<double>         width{*this, "width", "between the two frequencies that are 3 dB down", {.initial = 5.0, .unit = "Hz"}};
-    hal::In<double>         depth{*this, "depth", "what remains in the middle: 0 nothing, 1 all"};
-    hal::Out<std::uint32_t> active{*this, "active", "notches at work: those below 0.45 of the thread's rate"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "inputs that were no number: out stays"};
+    hal::In<double>         in{*this, "in", "input"};
+    hal::Out<double>        out{*this, "out", "filtered input", {.finite = true}};
+    hal::In<bool>           enable{*this, "enable", "FALSE copies in to out", {.initial = true}};
+    hal::In<double>         frequency{*this, "frequency", "frequency to remove; may follow a speed", {.initial = 50.0, .unit = "Hz"}};
+    hal::In<double>         width{*this, "width", "bandwidth between the two frequencies that are 3 dB down", {.initial = 5.0, .unit = "Hz"}};
+    hal::In<double>         depth{*this, "depth", "gain at the centre: 0 removes the frequency, 1 passes it"};
+    hal::Out<std::uint32_t> active{*this, "active", "number of active notches: those below 0.45 of the thread's rate"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "number of NaN or infinite inputs; out keeps its value"};
     hal::Function           run{*this, "", &Notch::update, "filters"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -64,10 +64,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Notch, "notch", "Takes a frequency and its multiples out of a signal; the frequency may move", R"(
-A notch of `width` Hz about `frequency` and, with `harmonics`, about its multiples: mains hum in a force sensor, the teeth of a gear, a spindle's
-imbalance. Link `frequency` to the speed (in turns per second) and the notches follow it from one cycle to the next. A notch above 0.45 of the
-thread's rate, or without a sensible width and depth, is left out; `active` says how many work.
+HAL_COMPONENT(Notch, "notch", "Removes a variable frequency and its multiples from a signal", R"(
+A notch of `width` Hz around `frequency` and, with `harmonics`, around its multiples: mains hum in a force sensor, the teeth of a gear, a spindle's
+imbalance. Link `frequency` to the speed (in turns per second) and the notches follow it in every cycle. A notch above 0.45 of the
+thread's rate, or with an invalid width or depth, is disabled; `active` is the number of active ones.
 
     loadrt notch names=no-hum harmonics=3
     addf no-hum servo

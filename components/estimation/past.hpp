@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Kalman filter that remembers: a measurement that arrives late is taken where it belongs, and what came after it is done again.
+// A Kalman filter with a history: a late measurement is applied at its own time, and the later steps are repeated.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace hal::estimation {
 
-/// The estimate at a moment, and what is known to have happened there.
+/// The estimate at one time, and the inputs and measurements of that time.
 struct Moment {
     Vector        x;                 ///< after the measurements of this moment
     Matrix        p;                 ///< covariance of x
@@ -22,13 +22,13 @@ struct Moment {
     std::uint32_t fresh = 0;  ///< those of `measured` that were not counted yet
 };
 
-/// What became of a measurement.
+/// The outcome of a measurement.
 enum class Fate { none, used, outlier, lost };
 
 /// x and P after a scalar measurement of cx with variance r, by Joseph's form (P. Joseph, in R. Bucy, *Filtering for Stochastic Processes*, 1968):
 ///     k = Pc / (c'Pc + r),  x <- x + k off,  P <- (I - kc')P(I - kc')' + k r k'
-/// which stays symmetric and positive where P - kc'P does not; rounding is taken off the two halves. `gate`: beyond so many standard deviations
-/// nothing is done; 0 for none. [realtime]
+/// which remains symmetric and positive where P - kc'P does not; the two halves are symmetrised. A deviation beyond `gate` standard
+/// deviations changes nothing; 0 disables the gate. [realtime]
 inline Fate correct(Vector& x, Matrix& p, const Vector& c, double off, double r, double gate) noexcept {
     const Eigen::Index n = x.size();
     Vector             pc, k, mc;
@@ -75,7 +75,7 @@ inline void spread(Matrix& to, const Matrix& a, const Matrix& p, const Matrix& q
 template <class Model>
 class Past {
 public:
-    /// Takes its memory here. [setup]
+    /// Allocates the history. [setup]
     Past(Model& model, std::size_t history, Vector x0, Matrix p0, Eigen::Index inputs, Eigen::Index channels)
         : model_(model), start_{std::move(x0), std::move(p0), Vector::Zero(inputs), Vector::Zero(channels)}, moments_(history, start_) {}
 
@@ -90,10 +90,10 @@ public:
         first_ = number_;
         known_ = known_ < moments_.size() ? known_ + 1 : known_;
     }
-    /// Measurement `channel`, `cycles` old. False: older than what is remembered. [realtime]
+    /// Adds measurement `channel`, `cycles` old. False if it is older than the history. [realtime]
     bool tell(Eigen::Index channel, double z, std::int64_t cycles) noexcept {
         if (cycles < 0) cycles = 0;
-        // the oldest moment can no longer be done again: the one before it is gone
+        // the oldest step cannot be repeated: its predecessor is no longer stored
         if (cycles >= static_cast<std::int64_t>(known_) - (full() ? 1 : 0)) return false;
         const std::uint64_t where = number_ - static_cast<std::uint64_t>(cycles);
         Moment&             moment = at(where);
@@ -103,7 +103,7 @@ public:
         if (where < first_) first_ = where;
         return true;
     }
-    /// Does everything from the oldest new measurement on. [realtime]
+    /// Repeats all steps from the oldest new measurement on. [realtime]
     void settle(double gate) noexcept {
         for (std::uint64_t k = first_; k <= number_; ++k) {
             Moment& moment = at(k);

@@ -10,10 +10,10 @@ namespace {
 struct SavgolDiff : hal::Component {
     explicit SavgolDiff(const hal_host* host)
         : Component(host),
-          window(*this, "window", 9, "samples that the polynomial is laid through; odd", {.min = 3, .max = 255}),
+          window(*this, "window", 9, "number of samples for the polynomial; odd", {.min = 3, .max = 255}),
           order(*this, "order", 2, "degree of the polynomial", {.min = 1, .max = 6}) {
         if (window % 2 == 0)
-            throw hal::ArgumentError("window", "window=" + std::to_string(window) + " is even; take " + std::to_string(window + 1));
+            throw hal::ArgumentError("window", "window=" + std::to_string(window) + " is even; use " + std::to_string(window + 1));
         if (order >= window)
             throw hal::ArgumentError("order", "order=" + std::to_string(order) + " needs a window of at least " +
                                         std::to_string((order + 1) | 1));
@@ -22,12 +22,12 @@ struct SavgolDiff : hal::Component {
     }
 
     hal::Argument           window, order;
-    hal::In<double>         in{*this, "in", "the input"};
-    hal::Out<double>        smooth{*this, "smooth", "the polynomial's value now", {.finite = true}};
-    hal::Out<double>        slope{*this, "slope", "the polynomial's first derivative now", {.finite = true}};
-    hal::Out<double>        curvature{*this, "curvature", "its second derivative now; 0 with order 1", {.finite = true}};
-    hal::In<bool>           reset{*this, "reset", "while TRUE the past is filled with the input of now"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "inputs that were no number: the one before was taken"};
+    hal::In<double>         in{*this, "in", "input"};
+    hal::Out<double>        smooth{*this, "smooth", "value of the polynomial", {.finite = true}};
+    hal::Out<double>        slope{*this, "slope", "first derivative of the polynomial", {.finite = true}};
+    hal::Out<double>        curvature{*this, "curvature", "second derivative of the polynomial; 0 with order 1", {.finite = true}};
+    hal::In<bool>           reset{*this, "reset", "TRUE fills the history with the current input"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "number of NaN or infinite inputs; the previous input is used"};
     hal::Function           run{*this, "", &SavgolDiff::update, "smooths and differentiates"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -42,7 +42,7 @@ struct SavgolDiff : hal::Component {
         past_[newest_] = last_;
         double sums[3] = {0.0, 0.0, 0.0};
         for (std::size_t age = 0, at = newest_; age < size(); ++age, at = at == 0 ? size() - 1 : at - 1)
-            for (std::size_t d = 0; d < 3; ++d) sums[d] += weights_[d][age] * (past_[at] - last_);  // small numbers: nothing cancels
+            for (std::size_t d = 0; d < 3; ++d) sums[d] += weights_[d][age] * (past_[at] - last_);  // small differences avoid cancellation
         const double dt = cycle.seconds();
         smooth = sums[0] + last_;
         slope = sums[1] / dt;
@@ -96,10 +96,10 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SavgolDiff, "savgol_diff", "Speed and acceleration from a position, by a polynomial through the last samples", R"(
-A polynomial of degree `order` is laid through the last `window` samples by least squares, and read at the newest: without delay for whatever
-such a polynomial follows exactly (A. Savitzky, M. Golay, 1964; read at the end of the window as P. Gorry, 1990). More samples: less noise;
-higher order: less lag. For an encoder's position, 15 to 31 samples and order 2 or 3. An input that is no number is replaced by the one before.
+HAL_COMPONENT(SavgolDiff, "savgol_diff", "Speed and acceleration from a position (Savitzky-Golay filter)", R"(
+A polynomial of degree `order` is fitted to the last `window` samples by least squares and evaluated at the newest: there is no delay for signals that
+such a polynomial describes exactly (A. Savitzky, M. Golay, 1964; evaluated at the end of the window as in P. Gorry, 1990). More samples reduce noise; a
+higher order reduces lag. For an encoder position use 15 to 31 samples and order 2 or 3. A NaN or infinite input is replaced by the previous one.
 
     loadrt savgol_diff names=speed window=21 order=2
     addf speed servo

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Second-order sections: what filter_biquad and notch are made of.
+// Second-order sections of filter_biquad and notch.
 #pragma once
 
 #include <cmath>
@@ -34,7 +34,7 @@ inline Coefficients section(Shape shape, double frequency, double q, double gain
     return {b0 / a0, b1 / a0, b2 / a0, a1 / a0, a2 / a0};
 }
 
-/// The memory of one section, transposed direct form II.
+/// The state of one section, transposed direct form II.
 struct Section {
     double s1 = 0.0, s2 = 0.0;
 
@@ -45,7 +45,7 @@ struct Section {
         s2 = c.b2 * x - c.a2 * y;
         return y;
     }
-    /// As after a long time of this input. [realtime]
+    /// Sets the steady state for this input. [realtime]
     void settle(const Coefficients& c, double x) noexcept {
         const double y = x * (c.b0 + c.b1 + c.b2) / (1.0 + c.a1 + c.a2);
         s2 = c.b2 * x - c.a2 * y;

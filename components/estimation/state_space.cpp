@@ -37,10 +37,10 @@ private:
 public:
     hal::Ins<double>        u;
     hal::Outs<double>       y, x;
-    hal::In<bool>           reset{*this, "reset", "while TRUE the states are those of x0"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "inputs that were no number: the one of the cycle before was taken"};
-    hal::Out<std::uint32_t> restarts{*this, "restarts", "times the states grew beyond all numbers and went back to x0"};
-    hal::Function           run{*this, "update", &StateSpace::update, "moves the plant on by one period and gives its outputs"};
+    hal::In<bool>           reset{*this, "reset", "TRUE sets the states to x0"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "number of NaN or infinite inputs; the previous input is used"};
+    hal::Out<std::uint32_t> restarts{*this, "restarts", "number of times the states overflowed and were reset to x0"};
+    hal::Function           run{*this, "update", &StateSpace::update, "computes the states and outputs after one period"};
 
     void update(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() != period_ns_) sample(cycle);
@@ -66,11 +66,11 @@ private:
         if (!continuous && plant.get() != "discrete")
             throw hal::ArgumentError("plant", "plant=" + plant.get() + " is neither continuous nor discrete");
         continuous_ = continuous;
-        const Matrices given(*this, {{"A", "0,1;-1,-1", "n x n: how the states drive each other"},
-                                     {"B", "0;1", "n x m: how the inputs drive the states"},
-                                     {"C", "1,0", "p x n: how the states show in the outputs; without it the outputs are the states"},
-                                     {"D", "", "p x m: how the inputs show in the outputs at once; 0 without it"},
-                                     {"x0", "", "n: the states at the start; 0 without it"}});
+        const Matrices given(*this, {{"A", "0,1;-1,-1", "n x n: system matrix"},
+                                     {"B", "0;1", "n x m: input matrix"},
+                                     {"C", "1,0", "p x n: output matrix; default: the outputs are the states"},
+                                     {"D", "", "p x m: feedthrough matrix; default: 0"},
+                                     {"x0", "", "n: initial states; default: 0"}});
         Model          model;
         model.a = given.square("A");
         const auto n = model.a.rows();
@@ -108,11 +108,11 @@ HAL_COMPONENT(StateSpace, "state_space", "A linear plant or filter in state-spac
     plant=continuous:  x' = A x + B u,         y = C x + D u
     plant=discrete:    x(k+1) = A x(k) + B u,  y = C x + D u, a step per cycle
 
-Up to 12 states, inputs and outputs; how many there are follows from the matrices. `y` is that of the end of the period, with
-the input of now. A continuous plant is solved exactly for inputs that are held over the period (K. Åström, B. Wittenmark,
-*Computer-Controlled Systems*, 2.3), in the first cycle of a thread: that one takes some microseconds longer.
+Up to 12 states, inputs and outputs; their numbers follow from the matrices. `y` is the output at the end of the period, with
+the current input. A continuous plant is discretised exactly for inputs held for the period (K. Åström, B. Wittenmark,
+*Computer-Controlled Systems*, 2.3), in the first cycle of a thread, which takes a few microseconds longer.
 
-Matrices are load arguments, a comma between numbers and a `;` between rows, or stand in a `file=`:
+Matrices are load arguments, with a comma between numbers and a `;` between rows, or in a `file=`:
 
     # rig.matrices: a mass of 2 kg on a spring
     A =  0   1
@@ -121,8 +121,8 @@ Matrices are load arguments, a comma between numbers and a `;` between rows, or 
         0.5
     C = 1 0
 
-An input that is no number is left out: the one of the cycle before stays. An unstable plant whose states grow beyond all
-numbers starts again at `x0`.
+A NaN or infinite input is replaced by the previous one. If the states of an unstable plant overflow, they are
+reset to `x0`.
 
     loadrt state_space names=sled a=0,1;-50,-0.5 b=0;0.5 c=1,0
     addf sled.update servo

@@ -8,15 +8,15 @@ namespace {
 struct StepMeter : hal::Component {
     using Component::Component;
 
-    hal::In<double>    command{*this, "command", "the wanted value; a change of it starts a measurement"};
-    hal::In<double>    value{*this, "value", "the real one"};
-    hal::Param<double> band{*this, "band", "settled: this part of the step away from the command", {.initial = 0.02}};
+    hal::In<double>    command{*this, "command", "setpoint; a change starts a measurement"};
+    hal::In<double>    value{*this, "value", "measured value"};
+    hal::Param<double> band{*this, "band", "tolerance for settling, as a fraction of the step", {.initial = 0.02}};
 
-    hal::Out<double> overshoot{*this, "overshoot", "largest value beyond the command, as a part of the step"};
-    hal::Out<double> rise_time{*this, "rise-time", "from 10 % to 90 % of the step", {.unit = "s"}};
-    hal::Out<double> settling_time{*this, "settling-time", "from the step to the last time outside of the band", {.unit = "s"}};
-    hal::Out<double> steady_error{*this, "steady-error", "command - value of now, averaged over the last tenth of the time since the step"};
-    hal::Out<double> time{*this, "time", "since the step", {.unit = "s"}};
+    hal::Out<double> overshoot{*this, "overshoot", "overshoot beyond the command, as a fraction of the step"};
+    hal::Out<double> rise_time{*this, "rise-time", "time from 10 % to 90 % of the step", {.unit = "s"}};
+    hal::Out<double> settling_time{*this, "settling-time", "time from the step to the last value outside of the band", {.unit = "s"}};
+    hal::Out<double> steady_error{*this, "steady-error", "command - value, averaged over the last tenth of the time since the step"};
+    hal::Out<double> time{*this, "time", "time since the step", {.unit = "s"}};
 
     hal::Function run{*this, "update", &StepMeter::update, "measures"};
 
@@ -30,7 +30,7 @@ struct StepMeter : hal::Component {
             mean_ = wanted - now;
         }
         time = time + cycle.seconds();
-        // an average that forgets as fast as the measurement grows old
+        // an average whose time constant grows with the time since the step
         mean_ += (wanted - now - mean_) * std::fmin(1.0, cycle.seconds() / (0.1 * time));
         steady_error = mean_;
         if (step_ == 0.0) return;
@@ -49,8 +49,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(StepMeter, "step_meter", "Overshoot, rise time, settling time and steady error of a step", R"(
-Each change of `command` starts a measurement from the value of that moment; the outputs grow true as the step goes on. A settling time that
-is as long as `time` means that it has not settled. A value that is no number is left out.
+Each change of `command` starts a measurement from the current value; the outputs converge during the step. A settling time
+equal to `time` means that the value has not settled. NaN and infinite values are ignored.
 
     loadrt step_meter names=judge
     addf judge.update servo

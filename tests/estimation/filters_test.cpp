@@ -141,7 +141,7 @@ TEST(Lqr, A_plant_that_cannot_be_steered_is_refused_by_name) {
     expect_refused("lqr", {{"a", "0,1,0;0,0,0;0,0,2"}, {"b", "0;1;0"}, {"q", "diag 1 1 1"}, {"r", "1"}},
                    "no input reaches its mode at 2, strongest in state 2");
     expect_refused("lqr", {{"a", "0,1;0,0"}, {"b", "0;1"}, {"q", "diag 0 1"}, {"r", "1"}},
-                   "the cost does not see the plant's mode at 0, strongest in state 0");
+                   "the cost does not observe the plant's mode at 0, strongest in state 0");
     expect_refused("lqr", {{"a", "0,1;0,0"}, {"b", "0;1"}, {"q", "diag 1 1"}, {"r", "-1"}}, "R is not positive");
     expect_refused("lqr", {{"a", "0,1;0"}, {"b", "0;1"}, {"q", "diag 1 1"}, {"r", "1"}}, "row 2 of A has 1 number, its first has 2");
     expect_refused("lqr", {{"b", "0;1"}}, "A is missing");

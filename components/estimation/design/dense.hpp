@@ -22,7 +22,7 @@ Dense symmetric(const Dense& a);
 /// Returns x of a * x = b. `a` must be invertible.
 Dense solve(const Dense& a, const Dense& b);
 
-/// LU decomposition with complete pivoting, which tells how far from singular a matrix is.
+/// LU decomposition with complete pivoting, which measures how far a matrix is from singular.
 class FullPivot {
 public:
     explicit FullPivot(const Dense& a);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Linear plants outside of the cycle: sampling, and which of their modes can be steered or seen.
+// Linear plants outside of the cycle: sampling, controllability and observability.
 #pragma once
 
 #include <complex>
@@ -10,7 +10,7 @@
 
 namespace hal::estimation {
 
-/// e to the power of a square matrix: scaled to a norm below 1/4, Taylor's series, squared back (N. Higham, *Functions of
+/// Returns the exponential of a square matrix: scaled to a norm below 1/4, Taylor series, squared back (N. Higham, *Functions of
 /// Matrices*, 10.3). [setup]
 Dense exponential(const Dense& a);
 
@@ -18,10 +18,10 @@ struct Discrete {
     Dense a, b;
 };
 
-/// What x' = Ax + Bu does over `period` seconds while u is held. [setup]
+/// Returns the discrete equivalent of x' = Ax + Bu over `period` seconds with u held. [setup]
 Discrete hold(const Dense& a, const Dense& b, double period);
 
-/// What the costs of x' = Ax + Bu, integral of x'Qx + u'Ru, sum up to over a period in which u is held: per sample x'Qx + 2x'Nu + u'Ru
+/// Returns the discrete equivalent of x' = Ax + Bu with the cost integral of x'Qx + u'Ru, with u held: per sample x'Qx + 2x'Nu + u'Ru
 /// (C. Van Loan, *Computing Integrals Involving the Matrix Exponential*, IEEE Trans. AC 23, 1978). [setup]
 struct Sampled {
     Dense a, b, q, r, n;
@@ -36,20 +36,20 @@ struct Mode {
     Eigen::Index         state;
 };
 
-/// A mode that does not die out by itself and that no column of `b` reaches, if there is one (the test of Popov, Belevitch and
+/// Returns an unstable mode that no column of `b` controls, if any (the test of Popov, Belevitch and
 /// Hautus). [setup]
 std::optional<Mode> unreachable(const Dense& a, const Dense& b, Time time);
 
-/// A mode that does not die out by itself and that no row of `c` shows. [setup]
+/// Returns an unstable mode that no row of `c` observes, if any. [setup]
 std::optional<Mode> unseen(const Dense& a, const Dense& c, Time time);
 
 /// "0.5", "-1 + 2i". [setup]
 std::string text(std::complex<double> value);
 
-/// The largest |eigenvalue|. [setup]
+/// Returns the largest |eigenvalue|. [setup]
 double spectral_radius(const Dense& a);
 
-/// L so that A - LC has these eigenvalues: with a vector per pole, A'X - XP = C'G for a full G, and L' = G X^-1 (S. Bhattacharyya,
+/// Returns L such that A - LC has these eigenvalues: with a vector per pole, A'X - XP = C'G for a full G, and L' = G X^-1 (S. Bhattacharyya,
 /// E. de Souza, *Pole assignment via Sylvester's equation*, Systems & Control Letters 1, 1982). None: the plant is not observable, a
 /// pole is A's own, or one without its conjugate. [setup]
 std::optional<Dense> place_observer(const Dense& a, const Dense& c, const Eigen::VectorXcd& poles);

@@ -14,7 +14,7 @@ struct Riccati {
     int   doublings = 0;
 };
 
-/// A'XA - X - (A'XB + N)(R + B'XB)^-1 (B'XA + N') + Q = 0 and K = (R + B'XB)^-1 (B'XA + N'). None when there is no stabilising solution:
+/// A'XA - X - (A'XB + N)(R + B'XB)^-1 (B'XA + N') + Q = 0 and K = (R + B'XB)^-1 (B'XA + N'). Nothing if no stabilising solution exists:
 /// check with unreachable() and unseen() before, they name the reason. `r` is positive definite. [setup]
 std::optional<Riccati> discrete_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r, const Dense& n);
 std::optional<Riccati> discrete_riccati(const Dense& a, const Dense& b, const Dense& q, const Dense& r);
