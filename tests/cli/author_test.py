@@ -17,7 +17,7 @@ STEP = '    void step(hal::Cycle) noexcept { out = in; }\n'
 GOOD = IN + OUT + RUN + STEP
 
 # What is in the component, and all that is printed: line 6 is the first behind the head.
-REFUSED = {
+REJECTED = {
     "two pins of one name": (IN + OUT.replace('"out"', '"in"') + RUN + STEP,
                              "mine.cpp:7: component 'mine' declares pin 'mine.0.in' twice"),
     "a function below its pin": (IN + OUT.replace('*this, "out"', '*this, run, "out"') + RUN + STEP,
@@ -49,12 +49,12 @@ class Author(Case):
         return self.run_program("compile", "--output", "plugins", "mine.cpp", *words)
 
     def test_what_cannot_be_loaded_is_not_installed(self):
-        for name, (body, said) in REFUSED.items():
+        for name, (body, message) in REJECTED.items():
             with self.subTest(name):
                 done = self.compile(body)
                 self.assertEqual((1, ""), (done.returncode, done.stdout))
                 own = [line for line in done.stderr.splitlines() if line.startswith("hal compile")]  # the compiler may warn
-                self.assertEqual([f"hal compile: {said}; nothing was installed"], own, done.stderr)
+                self.assertEqual([f"hal compile: {message}; nothing was installed"], own, done.stderr)
                 self.assertFalse((self.folder / "plugins/mine.so").exists())
 
     def test_an_error_is_not_followed_by_a_false_one(self):

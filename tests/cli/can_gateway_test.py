@@ -7,7 +7,7 @@ import subprocess
 import unittest
 
 from can_node_test import Node
-from harness import HAL, PATIENCE, Case
+from harness import HAL, TIMEOUT, Case
 
 
 class Client:
@@ -16,7 +16,7 @@ class Client:
     def __init__(self, place):
         family = socket.AF_UNIX if isinstance(place, str) else socket.AF_INET
         self.socket = socket.socket(family, socket.SOCK_STREAM)
-        self.socket.settimeout(2 * PATIENCE)
+        self.socket.settimeout(2 * TIMEOUT)
         self.socket.connect(place)
         self.lines, self.events = self.socket.makefile("r", newline="\r\n"), []
 

@@ -6,7 +6,7 @@ import subprocess
 import unittest
 
 from can_test import Can
-from harness import PATIENCE
+from harness import TIMEOUT
 
 CONVERT = shutil.which("can_logconvert", path="/usr/bin") or shutil.which("can_logconvert")
 FRAMES = ["702#00", "602#4000100000000000", "582#4300100092010200", "123#", "18FF0001#AA", "00000123#1122334455667788", "7FF#0102030405060708"]
@@ -24,7 +24,7 @@ class Logs(Can):
     def convert(self, source, target):
         """What can_logconvert prints, and so leaves out; skips the test where this python-can does not have the format."""
         done = subprocess.run([CONVERT, source, target], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              text=True, timeout=2 * PATIENCE)
+                              text=True, timeout=2 * TIMEOUT)
         if "no write support" in done.stdout or "No write support" in done.stdout or "Unknown file type" in done.stdout:
             self.skipTest(f"this python-can does not write {target}: {done.stdout.strip().splitlines()[-1]}")
         self.assertEqual(0, done.returncode, done.stdout)

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, PATIENCE, Case, wait_until
+from harness import HAL, TIMEOUT, Case, wait_until
 
 
 class Node(Case):
@@ -44,7 +44,7 @@ class Node(Case):
     def end(self, process, number=signal.SIGTERM):
         if process.poll() is None:
             process.send_signal(number)
-        process.wait(timeout=PATIENCE)
+        process.wait(timeout=TIMEOUT)
 
 
 class Sdo(Node):
@@ -238,7 +238,7 @@ class Pdo(Node):
         self.addCleanup(Case.end, self, watch)
         self.assertIn("listening on", watch.stderr.readline())
         self.can("send", self.bus, "205#1122", "305#2CFE0100")
-        out, _ = watch.communicate(timeout=2 * PATIENCE)
+        out, _ = watch.communicate(timeout=2 * TIMEOUT)
         self.assertRegex(out, r"\A +\S+  RPDO1   Write output 8-bit, Output block 1 = 0x11 \(17\)  Write output 8-bit, Output block 2 = 0x22 \(34\)\n"
                               r" +\S+  RPDO2   Write analogue output 16-bit, Analogue output 1 = -468 \(0xFE2C\)  Write analogue output 16-bit, Analogue output 2 = 1 \(0x0001\)\n\Z")
 
@@ -288,7 +288,7 @@ class Watch(Node):
         listener = self.begin("nodes", "--json", "--for", "3s")
         sent = self.run_program("can", "send", self.bus, "707#00", "087#3081110000000000", "707#7F", "--every", "100ms", "--count", 2)
         self.assertEqual(0, sent.returncode, sent.stderr)
-        found = json.loads(listener.communicate(timeout=2 * PATIENCE)[0])
+        found = json.loads(listener.communicate(timeout=2 * TIMEOUT)[0])
         seven = next(n for n in found if n["node"] == 7)
         self.assertEqual(("pre-operational", 2, 2), (seven["state"], seven["boot_ups"], seven["emergencies"]))
         self.assertEqual((0x8130, "life guard or heartbeat error", 0x11), tuple(seven["newest"][0][key] for key in ("code", "text", "error_register")))
@@ -316,7 +316,7 @@ class Watch(Node):
                 (self.folder / "seen.log").unlink(missing_ok=True)
                 listener = self.begin("record", "seen.log", "--count", 3, "--filter", lines[0].split("#")[0] + ("/7FE" if words[0] == "generate" else "/7FF"))
                 self.assertEqual(0, self.run_program("can", *words, "--every", "10ms", "--count", 3).returncode)
-                listener.communicate(timeout=2 * PATIENCE)
+                listener.communicate(timeout=2 * TIMEOUT)
                 self.assertEqual(lines, [line.split()[2] for line in (self.folder / "seen.log").read_text().splitlines()])
         self.assertEqual("hal can produce: unknown 'synk'; did you mean 'sync'?\n", self.bad("can", "produce", self.bus, "synk"))
         self.assertIn("invalid --id '800'", self.bad("can", "generate", self.bus, "--id", "800"))

@@ -11,7 +11,7 @@ import threading
 import time
 import unittest
 
-from harness import HAL, PATIENCE, Case
+from harness import HAL, TIMEOUT, Case
 
 CAPTURE = """(1000.000000) can0 000#0102
 (1000.001000) can0 080#
@@ -73,7 +73,7 @@ class Can(Case):
         return process
 
     def result(self, process):
-        out, error = process.communicate(timeout=2 * PATIENCE)
+        out, error = process.communicate(timeout=2 * TIMEOUT)
         self.assertEqual(0, process.returncode, error)
         return out, error
 

@@ -6,7 +6,7 @@ import re
 import subprocess
 import unittest
 
-from harness import HAL, PATIENCE, ROOT, Case, wait_until
+from harness import HAL, TIMEOUT, ROOT, Case, wait_until
 from own_network import dds_domain
 
 # Fast DDS frees some of its memory by another size than it took; who is killed here leaks on purpose.
@@ -150,7 +150,7 @@ class Running(Case):
         self.until("taker", "twice.in", lambda v: float(v or 0) > 0, "the count comes")
         self.until("sender", "back.in0", lambda v: float(v or 0) > 0, "twice the value returns")
         self.until("sender", "alive.in0", lambda v: v == "TRUE", "a linked online pin")
-        self.assertLess(float(self.value("node.sender.age-ms", instance="taker")), 1000 * PATIENCE)
+        self.assertLess(float(self.value("node.sender.age-ms", instance="taker")), 1000 * TIMEOUT)
 
         latency = self.shell("show", "latency", instance="taker").stdout
         self.assertIn("count: node sender => twice.in  over DDS every 5 ms, deadline 1 s, then -1", latency)
@@ -215,7 +215,7 @@ class Namespaces(Case):
         done = subprocess.run([ROOT / "halfiles/cell/bring-up", *words], cwd=self.folder, stdin=subprocess.DEVNULL,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder), "SKIP_DEFAULT_XML_FILE": "1"},
-                              text=True, timeout=16 * PATIENCE)
+                              text=True, timeout=16 * TIMEOUT)
         if done.returncode == 77 or "not to be had" in done.stdout:
             self.skipTest("no network namespaces here: " + done.stdout.strip())
         logs = "".join(f"--- {log.name}\n{log.read_text()}" for log in self.folder.glob("hal-cell.*/*.log"))

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, PATIENCE, Case, Terminal, wait_until
+from harness import HAL, TIMEOUT, Case, Terminal, wait_until
 
 
 class Drive(Case):
@@ -230,7 +230,7 @@ class EveryEnd(Drive):
                 self.assertEqual("A: speed 500\n", session.stdout.readline())
                 self.moving()
                 session.send_signal(number)  # its input stays open
-                session.wait(PATIENCE)
+                session.wait(TIMEOUT)
                 error = self.end(session)[1]
                 self.assertRegex(error, r"^hal can drive: A: stopped and off, at \d+ \(interrupted\)\n$")
                 self.assertEqual("A: state switch on disabled\n", self.drive("A", "state?"))

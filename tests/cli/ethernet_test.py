@@ -34,12 +34,12 @@ class Segment(Case):
             self.assertRegex(done.stdout, r"the (motor|machine) is off at the end: the control missed \d+ cycles")
 
     def stations(self, logs, names):
-        """Each was synchronous, and found its skew within what a busy machine leaves of it."""
+        """Each station was synchronous, and measured its skew as exactly as a busy machine permits."""
         for name, ppm in names.items():
-            said = re.search(r"^TDMA: (.*)$", logs[name], re.M)
-            self.assertIsNotNone(said, f"{name}: {logs[name]}")
-            print(f"{name}: {said[1]}", file=sys.stderr)
-            self.assertGreater(int(re.search(r"syncs (\d+) received", said[1])[1]), 0, said[1])
+            line = re.search(r"^TDMA: (.*)$", logs[name], re.M)
+            self.assertIsNotNone(line, f"{name}: {logs[name]}")
+            print(f"{name}: {line[1]}", file=sys.stderr)
+            self.assertGreater(int(re.search(r"syncs (\d+) received", line[1])[1]), 0, line[1])
             self.assertLess(abs(float(re.search(r"clock ([-+.\d]+) ppm", said[1])[1]) + ppm), 150, said[1])
 
     def test_the_rig_hangs_at_the_other_end(self):

@@ -5,7 +5,7 @@ import resource
 import subprocess
 import unittest
 
-from harness import HAL, PATIENCE, SANITIZED, Case
+from harness import HAL, TIMEOUT, SANITIZED, Case
 
 LIMIT = 2 << 30  # bytes of address space: the program, its threads' stacks, a plugin
 MASTER = "master:\nname m\ncycle 1000\nslot 0 100\n"
@@ -29,7 +29,7 @@ class Flood(Case):
                 self.write("flood.hal", netlist)
                 limit = None if SANITIZED else lambda: resource.setrlimit(resource.RLIMIT_AS, (LIMIT, LIMIT))
                 done = subprocess.run([HAL, "check", "flood.hal"], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-                                      capture_output=True, text=True, timeout=2 * PATIENCE, preexec_fn=limit)
+                                      capture_output=True, text=True, timeout=2 * TIMEOUT, preexec_fn=limit)
                 if "left out of this build" in done.stderr:
                     continue
                 self.assertEqual(1, done.returncode, done.stderr[-500:])

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 from program import program  # noqa: E402
 
-PATIENCE = float(os.environ.get("HALCYON_TEST_TIMEOUT", "30"))  # for what should happen at once
+TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "30"))  # for what should happen at once
 
 
 HAL = program()
@@ -44,12 +44,12 @@ def undisturbed(error):
 
 def wait_until(predicate, what):
     """Asks again and again until `predicate` answers something true, which is returned."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while True:
         if answer := predicate():
             return answer
         if time.monotonic() > deadline:
-            raise AssertionError(f"{what}: not after {PATIENCE:g} s")
+            raise AssertionError(f"{what}: not after {TIMEOUT:g} s")
         time.sleep(0.01)
 
 
@@ -74,7 +74,7 @@ class Case(unittest.TestCase):
         """Runs hal (or an alias) to its end; standard output and error as text."""
         done = subprocess.run([name, *map(str, words)], executable=str(HAL), cwd=self.folder, env={**self.environment, **(environment or {})},
                               input=given, stdin=subprocess.DEVNULL if given is None else None, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, timeout=2 * PATIENCE)
+                              stderr=subprocess.PIPE, text=True, timeout=2 * TIMEOUT)
         done.stderr = undisturbed(done.stderr)
         return done
 
@@ -108,7 +108,7 @@ class Case(unittest.TestCase):
         if machine.poll() is None:
             machine.send_signal(number)
         try:
-            out, err = machine.communicate(timeout=PATIENCE)
+            out, err = machine.communicate(timeout=TIMEOUT)
             return out, undisturbed(err)
         except subprocess.TimeoutExpired:
             machine.kill()
@@ -152,7 +152,7 @@ class Terminal:
 
     def expect(self, text):
         """Waits for a text; returns, and forgets, everything up to its end."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while text not in self.seen:
             if self.read(0.1) is None or time.monotonic() > deadline:
                 raise AssertionError(f"{text!r} does not appear; there is: {self.seen!r}")
@@ -162,7 +162,7 @@ class Terminal:
 
     def wait(self):
         """Waits for the end of the process; its exit status."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while self.status is None:
             self.read(0.05)
             done, status = os.waitpid(self.process, os.WNOHANG)

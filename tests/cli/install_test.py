@@ -12,7 +12,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from harness import HAL, PATIENCE, ROOT, SANITIZED
+from harness import HAL, TIMEOUT, ROOT, SANITIZED
 
 BUILD = HAL.parent.parent
 RUNUSER = shutil.which("runuser")
@@ -28,7 +28,7 @@ LATER = "python/hal/_core*.so reference completion components/fieldbus/tdma/libh
 
 
 def run(*words, **how):
-    return subprocess.run([str(word) for word in words], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=4 * PATIENCE, **how)
+    return subprocess.run([str(word) for word in words], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=4 * TIMEOUT, **how)
 
 
 class Installed(unittest.TestCase):
@@ -164,9 +164,9 @@ class Installed(unittest.TestCase):
         if not list((BUILD / "python/hal").glob("_core*.so")):
             self.skipTest("Python's module hal was left out of this build")
         self.assertIn(str(self.prefix), self.good("env", f"PYTHONPATH={module}", "/usr/bin/python3", "-c", "import hal; print(hal.__file__)"))
-        (self.home / "say.py").write_text("import hal, sys\nprint('module', hal.__file__)\n")
-        (self.home / "say.hal").write_text("loadusr -w /usr/bin/python3 say.py\n")
-        self.assertIn(f"module {module}", self.good(self.hal, "sim", "-q", "say.hal", cwd=self.home))
+        (self.home / "module.py").write_text("import hal, sys\nprint('module', hal.__file__)\n")
+        (self.home / "module.hal").write_text("loadusr -w /usr/bin/python3 module.py\n")
+        self.assertIn(f"module {module}", self.good(self.hal, "sim", "-q", "module.hal", cwd=self.home))
 
     def test_manual_pages_and_completion_are_found(self):
         if shutil.which("man"):

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import unittest
 
-from harness import HAL, PATIENCE, Case
+from harness import HAL, TIMEOUT, Case
 
 BUILD = HAL.parent.parent  # the build tree, or an installation
 PACKAGE = BUILD / "lib" / "cmake" / "Halcyon"
@@ -20,7 +20,7 @@ class NewComponent(Case):
     def shell_line(self, line, folder, status=0, path=None):
         environment = {**self.environment, "PATH": path or self.environment["PATH"]}
         done = subprocess.run(["bash", "-c", line], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              text=True, timeout=4 * PATIENCE)
+                              text=True, timeout=4 * TIMEOUT)
         self.assertEqual(status, done.returncode, done.stdout)
         return done.stdout
 

@@ -10,7 +10,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from harness import HAL, PATIENCE, ROOT, SANITIZED
+from harness import HAL, TIMEOUT, ROOT, SANITIZED
 
 BUILD = ROOT / "build"
 HEADERS = "/usr/include/opencv4"
@@ -42,7 +42,7 @@ class Optional(unittest.TestCase):
         (folder / "apt-get").chmod(0o755)
         environment = {"PATH": f"{folder}:{os.environ['PATH']}", "FOLDER": str(folder), "HOME": os.environ.get("HOME", str(folder)), "XDG_RUNTIME_DIR": str(folder), "LC_ALL": "C.UTF-8"}
         done = subprocess.run(["unshare", "-m", "sh", "-c", SCRIPT, "sh", str(folder)], env=environment, stdin=subprocess.DEVNULL,
-                              capture_output=True, text=True, timeout=8 * PATIENCE)
+                              capture_output=True, text=True, timeout=8 * TIMEOUT)
         if done.returncode == 77:
             self.skipTest("no overlay file systems here")
         _, offline, online, same = (part.split("\n", 1)[-1] for part in ("\n" + done.stderr).split("=="))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A separate network namespace for a test: its programs share no address or port with other tests."""
+"""A separate network namespace for a test: its addresses and ports are separate from those of other tests."""
 import fcntl
 import os
 import shutil

@@ -32,7 +32,7 @@ def ours(hal, path):
     found = SUMMARY.search(lines[-1]) if lines else None
     if done.returncode == 0 and found:
         return (*map(int, found.groups()), took)
-    if done.returncode == 1 and lines and "refused" in lines[-1]:
+    if done.returncode == 1 and lines and re.search("refused|rejected", lines[-1]):
         return next((line for line in lines if " error: " in line), "rejected without a reason")
     return f"CRASH: status {done.returncode}"
 
@@ -60,7 +60,7 @@ def main():
     table = "--table" in sys.argv
     if table:
         print("| file | objects | entries | warnings | notes | canopen |\n| --- | --- | --- | --- | --- | --- |")
-    read = refused = crashed = clean = warnings = theirs_read = theirs_there = entries = 0
+    read = rejected = crashed = clean = warnings = theirs_read = theirs_there = entries = 0
     slowest = (0.0, "")
     for path in files:
         mine, other = ours(hal, path), theirs(path)
@@ -75,7 +75,7 @@ def main():
             slowest = max(slowest, (mine[4], path.name))
             row = f"| {path.name} | {mine[0]} | {mine[1]} | {mine[2]} | {mine[3]} | {word} |"
         else:
-            refused += not mine.startswith("CRASH")
+            rejected += not mine.startswith("CRASH")
             crashed += mine.startswith("CRASH")
             row = f"| {path.name} | {mine} | | | | {word} |"
         if table:
@@ -84,7 +84,7 @@ def main():
             print(row)
         elif isinstance(other, int) and other != mine[0]:
             print(f"{path.name}: {mine[0]} objects here, {other} in canopen")
-    print(f"{len(files)} files: {read} read ({clean} without a warning), {refused} refused, {crashed} crashed; "
+    print(f"{len(files)} files: {read} read ({clean} without a warning), {rejected} rejected, {crashed} crashed; "
           f"{entries} entries, {warnings} warnings; "
           f"slowest {slowest[0]:.0f} ms ({slowest[1]})")
     if theirs_there:

@@ -68,19 +68,19 @@ def compile_all(sources, folder):
         if needs:
             print(f"needs    {source.name}: {', '.join(needs)}", flush=True)
             continue
-        said, status = hal("compile", "--output", str(plugins), str(source), folder=folder)
+        output, status = hal("compile", "--output", str(plugins), str(source), folder=folder)
         if status:
             bad += 1
-            print(f"FAILED   {source.name}: {first_error(said)}", flush=True)
+            print(f"FAILED   {source.name}: {first_error(output)}", flush=True)
             continue
         if not (plugins / f"{source.stem}.so").exists():
             good.append(source.stem)
             print(f"compiled {source.name} (a program)", flush=True)
             continue
         (folder / "load.hal").write_text(f"loadrt {source.stem}\n")
-        said, status = hal("check", "load.hal", folder=folder, plugins=plugins)
+        output, status = hal("check", "load.hal", folder=folder, plugins=plugins)
         good.append(source.stem)
-        print(f"compiled {source.name}" + (f" (loads with arguments only: {first_error(said)})" if status else ""), flush=True)
+        print(f"compiled {source.name}" + (f" (loads with arguments only: {first_error(output)})" if status else ""), flush=True)
     return good, bad
 
 
@@ -104,9 +104,9 @@ def run_tests(top, compiled, folder):
                  for word in re.findall(r"loadrt\s+(\w+)", file.read_text(errors="replace"))}
         if not (loads & set(compiled) or own and "halcompile" in (test / script).read_text(errors="replace")):
             continue
-        if lacks := tests.missing(test, known | own):
+        if parts := tests.missing_parts(test, known | own):
             other += 1
-            print(f"needs    {name}: {lacks}", flush=True)
+            print(f"needs    {name}: {parts}", flush=True)
             continue
         verdict = tests.run(test, script)
         passed, failed = passed + (verdict is True), failed + (verdict is not True)

@@ -61,7 +61,7 @@ def shell_programs(text):
             yield words[0]
 
 
-def missing(test, components):
+def missing_parts(test, components):
     """What the test needs and this project does not have, or an empty text."""
     needs = []
 
@@ -110,8 +110,8 @@ def run(test, script):
             except subprocess.TimeoutExpired:
                 return "still running after 60 s"
         if status != 0:
-            said = (here / "stderr").read_text(errors="replace").strip().splitlines()
-            return f"status {status}: {said[-1] if said else ''}"
+            output = (here / "stderr").read_text(errors="replace").strip().splitlines()
+            return f"status {status}: {output[-1] if output else ''}"
         if (here / "checkresult").exists():
             judge = subprocess.run([str(here / "checkresult"), str(here / "result")], cwd=here, env=environment, timeout=60,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
@@ -139,15 +139,15 @@ def main():
         name = str(test.relative_to(top))
         if len(sys.argv) > 2 and not any(part in name for part in sys.argv[2:]):
             continue
-        lacks = missing(test, components)
-        if lacks:
+        parts = missing_parts(test, components)
+        if parts:
             needs += 1
-            print(f"needs   {name}: {lacks}", flush=True)
+            print(f"needs   {name}: {parts}", flush=True)
             continue
         verdict = run(test, script)
         passed, failed = passed + (verdict is True), failed + (verdict is not True)
         print(f"passed  {name}" if verdict is True else f"FAILED  {name}: {verdict}", flush=True)
-    print(f"{passed} passed, {failed} failed, {needs} need what is not here")
+    print(f"{passed} passed, {failed} failed, {needs} need unsupported parts")
     return 1 if failed else 0
 
 
