@@ -40,7 +40,7 @@ class Segment(Case):
             self.assertIsNotNone(line, f"{name}: {logs[name]}")
             print(f"{name}: {line[1]}", file=sys.stderr)
             self.assertGreater(int(re.search(r"syncs (\d+) received", line[1])[1]), 0, line[1])
-            self.assertLess(abs(float(re.search(r"clock ([-+.\d]+) ppm", said[1])[1]) + ppm), 150, said[1])
+            self.assertLess(abs(float(re.search(r"clock ([-+.\d]+) ppm", line[1])[1]) + ppm), 150, line[1])
 
     def test_the_rig_hangs_at_the_other_end(self):
         done, logs = self.bring_up("ethernet-furuta", SECONDS)

@@ -129,10 +129,10 @@ def main():
         (folder / "config" / "config.h").touch()
         INCLUDES = f"{given.source.resolve()}:{folder / 'config'}"
         good, bad = compile_all(sources, folder)
-        print(f"{len(good)} compiled, {bad} failed, {len(sources) - len(good) - bad} need what is not here")
+        print(f"{len(good)} compiled, {bad} failed, {len(sources) - len(good) - bad} need unsupported parts")
         if given.tests:
             passed, failed, other = run_tests(given.tests.resolve(), good, folder)
-            print(f"tests: {passed} passed, {failed} failed, {other} need what is not here")
+            print(f"tests: {passed} passed, {failed} failed, {other} need unsupported parts")
             bad += failed
     return 1 if bad else 0
 
