@@ -18,9 +18,9 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
 set(HALCYON_COMPONENT_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/components")
-set(CMAKE_INSTALL_RPATH_USE_LINK_PATH ON)  # a library that is not in the system's folders, OpenCV in /opt for one, is found once installed, too
+set(CMAKE_INSTALL_RPATH_USE_LINK_PATH ON)  # finds libraries outside of the system's folders, such as OpenCV in /opt, after the installation, too
 
-# No fused multiply-add behind our back: the same netlist gives the same bytes on every machine.
+# No implicit fused multiply-add: the same netlist has byte-identical output on every machine.
 add_compile_options(-Wall -Wextra -Wpedantic "$<$<COMPILE_LANGUAGE:CXX>:-Wconversion;-Wshadow>" -ffp-contract=off)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     # g++ 12 warns about its own std::string and std::optional (GCC bugs 105651, 105329, 80635).
@@ -30,20 +30,20 @@ if(HALCYON_WERROR)
     add_compile_options(-Werror)
 endif()
 if(HALCYON_SANITIZE)
-    # Without the checks that double the compiler's time: a null pointer ends the program anyway, and x86 and ARM load from any address.
+    # Omits the checks that double the compile time: a null pointer ends the program anyway, and x86 and ARM load from any address.
     add_compile_options("-fsanitize=${HALCYON_SANITIZE}" -fno-sanitize=null,alignment -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
     string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
     add_link_options("-fsanitize=${HALCYON_SANITIZE}")
 endif()
-set(HALCYON_TEST_OPTIONS -O0)  # of the tests' own sources: their assertions take longer to optimise than to run
+set(HALCYON_TEST_OPTIONS -O0)  # for the tests' own sources: their assertions take longer to optimise than to run
 if(HALCYON_SANITIZE)
-    set(HALCYON_TOOL_OPTIONS -O0)  # of programs and their commands, where nothing is real time
+    set(HALCYON_TOOL_OPTIONS -O0)  # for programs and their commands, which are not real time
 else()
     set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")
 endif()
 
 # Optional packages, a file of each, and for the script `hal` the part of the tree that needs it: a build configures again when one of them
-# was installed or removed since, and forgets the files of one that is gone.
+# was installed or removed since, and forgets the files of one that was removed.
 file(STRINGS "${PROJECT_SOURCE_DIR}/cmake/optional" optional REGEX "/")
 list(TRANSFORM optional REPLACE "^[^ ]+ ([^ ]+).*" "\\1")
 file(GLOB optional CONFIGURE_DEPENDS ${optional})
@@ -57,9 +57,9 @@ foreach(variable IN LISTS variables)
 endforeach()
 
 # halcyon_unity(TARGET [ALONE SOURCE...]): compiles the sources of a target eight at a time: without optimisation most of the time goes into
-# reading the same headers. Two sources of such a target must not give one name to different things, not even in anonymous namespaces;
-# those ALONE do, and are compiled one by one, as are those that cmake/alone.awk finds. For sources that nothing optimises; for the others
-# with HALCYON_QUICK only, because then a change compiles eight of them.
+# reading the same headers. Two sources of such a target must not define the same name differently, not even in anonymous namespaces;
+# ALONE lists those that do: they are compiled one by one, as are those that cmake/alone.awk finds. For sources without optimisation; for the
+# others with HALCYON_QUICK only, because a change then compiles eight of them.
 function(halcyon_unity target)
     cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
     if(HALCYON_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
@@ -77,21 +77,21 @@ function(halcyon_unity target)
     endif()
 endfunction()
 
-# The same for what is optimised.
+# The same for optimised targets.
 function(halcyon_unity_quick)
     if(HALCYON_QUICK)
         halcyon_unity(${ARGV})
     endif()
 endfunction()
 
-# The same for what has HALCYON_TOOL_OPTIONS, which do not optimise it under a sanitizer.
+# The same for targets with HALCYON_TOOL_OPTIONS, which are not optimised under a sanitizer.
 function(halcyon_unity_tool)
     if(HALCYON_SANITIZE OR HALCYON_QUICK)
         halcyon_unity(${ARGV})
     endif()
 endfunction()
 
-# ccache: the same object for the same text, wherever the tree lies.
+# ccache: the same object for the same text, independent of the path of the tree.
 find_program(HALCYON_CCACHE ccache)
 if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
     set(HALCYON_LAUNCHER env "CCACHE_BASEDIR=${PROJECT_SOURCE_DIR}" CCACHE_ABSSTDERR=1 CCACHE_SLOPPINESS=pch_defines,time_macros "${HALCYON_CCACHE}")
@@ -106,7 +106,7 @@ if(HALCYON_MOLD)
     add_link_options(-fuse-ld=mold)
 endif()
 
-# The real-time guard: clang 19's runtime archive (Debian: libclang-rt-19-dev) works with g++ when it is linked whole into the program.
+# The real-time guard: clang 19's runtime archive (Debian: libclang-rt-19-dev) works with g++ when it is linked into the program as a whole.
 # HALCYON_RT_GUARD puts it into every program of the tree; the tests have a guarded program of their own.
 if(NOT HALCYON_SANITIZE)
     find_library(HALCYON_RTSAN_ARCHIVE NAMES "libclang_rt.rtsan-${CMAKE_SYSTEM_PROCESSOR}.a"
@@ -139,7 +139,7 @@ endfunction()
 
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_LIBDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_LIBRARIES_FROM_PROGRAMS)
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_INCLUDEDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_INCLUDES_FROM_PROGRAMS)
-# The values of runtime/paths.hpp, in the one source that depends on where this build tree lies.
+# The values of runtime/paths.hpp, in the only source that depends on the path of this build tree.
 file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/paths.cpp" @ONLY CONTENT [[
 // SPDX-License-Identifier: MIT
 #include "paths.hpp"

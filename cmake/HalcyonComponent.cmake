@@ -2,13 +2,13 @@
 # add_hal_component(NAME SOURCE...): a plugin NAME.so that exports `hal_plugin` and nothing else.
 #
 # Works in this tree and, after find_package(Halcyon), in any other. The target is component_NAME. Outside of this tree a `test.hal`
-# with its `expected` beside the CMakeLists.txt becomes the test NAME, which ctest runs.
+# with its `expected` beside the CMakeLists.txt becomes the test NAME, run by ctest.
 
 # hal_component_options(TARGET): how the sources of a plugin are compiled.
 function(hal_component_options target)
     target_link_libraries(${target} PRIVATE Halcyon::sdk)
     target_compile_options(${target} PRIVATE -fno-plt -ffp-contract=off "$<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>"
-        "$<$<CONFIG:>:-O2>")  # a project that names no build type wants neither an assertion less nor a slow cycle
+        "$<$<CONFIG:>:-O2>")  # without a build type: optimised, with assertions
     set_target_properties(${target} PROPERTIES
         CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON DEFINE_SYMBOL "")
 endfunction()
@@ -18,21 +18,21 @@ function(add_hal_component name)
     set(target "component_${name}")
     add_library(${target} MODULE ${ARGN})
     hal_component_options(${target})
-    # The version script also hides the templates of libstdc++, which -fvisibility=hidden lets through.
+    # The version script also hides the templates of libstdc++, which -fvisibility=hidden does not hide.
     set(map "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/plugin.map")
     target_link_options(${target} PRIVATE "LINKER:--version-script=${map}")
-    if(NOT (HALCYON_SANITIZE AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))  # there the sanitizer is in the program only
+    if(NOT (HALCYON_SANITIZE AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))  # Clang links the sanitizer into the program only
         target_link_options(${target} PRIVATE "LINKER:-z,defs")
     endif()
     set_target_properties(${target} PROPERTIES OUTPUT_NAME "${name}" PREFIX "" SUFFIX ".so" LINK_DEPENDS "${map}"
-        INSTALL_RPATH "$ORIGIN/../..")  # for programs other than hal, which loads the libraries of Halcyon by itself
+        INSTALL_RPATH "$ORIGIN/../..")  # for programs other than hal, which loads Halcyon's libraries itself
     if(HALCYON_COMPONENT_OUTPUT_DIRECTORY)
         set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${HALCYON_COMPONENT_OUTPUT_DIRECTORY}")
     endif()
     if(TARGET halcyon_precompiled)  # in this tree: the sdk's header is read once for all components
         target_precompile_headers(${target} REUSE_FROM halcyon_precompiled)
     endif()
-    if(HALCYON_COMPONENT_FOLDER)  # in this tree: the folder below components/ is its group; the summary is for what is not built yet
+    if(HALCYON_COMPONENT_FOLDER)  # in this tree: the folder below components/ is its group; the summary is for components that are not built yet
         list(GET ARGN 0 source)
         cmake_path(ABSOLUTE_PATH source)
         file(STRINGS "${source}" summary REGEX "^HAL_COMPONENT[(]" LIMIT_COUNT 1)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-# halcyon_interface(LIBRARY TARGET FOLDER): ties what links the shared library LIBRARY to its headers below FOLDER. They have C++ classes, so a
-# plugin of another build would read other members than the library wrote. TARGET, whose objects are in the library, defines a symbol with the
-# hash of the headers in its name, and each target that links the library needs it: a plugin of other headers does not load.
+# halcyon_interface(LIBRARY TARGET FOLDER): ties users of the shared library LIBRARY to its headers below FOLDER. These contain C++ classes, so
+# the layout in a plugin of another build may differ. TARGET, whose objects are in the library, defines a symbol with the hash of the headers in
+# its name, and each target that links the library references it: a plugin compiled with other headers does not load.
 function(halcyon_interface library target folder)
     file(GLOB_RECURSE headers CONFIGURE_DEPENDS "${folder}/*.hpp")
     list(SORT headers)

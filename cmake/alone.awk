@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 # awk -f alone.awk SOURCE...
-# Prints the sources that cannot be compiled as one with those before them, because they give a name in an anonymous namespace to something
-# else. A rough reader of this tree's own style: such a name stands in the first line of its declaration, which is not indented.
-# Also those that call hal::quoted() by its short name, when another source includes std::quoted(), which would be meant as well.
+# Prints the sources that cannot be compiled as one with those before them, because they define a name in an anonymous namespace
+# differently. A rough parser for the style of this tree: such a name is in the first line of its declaration, which is not indented.
+# Also prints those that call hal::quoted() unqualified, when another source includes std::quoted(), which would be ambiguous.
 
 function finish(    name, taken) {
     for (name in names)
@@ -12,7 +12,7 @@ function finish(    name, taken) {
     split("", names)
 }
 
-# The name that a line declares, or "".
+# Returns the name that a line declares, or "".
 function declared(text,    at) {
     sub(/^template *<[^>]*(<[^>]*>[^>]*)*> */, "", text)
     if (text ~ /^(using +namespace|namespace|static_assert|friend|extern)/) return ""

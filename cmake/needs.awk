@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 # awk -v command=run -f needs.awk -- ARGUMENT...
-# Prints what a command of `hal` needs beside the program, one name per line: components, with _ for -, and
+# Prints what a command of `hal` needs in addition to the program, one name per line: components, with _ for -, and
 #     bus       the program of the bus tools
 #     python    Python's module hal
 #     all       all components
-# Read before the program is built, so it is a rough reader of netlists and INI files: it may print a name that is not used, or that is no
-# component; it does not print what only the program can know. The program builds what is missing then (runtime/machine/plugins.cpp).
+# It runs before the program is built, so it is only a rough parser of netlists and INI files: it may print an unused name, or one that is not
+# a component, and it misses names that only the program can determine. The program builds missing ones later (runtime/machine/plugins.cpp).
 
 function emit(name) {
     gsub(/["']/, "", name)
@@ -16,7 +16,7 @@ function emit(name) {
     }
 }
 
-# The words that a variable of a netlist may stand for.
+# The possible values of a variable of a netlist.
 function offer(text,    words, i, count) {
     count = split(text, words, /[ \t=,]+/)
     for (i = 1; i <= count; ++i)
@@ -61,7 +61,7 @@ function read_command(text, folder,    words, count, i) {
     }
 }
 
-# A file as it was named, or in the folder of the one that names it.
+# Finds a file as it was named, or in the folder of the file that names it.
 function read_file(name, folder,    path, line, text, ini) {
     gsub(/["']/, "", name)
     path = there(name) ? name : folder name
