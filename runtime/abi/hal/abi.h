@@ -36,7 +36,7 @@ typedef struct hal_port {
     uint8_t *data;
 } hal_port;
 
-/* One slot: eight bytes, whatever the type. `raw` stands first, so that `= {0}` clears all of them. */
+/* One slot: eight bytes, whatever the type. `raw` is first, so that `= {0}` clears all of it. */
 typedef union hal_value {
     uint64_t raw;
     bool bit;
@@ -48,8 +48,8 @@ typedef union hal_value {
     hal_port *port;
 } hal_value;
 
-/* A pin as it stands in the instance's memory. While the pin is not linked, `slot` points at `own`. Only
- * the host changes `slot`, at the top of a cycle of the thread the pin belongs to. */
+/* A pin in the memory of its instance. While the pin is not linked, `slot` points to `own`. Only the host
+ * changes `slot`, at the beginning of a cycle of the thread the pin belongs to. */
 typedef struct hal_pin {
     hal_value *slot;
     hal_value own;
@@ -71,7 +71,7 @@ typedef struct hal_pin_decl {
     const char *unit;
     hal_value initial, safe;
     const void *function; /* `identity` of the one function that uses the pin; NULL: all of them do */
-    hal_value **pointer;  /* since 1.1: NULL, or a place of the plugin's that the host sets whenever it sets `slot`, to the same */
+    hal_value **pointer;  /* since 1.1: NULL, or a pointer in the plugin that the host keeps equal to `slot` */
 } hal_pin_decl;
 
 #define HAL_PIN_DECL_SIZE_1_0 offsetof(hal_pin_decl, pointer)
@@ -94,8 +94,8 @@ typedef struct hal_call {
     void *self;
 } hal_call;
 
-/* Since 1.1: does `*current = call; call->step(call->self, cycle)` for each call from `first` up to, not with, `last`, which all have the
- * same step. `current` tells the host where it is, should a call not come back. [realtime] */
+/* Since 1.1: does `*current = call; call->step(call->self, cycle)` for each call in [first, last), which all have the
+ * same step. `current` shows the host the running call, in case it does not return. [realtime] */
 typedef void (*hal_row)(const hal_call *first, const hal_call *last, const hal_cycle *cycle, const hal_call *volatile *current);
 
 enum {
@@ -111,7 +111,7 @@ typedef struct hal_function_decl {
     hal_step step;
     void *self;
     const void *identity;
-    hal_row row; /* since 1.1: NULL, or what runs many of these in a row with less than a call each */
+    hal_row row; /* since 1.1: NULL, or runs many consecutive calls in one loop */
 } hal_function_decl;
 
 #define HAL_FUNCTION_DECL_SIZE_1_0 offsetof(hal_function_decl, row)
@@ -131,7 +131,7 @@ typedef struct hal_argument_decl {
 /* What a rejection is about. */
 typedef enum hal_subject { HAL_SUBJECT_INSTANCE, HAL_SUBJECT_ARGUMENT, HAL_SUBJECT_PIN } hal_subject;
 
-/* Since 1.2: why create or start returns false. The host copies all texts; it reads only as many bytes as `size` says. */
+/* Since 1.2: why create or start returns false. The host copies all texts; it reads only the first `size` bytes. */
 typedef struct hal_rejection {
     uint32_t size;
     hal_subject subject;
@@ -162,10 +162,10 @@ typedef struct hal_host {
 enum {
     HAL_COMPONENT_SINGLETON = 1, /* one instance, named like the component without a number */
     HAL_COMPONENT_STARTS = 2,    /* start or stop does something (since 1.1): a reload stops the old before it starts the new */
-    HAL_COMPONENT_WHOLE_NAMES = 4, /* since 1.1: names of pins and functions stand for themselves, not below the instance's;
-                                      names=, count=, num_chan= and personality= are arguments like others */
-    HAL_COMPONENT_LOOSE_PINS = 8   /* since 1.1: a pin may be used by every function, in whichever threads they are: then its
-                                      signal is one cell that all of them see at once */
+    HAL_COMPONENT_WHOLE_NAMES = 4, /* since 1.1: names of pins and functions are complete, without the name of the instance;
+                                      names=, count=, num_chan= and personality= are ordinary arguments */
+    HAL_COMPONENT_LOOSE_PINS = 8   /* since 1.1: functions in different threads may use the same pin: then its signal is one
+                                      cell that all of them access directly */
 };
 
 typedef struct hal_component {
@@ -177,7 +177,7 @@ typedef struct hal_component {
     size_t instance_size, instance_align; /* the host gives `create` this much zeroed memory */
     bool (*create)(const hal_host *, void *memory);  /* [setup] declares; touches no hardware */
     bool (*start)(void *self, const hal_host *);     /* [setup] acquires hardware; false after fail() */
-    void (*stop)(void *self);                        /* [setup] gives it back, outputs safe */
+    void (*stop)(void *self);                        /* [setup] releases hardware, outputs safe */
     void (*destroy)(void *self);                     /* [setup] */
 } hal_component;
 
@@ -211,25 +211,25 @@ typedef struct hal_faults {
     uint64_t last_cycle;
     void (*clear)(const struct hal_faults *);                                  /* [realtime] acknowledges all */
     void (*raise)(const struct hal_faults *, const void *self, const char *reason, double detail); /* [realtime]
-                              reason: a string that lives as long as the instance. `detail` stands where it has {}, or behind it, or nowhere when it is NaN; what
-                              was done about it follows a semicolon: "node 5 silent for {} s; its outputs were set to safe values" */
+                              reason: a string that lives as long as the instance. `detail` replaces {}, is appended if there is no {}, or is omitted if it is NaN;
+                              the reaction follows a semicolon: "node 5: no heartbeat for {} s; outputs set to safe values" */
 } hal_faults;
 
 typedef enum hal_fault_code {
     HAL_FAULT_NONE, HAL_FAULT_EXCEPTION, HAL_FAULT_NOT_FINITE, HAL_FAULT_BUDGET, HAL_FAULT_SILENT_THREAD, HAL_FAULT_COMPONENT
 } hal_fault_code;
 
-/* Extension "hal.clock/1": the grid of all threads' deadlines, which one instance may make follow an outside beat. */
+/* Extension "hal.clock/1": lets one instance discipline the deadlines of all threads to an external clock reference. */
 typedef struct hal_clock {
     uint32_t size;
     uint32_t pad;
-    int64_t shift_ns; /* sum of all steps; written by the host, read atomically [any] */
-    int64_t limit_ns; /* most that the steps of one cycle move the grid, either way: a tenth of the fastest thread's period; read
+    int64_t shift_ns; /* sum of all clock adjustments; written by the host, read atomically [any] */
+    int64_t limit_ns; /* largest adjustment per cycle in either direction: a tenth of the period of the fastest thread; read
                          atomically [any] */
-    /* [realtime] in a cycle, of the instance that leads only: what is due after this cycle comes so much later (negative: earlier), in all
-       threads, so that their phase to one another stays. hal_cycle.start_ns is the shifted time. */
+    /* [realtime] in a cycle of the leading instance only: delays (negative: advances) all later deadlines of all threads by `ns`, so that
+       their relative phase is kept. hal_cycle.start_ns is the adjusted time. */
     void (*step)(const struct hal_clock *, int64_t ns);
-    /* [setup] in start: this instance leads until it is stopped. false, after fail(): another does. */
+    /* [setup] in start: this instance leads until it is stopped. false, after fail(): another instance leads. */
     bool (*claim)(const struct hal_clock *, const hal_host *);
 } hal_clock;
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Extension "hal.naming/1", offered while an instance is created: names as LinuxCNC's older components make them.
+ * Extension "hal.naming/1", offered while an instance is created: names in the form of LinuxCNC's older components.
  */
 #ifndef HAL_NAMING_H
 #define HAL_NAMING_H
@@ -15,13 +15,13 @@ extern "C" {
 
 typedef struct hal_naming {
     uint32_t size;
-    /* Before the first pin and function: without names= the instance is PREFIX.N, N with at least so many digits. [setup] */
+    /* Names the instance PREFIX.N, N with at least `digits` digits, unless names= is given. Call it before declaring a pin. [setup] */
     void (*instance)(const hal_host *, const char *prefix, unsigned digits);
-    /* From here on a function's name is all of its name. [setup] */
+    /* Declares that the names of all further functions are complete. [setup] */
     void (*whole_function_names)(const hal_host *);
-    /* This argument says how many instances there are when neither names= nor count= does. [setup] */
+    /* Sets the number of instances from this argument when neither names= nor count= is given. [setup] */
     void (*count)(const hal_host *, const char *argument, uint64_t instances);
-    /* The instance's name, valid until create returns. Ask after instance(). [setup] */
+    /* Returns the name of the instance, valid until create returns. Call it after instance(). [setup] */
     const char *(*name)(const hal_host *);
 } hal_naming;
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What an instance is and how it does, as a text: for a component that tells others of it. Offered in start(). */
+/* The state of an instance as text, for a component that publishes it. Offered in start(). */
 #ifndef HAL_STATUS_H
 #define HAL_STATUS_H
 

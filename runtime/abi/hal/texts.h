@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Extension "hal.texts/1", offered while an instance is created: a file that the component reads, with what is wrong in it said as
- * the netlist's own errors are.
+ * Extension "hal.texts/1", offered while an instance is created: reports errors in a file that the component reads in the same form as
+ * errors of the netlist.
  */
 #ifndef HAL_TEXTS_H
 #define HAL_TEXTS_H
@@ -22,18 +22,18 @@ typedef struct hal_text_message {
     const char *code;      /* one of `hal explain` */
     uint32_t begin, end;   /* bytes of the text */
     const char *sentence;  /* no final stop */
-    const char *label;     /* a word under the place, or "" */
+    const char *label;     /* text under the span, or "" */
     const char *help;      /* what to type, or "" */
 } hal_text_message;
 
 typedef struct hal_texts {
     uint32_t size;
-    /* Where the file is that the user calls so: beside the netlist that loads the component, or else as it is written. Valid until
-     * create returns. [setup] */
+    /* Returns the path of `file`: beside the netlist that loads the component, or else as written. Valid until create
+     * returns. [setup] */
     const char *(*find)(const hal_host *, const char *file);
-    /* The text that the messages after it are about, and the name they print. [setup] */
+    /* Sets the text, and its name, to which the following messages refer. [setup] */
     void (*begin)(const hal_host *, const char *name, const char *text, size_t bytes);
-    /* After an error create must fail, and needs no other reason. [setup] */
+    /* Reports a message. After an error create must fail; fail() is then unnecessary. [setup] */
     void (*say)(const hal_host *, const hal_text_message *);
 } hal_texts;
 

@@ -264,7 +264,7 @@ static int run_function(int f) {
         in_cycle = false;
         const int64_t took = now_ns() - begin;
         if (took < shortest) shortest = took;
-        if (took > 5 * period_ns) shortest = took, i = cycles; /* once is no accident */
+        if (took > 5 * period_ns) shortest = took, i = cycles; /* already conclusive */
     }
     alarm(0);
     if (forbidden && strcmp(forbidden, "throw") == 0) printf("function '%s' throws %s in a cycle\n", running, thrown ? thrown : "an exception");

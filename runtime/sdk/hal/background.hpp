@@ -28,7 +28,7 @@ public:
         host_ = extension<hal_background>(HAL_BACKGROUND);
         if (host_ != nullptr && host_->is_virtual != 0) {
             attached_ = host_->attach(host_, [](void* self, std::int64_t now) { static_cast<Background*>(self)->turn_(now, false); }, this);
-            if (!attached_) throw std::runtime_error("there is no memory left for its work outside of the cycle");
+            if (!attached_) throw std::runtime_error("out of memory for its work outside the cycle");
             return;
         }
         ended_.store(false);
@@ -36,7 +36,7 @@ public:
             while (!ended_.load()) turn_(now(), true);
         });
     }
-    /// In the component's stop(). No turn is running when it comes back. [setup]
+    /// Call it in stop(). No turn is running when it returns. [setup]
     void stop() noexcept {
         if (attached_) host_->detach(host_, this);
         attached_ = false;

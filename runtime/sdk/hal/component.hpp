@@ -40,29 +40,29 @@ private:
 };
 static_assert(sizeof(Cycle) == sizeof(void*) && std::is_trivially_copyable_v<Cycle>, "passed in a register, like the pointer");
 
-/// A byte stream (LinuxCNC `port`): one writer, one reader, never blocks. Reads and writes are whole or not at all.
+/// A byte stream (LinuxCNC `port`): one writer, one reader, never blocks. Reads and writes are atomic: all bytes or none.
 class Port {
 public:
     explicit Port(hal_port* port = nullptr) noexcept : port_(port) {}
     std::size_t capacity() const noexcept { return port_ ? port_->capacity : 0; }
     /// Bytes waiting. [any]
     std::size_t readable() const noexcept { return port_ ? static_cast<std::size_t>(load(port_->head) - load(port_->tail)) : 0; }
-    /// Bytes of room. [any]
+    /// Free bytes. [any]
     std::size_t writable() const noexcept { return capacity() - readable(); }
-    /// Copies `bytes` out without taking them; false when fewer are there. [realtime] reader
+    /// Copies `bytes` without consuming them; false when fewer are available. [realtime] reader
     bool peek(void* to, std::size_t bytes) const noexcept {
         if (readable() < bytes) return false;
         for (std::size_t i = 0; i < bytes; ++i) static_cast<std::uint8_t*>(to)[i] = port_->data[(port_->tail + i) % port_->capacity];
         return true;
     }
-    /// Takes `bytes`; false, and nothing taken, when fewer are there. [realtime] reader
+    /// Consumes `bytes`; false, without consuming any, when fewer are available. [realtime] reader
     bool read(void* to, std::size_t bytes) const noexcept { return peek(to, bytes) && discard(bytes); }
     bool discard(std::size_t bytes) const noexcept {
         if (readable() < bytes) return false;
         store(port_->tail, port_->tail + bytes);
         return true;
     }
-    /// Appends `bytes`; false, and nothing written, when there is no room. [realtime] writer
+    /// Appends `bytes`; false, without writing any, when there is not enough space. [realtime] writer
     bool write(const void* from, std::size_t bytes) const noexcept {
         if (writable() < bytes) return false;
         for (std::size_t i = 0; i < bytes; ++i) port_->data[(port_->head + i) % port_->capacity] = static_cast<const std::uint8_t*>(from)[i];
@@ -85,7 +85,7 @@ template <PinType T>
 struct PinOptions {
     T initial{};                        ///< value before anything is linked or set
     const char* unit = "";              ///< "mm", "rad/s", "V" …
-    std::optional<T> safe = {};         ///< outputs: written on stop, unload, a stopping fault, end of process
+    std::optional<T> safe = {};         ///< outputs: written on stop, unload, a fault that stops the thread, end of process
     bool finite = false;                ///< float outputs: NaN or infinity here is a fault
 };
 
@@ -179,9 +179,9 @@ void run_row(const hal_call* call, const hal_call* last, const hal_cycle* cycle,
 }
 }  // namespace detail
 
-/// A member function as a constant: `Function run{*this, "", hal::step<&And2::update>, "computes out"}`. Where many instances stand in
-/// a row in a thread, they are run by one loop in the plugin, in which the compiler can inline `update`: worth it where the work is a few
-/// instructions, and the call would cost as much.
+/// A member function as a constant: `Function run{*this, "", hal::step<&And2::update>, "computes out"}`. Consecutive instances
+/// in a thread are run by one loop in the plugin, in which the compiler can inline `update`: useful when the work is only a few
+/// instructions, comparable to the cost of a call.
 template <auto member>
 struct Step {};
 template <auto member>
@@ -232,8 +232,8 @@ protected:
     }
 };
 
-/// What the host calls to make hardware outputs safe: on stop, unload, a stopping fault, the end of the process and in
-/// a crash handler. Must be async-signal-safe: it may write to devices and must not allocate, lock or log.
+/// What the host calls to make hardware outputs safe: on stop, unload, a fault that stops the thread, the end of the process
+/// and in a crash handler. Must be async-signal-safe: it may write to devices and must not allocate, lock or log.
 class Emergency : Function {
 public:
     template <std::derived_from<Component> C>
@@ -281,7 +281,7 @@ private:
 class RealArgument {
 public:
     RealArgument(Component&, const char* name, double fallback, const char* doc, ArgumentOptions options = {}) {
-        char shortest[32] = {};  // that is read as the same number again
+        char shortest[32] = {};  // the shortest text that parses to the same number
         std::to_chars(shortest, shortest + sizeof shortest - 1, fallback);
         const std::string text = Argument::ask(name, shortest, doc, options);
         char* end = nullptr;
@@ -353,7 +353,7 @@ public:
     Io& operator=(const Io& other) noexcept { return this->put(other.get()), *this; }
 };
 
-/// A row of pins. In `name` and `doc` a block of `#` stands for the index, padded with zeros to the block's width.
+/// An array of pins. In `name` and `doc` a block of `#` is replaced by the index, padded with zeros to the width of the block.
 template <class P, class T>
 class Pins {
 public:
@@ -361,7 +361,7 @@ public:
     Pins(Component& component, const Function& function, const char* name, std::int64_t count, const char* doc, PinOptions<T> options = {}) {
         make(component, &function, name, count, doc, options, 0);
     }
-    /// The same, counting from `first` (LinuxCNC numbers some rows from 1).
+    /// The same, counting from `first` (LinuxCNC numbers some arrays from 1).
     Pins(Component& component, const char* name, std::int64_t count, std::int64_t first, const char* doc, PinOptions<T> options = {}) { make(component, nullptr, name, count, doc, options, first); }
     std::size_t size() const noexcept { return size_; }
     P& operator[](std::size_t i) noexcept { return pins_[i]; }
@@ -402,7 +402,7 @@ template <PinType T> using Outs = Pins<Out<T>, T>;
 template <PinType T> using Ios = Pins<Io<T>, T>;
 template <PinType T> using Params = Pins<Param<T>, T>;
 
-/// What a component says of itself as a whole: `static constexpr hal::Traits traits{.singleton = true};`
+/// Properties of a component as a whole: `static constexpr hal::Traits traits{.singleton = true};`
 struct Traits {
     bool singleton = false;           ///< one instance, named like the component without a number
     std::uint32_t default_count = 1;  ///< instances of a bare `loadrt`
@@ -442,7 +442,7 @@ void construct(const hal_host* host, void* memory) {
 
 template <std::derived_from<Component> C>
 constexpr hal_component component(const char* name, const char* summary, const char* doc = "") {
-    // An error in a member's declaration makes C unconstructible as well; then it is no aggregate, because the constructor is inherited.
+    // An error in the declaration of a member also makes C unconstructible; C is then not an aggregate, because the constructor is inherited.
     static_assert(std::is_constructible_v<C, const hal_host*> || !std::is_aggregate_v<C>,
                   "missing line in the component: using Component::Component;");
     constexpr Traits traits = traits_of<C>();
@@ -468,7 +468,7 @@ constexpr hal_component component(const char* name, const char* summary, const c
 }
 }  // namespace detail
 
-/// Asks the host for an extension of the interface, or gives nullptr. In constructor and start() only. [setup]
+/// Returns an extension of the host interface, or nullptr. In constructor and start() only. [setup]
 template <class Extension>
 const Extension* extension(const char* id) {
     return static_cast<const Extension*>(detail::creating->extension(detail::creating, id));

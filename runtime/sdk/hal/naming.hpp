@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// For components whose instances, functions or number of instances have names of their own in LinuxCNC.
+// For components whose instance or function names in LinuxCNC differ from COMPONENT.N.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace hal {
 
-/// What the instance is called that is being made; `otherwise` where the host does not say. In a component's constructor. [setup]
+/// Returns the name of the instance under construction; `otherwise` if the host does not provide it. In a constructor only. [setup]
 inline std::string own_name(const char* otherwise) {
     const auto* naming = extension<hal_naming>(HAL_NAMING);
     return naming != nullptr ? naming->name(detail::creating) : otherwise;
@@ -23,7 +23,7 @@ public:
     }
 };
 
-/// The functions declared after it are called just what they say, without a component or instance before it.
+/// Declares that the names of all further functions are complete, without the name of the component or instance.
 class WholeFunctionNames {
 public:
     explicit WholeFunctionNames(Component&) {

@@ -22,7 +22,7 @@ class Queue {
     static_assert(std::is_trivially_copyable_v<T>);
 
 public:
-    /// Room for at least `capacity` items. [setup]
+    /// Allocates space for at least `capacity` items. [setup]
     explicit Queue(std::size_t capacity)
         : mask_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity) - 1), items_(std::make_unique<T[]>(mask_ + 1)) {}
 
@@ -34,7 +34,7 @@ public:
         head_.store(head + 1, std::memory_order_release);
         return true;
     }
-    /// All of a row or, when there is no room for all of it, nothing: the reader never sees a part. [realtime] writer
+    /// Appends all items or, when there is not enough space, none: the reader never sees a part. [realtime] writer
     bool push(const T* items, std::size_t count) noexcept {
         const auto head = head_.load(std::memory_order_relaxed);
         if (head + count - tail_.load(std::memory_order_acquire) > mask_ + 1) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writing a file whole: the one way in which the program and its components write files that somebody reads later. [setup]
+// Atomic replacement of a file: the program and its components write all files for later reading in this way. [setup]
 #pragma once
 
 #include <atomic>
@@ -39,7 +39,7 @@ inline std::string write_in_place(const std::string& path, std::string_view byte
 
 }  // namespace detail
 
-/// Replaces the content of a file, or makes the file. Whoever reads it, and whatever fails (a full disk, a crash), finds the old
+/// Replaces the content of a file, or creates the file. A reader finds, even after a failure (a full disk, a crash), the old
 /// content or the new one, never a part of it: the bytes go to a file beside it, to the disk, and then take the name. An existing
 /// file keeps its permissions, and its owner where that is allowed; a symbolic link stays one. Returns the reason of a failure, or an
 /// empty string.

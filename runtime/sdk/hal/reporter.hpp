@@ -14,7 +14,7 @@
 
 namespace hal {
 
-/// `Event` must be trivially copyable. One cycle queues events, one thread words them; on the virtual clock they are printed at the end of
+/// `Event` must be trivially copyable. A cycle queues events, one thread formats them; on the virtual clock they are printed at the end of
 /// the instant, so that the sentences of several instances come in the same order every time. One line per subject and second is printed.
 template <class Event>
 class Reporter {
@@ -34,7 +34,7 @@ public:
         print(now_ns_);
         log_.close();
     }
-    /// What finds no room in the queue is only counted. [realtime]
+    /// Queues an event; if the queue is full, only counts it. [realtime]
     void tell(const Event& event) noexcept {
         if (!events_.push(event)) lost_.fetch_add(1, std::memory_order_relaxed);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// For components that read a file of the user's: where it is, and what is wrong in it, said as the netlist's own errors are.
+// For components that read a file of the user: finds the file and reports errors in it in the same form as errors of the netlist.
 #pragma once
 
 #include <stdexcept>
@@ -12,15 +12,15 @@
 
 namespace hal {
 
-/// In a component's constructor only. A host without the extension (`hal doc`) hears nothing.
+/// In a component's constructor only. A host without the extension (`hal doc`) gets no messages.
 class Texts {
 public:
     explicit Texts(Component&) : texts_(extension<hal_texts>(HAL_TEXTS)) {}
-    /// False: nobody loads this instance, its declarations are looked at.
+    /// False: the instance is not loaded, only its declarations are read.
     bool offered() const { return texts_ != nullptr; }
-    /// Beside the netlist, or else as it is written. [setup]
+    /// Returns the path of `file`: beside the netlist, or else as written. [setup]
     std::string find(const std::string& file) const { return texts_ ? texts_->find(detail::creating, file.c_str()) : file; }
-    /// The text of `file`, which the argument `argument` names. Throws when it cannot be read or is longer than 64 KiB. [setup]
+    /// Returns the content of `file`, the value of `argument`. Throws if it cannot be read or is longer than 64 KiB. [setup]
     std::string read(const char* argument, const std::string& file) const {
         constexpr std::size_t most = 65536;
         const std::string path = find(file);
@@ -32,11 +32,11 @@ public:
                                               "' is longer than 64 KiB; is it the right one?");
         return text;
     }
-    /// The text the next messages are about. [setup]
+    /// Sets the text to which the next messages refer. [setup]
     void begin(const std::string& name, std::string_view text) const {
         if (texts_) texts_->begin(detail::creating, name.c_str(), text.data(), text.size());
     }
-    /// [setup]
+    /// Reports a message about bytes `begin` to `end`. [setup]
     void say(hal_severity severity, const char* code, std::uint32_t begin, std::uint32_t end, const std::string& sentence,
              const std::string& label, const std::string& help) const {
         const hal_text_message message{sizeof message, severity, code, begin, end, sentence.c_str(), label.c_str(), help.c_str()};
@@ -51,7 +51,7 @@ public:
         if (offered()) refuse();
         throw std::invalid_argument(file + ": " + problems.front().sentence + "; " + problems.front().help);
     }
-    /// Ends the constructor after an error was said. [setup]
+    /// Ends the constructor after an error was reported. [setup]
     [[noreturn]] static void refuse() { detail::refused(); }
 
 private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// For components of buses: `show latency` says how long the values of their pins are on the wire.
+// For components of buses: reports the path delay of the values of their pins, for `show latency`.
 #pragma once
 
 #include "hal/component.hpp"

@@ -40,7 +40,7 @@ static int comp_id __attribute__((unused)) = 1; /* what hal_init() would have gi
 
 typedef struct __comp_item {
     size_t offset; /* of the first hal_pin in the instance */
-    unsigned most; /* elements there is room for */
+    unsigned most; /* capacity in elements */
     hal_type type;
     hal_dir dir;
     unsigned flags;
@@ -115,7 +115,7 @@ static inline void __comp_begin_as(__comp_context *context, const char *prefix, 
 /* What EXTRA_SETUP or POST_EXPORT gave. */
 static inline bool __comp_called(const char *name, int result) { return result >= 0 || halcyon_refuse(name, result); }
 
-/* get_count() says how many instances there are. */
+/* Takes the number of instances from get_count(). */
 static inline bool __comp_counted(const __comp_context *context, int result) {
     char reason[100];
     const hal_naming *const naming = context->host->extension(context->host, HAL_NAMING);

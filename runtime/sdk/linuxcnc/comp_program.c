@@ -24,7 +24,7 @@ static bool take_word(char *word) {
     if (strncmp(word, "count=", 6) == 0) {
         const long wanted = strtol(word + 6, &end, 0);
         if (end == word + 6 || *end || wanted < 0 || wanted > 1000) {
-            fprintf(stderr, "%s: %s is no number of instances\n", hal_plugin.name, word);
+            fprintf(stderr, "%s: %s is not a valid number of instances\n", hal_plugin.name, word);
             exit(1);
         }
         count = (int)wanted;

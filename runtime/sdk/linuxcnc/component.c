@@ -3,7 +3,7 @@
  * What stands behind hal.h and rtapi.h: a Halcyon component whose constructor calls the user's rtapi_app_main().
  * `hal compile FILE.c` compiles this file with the user's, with HALCYON_COMPONENT as the name of the plugin.
  *
- * Such a component keeps its state in static variables, so it has one instance; how many channels it makes it says itself,
+ * Such a component keeps its state in static variables, so it has one instance; it chooses its number of channels itself,
  * under whole names. Its pins may be used by any of its functions, in whichever threads (HAL_COMPONENT_LOOSE_PINS).
  */
 #define _GNU_SOURCE
@@ -74,7 +74,7 @@ static bool refuse_value(const char *argument, const char *value, const char *wh
 static bool take_element(const struct halcyon_parameter *p, int index, const char *text) {
     if (p->type == 's') {
         char *const copy = host->allocate(host, strlen(text) + 1, 1);
-        if (!copy) return refuse("there is no memory for %s=", p->name);
+        if (!copy) return refuse("out of memory for %s=", p->name);
         strcpy(copy, text);
         ((char **)p->place)[index] = copy;
         return true;
@@ -111,7 +111,7 @@ static bool take_parameter(const struct halcyon_parameter *p) {
             return refuse_value(p->name, given, why);
         }
         char *const element = strndup(at, (size_t)(comma - at));
-        const bool good = element ? take_element(p, index, element) : refuse("there is no memory for %s=", p->name);
+        const bool good = element ? take_element(p, index, element) : refuse("out of memory for %s=", p->name);
         free(element);
         if (!good) return false;
         if (*comma == '\0') return true;
@@ -512,7 +512,7 @@ static bool remember_or_restore(void) {
 
 static bool create(const hal_host *of, void *unused) {
     (void)unused;
-    if (!remember_or_restore()) return of->fail(of, "there is no memory left"), false;
+    if (!remember_or_restore()) return of->fail(of, "out of memory"), false;
     host = of;
     prepare_lines();
     bool good = true;
@@ -522,7 +522,7 @@ static bool create(const hal_host *of, void *unused) {
         if (result < 0) {
             for (char *at = said; *at; ++at) /* one line; the last end of line goes */
                 if (*at == '\n') *at = at[1] ? ';' : '\0';
-            good = *said ? refuse("%s (rtapi_app_main: %s)", said, strerror(-result)) : refuse("rtapi_app_main says: %s", strerror(-result));
+            good = *said ? refuse("%s (rtapi_app_main: %s)", said, strerror(-result)) : refuse("rtapi_app_main failed: %s", strerror(-result));
         }
     }
     if (good) look_at_parameters();

@@ -80,7 +80,7 @@ static inline go_flag go_cart_cart_par(const go_cart *a, const go_cart *b) {
     go_cart_cart_cross(&one, &other, &cross);
     return GO_SMALL(sqrt(__go_dot(&cross, &cross)));
 }
-/* The part of `v` along `base`, and what is left of it in the plane of that normal. */
+/* The part of `v` along `base`, and the remainder in the plane of that normal. */
 static inline int go_cart_cart_proj(const go_cart *v, const go_cart *base, go_cart *to) {
     const go_real square = __go_dot(base, base);
     if (square < GO_REAL_MIN) return *to = go_cart_zero(), GO_RESULT_DIV_ERROR;

@@ -131,7 +131,7 @@ int hal_export_functf(hal_funct_t code, void *arg, int uses_fp, int reentrant, i
 
 #ifdef HALCYON_PROGRAM
 /* Declares that the program calls halcyon_alive() at least every so many milliseconds. When it has not for `timeout_ms` longer, `show
- * comp` says "not responding" and its outputs take their declared values, until it calls again. 0: no longer. */
+ * comp` shows "not responding" and its outputs take their declared values, until it calls again. 0: no longer. */
 int halcyon_every(int comp, unsigned every_ms, unsigned timeout_ms);
 int halcyon_alive(int comp);
 /* Declares what an output takes when the program is dead or does not respond; without it, it keeps its value. */

@@ -77,7 +77,7 @@ static inline int pmCartCartProj(const PmCartesian *v, const PmCartesian *base, 
     const double square = __pm_dot(base, base);
     return square == 0.0 ? __pm_vector(to, 0.0, 0.0, 0.0), -1 : pmCartScalMult(base, __pm_dot(v, base) / square, to);
 }
-/* What is left of `v` in the plane with this normal. */
+/* The component of `v` in the plane with this normal. */
 static inline int pmCartPlaneProj(const PmCartesian *v, const PmCartesian *normal, PmCartesian *to) {
     PmCartesian along;
     const int result = pmCartCartProj(v, normal, &along);

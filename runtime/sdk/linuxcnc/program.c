@@ -51,9 +51,9 @@ static char name_of_program[HAL_NAME_LEN + 1];
 static long machine;       /* its process */
 static bool tied, lost_said; /* the kernel ends this process with the machine; its loss has been reported */
 static unsigned every_ms, timeout_ms;
-static bool alive;          /* the program has said so since the last exchange */
-static long long alive_ns;  /* when the machine was last told */
-static char *refused; /* why the host refused, until it is said */
+static bool alive;          /* reported by the program since the last exchange */
+static long long alive_ns;  /* time of the last report to the machine */
+static char *rejected; /* why the host rejected the request, until it is printed */
 
 /* --- text ------------------------------------------------------------------------------------------------------------------ */
 
@@ -77,7 +77,7 @@ static void add(const char *format, ...) {
             return;
         }
         char *const larger = realloc(request.at, request.room * 2 + (size_t)length + 256);
-        if (!larger) return; /* the request is cut, and refused */
+        if (!larger) return; /* the request is truncated, and rejected */
         request.at = larger;
         request.room = request.room * 2 + (size_t)length + 256;
     }
@@ -167,7 +167,7 @@ static char *line(void) {
     }
 }
 
-/* Sends the request; NULL when it was refused or there is no machine any more, which `refused` says. */
+/* Sends the request; NULL when it was rejected or the machine is lost, with the reason in `rejected`. */
 static char *ask(void) {
     add("\n");
     for (size_t sent = 0; connection >= 0 && sent < request.length;) {
@@ -181,9 +181,9 @@ static char *ask(void) {
     if (!answer) disconnect();
     if (answer && strstr(answer, "\"ok\":true")) return answer;
     char *error = answer ? strstr(answer, "\"error\":\"") : NULL;
-    free(refused);
-    refused = strdup(error ? error + 9 : "the machine does not answer");
-    if (error && refused) refused[strcspn(refused, "\"")] = '\0';
+    free(rejected);
+    rejected = strdup(error ? error + 9 : "the machine does not respond");
+    if (error && rejected) rejected[strcspn(rejected, "\"")] = '\0';
     return NULL;
 }
 
@@ -222,7 +222,7 @@ static void be_lost(void) {
     const bool end = wanted && strcmp(wanted, "end") == 0;
     if (end && tied) return; /* the kernel's SIGTERM, or the machine's, is on its way */
     rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) has ended; %s\n", name_of_program, instance(), machine,
-                    end ? "ending" : "pins keep their values until it is back (HALCYON_LOST=end ends the program instead)");
+                    end ? "ending" : "pins keep their values until it returns (HALCYON_LOST=end ends the program instead)");
     if (end) kill(getpid(), SIGTERM);
 }
 
@@ -385,7 +385,7 @@ static void depart(locale_t before) {
 }
 
 static bool complain(const char *of) {
-    rtapi_print_msg(RTAPI_MSG_ERR, "%s: %s: %s\n", name_of_program, of, refused ? refused : "there is no memory left");
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: %s: %s\n", name_of_program, of, rejected ? rejected : "out of memory");
     return false;
 }
 
@@ -533,7 +533,7 @@ int program_safe(const char *pin, double value) {
     const bool good = fits && announce(ready, true);
     if (one && !good) one->safe = false;
     depart(before);
-    if (!fits) rtapi_print_msg(RTAPI_MSG_ERR, "%s: halcyon_safe: there is no pin with a value named '%s'\n", name_of_program, pin);
+    if (!fits) rtapi_print_msg(RTAPI_MSG_ERR, "%s: halcyon_safe: unknown pin '%s', or it has no value\n", name_of_program, pin);
     return good ? 0 : (fits ? complain(pin) : false, -EINVAL);
 }
 

@@ -20,7 +20,7 @@ enum { line_length = 240, lines_in_flight = 128 };
 
 /* --- messages ------------------------------------------------------------------------------------------------------------ */
 
-/* Any thread fills a line, the printer empties it. `turn` says whose it is: n for the writer of message n, n + 1 for the
+/* Any thread fills a line, the printer empties it. `turn` is the owner: n for the writer of message n, n + 1 for the
  * printer of message n; then it is n + lines_in_flight for the next writer. A full queue loses the new message and counts it. */
 static struct line {
     uint64_t turn;

@@ -57,7 +57,7 @@ struct halcyon_parameter {
     const char *name, *doc;
     void *place;
     int type; /* 'i' int, 'l' long, 's' char * */
-    int most; /* elements of an array; 0: it is none */
+    int most; /* elements of an array; 0: not an array */
 };
 struct halcyon_note {
     const char *key, *text;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory comes from the C library, whatever the flag says. */
+/* Memory comes from the C library, whatever the flag. */
 #ifndef RTAPI_GFP_H
 #define RTAPI_GFP_H
 
