@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What could stand at the cursor: the command's row says which kind of word, the model says which names.
+// Candidates at the cursor: the row of the command determines the kind of word, the model the names.
 #include <algorithm>
 #include <filesystem>
 

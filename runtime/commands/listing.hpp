@@ -41,7 +41,7 @@ std::vector<const LoadedComponent*> components_newest_first(const Model& model, 
 /// Slowest first, as LinuxCNC lists them.
 std::vector<const Thread*> threads_slowest_first(const Model& model, const Patterns& patterns);
 
-/// A line that says which beat the threads follow, and how that went so far; empty while they run by their own clock.
+/// A line with the external clock reference of the threads and its drift; empty while they use the local clock.
 std::string clock_text(const Session& session);
 
 /// Whose pin it is: the component of its instance or function, of a thread's own pins the one that

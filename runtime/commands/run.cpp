@@ -18,7 +18,7 @@ std::optional<std::uint64_t> whole_number(std::string_view text) {
     return status == std::errc{} && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
 }
 
-/// Waits without the session's mutex until `done` says so (with it).
+/// Waits, without holding the mutex of the session, until `done` (called with it) returns true.
 template <class Done>
 void wait_for(Context& context, Done&& done) {
     while (!done() && !context.interrupted()) {
@@ -28,7 +28,7 @@ void wait_for(Context& context, Done&& done) {
     }
 }
 
-/// On the virtual clock in pieces, so that somebody else can look at the machine and a long simulation can be ended.
+/// On the virtual clock in steps, so that other clients can access the machine and a long simulation can be ended.
 void advance_ns(Context& context, std::int64_t ns) {
     Session& session = context.session;
     if (session.options().virtual_clock) {

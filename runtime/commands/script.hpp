@@ -38,7 +38,7 @@ public:
     /// The `source` and `quit` commands.
     void source(Context& context);
     void quit() { ended_ = true; }
-    /// True when Shell::cancel was called; says so once.
+    /// True when Shell::cancel was called; reports it once.
     bool interrupted(Context& context);
     bool quit_seen() const { return ended_; }
     /// True when nothing in the model points into the text that was run.

@@ -44,7 +44,7 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
                 const bool again =
                     std::any_of(files_.begin(), files_.end(), [&](const Open& open) { return open.path == canonical_path(path); });
                 if (again || !read_netlist(command.args[0].text, shell_.options.directory, path, content, problem)) {
-                    rest.push_back(std::move(command));  // run in its turn, it says what is wrong
+                    rest.push_back(std::move(command));  // reports the error when it runs in its turn
                     continue;
                 }
                 files_.push_back({canonical_path(path), command.span});

@@ -215,7 +215,7 @@ bool Shell::may_wait(std::string_view text) {
             if (row.flags & command_waits) names.push_back(row.name);
         return names;
     }();
-    // A word anywhere is enough, and what $NAME and [SECTION]KEY stand for is not known here: running a harmless text in a
+    // A match anywhere is enough, and the values of $NAME and [SECTION]KEY are unknown here: running a harmless text in a
     // thread of its own costs little.
     if (text.find_first_of("$[") != text.npos) return true;
     return std::any_of(waiting.begin(), waiting.end(), [&](std::string_view name) { return text.find(name) != text.npos; });

@@ -49,7 +49,7 @@ public:
     bool is_process() const override { return true; }
 };
 
-/// How much is said: `-Q`, `-q` (the default), `-v`, `-V`.
+/// Verbosity: `-Q`, `-q` (the default), `-v`, `-V`.
 enum class Level { nothing, errors, results, debug };
 
 struct ShellOptions {
@@ -92,13 +92,13 @@ public:
     /// Reads an .ini file for [SECTION]KEY only (`-i`).
     int read_ini(const std::string& path, Output& output);
 
-    /// True between `begin` and `commit` or `abort`; the edits wait in this shell and nobody sees them.
+    /// True between `begin` and `commit` or `abort`; the edits are kept in this shell and invisible to others.
     bool collecting() const;
     /// Adds commands that set NAME VALUE to those collected since `begin`.
     void collect(const std::vector<Command>& commands);
-    /// True after `quit` or `exit` was executed; whoever reads lines stops reading.
+    /// True after `quit` or `exit` was executed; the caller then stops reading lines.
     bool quit() const;
-    /// Ends a command that waits; it reports that it was interrupted, as do all later ones until `false` is said. [any]
+    /// Interrupts a command that waits, and all later ones until cancel(false). [any]
     void cancel(bool on = true);
     /// True when executing the line may wait for something outside (loadusr -w …), so that a server needs a thread for it.
     static bool may_wait(std::string_view text);

@@ -31,7 +31,7 @@ struct Client::State {
     std::uint64_t next_id = 1;
     std::string in;
     std::size_t taken = 0;
-    std::map<std::uint64_t, Json> replies;  ///< that came before somebody waited for them
+    std::map<std::uint64_t, Json> replies;  ///< received before a caller waits for them
     std::deque<Json> events;
     std::function<void(std::string_view)> notice;
     std::string reason;       ///< that the other side gave for closing the connection
@@ -101,7 +101,7 @@ struct Client::State {
         return count != 0;
     }
 
-    /// Reads while it writes: a long row of requests must not stand still because replies fill the other direction.
+    /// Reads while it writes: a long sequence of requests must not block because replies fill the other direction.
     void write_all(std::string_view text) {
         while (!text.empty() && fd >= 0) {
             const ssize_t gone = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);

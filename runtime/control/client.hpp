@@ -18,7 +18,7 @@ namespace hal {
 
 class Client {
 public:
-    /// Connects to a running instance by its name. nullptr: `problem` is a sentence that says why and what to type.
+    /// Connects to a running instance by its name. Returns nullptr and sets `problem` to the reason and what to type.
     static std::unique_ptr<Client> connect(std::string_view instance, std::string& problem);
     ~Client();
     Client(const Client&) = delete;
@@ -26,16 +26,16 @@ public:
     const std::string& instance() const;
     const std::string& version() const;  ///< of the runtime on the other side
     std::int64_t pid() const;
-    /// False once the other side has gone; then every answer has status 1 and says so.
+    /// False once the connection is lost; then every answer has status 1 and reports it.
     bool connected() const;
     /// Looks whether the other side is still there, without waiting; events that have come are kept.
     bool look();
-    /// Why the other side closed the connection, as it said; "" when it did not.
+    /// The reason the server gave for closing the connection; "" when it gave none.
     const std::string& closed_because() const;
-    /// Who is told what a command that waits reports meanwhile; without one nobody is.
+    /// Receives what a waiting command reports meanwhile; without it these reports are dropped.
     void on_notice(std::function<void(std::string_view)> take);
     int fd() const;  ///< for poll(); readable when next_event() may have something
-    /// A non-blocking descriptor (a signalfd, say) that becomes readable when the user wants no more of the command that
+    /// A non-blocking descriptor (for example a signalfd) that becomes readable when the user wants no more of the command that
     /// runs: then it is emptied and the command cancelled; a second time, the connection is given up.
     void cancel_on(int descriptor);
 
@@ -64,7 +64,7 @@ public:
     /// Ends the instance.
     Answer stop();
 
-    /// Any request: `body` without an id. Waits for its reply, which is a JSON object as docs/protocol.md says; when the
+    /// Any request: `body` without an id. Waits for its reply, a JSON object (docs/protocol.md); when the
     /// connection is lost: {"ok":false,"error":"…"}. Events that come meanwhile are kept for next_event().
     nlohmann::json request(nlohmann::json body);
     /// Sends without waiting; replies come in the order of the requests through wait().

@@ -71,7 +71,7 @@ bool listed_in(std::string_view words, std::string_view word) {
     return false;
 }
 
-/// The one verb of a request; refuses what is not understood, so that a misspelt member is not silently without effect.
+/// The one verb of a request; rejects unknown members, so that a misspelt one is not silently ignored.
 const Verb& verb_of(const Json& body) {
     const Verb* found = nullptr;
     for (auto entry = body.begin(); entry != body.end(); ++entry) {

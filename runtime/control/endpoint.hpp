@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The listening socket of an instance and the lock file that says it lives. Internal to the server.
+// The listening socket of an instance and the lock file that shows it is running. Internal to the server.
 #pragma once
 
 #include <string>

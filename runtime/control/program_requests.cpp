@@ -28,7 +28,7 @@ struct Direction {
 constexpr Direction directions[] = {{"in", HAL_DIR_IN, false},    {"out", HAL_DIR_OUT, false},  {"io", HAL_DIR_IO, false},
                                     {"rw", HAL_DIR_PARAM, false}, {"ro", HAL_DIR_PARAM, true}};
 
-/// Whether the program itself is the only one that changes it: it need not be told of it.
+/// Whether only the program itself changes it: then it needs no notification.
 bool own(const Pin& pin) { return pin.dir == HAL_DIR_OUT || pin.read_only(); }
 
 hal_value value_of(const Json& value, hal_type type, const std::string& of) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the verbs of the control protocol share: how they look at a request and refuse it. Internal to the shell.
+// What the verbs of the control protocol share: reading a request and rejecting it. Internal to the shell.
 #pragma once
 
 #include <cstdint>

@@ -184,7 +184,7 @@ void Server::State::serve() {
     connected = 0;
 }
 
-/// Until the next subscription or the end of a client's patience; at once while complete requests lie here.
+/// Time until the next subscription or client timeout is due; 0 while complete requests are pending.
 int Server::State::sleep_ms() const {
     const std::int64_t now = steady_ns();
     std::int64_t until = accepts_from > now ? accepts_from : std::numeric_limits<std::int64_t>::max();

@@ -20,7 +20,7 @@ struct ServerOptions {
     std::function<void(std::string_view)> log;       ///< one sentence when a client is dropped; may be empty
     std::size_t max_request = std::size_t{16} << 20; ///< bytes of one request
     std::size_t queue = std::size_t{1} << 20;        ///< replies waiting for a client before it is no longer listened to
-    int stall_ms = 10000;                            ///< a client with a full queue that reads nothing for so long is dropped
+    int stall_ms = 10000;                            ///< a client with a full queue that reads nothing for this time is disconnected
     std::size_t max_clients = 256;
     std::size_t reserved = 8;                        ///< connections beyond these, for short commands: an operator always gets in
     int idle_ms = 1000;                              ///< after this time without a request, a client on which nothing depends counts as idle
@@ -38,7 +38,7 @@ public:
     ~Server();  ///< ends all connections and waits for the thread; removes the socket
     Server(const Server&) = delete;
 
-    /// Makes the socket (named by the session's instance name) and starts the thread. False: `diagnostics` says why, for
+    /// Makes the socket (named by the session's instance name) and starts the thread. False: `diagnostics` has the reason, for
     /// instance that an instance of this name runs already. A socket left over by a dead process is replaced.
     bool start(Diagnostics& diagnostics);
     const std::string& path() const;

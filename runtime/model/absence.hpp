@@ -21,7 +21,7 @@ public:
     using Cause = std::size_t;
     enum class Scope : std::uint8_t {
         names,      ///< only names that are noted depend on it
-        component,  ///< so does any pin, function or thread that nothing loaded explains: its names are not known
+        component,  ///< also any pin, function or thread that no loaded component has: the names of this one are unknown
         file,       ///< so does any signal
     };
     /// Enters what is missing: "component 'motmod'", "which is missing". `at` is the place of its error, or unknown when there is none.

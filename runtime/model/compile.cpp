@@ -203,7 +203,7 @@ private:
     // Instances of one loadrt lie in a row: mostly one entry for all of them.
     void note_working_set(const Thread& thread, plan::Plan& plan) const {
         constexpr std::size_t gap = 64;     // closer than that is in a row
-        constexpr std::size_t code = 2048;  // of a function: its length is not known
+        constexpr std::size_t code = 2048;  // assumed size of a function's code: its length is unknown
         auto& set = plan.working_set;
         set.push_back({plan.steps.data(), plan.steps.size() * sizeof(plan::Step)});
         set.push_back({plan.image.get(), plan.image_size * sizeof(hal_value)});

@@ -120,7 +120,7 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
         }
         for (const auto& pin : made->pins) model_.pin.erase(pin->name);
         model_.instance.erase(made->name);
-        removed_.instances.push_back(std::move(of.instances.back()));  // undone last first, so it is the last
+        removed_.instances.push_back(std::move(of.instances.back()));  // rolled back in reverse order, so it is the last
         of.instances.pop_back();
     });
     component.instances.push_back(std::move(owned));
@@ -156,7 +156,7 @@ void Edit::remove_pins(Instance& instance, const std::vector<Pin*>& pins) {
         if (leaving.contains(instance.pins[i].get())) places.push_back(static_cast<std::ptrdiff_t>(i));
     make_room(removed_.pins, places.size());
     on_undo([this, &instance, places] {
-        const std::size_t before = removed_.pins.size() - places.size();  // undone last first, so they are the last
+        const std::size_t before = removed_.pins.size() - places.size();  // rolled back in reverse order, so they are the last
         for (std::size_t i = 0; i < places.size(); ++i) {
             Pin& pin = *removed_.pins[before + i];
             instance.pins.insert(instance.pins.begin() + places[i], std::move(removed_.pins[before + i]));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Edits of the model as one transaction: every rule a single edit can break is checked here, with the place of every
-// word; everything done can be undone. LinuxCNC's rules (docs/linuxcnc-compatibility.md).
+// word; everything can be rolled back. LinuxCNC's rules (docs/linuxcnc-compatibility.md).
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,7 @@ public:
     Signal* add_signal(Word name, hal_type type, Span typed_at);
     bool remove_signal(Word name);
     bool remove_all_signals();
-    /// Links a pin to a signal; refuses what the rules refuse. A pin that is on this signal already is accepted.
+    /// Links a pin to a signal if the rules allow it. Accepts a pin that is already linked to this signal.
     bool link(Pin& pin, Signal& signal, Word pin_word, Arrow arrow);
     void unlink(Pin& pin);
 
@@ -64,7 +64,7 @@ public:
     // --- components and instances -----------------------------------------------------------------------------------
     LoadedComponent& add_component(std::string name, Span at);
     /// Takes an instance with its pins and functions into the indices; reports names that are taken.
-    /// Leaves `instance` alone when it refuses.
+    /// Leaves `instance` unchanged on failure.
     bool add_instance(LoadedComponent& component, std::unique_ptr<Instance>& instance,
                       std::vector<std::unique_ptr<LoadedFunction>> functions);
     /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names that are taken.
@@ -109,7 +109,7 @@ public:
         std::vector<std::unique_ptr<LoadedComponent>> components;
         std::vector<std::unique_ptr<Signal>> signals;
         std::vector<std::unique_ptr<Thread>> threads;
-        std::vector<decltype(Signal::port)> ports;  ///< of a buffer that was undone
+        std::vector<decltype(Signal::port)> ports;  ///< of a buffer that was rolled back
     };
     Removed& removed() { return removed_; }
     const std::vector<Instance*>& added_instances() const { return added_instances_; }
@@ -137,7 +137,7 @@ private:
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
     void keep_value(Pin& pin);
-    // Memory may end at any line. So every edit first makes room for what it will add, then says how to undo it, and only
+    // Memory may end at any line. So every edit first allocates the space that it needs, then registers its undo action, and only
     // then changes the model, without allocating; entries of an index come last, and undoing copes with missing ones.
     template <class T>
     static void make_room(std::vector<T>& row, std::size_t more = 1) {

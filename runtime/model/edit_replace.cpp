@@ -45,7 +45,7 @@ void exchange_back(std::vector<std::unique_ptr<T>>& model_row, std::vector<std::
     model_row.swap(other);
 }
 
-/// What a new version may say differently about a pin.
+/// The properties of a pin that may differ in a new version.
 void swap_declarations(Pin& a, Pin& b) {
     std::swap(a.dir, b.dir);
     std::swap(a.flags, b.flags);
@@ -88,7 +88,7 @@ struct InstancePair {
     std::vector<Pair> pins;
 };
 
-/// All of one replacement, so that it can be done and undone.
+/// All state of one replacement, so that it can be applied and rolled back.
 struct Replacement {
     Model& model;
     LoadedComponent &component, &other;
@@ -250,7 +250,7 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
     }
     if (diagnostics->errors() > errors_before) return false;
 
-    // nothing below refuses
+    // nothing below can fail
     translate(*r);
     for (const InstancePair& pair : r->instances)
         for (const Pair& pin : pair.pins) {

@@ -40,7 +40,7 @@ struct Pin {
     Thread* of_thread = nullptr;     ///< pins of a thread itself
     Signal* signal = nullptr;
     Span linked_at;
-    bool arrow_in = false, arrow_out = false;  ///< the arrow written before it said "reads" / "writes"
+    bool arrow_in = false, arrow_out = false;  ///< the arrow before it marks it as a reader / writer
     std::uint32_t id = 0;
     // Where it is now (set by the compiler when a plan has been taken; nullptr home: the session owns it).
     Thread* home = nullptr;
@@ -104,7 +104,7 @@ struct Instance {
     std::vector<std::pair<std::string, hal_stream*>> streams;
     std::vector<Pin*> finite;        ///< its declared-finite outputs
     bool constructed = false, started = false;
-    bool leads_clock = false;        ///< it makes the threads follow an outside beat
+    bool leads_clock = false;        ///< it disciplines the threads to an external clock reference
     Span loaded;
     std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances
     std::vector<Way> ways;           ///< while it is started

@@ -24,7 +24,7 @@ struct NodePart {
 /// A node that reads a signal of another one.
 struct NodeReader {
     std::size_t node = 0;
-    hal_value safe{};             ///< what `sets` gave it there: its value while the writer's node is silent
+    hal_value safe{};             ///< the value that `sets` gave it there, used while the node of the writer is offline
     std::vector<const Pin*> pins;
 };
 

@@ -63,7 +63,7 @@ class PatternParser {
 public:
     explicit PatternParser(std::string_view text) : text_(text) {}
 
-    /// False with fault() set. An open quote needs no care: the parser refused it.
+    /// False with fault() set. Open quotes cannot occur: the parser rejects them.
     bool parse(std::size_t begin, std::size_t end, Pattern& pattern) {
         text_end_ = end;
         std::size_t literal = begin;

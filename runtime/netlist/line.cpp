@@ -67,7 +67,7 @@ void Line::append_value(std::string_view value, Span reference) {
 }
 
 LineReader::LineReader(const Sources& sources, std::uint32_t source) : source_(source), text_(sources.get(source).text) {
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // a byte-order mark says nothing here
+    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // ignores a byte-order mark
 }
 
 bool LineReader::next(Line& line) {

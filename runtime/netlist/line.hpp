@@ -14,17 +14,17 @@
 
 namespace hal {
 
-/// A text made of pieces: stretches of the source as they stand there, and values put in place of references.
+/// A text of segments: verbatim parts of the source, and values that replaced references.
 class Line {
 public:
     std::string_view text() const { return text_; }
     /// Where the characters [begin, end) of the text stand in the source; a value stands where its reference does.
     Span span(std::size_t begin, std::size_t end) const;
-    /// The characters [begin, end) are one stretch of the source.
+    /// True when the characters [begin, end) are one verbatim segment of the source.
     bool verbatim(std::size_t begin, std::size_t end) const;
 
     void clear(std::uint32_t source);
-    /// Appends a stretch of the source itself.
+    /// Appends a verbatim segment of the source.
     void append(std::string_view stretch, std::uint32_t source_begin);
     /// Appends [begin, end) of another line; calls come in rising order of place, which makes all of them linear.
     void append(const Line& line, std::size_t begin, std::size_t end);
@@ -54,7 +54,7 @@ public:
     bool next(Line& line);
 
     /// Of the line that next() gave: the first carriage return that ends no line; the first other control character
-    /// (tabs aside), as places in the line.
+    /// (except tabs), as positions in the line.
     std::optional<std::size_t> carriage_return() const { return carriage_return_; }
     std::optional<std::size_t> control() const { return control_; }
     bool continued() const { return continued_; }

@@ -70,7 +70,7 @@ bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
     return good;
 }
 
-/// rate= and deadline= of a node are said once.
+/// Sets rate= and deadline= of a node; different values in two lines are an error.
 void take_options(NodeLine& node, const Line& line, Diagnostics& diagnostics) {
     const bool again = (line.rate_ns != 0 && node.rate_ns != 0 && line.rate_ns != node.rate_ns) ||
                        (line.deadline_ns != 0 && node.deadline_ns != 0 && line.deadline_ns != node.deadline_ns);

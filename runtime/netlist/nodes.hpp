@@ -13,16 +13,16 @@
 
 namespace hal {
 
-/// What a `node` line says of a node.
+/// A node of a netlist, from its `node` lines.
 struct NodeLine {
     std::string name;
     Span at;                       ///< where it is named first
-    std::int64_t rate_ns = 0;      ///< from one sending of its signals to the next; 0: not said
-    std::int64_t deadline_ns = 0;  ///< after so long without them its readers take their safe values; 0: not said
-    Span options_at;               ///< of the line that says so
+    std::int64_t rate_ns = 0;      ///< send interval of its signals; 0: not set
+    std::int64_t deadline_ns = 0;  ///< without them for this time its readers use their safe values; 0: not set
+    Span options_at;               ///< of the line that sets them
 
     std::int64_t rate() const { return rate_ns != 0 ? rate_ns : 10'000'000; }
-    /// Not said: ten sendings, at least 100 ms: a machine that is not real time may be late for so long.
+    /// The default is ten intervals, at least 100 ms: without real-time scheduling a message may be that late.
     std::int64_t deadline() const { return deadline_ns != 0 ? deadline_ns : rate() < 10'000'000 ? 100'000'000 : 10 * rate(); }
 };
 

@@ -72,7 +72,7 @@ private:
         split(expanded_, expanded_.text());
     }
 
-    /// Lines of a file that is no text are not worth a message each: the first one speaks for all.
+    /// Reports only the first line of a binary file.
     bool characters_good(std::size_t comment) {
         if (const auto at = reader_.control(); at && (*at < comment || line_.text()[*at] == '\0')) {
             error("binary-text", line_.span(*at, *at + 1), "this is not a text file", "a control character",

@@ -132,7 +132,7 @@ struct Plan {
     std::size_t image_size = 0;
     std::vector<Memory> working_set;         ///< steps, image, code, instances in the order of their steps: see Core::warm
     std::vector<std::shared_ptr<void>> keep; ///< what must outlive the plan: cells shared between threads
-    std::vector<std::uint64_t> scratch;      ///< room for the carries' reads, so that taking the plan allocates nothing
+    std::vector<std::uint64_t> scratch;      ///< buffer for the values carried over, so that taking the plan allocates nothing
 };
 
 }  // namespace hal::plan

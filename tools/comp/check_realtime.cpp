@@ -40,18 +40,18 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
     std::string report;
     const int status = run_program(run, report);
     std::istringstream lines(report);
-    std::string line, refused, start;
+    std::string line, rejected, start;
     int found = 0;
     for (; std::getline(lines, line);) {
-        if (line.starts_with("rejected: ")) refused = line.substr(10);
+        if (line.starts_with("rejected: ")) rejected = line.substr(10);
         else if (line.starts_with("start fails: ")) start = line.substr(13);
-        else if (line.starts_with("outside: ")) found += fail(options, fmt::format("{}: {}", built.name, line.substr(10)));
+        else if (line.starts_with("outside: ")) found += fail(options, fmt::format("{}: {}", built.name, line.substr(9)));
         else if (line.starts_with("function '")) found += fail(options, fmt::format("{}: {}", built.name, line));
         else if (line.ends_with("extreme values")) print(fmt::format("real time: {}, no violation\n", line));
     }
     if (!start.empty()) return fail(options, fmt::format("{}: start() failed, so its functions were not checked: {}", built.name, start));
-    if (!refused.empty())
-        return fail(options, fmt::format("{} cannot be checked: its constructor fails: {}; load arguments go behind --", built.name, refused));
+    if (!rejected.empty())
+        return fail(options, fmt::format("{} cannot be checked: its constructor fails: {}; load arguments go behind --", built.name, rejected));
     if (found == 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))
         return fail(options, WIFSIGNALED(status) ? fmt::format("{} cannot be checked: the check was terminated by signal {}", built.name, WTERMSIG(status))
                                                  : fmt::format("{} cannot be checked: the check ended with status {}", built.name, WEXITSTATUS(status)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The rules over a whole model: one file per rule. (What a single edit can break is refused in model/edit.)
+// The rules over a whole model: one file per rule. (What a single edit can break is rejected in model/edit.)
 #pragma once
 
 #include <string>

@@ -192,7 +192,7 @@ static void *allocate(const hal_host *host, size_t bytes, size_t align) {
 }
 static void take_failure(const hal_host *host, const char *reason) {
     (void)host;
-    printf("%s: %s\n", strcmp(phase, "start()") == 0 ? "start fails" : "refused", reason);
+    printf("%s: %s\n", strcmp(phase, "start()") == 0 ? "start fails" : "rejected", reason);
 }
 static void take_rejection(const hal_host *host, const hal_rejection *rejection) { take_failure(host, rejection->text); }
 static const void *no_extension(const hal_host *host, const char *id) { return (void)host, (void)id, NULL; }
