@@ -20,7 +20,7 @@ namespace {
 
 constexpr int bad_option = 255;
 
-/// halcmd's letters, which halrun takes too. False: not one of them.
+/// Handles an option letter of halcmd, also valid for halrun. Returns false for any other letter.
 bool halcmd_letter(int letter, ExecutionOptions& options) {
     switch (letter) {
     case 'f': options.from_file = true; return true;
@@ -50,7 +50,7 @@ constexpr const char* halcmd_usage =
     "  -R          accepted and ignored: no lock needs to be released\n"
     "  -h [NAME]   this text, or the help of a command; halcmd help lists the commands\n";
 
-/// For bash's `complete -C halcmd`: what fits the word being typed, one per line.
+/// Prints completions of the current word for bash's `complete -C halcmd`, one per line.
 int complete_word() {
     const char* line = std::getenv("COMP_LINE");
     const char* point = std::getenv("COMP_POINT");
@@ -136,7 +136,7 @@ int halrun(int argc, char** argv) {
     return run_run(options);
 }
 
-/// halsampler and halstreamer: -c and -n are numbers. `take` fills in the letters of one of them.
+/// Reads the options of halsampler or halstreamer: -c and -n are numbers; `take` handles the letters of one of them.
 template <class O>
 int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, bool (*take)(int letter, std::uint64_t number, O&),
                         int (*run)(const O&)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The programs LinuxCNC users know, with LinuxCNC's own option letters and exit codes.
+// The programs with LinuxCNC's names, option letters and exit codes.
 #pragma once
 
 #include <string_view>
@@ -11,7 +11,7 @@ struct Classic {
     int (*run)(int argc, char** argv);
 };
 
-/// The row of a program name, or nullptr.
+/// Returns the row of a program name, or nullptr.
 const Classic* find_classic(std::string_view program);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of subcommands: a row per command. Its options stand in the command's own header.
+// The table of subcommands: a row per command. The options are declared in the command's own header.
 #include "commands.hpp"
 
 #include <algorithm>
@@ -66,10 +66,10 @@ struct Subcommand {
     const char* summary;
     std::unique_ptr<Options> (*make_options)();
     int (*run)(const Options&);  ///< nullptr: in hal-bus
-    bool verbatim;               ///< from the first word on everything belongs to the words, `-1` and `--` too
+    bool verbatim;               ///< from the first word on, everything counts as words, including `-1` and `--`
 };
 
-/// A row. `run` takes the command's own options, O; nullptr: the command is in hal-bus.
+/// Makes a row. `run` takes the command's own options, O; nullptr: the command is in hal-bus.
 template <class O, auto run>
 constexpr Subcommand command(const char* name, const char* usage, const char* summary, bool verbatim = false) {
     Subcommand row{name, usage, summary, []() -> std::unique_ptr<Options> { return std::make_unique<O>(); }, nullptr, verbatim};
@@ -163,10 +163,10 @@ bool belongs(const Subcommand& row, const Group& group) { return std::string_vie
 
 struct Found {
     const Subcommand* row = nullptr;
-    std::size_t words = 0;  ///< how many of those typed are its name
+    std::size_t words = 0;  ///< number of typed words that form its name
 };
 
-/// The row with the longest name that is typed.
+/// Returns the row with the longest name that matches the typed words.
 Found find(const std::vector<std::string>& typed) {
     Found found;
     std::string name;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of subcommands, and the words typed after `hal`.
+// The table of subcommands, and the parsing of the command line after `hal`.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace hal::tools {
 /// Finds the subcommand, reads its options, runs it. Returns the exit code.
 int run_command_line(int argc, char** argv);
 
-/// For the completion script: a subcommand and its options; of a group the words that may follow and all their options.
+/// An entry of the completion script: a subcommand and its options, or a group, the words that may follow and all their options.
 struct Completion {
     std::string name;
     std::vector<std::string> options;

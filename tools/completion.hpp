@@ -11,7 +11,7 @@ struct CompletionOptions : Options {
     }
 };
 
-/// `hal completion`: prints a script made from the table of subcommands. Returns the exit code.
+/// Runs `hal completion`: prints a script derived from the table of subcommands. Returns the exit code.
 int run_completion(const CompletionOptions&);
 
 }  // namespace hal::tools

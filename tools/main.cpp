@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The program `hal`; under the names halcmd, halcompile, halrun, halsampler and halstreamer it behaves as LinuxCNC hands expect.
+// The program `hal`; under the names halcmd, halcompile, halrun, halsampler and halstreamer it behaves like LinuxCNC's programs.
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -14,8 +14,8 @@
 
 namespace {
 
-/// Started by loadusr, this program ends with the machine. The spawner asked the kernel for that, but the kernel forgets it when it starts a
-/// program with file capabilities.
+/// Ends this program with the machine when loadusr has started it. The spawner requests this from the kernel, which drops the request when it
+/// starts a program with file capabilities.
 void end_with_machine() {
     const char* const machine = std::getenv("HALCYON_PARENT");
     const long pid = machine ? std::strtol(machine, nullptr, 10) : 0;

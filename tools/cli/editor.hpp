@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads lines from the user: with history and completion on a terminal, plainly from anything else.
+// Reads lines from the user, with history and completion on a terminal.
 #pragma once
 
 #include <functional>
@@ -11,17 +11,17 @@
 
 namespace hal::tools {
 
-/// Waits until `descriptor` can be read or `stop` (-1: none) is readable. False: stop. `meanwhile`: called every 10 ms until then.
+/// Waits until `descriptor` or `stop` (-1: none) is readable. Returns false for `stop`. Calls `meanwhile` every 10 ms.
 bool wait_readable(int descriptor, int stop, const std::function<void()>& meanwhile = {});
 
-/// Lines of a descriptor, as they arrive. Not for terminals that want editing.
+/// Reads lines of a descriptor as they arrive, without editing.
 class LineReader {
 public:
     explicit LineReader(int descriptor, int stop = -1, std::function<void()> meanwhile = {})
         : descriptor_(descriptor), stop_(stop), meanwhile_(std::move(meanwhile)) {}
-    /// False at the end of the input, or when `stop` became readable. A last line without end of line counts.
+    /// Returns false at the end of the input, or when `stop` became readable. A last line without end of line counts.
     bool read(std::string& line);
-    /// The next line is here already: read() will not wait.
+    /// Returns true when the next line is buffered: read() does not wait.
     bool waiting() const { return waiting_.find('\n', begin_) != std::string::npos; }
 
 private:
@@ -41,7 +41,7 @@ public:
     ~Editor();
     Editor(const Editor&) = delete;
 
-    /// Ctrl-C gives an empty line; Ctrl-D on an empty line, the end of the input and `stop` give false.
+    /// Ctrl-C returns an empty line; Ctrl-D on an empty line, the end of the input and `stop` return false.
     bool read(const std::string& prompt, std::string& line);
 
 private:
@@ -49,10 +49,10 @@ private:
     std::unique_ptr<State> state_;
 };
 
-/// The longest text all candidates begin with.
+/// Returns the longest common prefix of the candidates.
 std::string common_prefix(const std::vector<Candidate>& candidates);
 
-/// What is shown when a completion is not unique: a candidate and its hint per column, as wide as the terminal.
+/// Returns the list for an ambiguous completion: a candidate and its hint per column, as wide as the terminal.
 std::string candidate_table(const std::vector<Candidate>& candidates, std::size_t columns);
 
 }  // namespace hal::tools

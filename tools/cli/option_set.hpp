@@ -52,20 +52,20 @@ public:
     void duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns = 0, const char* examples = "10ms, 1s or 500us");
     /// Declares --for TIME.
     void for_how_long(std::int64_t& to, const char* what);
-    /// From the first positional argument on everything belongs to the words, options too.
+    /// Treats everything from the first positional argument on as words, including options.
     void keep_rest();
 
     enum class Outcome { good, help, missing, bad };
     struct Reading {
         Outcome outcome = Outcome::good;
         std::string problem;             ///< of `bad`
-        std::vector<std::string> extra;  ///< what no declaration takes
+        std::vector<std::string> extra;  ///< arguments that match no declaration
     };
     /// Fills the members of the options.
     Reading read(std::vector<std::string> arguments);
-    /// A line for each positional argument and each option.
+    /// Returns the help: a line for each positional argument and each option.
     std::string help() const;
-    /// The options as they are typed: --name, -n.
+    /// Returns the options as they are typed: --name, -n.
     std::vector<std::string> names() const;
 
 private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What every command has of its command line. The options of a command stand in the command's own header, as a struct that derives from one of
-// these; `declare` gives them their names and help.
+// The parts common to all command lines. The options of a command are in its own header, a struct that derives from one of these; `declare`
+// sets their names and help.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ struct Options {
 
 enum class Loudness { nothing, errors, results };  ///< halcmd's -Q, -q (the default) and -v
 
-/// Of commands that execute lines of the command language: what halcmd's letters set.
+/// Options of commands that execute lines of the command language, as set by halcmd's letters.
 struct ExecutionOptions : Options {
     std::string name;  ///< --name: of the instance; empty: not given
     std::string ini;

@@ -11,7 +11,7 @@
 
 namespace hal::tools {
 
-/// Executes the lines, and prints what they print.
+/// Executes lines and prints their output.
 class LineExecutor {
 public:
     virtual ~LineExecutor() = default;
@@ -19,8 +19,8 @@ public:
     virtual int execute(std::string_view line) = 0;
     virtual Completion complete(std::string_view line, std::size_t cursor) = 0;
     virtual bool collecting() const = 0;  ///< between begin and commit
-    virtual bool over() const = 0;        ///< after quit, or when the other side has gone
-    /// Called every few hundredths of a second while the next line is awaited, when this is not nothing.
+    virtual bool over() const = 0;        ///< after quit, or when the connection is closed
+    /// Called every few hundredths of a second while waiting for the next line, unless it is empty.
     virtual std::function<void()> meanwhile() { return {}; }
 };
 

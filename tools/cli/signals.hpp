@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The end of a run, asked for from outside: Ctrl-C, SIGTERM, a client's `stop`.
+// Requests to end a run: Ctrl-C, SIGTERM, a client's `stop`.
 #pragma once
 
 #include <atomic>
@@ -9,7 +9,7 @@
 
 namespace hal::tools {
 
-/// Takes the signals that ask for an end while it lives: SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU and SIGPWR. Make it before any other
+/// Handles the signals that end a run, during its lifetime: SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU and SIGPWR. Construct it before any other
 /// thread. Signals whose default action would end the process without a report (SIGUSR1, SIGALRM, SIGIO, real-time signals ...) are
 /// ignored from then on. Nothing runs in signal handlers.
 class StopRequest {
@@ -18,24 +18,23 @@ public:
     ~StopRequest();
     StopRequest(const StopRequest&) = delete;
 
-    /// Called in a thread of its own when a signal comes, to end what the main thread waits for.
+    /// Called in a helper thread when a signal arrives, to end a wait of the main thread.
     std::function<void()> on_signal;
-    /// While on, SIGINT only calls on_signal: it is for the command that runs, not for the machine. Switching takes what
-    /// has come so far first: a Ctrl-C that ended the command's program still belongs to the command.
+    /// While on, SIGINT only calls on_signal: it cancels the running command, not the machine. Switching handles pending
+    /// signals first: a Ctrl-C that ended the command's program belongs to that command.
     void spare(bool on);
 
     void request() noexcept;      ///< [any]
     bool requested() const noexcept { return requested_.load(std::memory_order_acquire); }
-    /// The signal that asked for the end; 0: none did.
+    /// Returns the signal that requested the end, 0 for none.
     int signal() const noexcept { return signal_.load(std::memory_order_relaxed); }
-    /// Readable for ever once requested.
+    /// Returns a descriptor that stays readable once the end is requested.
     int fd() const { return event_; }
-    /// Waits until requested, or for `ns` (negative: without end). True when requested.
+    /// Waits for a request, at most `ns` (negative: forever). Returns true when requested.
     bool wait_ns(std::int64_t ns) const;
-    /// From now on on_signal may be called.
+    /// Enables on_signal.
     void listen();
-    /// From now on it is not called any more. A further Ctrl-C ends the process at once, as it would any other: for the
-    /// time when outputs are safe and the rest is tidying up.
+    /// Disables on_signal. A further Ctrl-C ends the process at once: for the clean-up after outputs have been made safe.
     void release();
 
 private:

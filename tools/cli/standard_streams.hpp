@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What becomes of standard output as a whole, for main().
+// Set-up and final check of the standard streams, for main().
 #pragma once
 
 namespace hal::tools {

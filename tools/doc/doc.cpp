@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal doc [COMPONENT]`: the manual page of a component, made from its declarations; without a name, all components.
+// `hal doc [COMPONENT]`: the manual page of a component, derived from its declarations; without a name, all components.
 // `hal doc --all --output DIR`: the pages of all of them, with an index.
 #include "doc/doc.hpp"
 
@@ -88,7 +88,7 @@ struct Form {
     std::string (*write)(const Page& page, bool alone);
 };
 
-/// Man pages are named hal-NAME, so that they can lie beside LinuxCNC's.
+/// Man pages are named hal-NAME, so that they can be installed beside LinuxCNC's.
 constexpr Form forms[] = {
     {&DocOptions::markdown, "", ".md", [](const Page& page, bool) { return as_markdown(page); }},
     {&DocOptions::json, "", ".json", [](const Page& page, bool) { return as_json(page); }},

@@ -23,7 +23,7 @@ struct DocOptions : Options {
     }
 };
 
-/// `hal doc`. Returns the exit code.
+/// Runs `hal doc`. Returns the exit code.
 int run_doc(const DocOptions&);
 
 }  // namespace hal::tools

@@ -11,7 +11,7 @@ struct ExplainOptions : Options {
     }
 };
 
-/// `hal explain`. Returns the exit code.
+/// Runs `hal explain`. Returns the exit code.
 int run_explain(const ExplainOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Markdown, with tables, as HTML and as troff: by libcmark-gfm where there is one.
+// Converts Markdown with tables to HTML and troff, with libcmark-gfm where available.
 #pragma once
 
 #include <optional>
@@ -7,7 +7,7 @@
 
 namespace hal::tools {
 
-/// Nothing when this program was built without the library.
+/// Returns nothing when this program was built without the library.
 std::optional<std::string> markdown_as_html(const std::string& text);
 std::optional<std::string> markdown_as_man(const std::string& text);
 

@@ -12,16 +12,16 @@ namespace hal::tools {
 
 using Page = Declared;
 
-/// The page of `threads`, which the runtime provides itself.
+/// Returns the page of `threads`, which the runtime provides itself.
 Page threads_page();
 
 std::string as_text(const Page& page);
 std::string as_markdown(const Page& page);
 std::string as_json(const Page& page);
 std::string as_man(const Page& page);
-/// A whole page; `home` is the address of the index, or empty.
+/// Returns a whole page; `home` is the address of the index, or empty.
 std::string as_html(const Page& page, std::string_view home);
-/// The index: each group with its components, and a box to search them by name and summary.
+/// Returns the index: each group with its components, and a search box for names and summaries.
 struct IndexGroup {
     std::string name;
     std::vector<const Page*> pages;

@@ -7,7 +7,7 @@
 
 namespace hal::tools {
 
-/// The page in the form of a manual page, for asciidoctor.
+/// Returns the page in the form of a manual page, for asciidoctor.
 std::string as_asciidoc(const Page& page);
 
 }  // namespace hal::tools

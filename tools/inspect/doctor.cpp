@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal doctor`: what on this machine spoils real time, what to type against it, and the wake-up jitter it has.
+// `hal doctor`: what on this machine prevents real time, remedies to type, and the measured wake-up jitter.
 #include "inspect/doctor.hpp"
 
 #include <cctype>
@@ -32,11 +32,11 @@ namespace {
 
 enum class Verdict { good, fair, poor };
 
-/// One thing that was looked at.
+/// The result of one check.
 struct Finding {
     Verdict verdict;
     std::string subject, sentence;
-    std::string remedy = {};  ///< what to type; empty when nothing is to be done
+    std::string remedy = {};  ///< what to type; empty when no action is needed
     std::string other = {};   ///< what to type instead, where there is a choice
 };
 
@@ -53,12 +53,12 @@ std::string own_path() {
     return problem ? "hal" : path.string();
 }
 
-/// The other way to what scheduling and memory locking need, without file capabilities: limits for a group of users.
+/// The alternative to file capabilities for scheduling and memory locking: limits for a group of users.
 constexpr const char* limits_of_a_group =
     "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; "
     "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee /etc/security/limits.d/realtime.conf, then log in again";
 
-/// A capability in the effective set of this process.
+/// Returns true for a capability in the effective set of this process.
 bool capable(int number) {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
@@ -98,7 +98,7 @@ Finding machine() {
     return {Verdict::good, "machine", "not virtual"};
 }
 
-/// What the scheduler answers when a thread asks for SCHED_FIFO; limits and capabilities only hint at it.
+/// Requests SCHED_FIFO from the scheduler: limits and capabilities are only hints.
 Finding scheduling() {
     int problem = 0;
     std::thread([&] {

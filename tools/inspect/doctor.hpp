@@ -15,7 +15,7 @@ struct DoctorOptions : Options {
     }
 };
 
-/// `hal doctor`. Returns the exit code.
+/// Runs `hal doctor`. Returns the exit code.
 int run_doctor(const DoctorOptions&);
 
 }  // namespace hal::tools

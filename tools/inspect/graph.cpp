@@ -21,7 +21,7 @@ namespace hal::tools {
 
 namespace {
 
-/// Lets Graphviz lay it out. Returns the reason of a failure, or an empty string.
+/// Draws it with Graphviz. Returns the reason of a failure, or an empty string.
 std::string render_svg(const std::string& dot, const std::string& path) {
     int in[2], out[2];
     if (::pipe2(in, O_CLOEXEC) != 0) return std::strerror(errno);

@@ -18,7 +18,7 @@ struct GraphOptions : NetlistOptions {
     }
 };
 
-/// `hal graph`. Returns the exit code.
+/// Runs `hal graph`. Returns the exit code.
 int run_graph(const GraphOptions&);
 
 }  // namespace hal::tools

@@ -24,7 +24,7 @@ std::string quoted(std::string_view text) {
     return out + '"';
 }
 
-/// What is behind the dot of the instance's name; the whole name when it is not of that form.
+/// Returns the part after the instance's name and dot; the whole name when it has another form.
 std::string_view below(const std::string& name, const std::string& owner) {
     if (name.size() > owner.size() + 1 && name.starts_with(owner) && name[owner.size()] == '.')
         return std::string_view(name).substr(owner.size() + 1);
@@ -50,7 +50,7 @@ public:
     std::string text() && { return std::move(text_); }
 
 private:
-    /// 1 for the first function of the thread; 0: in none.
+    /// Returns the position in the thread, from 1; 0 for none.
     static std::size_t place(const LoadedFunction& function) {
         if (!function.thread || function.init) return 0;
         const auto& all = function.thread->functions;

@@ -34,7 +34,7 @@ std::vector<std::string> fields_of(std::string_view line) {
     return fields;
 }
 
-/// How many columns of a table by `hal record --csv` stand before the values: the sample number and the time.
+/// Returns the number of columns before the values in a table of `hal record --csv`: the sample number and the time.
 std::size_t leading_columns(const std::vector<std::string>& names) {
     std::size_t leading = 0;
     for (const char* const name : {"sample", "time_s"}) leading += leading < names.size() && names[leading] == name;
@@ -51,7 +51,7 @@ bool header(const std::string& line, const std::vector<std::string>& fields, con
     return true;
 }
 
-/// What is wrong with a record, or empty.
+/// Returns the error of a record, or an empty string.
 std::string problem_of(const std::vector<std::string>& fields, const Stream& stream) {
     if (fields.size() != stream.types.size())
         return fmt::format("{} values, but '{}' has {} pins", fields.size(), stream.name, stream.types.size());

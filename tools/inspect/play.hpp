@@ -13,7 +13,7 @@ struct PlayOptions : StreamOptions {
     }
 };
 
-/// `hal play`, and halstreamer. Returns the exit code.
+/// Runs `hal play`, and halstreamer. Returns the exit code.
 int run_play(const PlayOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal record` and halsampler: what a sampler samples, as text.
+// `hal record` and halsampler: the samples of a sampler as text.
 #include "inspect/record.hpp"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ void append_plain(std::string& to, hal_type type, const json& value) {
     else to += value.dump() + " ";
 }
 
-/// Floats with as many digits as give the same value back.
+/// Formats floats with the digits needed to read the same value again.
 void append_csv(std::string& to, hal_type type, const json& value) {
     if (type == HAL_TYPE_BIT) to += value.get<bool>() ? "1" : "0";
     else if (type == HAL_TYPE_FLOAT) to += fmt::format("{}", real_of(value));

@@ -8,7 +8,7 @@
 namespace hal::tools {
 
 struct RecordOptions : StreamOptions {
-    std::uint64_t count = 0;  ///< 0: without end
+    std::uint64_t count = 0;  ///< 0: unlimited
     bool csv = false, tag = false;
 
     void declare(OptionSet& set) override {
@@ -21,7 +21,7 @@ struct RecordOptions : StreamOptions {
     }
 };
 
-/// `hal record`, and halsampler. Returns the exit code.
+/// Runs `hal record`, and halsampler. Returns the exit code.
 int run_record(const RecordOptions&);
 
 }  // namespace hal::tools

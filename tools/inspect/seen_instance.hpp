@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `hal top` knows of an instance, and how it shows it.
+// The data of `hal top` about an instance, and its display.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ struct SeenInstance {
     std::vector<SeenThread> threads;
     std::uint64_t faults = 0;
     std::string fault;              ///< the newest, a sentence
-    double silent_s = 0;            ///< since its status came
+    double silent_s = 0;            ///< since its last status
 
     bool same(const SeenInstance& other) const { return pid == other.pid && instance == other.instance && host == other.host; }
 };
@@ -32,9 +32,9 @@ struct SeenInstance {
 /// Parses a status text. Returns false when it is invalid.
 bool read_status(std::string_view text, SeenInstance& seen);
 
-/// A table for people, sorted as given.
+/// Returns a table, in the given order.
 std::string top_table(const std::vector<SeenInstance>& all);
-/// An array of objects, a line.
+/// Returns an array of JSON objects, one line.
 std::string top_json(const std::vector<SeenInstance>& all);
 
 }  // namespace hal::tools

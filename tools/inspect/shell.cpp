@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal shell` and `halcmd`: the client of the control socket. One-shot commands must stay light: no session is made.
+// `hal shell` and `halcmd`: the client of the control socket. One-shot commands must start quickly: they create no session.
 #include "inspect/shell.hpp"
 
 #include <csignal>
@@ -21,7 +21,7 @@ namespace hal::tools {
 
 namespace {
 
-/// Prints what a command printed. Returns its exit status.
+/// Prints a command's output. Returns its exit status.
 int show(const Client::Answer& answer) {
     const bool good = print(answer.out);
     write_all(STDERR_FILENO, answer.err);
@@ -95,13 +95,13 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
     return status;
 }
 
-/// A connection that ends in a `begin` takes what was collected with it.
+/// The end of a connection after `begin` discards the collected edits.
 int without_commit(const RemoteShellOptions& options, const Client::Answer& last, int status) {
     if (!last.collecting || options.loudness == Loudness::nothing) return last.collecting ? 1 : status;
     return fail(options, "'begin' without 'commit' had no effect; write the transaction to a file, or type: hal shell");
 }
 
-/// Reads this user's INI file: the instance knows only its own. False after printing what is wrong with it.
+/// Reads the user's INI file, which the instance has not read. Returns false after printing an error.
 bool read_ini(const RemoteShellOptions& options, Client::Options& how) {
     Sources sources;
     Diagnostics diagnostics;
@@ -111,7 +111,7 @@ bool read_ini(const RemoteShellOptions& options, Client::Options& how) {
     return !diagnostics.failed();
 }
 
-/// While it lives, Ctrl-C is a message: it ends the command that is waited for, not this program.
+/// During its lifetime, Ctrl-C cancels the command that this program waits for, not the program.
 class Interrupts {
 public:
     Interrupts() {

@@ -28,7 +28,7 @@ struct RemoteShellOptions : ExecutionOptions {
     }
 };
 
-/// `hal shell`, and halcmd. Returns the exit code.
+/// Runs `hal shell`, and halcmd. Returns the exit code.
 int run_shell(const RemoteShellOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The far end of a sampler's or streamer's FIFO, through the control socket.
+// Access to a sampler's or streamer's FIFO through the control socket.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace hal::tools {
 
-/// What `hal record` and `hal play` work on.
+/// The stream of `hal record` and `hal play`.
 struct Stream {
     std::unique_ptr<Client> client;
     std::string name;             ///< of the instance: "sampler.0"
@@ -25,11 +25,11 @@ struct Stream {
     bool open(const StreamOptions& options, const char* component);
     /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME` sees that it is ready.
     bool announce(const StreamOptions& options) const;
-    /// Why it does not answer any more, as a sentence.
+    /// Returns the reason of a lost stream.
     std::string lost() const;
 };
 
-/// How long to wait when the FIFO was empty, or full, before asking again.
+/// Polling interval while the FIFO is empty, or full.
 constexpr std::int64_t poll_ns = 2'000'000;
 
 }  // namespace hal::tools

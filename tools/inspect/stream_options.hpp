@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `hal record` and `hal play` have in common.
+// Options common to `hal record` and `hal play`.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal tdma ping`: whether a station of a segment answers, and how long that takes. The machine asks, in its own slot; this program writes
-// the wish into a pin and reads from others what came of it.
+// `hal tdma ping`: measures the round-trip time to a station of a segment. The machine sends the ping in its own slot; this program requests it
+// through a pin and reads the result from others.
 #include "inspect/tdma_ping.hpp"
 
 #include <algorithm>
@@ -85,7 +85,7 @@ private:
     StationPins pins_;
 };
 
-/// Why nothing was answered at all.
+/// Returns the reason when no ping was answered.
 std::string explanation(Outcome last, const StationPins& pins, const std::string& instance, const std::string& station) {
     switch (last) {
     case Outcome::no_room:
@@ -111,7 +111,7 @@ const char* to_string(Outcome outcome) {
     }
 }
 
-/// The instance that has the station among the others, and its pins; empty: `problem`.
+/// Returns the instance that has this station among the others, with its pins; empty: sets `problem`.
 std::string instance_with(const std::map<std::string, StationPins>& instances, const TdmaPingOptions& options, std::string& problem) {
     const std::string& station = options.words.front();
     std::string known;

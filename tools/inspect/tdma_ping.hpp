@@ -10,7 +10,7 @@ namespace hal::tools {
 
 struct TdmaPingOptions : Options {
     std::uint64_t count = 0;  ///< 0: not given
-    std::string from;         ///< the component that asks
+    std::string from;         ///< the component that pings
     std::string name;         ///< of the instance; empty: not given
 
     void declare(OptionSet& set) override {
@@ -21,7 +21,7 @@ struct TdmaPingOptions : Options {
     }
 };
 
-/// `hal tdma ping`. Returns the exit code.
+/// Runs `hal tdma ping`. Returns the exit code.
 int run_tdma_ping(const TdmaPingOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stations of a segment as the pins of a running machine show them.
+// The stations of a segment, from the pins of a running machine.
 #pragma once
 
 #include <map>

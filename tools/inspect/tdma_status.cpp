@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal tdma status`: the stations of a segment as a running machine hears them.
+// `hal tdma status`: the stations of a segment as a running machine receives them.
 #include "inspect/tdma_status.hpp"
 
 #include <algorithm>

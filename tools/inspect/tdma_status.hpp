@@ -17,7 +17,7 @@ struct TdmaStatusOptions : Options {
     }
 };
 
-/// `hal tdma status`. Returns the exit code.
+/// Runs `hal tdma status`. Returns the exit code.
 int run_tdma_status(const TdmaStatusOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal top`: all instances, their threads and faults; of this machine by their control sockets, of others by DDS where it is there.
+// `hal top`: all instances, their threads and faults; of this machine through their control sockets, of others through DDS where it is installed.
 #include "inspect/top.hpp"
 
 #include <algorithm>
@@ -47,10 +47,10 @@ T number(std::string_view text) {
     return value;
 }
 
-/// What comes over the network is shown on a terminal: nothing in it may steer it.
+/// Removes control characters: data from the network must not control the terminal.
 std::string clean(std::string_view text) { return printable(text.substr(0, 300)); }
 
-/// The statuses that come over DDS.
+/// The statuses received over DDS.
 class Network {
 public:
     ~Network() {
@@ -112,7 +112,7 @@ private:
 
     std::mutex mutex_;
     std::vector<Seen> seen_;
-    bool absent_ = false;  ///< there is no DDS here
+    bool absent_ = false;  ///< DDS is not installed
     void* ear_ = nullptr;
     void (*close_)(void*) = nullptr;
 };

@@ -21,7 +21,7 @@ struct TopOptions : Options {
     }
 };
 
-/// `hal top`. Returns the exit code.
+/// Runs `hal top`. Returns the exit code.
 int run_top(const TopOptions&);
 
 }  // namespace hal::tools

@@ -7,18 +7,18 @@
 
 namespace hal::tools {
 
-/// A drawing of dots for the terminal: 2 x 4 dots per character (Braille), or 1 x 2 without Unicode.
+/// A dot drawing for the terminal: 2 x 4 dots per character (Braille), or 1 x 2 without Unicode.
 class Canvas {
 public:
     /// `columns` x `rows` characters.
     Canvas(std::size_t columns, std::size_t rows, bool unicode);
 
-    /// Coordinates run from -1 to 1 in the largest centred square, y upwards. What lies outside is not drawn.
+    /// Coordinates are -1..1 in the largest centred square, y upwards. Points outside are not drawn.
     void dot(double x, double y);
     void line(double x0, double y0, double x1, double y1);
     void circle(double x, double y, double radius);
 
-    /// One text per row, each `columns` characters.
+    /// Returns one text per row, each of `columns` characters.
     std::vector<std::string> rows() const;
 
 private:

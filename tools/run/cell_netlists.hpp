@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Netlists for several machines: which nodes there are, all of them in this process, the part of one.
+// Netlists for several machines: their nodes, all of them in this process, the part of one.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ namespace hal::tools {
 /// Returns the nodes of the files of `options`, none for a netlist of one machine; nullopt after printing an error in --node.
 std::optional<std::vector<NodeLine>> requested_nodes(const NetlistOptions& options);
 
-/// All nodes checked. Returns the exit code.
+/// Checks all nodes. Returns the exit code.
 int check_cell(const NetlistOptions& options, std::vector<NodeLine> nodes);
 
 /// Runs all nodes on the virtual clock in this process, or options.part alone, with the others offline. Returns the exit code.

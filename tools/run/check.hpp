@@ -9,7 +9,7 @@
 namespace hal::tools {
 
 struct CheckOptions : NetlistOptions {
-    std::vector<std::string> assume;  ///< components that exist only elsewhere
+    std::vector<std::string> assume;  ///< components that exist on the target machine only
 
     void declare(OptionSet& set) override {
         set.words("FILE", "netlists in load order; FILE.ini: the netlists of its [HAL] section");
@@ -18,7 +18,7 @@ struct CheckOptions : NetlistOptions {
     }
 };
 
-/// `hal check`. Returns the exit code.
+/// Runs `hal check`. Returns the exit code.
 int run_check(const CheckOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Faults on standard error at the moment they are raised, so that nobody has to ask for them while a machine runs.
+// Prints faults on standard error when they are raised.
 #pragma once
 
 #include <condition_variable>
@@ -13,16 +13,16 @@
 
 namespace hal::tools {
 
-/// While it lives: "fault: SENTENCE [CODE]" for each fault of a machine with real-time threads, limited as every MessageLog. Its thread takes
+/// Prints "fault: SENTENCE [CODE]" for each fault of a machine with real-time threads, limited by a MessageLog. Its thread takes
 /// Session::mutex only after a fault was raised.
 class FaultLines {
 public:
-    /// `sink` gets the lines instead of standard error.
+    /// `sink` receives the lines instead of standard error.
     explicit FaultLines(Session& session, MessageLog::Sink sink = {});
-    ~FaultLines();  ///< prints what is still due
+    ~FaultLines();  ///< prints pending lines
     FaultLines(const FaultLines&) = delete;
 
-    /// Prints the faults that are new. [any] but under Session::mutex
+    /// Prints the new faults. [any], but not under Session::mutex
     void look(std::int64_t now_ns);
 
 private:

@@ -14,7 +14,7 @@ struct FmtOptions : Options {
     }
 };
 
-/// `hal fmt`. Returns the exit code.
+/// Runs `hal fmt`. Returns the exit code.
 int run_fmt(const FmtOptions&);
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A session with its shell and its control socket: what `hal run`, `hal sim` and `halrun` have in common.
+// A session with its shell and its control socket: common to `hal run`, `hal sim` and `halrun`.
 #pragma once
 
 #include <memory>
@@ -18,24 +18,24 @@ namespace hal::tools {
 
 class HostedMachine {
 public:
-    /// Takes over the signals that ask for an end. Programs started from its netlists find it through $HALCYON_INSTANCE.
+    /// Handles the signals that end a run. Programs started from its netlists find it through $HALCYON_INSTANCE.
     HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock);
     ~HostedMachine();  ///< outputs safe, processes ended, instances destroyed
     HostedMachine(const HostedMachine&) = delete;
 
     /// Opens the control socket. Returns false after printing the error; a socket that is not `needed` is optional.
     bool serve(bool needed);
-    /// Runs the files; what they print goes to `output`, without one to the process's own. Returns the exit status.
+    /// Runs the files; their output goes to `output`, by default to the process's own. Returns the exit status.
     int load(Output* output = nullptr);
-    /// `start`, unless the threads run already.
+    /// Executes `start`, unless the threads are running.
     void start_threads();
-    /// Lets the user type until quit or the end. Returns the exit status.
+    /// Opens the interactive shell until quit or the end. Returns the exit status.
     int converse(const Prompt& prompt);
-    /// Virtual clock: advances; ends early when the end was requested.
+    /// Advances the virtual clock; returns early when the end is requested.
     void advance(std::int64_t ns, std::uint64_t cycles);
-    /// Makes outputs safe: the end of the run.
+    /// Ends the run: sets outputs to their safe values.
     void shut_down();
-    /// A fault has stopped one of the threads, or one of them hung at some time.
+    /// Returns true when a fault has stopped a thread, or a thread has hung.
     bool faulted();
 
     StopRequest stop;
@@ -54,7 +54,7 @@ private:
 void export_variables(const Options& options, const std::string& instance);
 ShellOptions shell_options(const NetlistOptions& options);
 
-/// The instance `hal run` makes: --name, else $HALCYON_INSTANCE, else "default".
+/// Returns the instance name: --name, else $HALCYON_INSTANCE, else "default".
 std::string own_name(const NetlistOptions& options);
 
 }  // namespace hal::tools

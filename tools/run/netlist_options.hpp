@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What commands that load netlists have in common.
+// Options common to commands that load netlists.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 namespace hal::tools {
 
 struct NetlistOptions : ExecutionOptions {
-    std::string part;                 ///< --node: whose part of the netlists
+    std::string part;                 ///< --node: the node to load
     std::int64_t cycle_limit_ns = 0;  ///< sim --cycle-limit: of one cycle, in wall time; 0: not given
 
 protected:

@@ -29,7 +29,7 @@ int run_classic(HostedMachine& machine, const RunOptions& options) {
     return std::max({status, said, machine.faulted() ? 1 : 0});
 }
 
-/// Why the run ended, where that is not what the user typed here.
+/// Returns the reason of the end, unless the user ended the run here.
 std::string end_reason(int signal) {
     const char* const name = signal == 0 || signal == SIGINT ? nullptr : ::sigabbrev_np(signal);
     return name ? fmt::format("ended by SIG{}\n", name) : "";

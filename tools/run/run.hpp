@@ -27,7 +27,7 @@ struct RunOptions : NetlistOptions {
     }
 };
 
-/// `hal run`, and halrun. Returns the exit code.
+/// Runs `hal run`, and halrun. Returns the exit code.
 int run_run(const RunOptions&);
 
 }  // namespace hal::tools

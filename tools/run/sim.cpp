@@ -35,7 +35,7 @@ struct Shown {
     std::string name, value;
 };
 
-/// Adds the pins, parameters and signals of that name or pattern. False: there is none.
+/// Adds the pins, parameters and signals of that name or pattern. Returns false for none.
 bool add_named(Session& session, const std::string& name, std::vector<Shown>& all) {
     const Model& model = session.model();
     const auto add_pin = [&](std::string_view own, const Pin* pin) {

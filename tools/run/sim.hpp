@@ -32,7 +32,7 @@ struct SimOptions : NetlistOptions {
     }
 };
 
-/// `hal sim`. Returns the exit code.
+/// Runs `hal sim`. Returns the exit code.
 int run_sim(const SimOptions&);
 
 }  // namespace hal::tools

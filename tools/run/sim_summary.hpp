@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How `hal sim` ends, for one machine and for several.
+// The summary of `hal sim`, for one machine and for several.
 #pragma once
 
 #include <chrono>
@@ -33,7 +33,7 @@ int show_values(const SimOptions& options, Session& session);
 /// "simulated 2 s in 12 ms, 163 times as fast as real time"
 std::string simulated_for(std::int64_t virtual_ns, std::chrono::steady_clock::duration wall);
 
-/// In a terminal, and where nothing was printed otherwise, unless --quiet.
+/// Prints the summary in a terminal, and where nothing else was printed, unless --quiet.
 bool summary_wanted(const SimOptions& options, bool printed);
 
 }  // namespace hal::tools

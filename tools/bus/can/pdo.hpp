@@ -54,7 +54,7 @@ struct PdoMapOptions : PdoOptions {
 
 struct PdoWatchOptions : PdoShowOptions {
     std::int64_t for_ns = -1;  ///< -1: not given
-    std::uint64_t count = 0;   ///< 0: without end
+    std::uint64_t count = 0;   ///< 0: unlimited
 
     void declare(OptionSet& set) override {
         PdoShowOptions::declare(set);

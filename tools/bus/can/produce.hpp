@@ -12,7 +12,7 @@ namespace hal::tools {
 struct PeriodicOptions : Options {
     std::int64_t every_ns = 0;  ///< 0: not given
     std::int64_t for_ns = -1;   ///< -1: not given
-    std::uint64_t count = 0;    ///< 0: without end
+    std::uint64_t count = 0;    ///< 0: unlimited
 };
 
 struct GenerateOptions : PeriodicOptions {

@@ -11,7 +11,7 @@ namespace hal::tools {
 
 struct CanRecordOptions : Options {
     std::vector<std::string> filters;
-    std::uint64_t count = 0;   ///< 0: without end
+    std::uint64_t count = 0;   ///< 0: unlimited
     std::int64_t for_ns = -1;  ///< -1: not given
 
     void declare(OptionSet& set) override {

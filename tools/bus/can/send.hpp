@@ -10,7 +10,7 @@ namespace hal::tools {
 struct SendOptions : Options {
     std::int64_t every_ns = 0;  ///< 0: once
     std::int64_t for_ns = -1;   ///< -1: not given
-    std::uint64_t count = 0;    ///< 0: without end
+    std::uint64_t count = 0;    ///< 0: unlimited
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS FRAME", "where to; then frames as candump writes them: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
