@@ -129,7 +129,7 @@ struct Master {
         const Time began = now(), used = cpu();
         for (unsigned n = 0; n < count; ++n) {
             SdoRequest r{.index = 0x2000, .upload = upload};
-            if (upload) r.room = bytes;
+            if (upload) r.buffer = bytes;
             else r.data = bytes;
             run(r);
         }
@@ -144,7 +144,7 @@ struct Master {
         run(down);
         std::printf("%s_down %.1f\n", name, static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
         began = now();
-        SdoRequest up{.index = 0x2001, .upload = true, .mode = mode, .room = back};
+        SdoRequest up{.index = 0x2001, .upload = true, .mode = mode, .buffer = back};
         run(up);
         std::printf("%s_up %.1f\n", name, static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
         if (data != back) fail("the bytes read differ from those written");
@@ -232,7 +232,7 @@ void memory(unsigned part, bool on_bus) {
         const Time began = cpu();
         for (unsigned n = 0; n < count; ++n) {
             SdoRequest r{.index = static_cast<std::uint16_t>(size <= 4 ? 0x2000 : 0x2001), .upload = upload, .mode = mode};
-            if (upload) r.room = bytes;
+            if (upload) r.buffer = bytes;
             else r.data = bytes;
             run(r);
         }

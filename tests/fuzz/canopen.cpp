@@ -51,8 +51,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::uint8_t room[64] = {};
     static std::uint8_t bytes[1200] = {1, 2, 3};
     SdoRequest requests[] = {{.index = 0x2006, .data = bytes},
-                             {.index = 0x2006, .upload = true, .mode = SdoMode::block, .room = room},
-                             {.index = 0x2006, .upload = true, .mode = SdoMode::segmented, .room = room},
+                             {.index = 0x2006, .upload = true, .mode = SdoMode::block, .buffer = room},
+                             {.index = 0x2006, .upload = true, .mode = SdoMode::segmented, .buffer = room},
                              {.index = 0x2000, .data = {bytes, 4}}};
     Time now = 0;
     device.start(now);
@@ -87,6 +87,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     now += 10 * second, step(nullptr, false);
     for (std::size_t n = 0; n < device.sdo_servers(); ++n) require(!device.sdo_server(n).busy(), "a server gives up on a silent client");
     for (const auto& r : requests)
-        require(r.done() && r.size <= std::max(r.room.size(), r.data.size()), "no more bytes than there is room");
+        require(r.done() && r.size <= std::max(r.buffer.size(), r.data.size()), "no more bytes than there is room");
     return 0;
 }

@@ -90,7 +90,7 @@ int client(const char* address, std::uint8_t id) {
                          .upload = what == "read",
                          .mode = mode == "block" ? SdoMode::block : SdoMode::segmented,
                          .data = data,
-                         .room = room};
+                         .buffer = room};
             node.sdo().submit(r);
             while (!r.done()) {
                 network.poll(clock_now());

@@ -183,10 +183,10 @@ def our_master(program, network):
         check("its heartbeat is set", node.sdo[0x1017].raw == 100)
         check("it is operational", node.nmt.state == "OPERATIONAL")
         node.nmt.stop_heartbeat()
-        check("its silence is noticed", wait_for(lambda: any(" sent no heartbeat for " in s for s in steps())), steps())
+        check("its silence is noticed", wait_for(lambda: any(" sent no heartbeat within " in s for s in steps())), steps())
         check("it is booted again", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
         node.nmt.state = "PRE-OPERATIONAL"
-        check("that it left operational is noticed", wait_for(lambda: any(" left operational by itself" in s for s in steps())), steps())
+        check("that it left operational is noticed", wait_for(lambda: any(" left the operational state " in s for s in steps())), steps())
         check("it is brought back", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
     finally:
         ours.kill()

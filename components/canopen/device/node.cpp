@@ -74,7 +74,7 @@ void Node::send(Time now, std::int64_t link_now) noexcept {
     };
     auto& out = device_.out();
     if (faults_.idle() && bus_.size() == 0) return void(emptied(out));
-    for (Frame f; bus_.room() > 4 && out.pop(f);) faults_.send(f, device_.node_id(), bus_, now);
+    for (Frame f; bus_.space() > 4 && out.pop(f);) faults_.send(f, device_.node_id(), bus_, now);
     if (faults_.poll(device_.node_id(), bus_, now) && runs_) out.clear(), device_.command(NmtCommand::reset_node, now);
     emptied(bus_);
 }

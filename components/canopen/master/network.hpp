@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a master knows of the other nodes: for each an SDO client, its state by heartbeat or guarding, its emergencies.
-// All nodes are served at once; none waits for another.
+// The remote nodes of a network: for each node an SDO client, its NMT state by heartbeat or node guarding, and its emergencies. All nodes are
+// served concurrently.
 #pragma once
 
 #include <array>
@@ -15,37 +15,50 @@
 
 namespace hal::canopen {
 
+/// One remote node as the master sees it. All calls belong to one thread.
 class RemoteNode {
 public:
+    /// Creates the node with its default SDO channel; the queue outlives it. [setup]
     RemoteNode(std::uint8_t id, FrameQueue& out, const SdoClientSettings& settings) : id_(id), out_(out), sdo_(out, settings) {
         sdo_.configure(id);
     }
 
+    /// Returns the node ID. [any]
     std::uint8_t id() const noexcept { return id_; }
+    /// Returns the SDO client of the node. [realtime]
     SdoClient& sdo() noexcept { return sdo_; }
 
-    /// Silence of its heartbeat for that long is a loss; 0: it is not watched. Watching begins with the first one heard. [realtime]
+    /// Supervises the heartbeat with a timeout of `limit` ns, from the first heartbeat on; 0: no supervision. [realtime]
     void expect_heartbeat(Time limit) noexcept { heartbeat_limit_ = limit; }
-    /// Asks it every `period`; it is lost after `factor` periods without a good answer. 0: no guarding. [realtime]
+    /// Guards the node every `period` ns; it is lost after `factor` periods without a valid response. 0: no guarding. [realtime]
     void guard(Time period, std::uint8_t factor, Time now) noexcept;
 
+    /// Returns true if node guarding is on. [realtime]
     bool guarded() const noexcept { return guard_period_ != 0; }
-    /// It was lost although it answered guarding: with a toggle bit that did not change.
+    /// Returns true if the node was lost because the toggle bit of its guarding responses did not alternate. [realtime]
     bool toggle_stuck() const noexcept { return toggle_stuck_; }
 
+    /// Returns true once a heartbeat, boot-up message or guarding response was received. [realtime]
     bool heard() const noexcept { return heard_; }
+    /// Returns true while heartbeat or guarding is timed out. [realtime]
     bool lost() const noexcept { return lost_; }
+    /// Returns the NMT state as last received. [realtime]
     NmtState state() const noexcept { return state_; }
+    /// Returns the time of the last heartbeat, boot-up message or guarding response. [realtime]
     Time last_heard() const noexcept { return last_; }
+    /// Returns the number of boot-up messages. [realtime]
     std::uint64_t boot_ups() const noexcept { return boot_ups_; }
+    /// Returns the number of guarding responses with a wrong toggle bit. [realtime]
     std::uint64_t wrong_toggles() const noexcept { return wrong_toggles_; }
 
-    static constexpr std::size_t history = 16;
-    /// Emergency `n` counted back from the newest, 0 first; the time is 0 where there is none.
+    static constexpr std::size_t history = 16;  ///< emergencies kept
+    /// Returns emergency `n`, 0 being the newest; its time is 0 if there is none. [realtime]
     const Emergency& emergency(std::size_t n) const noexcept {
         return emergencies_[(emergency_count_ + history * 2 - 1 - n % history) % history];
     }
+    /// Returns the number of emergencies received. [realtime]
     std::uint64_t emergencies() const noexcept { return emergency_count_; }
+    /// Returns 1001h as the newest emergency carried it. [realtime]
     std::uint8_t error_register() const noexcept { return error_register_; }
 
 private:
@@ -68,18 +81,21 @@ private:
     std::uint8_t error_register_ = 0;
 };
 
+/// All remote nodes of a bus. All calls belong to one thread.
 class Network {
 public:
+    /// Creates an empty network; queue and events outlive it. [setup]
     Network(FrameQueue& out, Events& events, const SdoClientSettings& settings = {}) : out_(out), events_(events), settings_(settings) {}
 
-    /// The node, made if it was not known yet; id 1–127. [setup]
+    /// Returns the node, creating it if necessary; id 1..127. [setup]
     RemoteNode& add(std::uint8_t id);
-    /// nullptr when it was not added. [realtime]
+    /// Returns the node; nullptr if it was not added. [realtime]
     RemoteNode* node(std::uint8_t id) noexcept { return id < nodes_.size() ? nodes_[id].get() : nullptr; }
-    /// To one node, or to all with id 0. False: no room. [realtime]
+    /// Sends an NMT command to one node, or to all with id 0. Returns false if the queue is full. [realtime]
     bool command(NmtCommand, std::uint8_t id = 0) noexcept;
-    /// True: it was for one of the nodes. [realtime]
+    /// Processes a frame; returns true if it belongs to one of the nodes. [realtime]
     bool handle(const Frame&, Time now) noexcept;
+    /// Polls all nodes; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
 
 private:

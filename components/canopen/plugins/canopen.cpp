@@ -32,7 +32,7 @@ std::string seconds_text(Time t) {
 
 /// A node's faults in words, made before the first cycle.
 struct FaultWords {
-    std::string                 silent, guarding, toggle, rebooted, left, not_started, doubled, suspected;
+    std::string                 silent, guarding, toggle, rebooted, reset, left, commanded, not_started, doubled, suspected;
     std::array<std::string, 16> boot;  // by the letter of CiA 302
 
     FaultWords(const config::Node& n) {
@@ -42,8 +42,10 @@ struct FaultWords {
         silent = who + " silent for {} s (limit " + seconds_text(limit) + " s)" + safe;
         guarding = who + " did not answer its guarding for {} s" + safe;
         toggle = who + " answers its guarding with a toggle bit that does not change" + safe;
-        rebooted = who + " restarted by itself" + safe;
-        left = who + " left the operational state by itself" + safe;
+        rebooted = who + " rebooted without a command from this master" + safe;
+        reset = who + " rebooted after an NMT reset from another device" + safe;
+        left = who + " left the operational state without a command from this master" + safe;
+        commanded = who + " left the operational state after an NMT command from another device" + safe;
         not_started = who + " was started and did not become operational" + safe;
         doubled = who + " is there twice: two devices have this node-id" + safe;
         suspected = who + " sends more heartbeats than it should: two devices may have this node-id";
@@ -301,10 +303,10 @@ private:
             switch (s.cause) {
             case Cause::guarding: raise(w.guarding.c_str(), silence); break;
             case Cause::guard_toggle: raise(w.toggle.c_str(), not_a_number); break;
-            case Cause::boot_up: raise(w.rebooted.c_str(), not_a_number); break;
-            case Cause::left_operational: raise(w.left.c_str(), not_a_number); break;
+            case Cause::boot_up: raise((s.foreign_command != 0 ? w.reset : w.rebooted).c_str(), not_a_number); break;
+            case Cause::left_operational: raise((s.foreign_command != 0 ? w.commanded : w.left).c_str(), not_a_number); break;
             case Cause::not_started: raise(w.not_started.c_str(), not_a_number); break;
-            case Cause::doubled: raise(w.doubled.c_str(), not_a_number); break;
+            case Cause::duplicate_id: raise(w.doubled.c_str(), not_a_number); break;
             default: raise(w.silent.c_str(), silence); break;
             }
             reporter_->node(s);
@@ -319,10 +321,10 @@ private:
         } else if (failed && !pins.is_faulty) {
             const NodeSetup& setup = config_.nodes[place].setup;
             // One that is not there yet may still be powered up.
-            const bool absent = s.result == BootResult::no_answer && (s.cause == Cause::silent || s.cause == Cause::unsent);
+            const bool absent = s.result == BootResult::no_answer && (s.cause == Cause::no_response || s.cause == Cause::not_sent);
             if (absent && (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) return;
             pins.is_faulty = true;
-            const std::string& why = s.cause == Cause::doubled ? w.doubled : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
+            const std::string& why = s.cause == Cause::duplicate_id ? w.doubled : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
             raise(why.c_str(), not_a_number);
             reporter_->node(s);
         } else if (s.step == Step::running && pins.is_faulty) {
@@ -336,10 +338,10 @@ private:
     /// What should be known of a node, once; that it is there twice, after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
         const unsigned fresh = s.notes & ~unsigned{notes_told_[place]};
-        notes_told_[place] = static_cast<std::uint8_t>((notes_told_[place] & ~note_doubled) | s.notes);
+        notes_told_[place] = static_cast<std::uint8_t>((notes_told_[place] & ~note_duplicate_id) | s.notes);
         for (unsigned bit = 1; bit <= note_updated; bit <<= 1)
             if ((fresh & bit) != 0) reporter_->note(s, static_cast<Note>(bit));
-        if ((fresh & note_doubled) != 0) raise(words_[place].suspected.c_str(), not_a_number);
+        if ((fresh & note_duplicate_id) != 0) raise(words_[place].suspected.c_str(), not_a_number);
     }
     void on_network(const NetworkStatus& n) noexcept override {
         static constexpr NodeStatus nobody{};

@@ -6,7 +6,7 @@
 namespace hal::canopen {
 
 namespace {
-/// Objects that a sub-index of 1010h or 1011h is about.
+/// The objects that a sub-index of 1010h or 1011h covers (CiA 301).
 constexpr std::pair<std::uint16_t, std::uint16_t> objects_of(std::uint8_t sub) noexcept {
     return sub == 1 ? std::pair<std::uint16_t, std::uint16_t>{0x1000, 0xffff}
            : sub == 2 ? std::pair<std::uint16_t, std::uint16_t>{0x1000, 0x1fff}
@@ -77,7 +77,7 @@ void Device::configure_channel(std::uint16_t index) noexcept {
     const auto request = dictionary_.get<std::uint32_t>(index, 1, index == 0x1200 ? 0x600U + node_id_ : cob_invalid);
     const auto answer = dictionary_.get<std::uint32_t>(index, 2, index == 0x1200 ? 0x580U + node_id_ : cob_invalid);
     for (auto& s : servers_)
-        // The first channel is what it is, whatever a description says.
+        // CiA 301 fixes the COB-IDs of the first channel, whatever the description contains.
         if (s.index == index)
             s.server->configure(index == 0x1200 ? 0x600U + node_id_ : request, index == 0x1200 ? 0x580U + node_id_ : answer);
     for (auto& c : clients_)
@@ -111,7 +111,7 @@ void Device::command(NmtCommand command, Time now) noexcept {
     case NmtCommand::reset_communication: {
         const bool application = command == NmtCommand::reset_node;
         node_id_ = lss_.pending_id();
-        lss_.took_over();
+        lss_.activate_pending_id();
         dictionary_.set_node_id(node_id_);
         if (application) dictionary_.reset(0x2000, 0xffff);
         dictionary_.reset(0x1000, 0x1fff);
@@ -137,7 +137,7 @@ void Device::communication_error(std::uint16_t code, std::uint8_t node, Time now
 void Device::take_sync(Time now) noexcept {
     pdos_.on_sync(now, sync_.window());
     events_.on_sync(sync_.counter(), now);
-    pdos_.on_sync_send(sync_.counter(), sync_.counter() != 0, now);
+    pdos_.send_synchronous(sync_.counter(), sync_.counter() != 0, now);
 }
 
 bool Device::produce_sync(Time now) noexcept {
@@ -182,9 +182,9 @@ void Device::poll(Time now) noexcept {
     now_ = now;
     lss_.poll();
     if (!usable(node_id_)) return;
-    const auto verdict = error_control_.poll(now, events_);
-    if (verdict.lost) communication_error(0x8130, verdict.node, now);
-    else if (verdict.back) emcy_.clear(0x8130);
+    const auto change = error_control_.poll(now, events_);
+    if (change.lost) communication_error(0x8130, change.node, now);
+    else if (change.recovered) emcy_.clear(0x8130);
     if (state_ == NmtState::stopped) return;
     if (sync_.poll(now)) take_sync(now);
     if (sync_.lost(now)) events_.on_sync_lost(now);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-// A CANopen node: an object dictionary and all services of CiA 301, 304 and 305 around it. A device is built on it, and so is the
-// master's own node. It owns no bus, no clock and no thread:
+// A CANopen node: an object dictionary and the services of CiA 301, CiA 304 and CiA 305 around it. Devices are built on it, and so is the
+// master's own node. It owns neither bus, clock nor thread:
 //
-//     Device device(description, {.node_id = 5}, events);   // [setup]
+//     Description d = basic_device({.vendor = 1, .product = 2, .heartbeat_ms = 100});
+//     d.add(0x2000, 0, Type::integer32, Access::read_write, 7, "speed").mappable();
+//     Events events;                                         // override what the application reacts to
+//     Device device(d, {.node_id = 5}, events);              // [setup]
 //     device.start(now);
 //     each cycle:
 //         while (link.receive(frame, now)) device.handle(frame, now);
@@ -27,37 +30,48 @@
 
 namespace hal::canopen {
 
+/// How a node behaves.
 struct DeviceSettings {
-    std::uint8_t node_id = unconfigured;  ///< 1–127; unconfigured: waits for an LSS master
-    std::size_t queue = 1024;             ///< frames on their way out
-    bool auto_start = false;         ///< becomes operational after boot-up without being told
-    bool nmt_slave = true;                ///< false: it is the NMT master
-    bool lss = true;
+    std::uint8_t node_id = unconfigured;  ///< 1..127; unconfigured: waits for an LSS master
+    std::size_t queue = 1024;             ///< capacity of the transmit queue in frames
+    bool auto_start = false;              ///< becomes operational after boot-up without an NMT command
+    bool nmt_slave = true;                ///< obeys NMT commands; false: it is the NMT master
+    bool lss = true;                      ///< answers LSS requests (CiA 305)
     SdoServerSettings sdo{};
     SdoClientSettings sdo_client{};
     PdoSettings pdo{};
 };
 
+/// One node. All calls belong to one thread.
 class Device final : private Handler {
 public:
-    Device(const Description&, const DeviceSettings&, Events&);  // [setup]
+    /// Builds the node; the events outlive it. [setup]
+    Device(const Description&, const DeviceSettings&, Events&);
 
-    /// Boots: the values in the dictionary hold, the boot-up message goes out. [realtime]
+    /// Boots the node with the present values of the dictionary and sends the boot-up message. [realtime]
     void start(Time now) noexcept;
+    /// Processes a received frame. [realtime]
     void handle(const Frame&, Time now) noexcept;
+    /// Does what is due: timers, PDOs, timeouts; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
+    /// Returns the transmit queue; the owner of the bus empties it. [realtime]
     FrameQueue& out() noexcept { return out_; }
 
+    /// Returns the NMT state. [realtime]
     NmtState state() const noexcept { return state_; }
+    /// Returns the node ID, 1..127, or `unconfigured`. [realtime]
     std::uint8_t node_id() const noexcept { return node_id_; }
-    /// What the NMT master would command, by itself. [realtime]
+    /// Executes an NMT command as if the NMT master had sent it. [realtime]
     void command(NmtCommand, Time now) noexcept;
-    /// The bus went off: errors are handled as 1029h says. [realtime]
+    /// Reports bus-off: raises EMCY 8140h and reacts as object 1029h specifies. [realtime]
     void bus_off(Time now) noexcept { communication_error(0x8140, 0, now); }
+    /// Reports that the bus is available again: clears EMCY 8140h. [realtime]
     void bus_recovered() noexcept { emcy_.clear(0x8140); }
-    /// The master's thread produces the SYNC itself: as if one had come. False: not the producer, or no room. [realtime]
+    /// Sends a SYNC now and processes it as a received one, for a thread that is the clock. Returns false if this node is not the producer (1005h)
+    /// or the queue is full. [realtime]
     bool produce_sync(Time now) noexcept;
 
+    /// Return the services of the node. [realtime]
     Dictionary& dictionary() noexcept { return dictionary_; }
     Pdos& pdos() noexcept { return pdos_; }
     Srdos& srdos() noexcept { return srdos_; }
@@ -67,6 +81,7 @@ public:
     TimeStamp& time() noexcept { return time_; }
     ErrorControl& error_control() noexcept { return error_control_; }
     LssSlave& lss() noexcept { return lss_; }
+    /// Return the SDO channels; servers and clients count from 0. [realtime]
     std::size_t sdo_servers() const noexcept { return servers_.size(); }
     SdoServer& sdo_server(std::size_t n) noexcept { return *servers_[n].server; }
     std::size_t sdo_clients() const noexcept { return clients_.size(); }

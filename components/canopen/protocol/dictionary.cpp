@@ -8,13 +8,13 @@ namespace hal::canopen {
 
 namespace {
 
-/// A domain that lies in the dictionary's own memory.
+/// Stream of a domain without an application stream: the bytes lie in the dictionary.
 class Memory final : public Stream {
 public:
     Abort open_read(Entry& e, std::uint32_t& size) noexcept override { return size = e.size, Abort::none; }
-    Abort read(Entry& e, std::uint32_t offset, std::span<std::uint8_t> room) noexcept override {
-        if (offset > e.size || room.size() > e.size - offset) return Abort::local_control;  // rewritten meanwhile
-        std::memcpy(room.data(), e.data + offset, room.size());
+    Abort read(Entry& e, std::uint32_t offset, std::span<std::uint8_t> buffer) noexcept override {
+        if (offset > e.size || buffer.size() > e.size - offset) return Abort::local_control;  // rewritten since the transfer began
+        std::memcpy(buffer.data(), e.data + offset, buffer.size());
         return Abort::none;
     }
     Abort open_write(Entry& e, std::uint32_t size) noexcept override {
@@ -34,7 +34,7 @@ public:
 };
 Memory own_memory;
 
-/// Types of the objects this library works with; a description that says otherwise is wrong. none: no such rule.
+/// Returns the type that CiA 301 prescribes for an object of this library; none: any type. A description with another type is invalid.
 Type standard_type(std::uint16_t index, std::uint8_t sub) noexcept {
     using enum Type;
     const bool count = sub == 0;
@@ -63,7 +63,7 @@ std::int64_t integer(const Entry& e, std::span<const std::uint8_t> bytes) noexce
 Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept {
     if (is_real(e.type)) {
         const double value = e.type == Type::real32 ? static_cast<double>(load<float>(bytes.data())) : load<double>(bytes.data());
-        if (!(value <= std::bit_cast<double>(e.high))) return Abort::too_high;  // a NaN is out of any range
+        if (!(value <= std::bit_cast<double>(e.high))) return Abort::too_high;  // NaN is outside any range
         return value < std::bit_cast<double>(e.low) ? Abort::too_low : Abort::none;
     }
     const auto value = integer(e, bytes);
@@ -81,7 +81,7 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
     for (const auto& e : description.entries) order.push_back(&e);
     const auto key = [](const EntryDescription* e) { return std::uint32_t{e->index} << 8 | e->sub; };
     std::stable_sort(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) < key(b); });
-    const auto complain = [&](const EntryDescription& e, const char* what) {
+    const auto report = [&](const EntryDescription& e, const char* what) {
         char text[120];
         std::snprintf(text, sizeof text, "object %04X sub-index %02X: %s", e.index, e.sub, what);
         problems_.emplace_back(text);
@@ -91,13 +91,13 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
     std::vector<const EntryDescription*> taken;
     for (const auto* from : order) {
         if (!keys_.empty() && keys_.back() == key(from)) {
-            complain(*from, "described twice; the first description counts");
+            report(*from, "duplicate description; the first one applies");
             continue;
         }
         Entry e;
         e.index = from->index, e.sub = from->sub, e.access = from->access, e.type = from->type;
         if (const auto standard = standard_type(e.index, e.sub); standard != Type::none && standard != e.type) {
-            complain(*from, (std::string("its type is ") + to_string(standard)).c_str());
+            report(*from, (std::string("its type must be ") + to_string(standard)).c_str());
             e.type = standard;
         }
         e.bits = static_cast<std::uint8_t>(bits_of(e.type));
@@ -105,7 +105,7 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
         e.ranged = from->ranged && e.bits != 0, e.low = from->low, e.high = from->high;
         if (e.bits != 0) {
             e.capacity = e.size = bytes_of(e.type);
-            if (!from->value.empty() && from->value.size() != e.size) complain(*from, "the value has not the length of its type");
+            if (!from->value.empty() && from->value.size() != e.size) report(*from, "the length of the value does not match its type");
         } else {
             e.capacity = std::max(from->capacity, static_cast<std::uint32_t>(from->value.size()));
             e.size = static_cast<std::uint32_t>(from->value.size());
@@ -156,15 +156,15 @@ Abort Dictionary::prepare_read(Entry& e) noexcept {
     return e.handler != nullptr ? e.handler->reading(e) : Abort::none;
 }
 
-Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> room, std::size_t& size) noexcept {
+Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> buffer, std::size_t& size) noexcept {
     size = 0;
     Abort why;
     Entry* e = find(index, sub, why);
     if (e == nullptr) return why;
     if (why = prepare_read(*e); why != Abort::none) return why;
-    if (e->size > room.size()) return Abort::memory;
+    if (e->size > buffer.size()) return Abort::memory;
     size = e->size;
-    if (size != 0) std::memcpy(room.data(), e->data, size);
+    if (size != 0) std::memcpy(buffer.data(), e->data, size);
     return Abort::none;
 }
 
@@ -229,14 +229,14 @@ void Dictionary::keep(std::uint16_t first, std::uint16_t last, bool to_defaults)
         const Entry& e = entries_[n];
         if (e.type == Type::domain || !writable(e.access)) continue;
         images_[n].size = to_defaults ? images_[n].default_size : e.size;
-        auto* kept = power_on_.data() + images_[n].offset;
+        auto* stored = power_on_.data() + images_[n].offset;
         if (images_[n].size == 0) continue;
-        std::memcpy(kept, to_defaults ? defaults_.data() + images_[n].offset : e.data, images_[n].size);
-        if (!to_defaults && e.plus_node_id && e.size <= 4) {  // is kept without the node id, which may be another next time
+        std::memcpy(stored, to_defaults ? defaults_.data() + images_[n].offset : e.data, images_[n].size);
+        if (!to_defaults && e.plus_node_id && e.size <= 4) {  // stored without the node ID, which may be another at the next start
             std::uint32_t value = 0;
-            std::memcpy(&value, kept, e.size);
+            std::memcpy(&value, stored, e.size);
             value -= node_id_ <= 127 ? node_id_ : 0;
-            std::memcpy(kept, &value, e.size);
+            std::memcpy(stored, &value, e.size);
         }
     }
 }

@@ -74,7 +74,7 @@ void Emcy::queue(std::uint16_t code, const Bytes& manufacturer) noexcept {
 }
 
 void Emcy::poll(Time now) noexcept {
-    if (count_ == 0 || active(0x8140)) return;  // "recovered from bus off" (CiA 301): told when it is, not to a bus that is off
+    if (count_ == 0 || active(0x8140)) return;  // "recovered from bus off" (CiA 301): sent after the recovery, not while the bus is off
     while (count_ != 0 && active_ && (!sent_once_ || now - sent_ >= inhibit_)) {
         const auto& e = waiting_[head_];
         Frame f = make_frame(cob_, 8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// EMCY: errors of this node told to all (1001h, 1003h, 1014h, 1015h), and those of others heard (1028h).
+// The emergency service (CiA 301): sends the errors of this node (1001h, 1003h, 1014h, 1015h) and receives those of other nodes (1028h).
 #pragma once
 
 #include <array>
@@ -11,32 +11,39 @@
 
 namespace hal::canopen {
 
-/// Bits of the error register 1001h.
+/// Bits of the error register 1001h (CiA 301).
 enum ErrorRegister : std::uint8_t {
     error_generic = 0x01, error_current = 0x02, error_voltage = 0x04, error_temperature = 0x08, error_communication = 0x10,
     error_profile = 0x20, error_manufacturer = 0x80,
 };
-/// The error code in words: its class, or "error reset or no error". [any]
+/// Returns the description of the class of the error code (CiA 301); "error reset or no error" for 0. [any]
 const char* emergency_text(std::uint16_t code) noexcept;
 
+/// The EMCY producer of a node.
 class Emcy final : public Handler {
 public:
-    using Bytes = std::array<std::uint8_t, 5>;
+    using Bytes = std::array<std::uint8_t, 5>;  ///< manufacturer-specific bytes 3 to 7
 
-    Emcy(Dictionary&, FrameQueue& out);  // [setup]
-    /// Communication was reset: reads 1014h and 1015h. `all`: no error is left. [realtime]
+    /// Creates the service; both arguments outlive it. [setup]
+    Emcy(Dictionary&, FrameQueue& out);
+    /// Reads 1014h and 1015h after a communication reset; `all`: also clears all errors. [realtime]
     void reset(bool all) noexcept;
-    /// Pre-operational and operational nodes may send.
+    /// Enables transmission, in the NMT states pre-operational and operational. [realtime]
     void set_active(bool active) noexcept { active_ = active; }
-    /// An error is there; as long as it is, saying so again does nothing. `source`: which of several parts that can have it, such as
-    /// the axes of a drive. While 8140h is there nobody would hear: that and what follows is sent when it is cleared. [realtime]
+    /// Reports an error; repeated calls have no effect until clear(). `register_bits` is set in 1001h. `source` distinguishes the parts of a node
+    /// that can have the same error, such as the axes of a drive. While 8140h (bus-off) is active, transmission waits until it is cleared.
+    /// [realtime]
     void raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer = {}, std::uint8_t source = 0) noexcept;
-    /// It is gone. [realtime]
+    /// Reports that an error is over; sends "error reset" when it was active. [realtime]
     void clear(std::uint16_t code, std::uint8_t source = 0) noexcept;
+    /// Returns true while the error is active. [realtime]
     bool active(std::uint16_t code, std::uint8_t source = 0) const noexcept;
+    /// Returns object 1001h. [realtime]
     std::uint8_t error_register() const noexcept { return dictionary_.get<std::uint8_t>(0x1001, 0); }
+    /// Sends pending emergencies after the inhibit time. [realtime]
     void poll(Time now) noexcept;
-    std::uint64_t lost() const noexcept { return lost_; }  ///< found no room while the inhibit time ran
+    /// Returns the number of emergencies discarded because too many were pending. [any]
+    std::uint64_t lost() const noexcept { return lost_; }
 
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
     void written(Entry&) noexcept override;
@@ -63,14 +70,17 @@ private:
     std::uint64_t lost_ = 0;
 };
 
-/// Hears the emergencies of the nodes in 1028h.
+/// Receives the emergencies of the nodes in 1028h.
 class EmcyConsumer final : public Handler {
 public:
-    explicit EmcyConsumer(Dictionary&);  // [setup]
+    /// Creates the service; the dictionary outlives it. [setup]
+    explicit EmcyConsumer(Dictionary&);
+    /// Reads 1028h. [realtime]
     void reset() noexcept;
+    /// Processes a frame; returns true if it is an emergency of a node in 1028h. [realtime]
     bool handle(const Frame&, Time now, Events&) noexcept;
     void written(Entry&) noexcept override { reset(); }
-    /// The emergency in a frame. [any]
+    /// Decodes an EMCY frame. [any]
     static Emergency read(const Frame&, Time now) noexcept;
 
 private:

@@ -51,7 +51,7 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
     if (f.extended || f.id <= 0x700 || f.id >= 0x780) return false;
     const auto node = static_cast<std::uint8_t>(f.id - 0x700);
     if (f.remote) {
-        // With a heartbeat there is no guarding; with a boot-up still to send there is nothing to say yet.
+        // The heartbeat excludes guarding (CiA 301), and nothing is sent before the boot-up message.
         if (node != node_id_ || !booted_ || boot_pending_ || period_ != 0) return true;
         Frame answer = make_frame(0x700U + node_id_, 1);
         answer.data[0] = static_cast<std::uint8_t>(static_cast<std::uint8_t>(state_) | toggle_);
@@ -79,7 +79,7 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
         c.watching = true, c.lost = false;
         c.heard = now;
         c.state = state;
-        // After a boot-up the node may take its time until the first heartbeat.
+        // After a boot-up the timeout starts with the first heartbeat.
         if (state == NmtState::initialising) c.watching = false, events.on_node(node, NodeEvent::boot_up, state, now);
         else if (first) events.on_node(node, NodeEvent::alive, state, now);
         else if (changed) events.on_node(node, NodeEvent::changed, state, now);
@@ -88,9 +88,9 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
     return true;
 }
 
-ErrorControl::Verdict ErrorControl::poll(Time now, Events& events) noexcept {
-    Verdict verdict;
-    if (!booted_) return verdict;
+ErrorControl::Change ErrorControl::poll(Time now, Events& events) noexcept {
+    Change change;
+    if (!booted_) return change;
     if (boot_pending_) send_boot_up();
     if (period_ != 0 && !boot_pending_) {
         if (due_now_) next_ = now, due_now_ = false;
@@ -103,7 +103,7 @@ ErrorControl::Verdict ErrorControl::poll(Time now, Events& events) noexcept {
     if (guarding_ && !life_lost_ && now - guarded_ >= life_time_) {
         life_lost_ = true;
         events.on_life_guarding(true, now);
-        verdict.lost = true;
+        change.lost = true;
     }
     for (std::size_t n = 1; n <= highest_; ++n) {
         auto& c = consumers_[n];
@@ -111,10 +111,10 @@ ErrorControl::Verdict ErrorControl::poll(Time now, Events& events) noexcept {
         c.lost = true;
         ++lost_;
         events.on_node(c.node, NodeEvent::lost, c.state, now);
-        verdict.lost = true, verdict.node = c.node;
+        change.lost = true, change.node = c.node;
     }
-    verdict.back = all_alive();
-    return verdict;
+    change.recovered = all_alive();
+    return change;
 }
 
 Abort ErrorControl::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who is alive: heartbeat produced (1017h) and consumed (1016h), node guarding answered and life guarding (100Ch, 100Dh).
+// Error control (CiA 301): heartbeat producer (1017h) and consumer (1016h), node guarding response and life guarding (100Ch, 100Dh).
 #pragma once
 
 #include <array>
@@ -10,27 +10,32 @@
 
 namespace hal::canopen {
 
+/// The error control of a node.
 class ErrorControl final : public Handler {
 public:
-    ErrorControl(Dictionary&, FrameQueue& out);  // [setup]
-    /// Communication was reset. [realtime]
+    /// Creates the service; both arguments outlive it. [setup]
+    ErrorControl(Dictionary&, FrameQueue& out);
+    /// Reads all parameters after a communication reset. [realtime]
     void reset(std::uint8_t node_id) noexcept;
-    /// The boot-up message and from then on the heartbeat. [realtime]
+    /// Sends the boot-up message, then the heartbeat. [realtime]
     void boot(Time now) noexcept;
+    /// Sets the NMT state that heartbeat and guarding responses carry. [realtime]
     void set_state(NmtState state) noexcept { state_ = state; }
 
-    /// True: it is a frame of error control. [realtime]
+    /// Processes a frame; returns true if it belongs to error control. [realtime]
     bool handle(const Frame&, Time now, Events&) noexcept;
-    struct Verdict {
-        bool lost = false;      ///< a node we consume, or the master's guarding, fell silent just now
-        std::uint8_t node = 0;  ///< which; 0: the master
-        bool back = false;      ///< nothing is silent any more
+    /// What changed in a poll().
+    struct Change {
+        bool lost = false;       ///< the heartbeat of a consumed node or the guarding of the master timed out
+        std::uint8_t node = 0;   ///< its node ID; 0: the master
+        bool recovered = false;  ///< no timeout is active any more
     };
-    Verdict poll(Time now, Events&) noexcept;
+    /// Sends the heartbeat when it is due and checks all timeouts. [realtime]
+    Change poll(Time now, Events&) noexcept;
 
-    /// Every node of 1016h is heard. Nodes not heard yet do not count as lost.
+    /// Returns true if no node of 1016h and no life guarding has timed out. Nodes never received do not count as lost. [realtime]
     bool all_alive() const noexcept { return lost_ == 0 && !life_lost_; }
-    /// Somebody else sent with our node-id since communication was reset.
+    /// Returns true if another device used this node ID since the communication reset. [realtime]
     bool collided() const noexcept { return collided_; }
 
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;

@@ -29,7 +29,7 @@ bool LssMaster::store_configuration(Time now) noexcept { return expect(0x17, 0, 
 bool LssMaster::inquire(unsigned part, Time now) noexcept { return part <= 4 && expect(static_cast<std::uint8_t>(0x5a + part), 0, now); }
 
 bool LssMaster::select(const Identity& identity, Time now) noexcept {
-    if (busy() || out_.room() < 4) return false;
+    if (busy() || out_.space() < 4) return false;
     for (unsigned part = 0; part < 3; ++part) send(static_cast<std::uint8_t>(0x40 + part), identity[part]);
     expect(0x43, identity[3], now);
     expected_ = 0x44;
@@ -37,7 +37,7 @@ bool LssMaster::select(const Identity& identity, Time now) noexcept {
 }
 
 bool LssMaster::identify(const Identity& low, const Identity& high, Time now) noexcept {
-    if (busy() || out_.room() < 6) return false;
+    if (busy() || out_.space() < 6) return false;
     const std::uint32_t values[] = {low[0], low[1], low[2], high[2], low[3], high[3]};
     for (unsigned step = 0; step < 5; ++step) send(static_cast<std::uint8_t>(0x46 + step), values[step]);
     expect(0x4b, values[5], now);
@@ -51,7 +51,7 @@ bool LssMaster::identify_unconfigured(Time now) noexcept {
     return true;
 }
 
-// The scan asks for one bit after the other whether there is a slave whose number continues with 0; silence means 1.
+// Fastscan asks bit by bit whether a slave exists whose number continues with 0; no response means 1.
 
 bool LssMaster::scan(Time now, const Identity& known, const std::array<std::uint8_t, 4>& known_bits) noexcept {
     if (busy()) return false;
@@ -87,7 +87,7 @@ void LssMaster::scan_part() noexcept {
     send_scan(bit_, part_);
 }
 
-/// Twice as long with each repetition: the answers may have come late.
+/// Doubles with each repetition: the responses may have been late.
 Time LssMaster::scan_wait() const noexcept { return settings_.scan_timeout << std::min(settings_.repeats - repeats_left_, 5U); }
 
 void LssMaster::scan_answer(bool yes) noexcept {
@@ -103,7 +103,7 @@ void LssMaster::scan_answer(bool yes) noexcept {
         job_ = Job::scan_confirm;
         return send_scan(0, static_cast<std::uint8_t>(part_ == 3 ? 0 : part_ + 1));
     case Job::scan_confirm:
-        if (!yes) {  // an answer was lost, or came from nobody
+        if (!yes) {  // a response was lost, or an earlier one was invalid
             if (repeats_left_ != 0) return --repeats_left_, scan_part();
             job_ = Job::none;
             return;
@@ -124,7 +124,7 @@ void LssMaster::handle(const Frame& f, Time now) noexcept {
     now_ = now;
     if (!busy() || f.length != 8) return;
     if (job_ != Job::expect) {
-        // All slaves that the question fits answer, each in its turn: the next question waits for the last of them.
+        // All matching slaves respond one after the other: the next request waits for the last of them.
         if (f.data[0] == 0x4f && !unsent_ && !heard_) heard_ = true, asked_ = now - scan_wait() + settings_.scan_timeout / 4;
         return;
     }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The LSS slave (CiA 305), a part of every Device.
 #pragma once
 
 #include "events.hpp"
@@ -7,21 +8,26 @@
 
 namespace hal::canopen {
 
-/// The slave's side: gets a node id and a bit rate from the master, before it has either.
+/// Receives node ID and bit rate from an LSS master. All calls belong to one thread.
 class LssSlave {
 public:
+    /// Creates the slave; both arguments outlive it. [setup]
     LssSlave(FrameQueue& out, Events& events) noexcept : out_(out), events_(events) {}
+    /// Sets identity (1018h) and active node ID. [realtime]
     void configure(const Identity& identity, std::uint8_t node_id) noexcept { identity_ = identity, active_id_ = pending_id_ = node_id; }
-    /// True: it is an LSS frame. [realtime]
+    /// Processes a frame; returns true if it is an LSS request. [realtime]
     bool handle(const Frame&) noexcept;
+    /// Sends a response that did not fit into the queue. [realtime]
     void poll() noexcept {
         if (waiting_answer_) waiting_answer_ = !out_.push(answer_);
     }
-    /// The id that holds after the next reset of communication.
+    /// Returns the node ID that applies after the next communication reset. [realtime]
     std::uint8_t pending_id() const noexcept { return pending_id_; }
-    void took_over() noexcept { active_id_ = pending_id_, wants_reset_ = false; }
-    /// A node without id has got one: communication starts now.
+    /// Makes the pending node ID the active one. [realtime]
+    void activate_pending_id() noexcept { active_id_ = pending_id_, wants_reset_ = false; }
+    /// Returns true once a node without ID has received one and must reset its communication. [realtime]
     bool wants_reset() const noexcept { return wants_reset_; }
+    /// Returns true in LSS configuration state. [realtime]
     bool configuring() const noexcept { return configuring_; }
 
 private:
@@ -37,7 +43,7 @@ private:
     std::uint8_t active_id_ = unconfigured, pending_id_ = unconfigured;
     std::uint32_t pending_rate_ = 0;
     bool configuring_ = false, wants_reset_ = false, waiting_answer_ = false;
-    std::uint8_t selected_ = 0, identified_ = 0;  // steps that fit so far
+    std::uint8_t selected_ = 0, identified_ = 0;  // matching steps so far
     std::uint8_t scan_part_ = 0;
     Frame answer_;
 };

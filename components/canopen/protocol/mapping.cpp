@@ -15,7 +15,7 @@ constexpr bool          is_dummy(std::uint32_t entry) noexcept {
 }
 }  // namespace
 
-Mapping::Mapping(std::size_t room) : room_(std::min<std::size_t>(room, 64)) { items_.reserve(room_); }
+Mapping::Mapping(std::size_t capacity) : capacity_(std::min<std::size_t>(capacity, 64)) { items_.reserve(capacity_); }
 
 Abort Mapping::check(Dictionary& dictionary, std::uint32_t entry, bool received) noexcept {
     const auto bits = bits_in(entry);
@@ -30,12 +30,12 @@ Abort Mapping::check(Dictionary& dictionary, std::uint32_t entry, bool received)
     if (bits == 0 || bits > 64) return Abort::pdo_length;
     if (e->type == Type::boolean) return bits == 1 || bits == 8 ? Abort::none : Abort::pdo_length;
     if (e->bits == 0) return bits % 8 == 0 && bits / 8 <= e->capacity && e->type != Type::domain ? Abort::none : Abort::pdo_length;
-    // A part of an integer, its low bits, is carried too; a real number only whole.
+    // The low bits of an integer may be mapped; a REAL only completely.
     return bits == e->bits || (bits < e->bits && !is_real(e->type)) ? Abort::none : Abort::pdo_length;
 }
 
 Abort Mapping::build(Dictionary& dictionary, std::span<const std::uint32_t> entries, bool received) noexcept {
-    if (entries.size() > room_) return Abort::pdo_length;
+    if (entries.size() > capacity_) return Abort::pdo_length;
     unsigned total = 0;
     for (const auto entry : entries) {
         if (const auto why = check(dictionary, entry, received); why != Abort::none) return why;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which objects a PDO carries, to the bit.
+// The objects that a PDO or SRDO carries, mapped bit by bit (CiA 301).
 #pragma once
 
 #include <cstdint>
@@ -9,25 +9,31 @@
 
 namespace hal::canopen {
 
+/// The mapping of one PDO. All calls belong to one thread.
 class Mapping {
 public:
-    /// `room`: how many objects it can ever hold, at most 64. [setup]
-    explicit Mapping(std::size_t room);
+    /// Reserves space for `capacity` objects, 64 at most. [setup]
+    explicit Mapping(std::size_t capacity);
 
-    /// Whether `entry` (as in 1600h or 1A00h) can be carried; `received`: in an RPDO, where dummies are good, too. [realtime]
+    /// Returns Abort::none if `entry` (an entry of 1600h or 1A00h) can be mapped; `received`: to an RPDO, which may contain dummies. [realtime]
     static Abort check(Dictionary&, std::uint32_t entry, bool received) noexcept;
-    /// Takes over `entries`; on an abort it stays as it was. [realtime]
+    /// Replaces the mapping by `entries`; on an abort it stays unchanged. [realtime]
     Abort build(Dictionary&, std::span<const std::uint32_t> entries, bool received) noexcept;
+    /// Removes all entries. [realtime]
     void clear() noexcept { items_.clear(), bits_ = 0; }
 
+    /// Returns the number of entries. [any]
     std::size_t count() const noexcept { return items_.size(); }
+    /// Returns the mapped length in bits. [any]
     unsigned bits() const noexcept { return bits_; }
+    /// Returns the mapped length in bytes, rounded up. [any]
     std::uint8_t bytes() const noexcept { return static_cast<std::uint8_t>((bits_ + 7) / 8); }
+    /// Returns true if the entry is mapped. [any]
     bool maps(const Entry& e) const noexcept;
 
-    /// The values as they lie in the frame; the first byte is the lowest. [realtime]
+    /// Returns the values as the data of a frame; its first byte is the least significant one. [realtime]
     std::uint64_t pack() const noexcept;
-    /// Writes all values, then tells the handlers. [realtime]
+    /// Writes all values, then calls the handlers. [realtime]
     void unpack(std::uint64_t) const noexcept;
 
 private:
@@ -35,8 +41,8 @@ private:
         Entry* entry = nullptr;  // nullptr: a dummy
         std::uint8_t first = 0, bits = 0;
     };
-    std::vector<Item> items_;  // has the memory for `room` from the start
-    std::size_t room_;
+    std::vector<Item> items_;  // reserved for capacity_
+    std::size_t capacity_;
     unsigned bits_ = 0;
 };
 

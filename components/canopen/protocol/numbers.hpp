@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The numbers of CiA 301: data types, access rights, abort codes, states and commands, and how values lie on the wire.
+// The constants of CiA 301: data types, access rights, SDO abort codes, NMT states and commands, and the byte order of values.
 #pragma once
 
 #include <bit>
@@ -11,13 +11,13 @@
 
 namespace hal::canopen {
 
-static_assert(std::endian::native == std::endian::little, "values are kept as they lie on the wire");
+static_assert(std::endian::native == std::endian::little, "values are stored in the byte order of CAN frames, little endian");
 
-/// Nanoseconds on the clock of whoever calls; only differences count.
+/// Nanoseconds on the caller's clock; only differences are used.
 using Time = std::int64_t;
 inline constexpr Time microsecond = 1000, millisecond = 1000 * microsecond, second = 1000 * millisecond;
 
-/// Data types by their index in the object dictionary.
+/// Data types by their index in the object dictionary, 0001h..001Bh (CiA 301).
 enum class Type : std::uint16_t {
     none = 0,
     boolean = 0x01, integer8 = 0x02, integer16 = 0x03, integer32 = 0x04, unsigned8 = 0x05, unsigned16 = 0x06, unsigned32 = 0x07,
@@ -26,7 +26,7 @@ enum class Type : std::uint16_t {
     unsigned24 = 0x16, unsigned40 = 0x18, unsigned48 = 0x19, unsigned56 = 0x1a, unsigned64 = 0x1b,
 };
 
-/// Length in bits; 0 for types without a fixed one. [any]
+/// Returns the length in bits; 0 for types of variable length. [any]
 constexpr unsigned bits_of(Type type) noexcept {
     switch (type) {
     case Type::boolean: return 1;
@@ -41,8 +41,9 @@ constexpr unsigned bits_of(Type type) noexcept {
     default: return 0;
     }
 }
-/// Length in bytes; 0 for types without a fixed one. [any]
+/// Returns the length in bytes; 0 for types of variable length. [any]
 constexpr unsigned bytes_of(Type type) noexcept { return (bits_of(type) + 7) / 8; }
+/// Returns true for INTEGER8 to INTEGER64. [any]
 constexpr bool is_signed(Type type) noexcept {
     switch (type) {
     case Type::integer8: case Type::integer16: case Type::integer24: case Type::integer32:
@@ -50,15 +51,19 @@ constexpr bool is_signed(Type type) noexcept {
     default: return false;
     }
 }
+/// Returns true for REAL32 and REAL64. [any]
 constexpr bool is_real(Type type) noexcept { return type == Type::real32 || type == Type::real64; }
-/// "UNSIGNED16", …, or "" for none that is known. [any]
+/// Returns the name in CiA 301, such as "UNSIGNED16"; "" for an unknown type. [any]
 const char* to_string(Type) noexcept;
 
+/// Access rights of an object: what an SDO client may do with it.
 enum class Access : std::uint8_t { read_write, read_only, write_only, constant };
+/// Returns true if an SDO may read the object. [any]
 constexpr bool readable(Access access) noexcept { return access != Access::write_only; }
+/// Returns true if an SDO may write the object. [any]
 constexpr bool writable(Access access) noexcept { return access == Access::read_write || access == Access::write_only; }
 
-/// Why an SDO transfer, or an access to the dictionary, did not happen.
+/// SDO abort codes (CiA 301): why an SDO transfer or an access to the dictionary failed.
 enum class Abort : std::uint32_t {
     none = 0,
     toggle = 0x05030000, timeout = 0x05040000, command = 0x05040001, block_size = 0x05040002, sequence = 0x05040003, crc = 0x05040004,
@@ -70,26 +75,29 @@ enum class Abort : std::uint32_t {
     general = 0x08000000, cannot_store = 0x08000020, local_control = 0x08000021, device_state = 0x08000022, no_dictionary = 0x08000023,
     no_data = 0x08000024,
 };
-/// The abort in words; "unknown abort code" for one that is not in the table. [any]
+/// Returns the description of the abort code; "unknown abort code" if CiA 301 does not define it. [any]
 const char* to_string(Abort) noexcept;
 
+/// NMT states as a heartbeat carries them (CiA 301).
 enum class NmtState : std::uint8_t { initialising = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7f };
+/// Returns the name of the state, such as "pre-operational"; "unknown" for an undefined value. [any]
 const char* to_string(NmtState) noexcept;
+/// NMT command specifiers (CiA 301).
 enum class NmtCommand : std::uint8_t {
     start = 0x01, stop = 0x02, enter_pre_operational = 0x80, reset_node = 0x81, reset_communication = 0x82,
 };
 
-/// Bits of a COB-ID object (1005h, 1014h, 1400h:1, …).
+/// Bits 31, 30 and 29 of a COB-ID object (1005h, 1014h, 1400h:1, …); the meaning of bit 30 depends on the object.
 inline constexpr std::uint32_t cob_invalid = 0x80000000, cob_flag30 = 0x40000000, cob_extended = 0x20000000;
-/// The identifier inside a COB-ID object. [any]
+/// Returns the CAN identifier in a COB-ID object, 11 or 29 bits. [any]
 constexpr std::uint32_t cob_id(std::uint32_t cob) noexcept { return cob & ((cob & cob_extended) != 0 ? 0x1fffffffU : 0x7ffU); }
-/// 11-bit identifiers that belong to one service for ever and cannot be given to another. [any]
+/// Returns true for the 11-bit identifiers that CiA 301 and CiA 304 restrict to one service. [any]
 constexpr bool restricted(std::uint32_t id) noexcept {
     return id <= 0x07f || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f) ||
            (id >= 0x6e0 && id <= 0x6ff) || (id >= 0x701 && id <= 0x77f) || id >= 0x780;
 }
 
-/// The value at `from`, which need not be aligned. [any]
+/// Returns the little-endian value at `from`, which need not be aligned. [any]
 template <class T>
     requires std::is_trivially_copyable_v<T>
 T load(const void* from) noexcept {
@@ -97,23 +105,13 @@ T load(const void* from) noexcept {
     std::memcpy(&value, from, sizeof value);
     return value;
 }
+/// Stores `value` little endian at `to`, which need not be aligned. [any]
 template <class T>
     requires std::is_trivially_copyable_v<T>
 void store(void* to, T value) noexcept { std::memcpy(to, &value, sizeof value); }
 
-/// CRC-16 of the block transfer: polynomial 1021h, start 0. [any]
+/// Returns the CRC-16 of SDO block transfer and SRDO signatures: polynomial 1021h, initial value 0, no reflection. `crc` continues an
+/// earlier call. [any]
 std::uint16_t crc16(std::span<const std::uint8_t> data, std::uint16_t crc = 0) noexcept;
-
-/// The size of the next block, as its receiver asks for it: half after a segment was lost, else growing again up to `most`. After a loss it
-/// differs from the size before and from `good`, so that an acknowledgement that comes twice is not taken for that of the next block. [any]
-constexpr std::uint8_t next_block_size(std::uint8_t size, bool lost, std::uint8_t good, std::uint8_t most) noexcept {
-    const unsigned limit = most < 1 ? 1 : most > 127 ? 127 : most;
-    unsigned next = size * 2U > limit ? limit : size * 2U;
-    if (lost && limit > 2) {
-        next = size > 1 ? size / 2U : 2;
-        while (next == good || next == size) ++next;
-    }
-    return static_cast<std::uint8_t>(next);
-}
 
 }  // namespace hal::canopen

@@ -18,7 +18,7 @@ void SdoClient::configure(std::uint32_t request_cob, std::uint32_t answer_cob) n
 bool SdoClient::submit(SdoRequest& request) noexcept {
     if (request.status == SdoRequest::Status::waiting || request.status == SdoRequest::Status::active) return false;
     request.status = SdoRequest::Status::waiting;
-    request.abort = Abort::none, request.aborted_by_server = request.unsent = false;
+    request.abort = Abort::none, request.aborted_by_server = request.not_sent = false;
     request.size = 0, request.retries = 0, request.next = nullptr;
     (first_ == nullptr ? first_ : last_->next) = &request;
     last_ = &request;
@@ -27,7 +27,7 @@ bool SdoClient::submit(SdoRequest& request) noexcept {
 
 void SdoClient::cancel(SdoRequest& request, Abort why) noexcept {
     if (&request == first_) {
-        if (state_ != State::idle) return give_up(why);
+        if (state_ != State::idle) return abort(why);
         offset_ = 0;
         return finish(why);
     }
@@ -42,7 +42,7 @@ void SdoClient::cancel(SdoRequest& request, Abort why) noexcept {
 }
 
 void SdoClient::cancel_all(Abort why) noexcept {
-    const auto* until = last_;  // what is submitted again meanwhile stays
+    const auto* until = last_;  // requests that a callback submits stay queued
     while (first_ != nullptr) {
         const bool end = first_ == until;
         cancel(*first_, why);
@@ -50,32 +50,32 @@ void SdoClient::cancel_all(Abort why) noexcept {
     }
 }
 
-void SdoClient::finish(Abort why, bool there) noexcept {
+void SdoClient::finish(Abort why, bool by_server) noexcept {
     auto& request = *first_;
     first_ = request.next;
     if (first_ == nullptr) last_ = nullptr;
     state_ = State::idle;
     pending_ = false;
     request.next = nullptr;
-    request.abort = why, request.aborted_by_server = there;
+    request.abort = why, request.aborted_by_server = by_server;
     request.size = offset_;
     request.status = SdoRequest::Status::done;
     if (request.on_done != nullptr) request.on_done(request, request.context);
 }
 
-void SdoClient::give_up(Abort why) noexcept {
+void SdoClient::abort(Abort why) noexcept {
     send_initiate(0x80, static_cast<std::uint32_t>(why));
     finish(why);
 }
 
-/// A transfer that broke for a reason that need not come again is begun anew; by segments where nobody asked for blocks, because some
-/// servers have them and cannot do them.
-void SdoClient::broke(Abort why, bool there) noexcept {
+/// Restarts a transfer that failed for a transient reason. It continues by segments unless the request demanded blocks, because some servers
+/// offer block transfer and fail to carry it out.
+void SdoClient::restart_or_fail(Abort why, bool by_server) noexcept {
     if (restarts_left_ == 0) {
-        if (!there) send_initiate(0x80, static_cast<std::uint32_t>(why));
-        return finish(why, there);
+        if (!by_server) send_initiate(0x80, static_cast<std::uint32_t>(why));
+        return finish(why, by_server);
     }
-    if (!there) send_initiate(0x80, static_cast<std::uint32_t>(why));
+    if (!by_server) send_initiate(0x80, static_cast<std::uint32_t>(why));
     --restarts_left_;
     ++retries_, ++first_->retries;
     begin_mode(in_block_ && first_->mode == SdoMode::block);
@@ -96,7 +96,7 @@ void SdoClient::send_initiate(std::uint8_t command, std::uint32_t value) noexcep
     send(b);
 }
 
-bool SdoClient::is_about(const Frame& f) const noexcept {
+bool SdoClient::concerns_request(const Frame& f) const noexcept {
     return load<std::uint16_t>(f.data.data() + 1) == first_->index && f.data[3] == first_->sub;
 }
 
@@ -115,13 +115,13 @@ void SdoClient::begin_mode(bool block) noexcept {
     toggle_ = 0, offset_ = 0, crc_ = 0, crc_until_ = 0, sequence_ = 0, held_count_ = 0, stalls_ = 0, acknowledged_ = 0,
     last_acknowledgement_ = 0;
     size_ = r.upload ? 0 : static_cast<std::uint32_t>(r.data.size());
-    size_told_ = crc_used_ = block_sent_ = last_seen_ = heard_block_ = block_any_ = gap_ = cut_short_ = false;
-    wrong_ = Abort::none;
+    size_known_ = crc_used_ = block_sent_ = last_seen_ = segment_received_ = block_any_ = gap_ = acknowledged_early_ = false;
+    last_error_ = Abort::none;
     progress();
     if (r.upload) {
         block_size_ = std::clamp<std::uint8_t>(settings_.block_size, 1, 127);
         state_ = block ? State::block_upload_start : State::upload_start;
-        // Values of up to three segments may come the ordinary way.
+        // pst = 21: the server may answer values of up to three segments by segmented transfer.
         return block ? send_initiate(0xa4, block_size_ | 21U << 8) : send_initiate(0x40, 0);
     }
     if (block && size_ != 0) {
@@ -151,14 +151,14 @@ void SdoClient::take(const Frame& f) noexcept {
     if (command == 0x80) return on_abort(f);
     switch (state_) {
     case State::download_start:
-        if (command >> 5 != 3 || !is_about(f)) return stranger(Abort::command);
+        if (command >> 5 != 3 || !concerns_request(f)) return unexpected(Abort::command);
         progress();
         if (size_ > 0 && size_ <= 4) return offset_ = size_, finish(Abort::none);
         state_ = State::download;
         return send_segment();
     case State::download:
-        if (command >> 5 != 1) return stranger(Abort::command);
-        if ((command & 0x10) != toggle_) return stranger(Abort::toggle);
+        if (command >> 5 != 1) return unexpected(Abort::command);
+        if ((command & 0x10) != toggle_) return unexpected(Abort::toggle);
         progress();
         offset_ += segment_;
         toggle_ ^= 0x10;
@@ -166,25 +166,25 @@ void SdoClient::take(const Frame& f) noexcept {
     case State::upload_start: return on_upload_start(f);
     case State::upload: return on_upload_segment(f);
     case State::block_download_start:
-        if ((command & 0xe3) != 0xa0 || !is_about(f)) return stranger(Abort::command);
-        if (f.data[4] < 1 || f.data[4] > 127) return give_up(Abort::block_size);
+        if ((command & 0xe3) != 0xa0 || !concerns_request(f)) return unexpected(Abort::command);
+        if (f.data[4] < 1 || f.data[4] > 127) return abort(Abort::block_size);
         progress();
         crc_used_ = (command & 4) != 0;
         block_size_ = f.data[4];
         state_ = State::block_download;
-        return pump();
+        return send_block();
     case State::block_download: return on_block_acknowledge(f);
     case State::block_download_end:
-        if (command != 0xa1) return stranger(Abort::command);
+        if (command != 0xa1) return unexpected(Abort::command);
         return finish(Abort::none);
     case State::block_upload_start: {
-        if (!is_about(f)) return stranger(Abort::command);
+        if (!concerns_request(f)) return unexpected(Abort::command);
         if (command >> 5 == 2) return on_upload_start(f);
-        if ((command & 0xe1) != 0xc0) return stranger(Abort::command);
+        if ((command & 0xe1) != 0xc0) return unexpected(Abort::command);
         crc_used_ = (command & 4) != 0;
-        size_told_ = (command & 2) != 0;
-        size_ = size_told_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
-        if (size_ > first_->room.size()) return give_up(Abort::memory);
+        size_known_ = (command & 2) != 0;
+        size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
+        if (size_ > first_->buffer.size()) return abort(Abort::memory);
         progress();
         state_ = State::block_upload;
         return send({0xa3});
@@ -197,11 +197,11 @@ void SdoClient::take(const Frame& f) noexcept {
 
 void SdoClient::on_abort(const Frame& f) noexcept {
     const auto why = static_cast<Abort>(load<std::uint32_t>(f.data.data() + 4));
-    if (!is_about(f)) return stranger(why);  // of an earlier transfer: some servers send it late
+    if (!concerns_request(f)) return unexpected(why);  // of an earlier transfer: some servers send their abort late
     const bool starting = state_ == State::upload_start || state_ == State::download_start || state_ == State::block_upload_start ||
                           state_ == State::block_download_start;
     if (starting) {
-        // A server without block transfer says so in one of these ways.
+        // The abort codes with which servers without block transfer reject it.
         if (in_block_ && (why == Abort::command || why == Abort::access || why == Abort::general)) {
             block_refused_ = why == Abort::command;
             return begin_mode(false);
@@ -209,12 +209,10 @@ void SdoClient::on_abort(const Frame& f) noexcept {
         return finish(why, true);
     }
     switch (why) {
-    case Abort::toggle: case Abort::timeout: case Abort::command: case Abort::sequence: case Abort::crc: return broke(why, true);
+    case Abort::toggle: case Abort::timeout: case Abort::command: case Abort::sequence: case Abort::crc: return restart_or_fail(why, true);
     default: return finish(why, true);
     }
 }
-
-// Segments.
 
 void SdoClient::send_segment() noexcept {
     segment_ = std::min<std::uint32_t>(7, size_ - offset_);
@@ -223,181 +221,59 @@ void SdoClient::send_segment() noexcept {
     send(b);
 }
 
-bool SdoClient::put(std::span<const std::uint8_t> bytes) noexcept {
-    if (size_told_ && bytes.size() > size_ - offset_) return broke(Abort::too_long, false), false;
-    if (bytes.size() > first_->room.size() - offset_) return give_up(Abort::memory), false;
-    if (!bytes.empty()) std::memcpy(first_->room.data() + offset_, bytes.data(), bytes.size());
+bool SdoClient::store_received(std::span<const std::uint8_t> bytes) noexcept {
+    if (size_known_ && bytes.size() > size_ - offset_) return restart_or_fail(Abort::too_long, false), false;
+    if (bytes.size() > first_->buffer.size() - offset_) return abort(Abort::memory), false;
+    if (!bytes.empty()) std::memcpy(first_->buffer.data() + offset_, bytes.data(), bytes.size());
     offset_ += static_cast<std::uint32_t>(bytes.size());
     return true;
 }
 
 void SdoClient::on_upload_start(const Frame& f) noexcept {
     const auto command = f.data[0];
-    if (command >> 5 != 2 || !is_about(f)) return stranger(Abort::command);
+    if (command >> 5 != 2 || !concerns_request(f)) return unexpected(Abort::command);
     progress();
-    size_told_ = (command & 1) != 0;
+    size_known_ = (command & 1) != 0;
     if ((command & 2) != 0) {
-        size_ = size_told_ ? 4U - (command >> 2 & 3) : 4U;
-        if (!size_told_) size_ = static_cast<std::uint32_t>(std::min<std::size_t>(4, first_->room.size()));
-        size_told_ = true;
-        if (put({f.data.data() + 4, size_})) finish(Abort::none);
+        size_ = size_known_ ? 4U - (command >> 2 & 3) : 4U;
+        if (!size_known_) size_ = static_cast<std::uint32_t>(std::min<std::size_t>(4, first_->buffer.size()));
+        size_known_ = true;
+        if (store_received({f.data.data() + 4, size_})) finish(Abort::none);
         return;
     }
-    size_ = size_told_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
-    if (size_ > first_->room.size()) return give_up(Abort::memory);
+    size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
+    if (size_ > first_->buffer.size()) return abort(Abort::memory);
     state_ = State::upload;
     send({0x60});
 }
 
 void SdoClient::on_upload_segment(const Frame& f) noexcept {
     const auto command = f.data[0];
-    if (command >> 5 != 0) return stranger(Abort::command);
-    if ((command & 0x10) != toggle_) return stranger(Abort::toggle);
+    if (command >> 5 != 0) return unexpected(Abort::command);
+    if ((command & 0x10) != toggle_) return unexpected(Abort::toggle);
     progress();
-    if (!put({f.data.data() + 1, 7U - (command >> 1 & 7)})) return;
+    if (!store_received({f.data.data() + 1, 7U - (command >> 1 & 7)})) return;
     toggle_ ^= 0x10;
     if ((command & 1) == 0) return send({static_cast<std::uint8_t>(0x60 | toggle_)});
-    if (size_told_ && offset_ != size_) return broke(Abort::too_short, false);
+    if (size_known_ && offset_ != size_) return restart_or_fail(Abort::too_short, false);
     finish(Abort::none);
 }
 
-// Block download.
-
-void SdoClient::pump() noexcept {
-    while (!block_sent_ && out_.room() > out_.reserve()) {
-        const auto from = offset_ + sequence_ * 7U;
-        const auto count = std::min<std::uint32_t>(7, size_ - from);
-        const bool last = from + count == size_;
-        Bytes b{static_cast<std::uint8_t>(++sequence_ | (last ? 0x80 : 0))};
-        std::memcpy(b.data() + 1, first_->data.data() + from, count);
-        if (from == crc_until_) crc_ = crc16({b.data() + 1, count}, crc_), crc_until_ += count;
-        send(b);
-        block_sent_ = last || sequence_ == block_size_;
-        block_end_ = out_.taken() + out_.size();
-        heard_ = now_;
-    }
-}
-
-void SdoClient::on_block_acknowledge(const Frame& f) noexcept {
-    if ((f.data[0] & 0xe3) != 0xa2) return stranger(Abort::command);
-    const auto good = f.data[1], next = f.data[2];
-    const auto said = static_cast<std::uint16_t>(good << 8 | next);
-    const bool again = said == last_acknowledgement_;
-    // The one before again; it cannot be about segments that have not left yet.
-    if (again && (good > sequence_ || !block_sent_ || out_.taken() < block_end_)) return stranger(Abort::sequence);
-    if (good > sequence_) return broke(Abort::sequence, false);
-    // A server that varies the size after a loss never says the same of two blocks: this one came twice, or it still waits for our block.
-    // One that comes in the middle of a block is of a server that waited too long: it goes on behind what it has.
-    if (again && good != next) {
-        if (now_ - acknowledged_at_ < settings_.timeout / 10) return stranger(Abort::sequence);
-        if (good != 0) {
-            if (++stalls_ > 4 + settings_.resends) return broke(Abort::sequence, false);
-            acknowledged_at_ = now_;
-            sequence_ = 0;
-            block_sent_ = false;
-            return pump();
-        }
-    }
-    last_acknowledgement_ = said;
-    acknowledged_at_ = now_;
-    if (next < 1 || next > 127) return give_up(Abort::block_size);
-    if (good == 0 && ++stalls_ > 4 + settings_.resends) return broke(Abort::sequence, false);
-    if (good != 0) stalls_ = 0;
-    if (good < sequence_) ++retries_, ++first_->retries;
-    progress();
-    offset_ += std::min<std::uint32_t>(good * 7U, size_ - offset_);
-    block_size_ = next;
-    sequence_ = 0;
-    block_sent_ = false;
-    if (offset_ != size_) return pump();
-    state_ = State::block_download_end;
-    send_block_end();
-}
-
-void SdoClient::send_block_end() noexcept {
-    Bytes b{static_cast<std::uint8_t>(0xc1 | (7 - (size_ - 1) % 7 - 1) << 2)};
-    store(b.data() + 1, crc_used_ ? crc_ : std::uint16_t{0});
-    send(b);
-}
-
-// Block upload: as the server does it in a block download.
-
-void SdoClient::on_block_segment(const Frame& f) noexcept {
-    const std::uint8_t number = f.data[0] & 0x7f;
-    const bool last = (f.data[0] & 0x80) != 0;
-    if (cut_short_ && number != 1) return;
-    if (!block_any_ && number != 1 && number == acknowledged_ && std::equal(held_.begin(), held_.end(), f.data.begin() + 1)) {
-        ++unexpected_;  // a duplicate last segment of the previous block, or the server missed the acknowledgement: repeat it
-        return;        // when nothing else comes
-    }
-    cut_short_ = false;
-    block_any_ = true;
-    if (number == sequence_ + 1 && number <= block_size_) {
-        if (held_count_ != 0) {
-            if (crc_used_) crc_ = crc16(held_, crc_);
-            if (!put(held_)) return;
-        }
-        std::copy_n(f.data.begin() + 1, 7, held_.begin());
-        held_count_ = 7;
-        sequence_ = number;
-        last_seen_ = last;
-        last_command_ = f.data[0];
-        heard_block_ = true;
-        progress();
-    } else {
-        ++unexpected_;
-        if (number <= sequence_ && !last && number != block_size_) return;
-        if (number > sequence_) gap_ = true;
-    }
-    if (number == block_size_ || last) acknowledge_block(gap_ ? Size::smaller : Size::larger);
-}
-
-void SdoClient::acknowledge_block(Size size) noexcept {
-    const std::uint8_t before = block_size_;
-    if (size != Size::same) block_size_ = next_block_size(before, size == Size::smaller, sequence_, settings_.block_size);
-    // Of a part of a block, the same twice would be taken for the last one again.
-    if (sequence_ == acknowledged_ && block_size_ == before && sequence_ != before)
-        block_size_ = next_block_size(before, true, sequence_, settings_.block_size);
-    acknowledged_ = sequence_;
-    if (sequence_ != 0) stalls_ = 0;
-    else if (++stalls_ > 4 + settings_.resends) return broke(Abort::sequence, false);
-    send({0xa2, sequence_, block_size_});
-    sequence_ = 0;
-    block_any_ = gap_ = false;
-    if (last_seen_) state_ = State::block_upload_end;
-}
-
-void SdoClient::on_block_end(const Frame& f) noexcept {
-    const auto command = f.data[0];
-    if ((command & 0xe3) != 0xc1) return stranger(Abort::command);
-    const std::uint32_t count = 7U - (command >> 2 & 7);
-    const bool good = crc16({held_.data(), count}, crc_) == load<std::uint16_t>(f.data.data() + 1);
-    const bool again = command == last_command_ && std::equal(held_.begin(), held_.end(), f.data.begin() + 1);
-    if (again && !(crc_used_ && good)) return stranger(Abort::command);  // the last segment again, which can look like an end
-    if (crc_used_ && !good) return broke(Abort::crc, false);
-    if (!put({held_.data(), count})) return;
-    if (size_told_ && offset_ != size_) return broke(Abort::too_short, false);
-    send({0xa1});
-    const bool lost = pending_;
-    finish(Abort::none);
-    if (lost) send_again();
-}
-
-/// Nothing useful came for the whole time-out: the last word is said again, then the transfer begun again, then given up.
-void SdoClient::silence() noexcept {
+/// On timeout: repeats the last frame, then restarts the transfer, then fails.
+void SdoClient::on_timeout() noexcept {
     heard_ = now_;
     if (resends_left_ == 0) {
         const bool starting = state_ == State::upload_start || state_ == State::download_start || state_ == State::block_upload_start ||
                               state_ == State::block_download_start;
-        const auto why = wrong_ != Abort::none ? wrong_ : Abort::timeout;
-        return starting ? give_up(why) : broke(why, false);
+        const auto why = last_error_ != Abort::none ? last_error_ : Abort::timeout;
+        return starting ? abort(why) : restart_or_fail(why, false);
     }
     --resends_left_;
     ++retries_, ++first_->retries;
-    if (state_ == State::block_upload && heard_block_) {
+    if (state_ == State::block_upload && segment_received_) {
         if (!block_any_) return send({0xa2, acknowledged_, block_size_});
-        acknowledge_block(gap_ ? Size::smaller : Size::same);
-        cut_short_ = first_ != nullptr && state_ == State::block_upload;
+        acknowledge_block(gap_ ? BlockChange::smaller : BlockChange::same);
+        acknowledged_early_ = first_ != nullptr && state_ == State::block_upload;
         return;
     }
     send_again();
@@ -405,32 +281,32 @@ void SdoClient::silence() noexcept {
 
 void SdoClient::poll(Time now) noexcept {
     now_ = now;
-    if (pending_ && out_.room() > 0) send_again();
+    if (pending_ && out_.space() > 0) send_again();
     if (state_ == State::idle) {
         if (first_ != nullptr) begin();
         return;
     }
     if (state_ == State::block_download && !block_sent_ && !pending_) {
         const auto before = sequence_;
-        pump();
-        const bool moves = sequence_ != before || out_.taken() != taken_;  // others may have had the room
-        taken_ = out_.taken();
-        if (!block_sent_ && !moves) return no_room();
+        send_block();
+        const bool moves = sequence_ != before || out_.popped() != popped_;  // other clients may have used the space
+        popped_ = out_.popped();
+        if (!block_sent_ && !moves) return queue_full();
         if (!block_sent_) heard_ = now;
     }
-    if (pending_) return no_room();
-    full_since_ = -1;
-    if (now - heard_ >= settings_.timeout) silence();
+    if (pending_) return queue_full();
+    queue_full_since_ = -1;
+    if (now - heard_ >= settings_.timeout) on_timeout();
 }
 
-/// The server cannot be blamed for not answering what did not leave. But a bus that takes nothing for as long as a silent server would be
-/// waited for is given up, too; without an abort, which would not leave either.
-void SdoClient::no_room() noexcept {
+/// A full transmit queue is not the server's timeout, so the response timer is held. If the queue stays full for as long as an unresponsive
+/// server would be waited for, the request fails, without an abort frame because that could not be sent either.
+void SdoClient::queue_full() noexcept {
     heard_ = now_;
-    if (full_since_ < 0) full_since_ = now_;
-    if (now_ - full_since_ < settings_.timeout * (settings_.resends + 1)) return;
-    full_since_ = -1;
-    first_->unsent = true;
+    if (queue_full_since_ < 0) queue_full_since_ = now_;
+    if (now_ - queue_full_since_ < settings_.timeout * (settings_.resends + 1)) return;
+    queue_full_since_ = -1;
+    first_->not_sent = true;
     finish(Abort::timeout);
 }
 

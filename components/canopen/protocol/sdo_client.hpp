@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: MIT
-// One SDO client channel with a line of requests. A master has one for each node, so nodes are served side by side.
+// One SDO client channel (CiA 301) with a queue of requests. A master has one channel per node, so all nodes are served concurrently.
 //
-//     SdoRequest read{.index = 0x1018, .sub = 1, .upload = true, .room = room};
-//     client.submit(read);            // `read` and its memory stay where they are until it is done
-//     ... client.poll(now); client.handle(frame, now); ...
-//     if (read.done()) use(read.abort, read.size);
+//     std::array<std::uint8_t, 4> buffer;
+//     SdoRequest read{.index = 0x1018, .sub = 1, .upload = true, .buffer = buffer};
+//     client.configure(5);                    // the default channel of node 5
+//     client.submit(read);                    // `read` and its buffer must outlive the transfer
+//     each cycle:
+//         while (link.receive(frame, now))
+//             if (client.listens_to(frame)) client.handle(frame, now);
+//         client.poll(now);
+//         if (read.ok()) use(load<std::uint32_t>(buffer.data()));      // the vendor ID
+//         else if (read.done()) report(to_string(read.abort));
 #pragma once
 
 #include <array>
@@ -13,68 +19,84 @@
 
 #include "frames.hpp"
 #include "numbers.hpp"
+#include "sdo_block.hpp"
 
 namespace hal::canopen {
 
+/// The SDO protocol of a request. Values of up to 4 bytes are transferred expedited in the first two modes.
 enum class SdoMode : std::uint8_t {
-    automatic,  ///< downloads of many bytes go by blocks, the rest expedited or by segments; by segments, too, when blocks broke
-    segmented,
-    block,      ///< by segments when the server refuses
+    automatic,  ///< block transfer for downloads of at least SdoClientSettings::block_from bytes, else segmented
+    segmented,  ///< never block transfer
+    block,      ///< block transfer; segmented if the server does not support it
 };
 
+/// One SDO transfer. The caller fills in the first part and keeps the request and its memory until done().
 struct SdoRequest {
     std::uint16_t index = 0;
     std::uint8_t sub = 0;
-    bool upload = false;
+    bool upload = false;                   ///< true: read the object; false: write it
     SdoMode mode = SdoMode::automatic;
-    std::span<const std::uint8_t> data{};  ///< what to write
-    std::span<std::uint8_t> room{};        ///< where to put what was read
-    void (*on_done)(SdoRequest&, void*) noexcept = nullptr;  ///< [realtime] called by poll() or handle(); may submit again
-    void* context = nullptr;
+    std::span<const std::uint8_t> data{};  ///< download: the value, little endian
+    std::span<std::uint8_t> buffer{};      ///< upload: receives the value; too small a buffer ends the request with Abort::memory
+    void (*on_done)(SdoRequest&, void*) noexcept = nullptr;  ///< called by poll(), handle() or cancel(); may submit again. [realtime]
+    void* context = nullptr;               ///< the second argument of on_done
 
-    // The client's part.
+    // Written by the client.
     enum class Status : std::uint8_t { fresh, waiting, active, done };
     Status status = Status::fresh;
-    Abort abort = Abort::none;     ///< none: it worked
-    bool aborted_by_server = false;    ///< the server refused; otherwise the client gave up
-    bool unsent = false;           ///< it gave up because there was no room to send for all of its patience: the bus takes no frames
-    std::size_t size = 0;          ///< bytes through
-    unsigned retries = 0;          ///< frames sent again and transfers begun again
-    SdoRequest* next = nullptr;
+    Abort abort = Abort::none;       ///< none: success
+    bool aborted_by_server = false;  ///< true: the server sent `abort`; false: the client did
+    bool not_sent = false;           ///< the client timed out because the bus accepted no frames
+    std::size_t size = 0;            ///< bytes transferred
+    unsigned retries = 0;            ///< repeated frames and restarted transfers
+    SdoRequest* next = nullptr;      ///< the next request in the queue
 
+    /// Returns true once the transfer has ended, successfully or not. [any]
     bool done() const noexcept { return status == Status::done; }
+    /// Returns true once the transfer has ended successfully. [any]
     bool ok() const noexcept { return done() && abort == Abort::none; }
 };
 
+/// Timing and retries of an SDO client.
 struct SdoClientSettings {
-    Time timeout = 500 * millisecond;  ///< silence after which a frame is sent again
-    unsigned resends = 2;              ///< how often
-    unsigned restarts = 1;             ///< how often a transfer that broke on the way is begun anew
-    std::uint8_t block_size = 127;
-    std::size_t block_from = 1000;     ///< bytes from which a download in automatic mode goes by blocks
+    Time timeout = 500 * millisecond;  ///< response timeout in ns, after which a frame is repeated
+    unsigned resends = 2;              ///< repeated frames per response
+    unsigned restarts = 1;             ///< restarts of a transfer that failed for a transient reason
+    std::uint8_t block_size = 127;     ///< segments per block of an upload, 1..127
+    std::size_t block_from = 1000;     ///< bytes from which SdoMode::automatic uses block transfer
 };
 
+/// An SDO client channel. It does one transfer at a time, in the order of submit(). All calls belong to one thread.
 class SdoClient {
 public:
-    SdoClient(FrameQueue& out, const SdoClientSettings& = {});  // [setup]
+    /// Creates a channel that sends through `out`, which outlives it. [setup]
+    SdoClient(FrameQueue& out, const SdoClientSettings& = {});
 
-    /// COB-IDs as object 1280h holds them. Ends what is under way. [realtime]
+    /// Sets the COB-IDs (1280h:1 and :2); bit 31 in either disables the channel. Ends all requests with Abort::no_resource. [realtime]
     void configure(std::uint32_t request_cob, std::uint32_t answer_cob) noexcept;
-    /// The default channel of that node.
+    /// Sets the predefined COB-IDs of node 1..127. [realtime]
     void configure(std::uint8_t node) noexcept { configure(0x600U + node, 0x580U + node); }
+    /// Returns true for frames that handle() must get. [any]
     bool listens_to(const Frame& f) const noexcept { return f.id == answer_id_ && f.extended == answer_extended_ && !f.remote; }
 
-    /// Puts the request at the end of the line; one that is in a line already is not taken. Starts at the next poll. [realtime]
+    /// Queues a request; it starts at the next poll(). Returns false if the request is already queued. [realtime]
     bool submit(SdoRequest&) noexcept;
-    /// Ends one request, or all: an abort is sent for what is under way. [realtime]
+    /// Ends one request with `why`; a transfer in progress is aborted on the bus. [realtime]
     void cancel(SdoRequest&, Abort why = Abort::general) noexcept;
+    /// Ends all queued requests with `why`. [realtime]
     void cancel_all(Abort why = Abort::general) noexcept;
+    /// Processes a response of the server. [realtime]
     void handle(const Frame&, Time now) noexcept;
+    /// Starts requests, sends segments and checks timeouts; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
+    /// Returns true if no request is queued. [any]
     bool idle() const noexcept { return first_ == nullptr; }
 
+    /// Returns the settings; changes apply from the next frame on. [realtime]
     SdoClientSettings& settings() noexcept { return settings_; }
-    std::uint64_t unexpected_responses() const noexcept { return unexpected_; }  ///< responses to no pending request
+    /// Returns the number of responses that match no pending request. [any]
+    std::uint64_t unexpected_responses() const noexcept { return unexpected_; }
+    /// Returns the number of repeated frames and restarted transfers. [any]
     std::uint64_t retries() const noexcept { return retries_; }
 
 private:
@@ -91,25 +113,24 @@ private:
     void send_again() noexcept;
     void send_initiate(std::uint8_t command, std::uint32_t value) noexcept;
     void send_segment() noexcept;
-    void pump() noexcept;
+    void send_block() noexcept;
     void send_block_end() noexcept;
-    enum class Size : std::uint8_t { smaller, same, larger };
-    void acknowledge_block(Size next) noexcept;
-    void finish(Abort, bool there = false) noexcept;
-    void give_up(Abort) noexcept;
-    void broke(Abort, bool there) noexcept;
+    void acknowledge_block(BlockChange) noexcept;
+    void finish(Abort, bool by_server = false) noexcept;
+    void abort(Abort) noexcept;
+    void restart_or_fail(Abort, bool by_server) noexcept;
     void on_abort(const Frame&) noexcept;
     void on_upload_start(const Frame&) noexcept;
     void on_upload_segment(const Frame&) noexcept;
     void on_block_segment(const Frame&) noexcept;
     void on_block_acknowledge(const Frame&) noexcept;
     void on_block_end(const Frame&) noexcept;
-    void silence() noexcept;
-    void no_room() noexcept;
-    bool put(std::span<const std::uint8_t>) noexcept;
+    void on_timeout() noexcept;
+    void queue_full() noexcept;
+    bool store_received(std::span<const std::uint8_t>) noexcept;
     void progress() noexcept { heard_ = now_, resends_left_ = settings_.resends; }
-    void stranger(Abort why) noexcept { ++unexpected_, wrong_ = why; }
-    bool is_about(const Frame&) const noexcept;
+    void unexpected(Abort why) noexcept { ++unexpected_, last_error_ = why; }
+    bool concerns_request(const Frame&) const noexcept;
 
     FrameQueue& out_;
     SdoClientSettings settings_;
@@ -121,20 +142,20 @@ private:
     State state_ = State::idle;
     std::uint8_t toggle_ = 0, block_size_ = 0, sequence_ = 0, acknowledged_ = 0, held_count_ = 0, last_command_ = 0;
     bool crc_used_ = false, block_sent_ = false, last_seen_ = false, block_refused_ = false, in_block_ = false;
-    bool size_told_ = false, pending_ = false, heard_block_ = false, block_any_ = false;
-    bool gap_ = false;         // a segment of this block did not come
-    bool cut_short_ = false;   // the block was acknowledged before its end: the rest of it does not count until a block begins
-    std::size_t block_end_ = 0;  // of a block that is sent: FrameQueue::taken() when all of it has left
+    bool size_known_ = false, pending_ = false, segment_received_ = false, block_any_ = false;
+    bool gap_ = false;         // a segment of this block is missing
+    bool acknowledged_early_ = false;  // the block was acknowledged before its end: ignore the rest until a new block begins
+    std::size_t block_end_ = 0;  // FrameQueue::popped() once the whole block has left the queue
     std::array<std::uint8_t, 7> held_{};
     std::uint16_t crc_ = 0, last_acknowledgement_ = 0;
     std::uint32_t crc_until_ = 0, offset_ = 0, size_ = 0;
-    std::uint32_t segment_ = 0;  // bytes of the segment that waits for its confirmation
+    std::uint32_t segment_ = 0;  // bytes of the segment that awaits its confirmation
     unsigned resends_left_ = 0, restarts_left_ = 0, stalls_ = 0;
-    Abort wrong_ = Abort::none;  // what was wrong with the answers dropped since the last good one
+    Abort last_error_ = Abort::none;  // of the responses dropped since the last valid one
     Bytes sent_{};
     Time heard_ = 0, acknowledged_at_ = 0, now_ = 0;
-    Time full_since_ = -1;    // since when there is no room for what it has to say
-    std::size_t taken_ = 0;  // of out_, when room was looked for last
+    Time queue_full_since_ = -1;  // -1: the queue has space
+    std::size_t popped_ = 0;      // of out_ at the last poll
     std::uint64_t unexpected_ = 0, retries_ = 0;
 };
 

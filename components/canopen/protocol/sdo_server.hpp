@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One SDO server channel: expedited, segmented and block transfer in both directions.
+// One SDO server channel (CiA 301): expedited, segmented and block transfer in both directions.
 #pragma once
 
 #include <array>
@@ -8,34 +8,42 @@
 
 #include "dictionary.hpp"
 #include "frames.hpp"
+#include "sdo_block.hpp"
 
 namespace hal::canopen {
 
+/// Timing of an SDO server.
 struct SdoServerSettings {
-    Time timeout = 1 * second;       ///< silence of the client that ends a transfer
-    /// Block download: silence in a block after which what came of it is acknowledged; 0: half of `timeout`.
-    Time acknowledge_after = 0;
-    std::uint8_t block_size = 127;   ///< segments per block of a download
-    bool tolerate_repeats = false;   ///< a segment that comes twice is answered again instead of aborted with "toggle bit not alternated"
+    Time timeout = 1 * second;       ///< ns without a frame of the client after which a transfer ends with Abort::timeout
+    Time acknowledge_after = 0;      ///< block download: ns after which an incomplete block is acknowledged; 0: half of `timeout`
+    std::uint8_t block_size = 127;   ///< segments per block of a download, 1..127
+    bool tolerate_repeats = false;   ///< answers a repeated segment again instead of aborting with "toggle bit not alternated"
 };
 
+/// An SDO server channel on an object dictionary. All calls belong to one thread.
 class SdoServer {
 public:
-    SdoServer(Dictionary&, FrameQueue& out, const SdoServerSettings& = {});  // [setup]
+    /// Creates a disabled channel; dictionary and queue outlive it. [setup]
+    SdoServer(Dictionary&, FrameQueue& out, const SdoServerSettings& = {});
 
-    /// COB-IDs as object 1200h holds them; with bit 31 in either the channel is off. Ends a transfer under way. [realtime]
+    /// Sets the COB-IDs (1200h:1 and :2); bit 31 in either disables the channel. Drops a transfer in progress. [realtime]
     void configure(std::uint32_t request_cob, std::uint32_t answer_cob) noexcept;
+    /// Returns true for frames that handle() must get. [any]
     bool listens_to(const Frame& f) const noexcept { return on_ && f.id == request_id_ && f.extended == request_extended_ && !f.remote; }
-    /// A frame listens_to() said yes to. [realtime]
+    /// Processes a request for which listens_to() returned true. [realtime]
     void handle(const Frame&, Time now) noexcept;
-    /// Time-outs, and what found no room in the queue. [realtime]
+    /// Checks timeouts and sends what did not fit into the queue; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
-    /// Drops a transfer without a word: the node was reset or stopped. [realtime]
+    /// Drops a transfer without an abort frame: the node was reset or stopped. [realtime]
     void reset() noexcept;
 
+    /// Returns true while a transfer is in progress. [any]
     bool busy() const noexcept { return state_ != State::idle; }
+    /// Returns the number of completed transfers. [any]
     std::uint64_t transfers() const noexcept { return transfers_; }
+    /// Returns the number of aborted transfers. [any]
     std::uint64_t aborted() const noexcept { return aborted_; }
+    /// Returns the last abort code, of either side. [any]
     Abort last_abort() const noexcept { return last_abort_; }
 
 private:
@@ -46,7 +54,7 @@ private:
 
     void answer(const Bytes&) noexcept;
     void answer_initiate(std::uint8_t command, std::uint32_t value) noexcept;
-    void abort(Abort, bool tell = true) noexcept;
+    void abort(Abort, bool notify = true) noexcept;
     void finish() noexcept;
     Entry* select(const Frame&) noexcept;
 
@@ -59,10 +67,9 @@ private:
     void end_block_download(const Frame&) noexcept;
     void start_block_upload(const Frame&) noexcept;
     void block_upload_command(const Frame&) noexcept;
-    void pump() noexcept;
-    enum class Size : std::uint8_t { smaller, same, larger };
-    void acknowledge_block(Size next) noexcept;
-    void on_silence_in_block() noexcept;
+    void send_block() noexcept;
+    void acknowledge_block(BlockChange) noexcept;
+    void on_block_timeout() noexcept;
     Time acknowledge_after() const noexcept {
         return settings_.acknowledge_after > 0 ? settings_.acknowledge_after : settings_.timeout / 2;
     }
@@ -70,14 +77,14 @@ private:
 
     bool open_read() noexcept;
     Abort open_write(std::uint32_t size) noexcept;
-    Abort take(std::span<const std::uint8_t>) noexcept;
-    Abort give(std::uint32_t offset, std::span<std::uint8_t>) noexcept;
+    Abort write_object(std::span<const std::uint8_t>) noexcept;
+    Abort read_object(std::uint32_t offset, std::span<std::uint8_t>) noexcept;
     Abort commit() noexcept;
 
     Dictionary& dictionary_;
     FrameQueue& out_;
     const SdoServerSettings settings_;
-    std::unique_ptr<std::uint8_t[]> scratch_;  // values that are no domain are collected and given out from here
+    std::unique_ptr<std::uint8_t[]> scratch_;  // holds values other than domains during a transfer
     const std::size_t scratch_size_;
 
     bool on_ = false, request_extended_ = false;
@@ -88,24 +95,24 @@ private:
     std::uint8_t sub_ = 0;
     bool writing_ = false, stream_open_ = false;
     std::uint8_t toggle_ = 0;
-    bool crc_used_ = false, size_told_ = false;
-    std::uint32_t size_ = 0;    // told, or of what is sent
-    std::uint32_t offset_ = 0;  // bytes through; block upload: where the block begins
+    bool crc_used_ = false, size_known_ = false;
+    std::uint32_t size_ = 0;    // as announced, or of the value that is sent
+    std::uint32_t offset_ = 0;  // bytes transferred; block upload: where the block begins
     // block transfer
     std::uint8_t block_size_ = 0, sequence_ = 0, held_count_ = 0, unused_ = 0;
     bool last_seen_ = false, block_sent_ = false, block_any_ = false;
-    bool gap_ = false;         // a segment of this block did not come
-    bool cut_short_ = false;   // the block was acknowledged before its end: the rest of it does not count until a block begins
-    std::size_t block_end_ = 0;  // of a block that is sent: FrameQueue::taken() when all of it has left
-    std::array<std::uint8_t, 7> held_{};  // how much of the last segment counts is known only at the end
+    bool gap_ = false;         // a segment of this block is missing
+    bool acknowledged_early_ = false;  // the block was acknowledged before its end: ignore the rest until a new block begins
+    std::size_t block_end_ = 0;  // FrameQueue::popped() once the whole block has left the queue
+    std::array<std::uint8_t, 7> held_{};  // the end frame carries the number of valid bytes in the last segment
     std::uint8_t acknowledged_ = 0;
     std::uint16_t crc_ = 0, last_acknowledgement_ = 0;
     std::uint32_t crc_until_ = 0;
 
     Bytes last_request_{}, last_answer_{}, block_request_{};
     bool repeatable_ = false;
-    State ended_ = State::idle;    // what the last transfer was, as long as its last frame may come again
-    bool pending_ = false;         // last_answer_ found no room
+    State ended_ = State::idle;    // state in which the last transfer ended, while its last frame may be repeated
+    bool pending_ = false;         // last_answer_ did not fit into the queue
     Time heard_ = 0, reminded_ = 0, acknowledged_at_ = 0, now_ = 0;
     std::uint64_t transfers_ = 0, aborted_ = 0;
     Abort last_abort_ = Abort::none;

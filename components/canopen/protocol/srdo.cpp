@@ -8,7 +8,7 @@ namespace hal::canopen {
 namespace {
 constexpr std::uint16_t gfc_index = 0x1300, communication = 0x1300, mapping_base = 0x1380, valid_index = 0x13fe, signatures = 0x13ff;
 constexpr std::uint32_t gfc_id = 0x001;
-constexpr std::uint16_t emergency = 0x8100;  // "communication"; its first manufacturer bytes are the SRDO and the cause
+constexpr std::uint16_t emergency = 0x8100;  // "communication"; the manufacturer bytes carry SRDO number and fault
 
 constexpr std::uint64_t ones(unsigned bits) noexcept { return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1; }
 std::uint64_t data_of(const Frame& f) noexcept { return load<std::uint64_t>(f.data.data()); }
@@ -16,14 +16,14 @@ std::uint64_t data_of(const Frame& f) noexcept { return load<std::uint64_t>(f.da
 
 const char* to_string(SrdoFault fault) noexcept {
     switch (fault) {
-    case SrdoFault::none: return "it is in order";
-    case SrdoFault::late: return "it did not come within its SCT";
-    case SrdoFault::incomplete: return "its second frame did not come within the SRVT";
-    case SrdoFault::order: return "its frames came out of order";
-    case SrdoFault::length: return "a frame of it has not the mapped length";
-    case SrdoFault::complement: return "its second frame is not the first one inverted";
-    case SrdoFault::fail_safe: return "a global fail-safe command came";
-    case SrdoFault::own_data: return "its objects are not complementary, so it is not sent";
+    case SrdoFault::none: return "no fault";
+    case SrdoFault::late: return "no SRDO within the SCT";
+    case SrdoFault::incomplete: return "second frame missing within the SRVT";
+    case SrdoFault::order: return "frames out of order";
+    case SrdoFault::length: return "frame length does not match the mapping";
+    case SrdoFault::complement: return "second frame is not the inverse of the first";
+    case SrdoFault::fail_safe: return "global fail-safe command received";
+    case SrdoFault::own_data: return "its objects are not complementary, so nothing is sent";
     }
     return "";
 }
@@ -31,13 +31,13 @@ const char* to_string(SrdoFault fault) noexcept {
 Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy) : dictionary_(dictionary), out_(out), emcy_(emcy) {
     of_number_.fill(-1);
     of_id_.fill(-1);
-    for (unsigned n = 1; n <= most; ++n) {
+    for (unsigned n = 1; n <= max_srdos; ++n) {
         const auto index = static_cast<std::uint16_t>(communication + n), mapping = static_cast<std::uint16_t>(mapping_base + n);
         if (dictionary.find(index, 1) == nullptr) continue;
-        std::size_t room = 0;
-        for (const auto& e : dictionary.object(mapping)) room = std::max<std::size_t>(room, e.sub);
+        std::size_t capacity = 0;
+        for (const auto& e : dictionary.object(mapping)) capacity = std::max<std::size_t>(capacity, e.sub);
         of_number_[n] = static_cast<std::int8_t>(srdos_.size());
-        srdos_.emplace_back(n, (room + 1) / 2);
+        srdos_.emplace_back(n, (capacity + 1) / 2);
         dictionary.handle(index, *this);
         dictionary.handle(mapping, *this);
     }
@@ -46,10 +46,8 @@ Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy) : dictionary_(
 }
 
 Srdos::Srdo* Srdos::find(unsigned number) noexcept {
-    return number < 1 || number > most || of_number_[number] < 0 ? nullptr : &srdos_[static_cast<std::size_t>(of_number_[number])];
+    return number < 1 || number > max_srdos || of_number_[number] < 0 ? nullptr : &srdos_[static_cast<std::size_t>(of_number_[number])];
 }
-
-// Parameters.
 
 std::uint16_t Srdos::signature(unsigned number) const noexcept {
     const auto index = static_cast<std::uint16_t>(communication + number), mapping = static_cast<std::uint16_t>(mapping_base + number);
@@ -87,7 +85,7 @@ Abort Srdos::configure(Srdo& s) noexcept {
     for (unsigned n = 0; n < count / 2; ++n) {
         plain[n] = dictionary_.get<std::uint32_t>(mapping, static_cast<std::uint8_t>(2 * n + 1), 0);
         inverted[n] = dictionary_.get<std::uint32_t>(mapping, static_cast<std::uint8_t>(2 * n + 2), 0);
-        if (((plain[n] ^ inverted[n]) & 0xff) != 0) return Abort::pdo_length;  // a pair is of one length
+        if (((plain[n] ^ inverted[n]) & 0xff) != 0) return Abort::pdo_length;  // both objects of a pair have the same length
     }
     const bool received = s.direction == SrdoDirection::receives;
     if (const auto why = s.plain.build(dictionary_, {plain.data(), count / 2}, received); why != Abort::none) return why;
@@ -142,11 +140,9 @@ void Srdos::written(Entry& e) noexcept {
         valid_ = *e.data == valid_mark;
         return;
     }
-    valid_ = false;  // EN 50325-5: whoever changes a parameter says anew that all are right
+    valid_ = false;  // EN 50325-5: after a parameter change 13FEh must be written again
     dictionary_.set(valid_index, 0, std::uint8_t{0});
 }
-
-// At work.
 
 void Srdos::begin(Srdo& s, Time now) noexcept {
     s.heard = s.half = false;
@@ -223,17 +219,17 @@ bool Srdos::handle(const Frame& f, Time now) noexcept {
     }
     if (f.id < first_id || of_id_[f.id - first_id] < 0) return false;
     auto& s = srdos_[static_cast<std::size_t>(of_id_[f.id - first_id])];
-    // After a fault nothing is believed until somebody has seen to it.
+    // After a fault all data is invalid until the fault is acknowledged.
     if (operational_ && valid_ && !s.ignored && s.fault == SrdoFault::none) take(s, f, f.id != s.cob, now);
     return true;
 }
 
 void Srdos::send(Srdo& s, Time now) noexcept {
     const auto bits = ones(8U * s.plain.bytes()), plain = s.plain.pack();
-    // Bits beyond the mapped ones are sent as 0 and as 1: the frames are complementary as a whole.
+    // Bits beyond the mapping are sent as 0 and as 1, so that the frames are complementary in all bits.
     const auto inverted = s.derived ? ~plain & bits : s.inverted.pack() | (bits & ~ones(s.inverted.bits()));
     if ((plain ^ inverted) != bits) return fail(s, SrdoFault::own_data, now);
-    if (out_.room() < 2) return;  // one without the other would be a fault over there
+    if (out_.space() < 2) return;  // a single frame would be a fault at the receiver
     Frame frame = make_frame(s.cob, s.plain.bytes());
     store(frame.data.data(), plain);
     out_.push(frame);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Safety-related data objects of EN 50325-5 (CiA 304), sent and received by one node, as its objects 1300h to 13FFh say. An SRDO is two
-// frames, the second one the first inverted bit by bit:
+// The safety-related data objects (SRDOs) of one node as its objects 1300h to 13FFh configure them (EN 50325-5, formerly CiA 304). An SRDO
+// consists of two frames; the second is the bitwise inverse of the first:
 //
 //     plain     COB-ID 1 (odd)     101h … 17Fh     objects 1, 3, 5 … of the mapping
 //     inverted  COB-ID 2 = 1 + 1   102h … 180h     objects 2, 4, 6 …
 //
-// A receiver believes the data when both frames came in this order, within the SRVT of each other, complementary and of the mapped
-// length, and an SRDO no later than the SCT behind the last. Anything else is a fault, and data that is not believed is not written.
+// Received data is valid if both frames arrive in this order, within the safety-relevant validation time (SRVT) of each other, complementary and
+// of the mapped length, and each SRDO within the safeguard cycle time (SCT) of the previous one. Anything else is a fault; invalid data is not
+// written to the dictionary.
 #pragma once
 
 #include <array>
@@ -20,72 +21,80 @@
 
 namespace hal::canopen {
 
+/// The direction of an SRDO as seen from the node.
 enum class SrdoDirection : std::uint8_t { none = 0, sends = 1, receives = 2 };  // 1301h:1
 
-/// Why the data of an SRDO is not believed, or why it is not sent.
+/// Why the data of a received SRDO is invalid, or why an SRDO is not sent.
 enum class SrdoFault : std::uint8_t {
     none,
-    late,        ///< no SRDO for its SCT
-    incomplete,  ///< the second frame did not come within the SRVT
-    order,       ///< the second frame came first, or the first one twice
-    length,      ///< a frame has not the mapped length
-    complement,  ///< the second frame is not the first inverted
-    fail_safe,   ///< a global fail-safe command
-    own_data,    ///< a sender: the two objects of a pair are not complementary; nothing is sent
+    late,        ///< no SRDO within the SCT
+    incomplete,  ///< the second frame did not arrive within the SRVT
+    order,       ///< the second frame arrived first, or the first one twice
+    length,      ///< the length of a frame differs from the mapping
+    complement,  ///< the second frame is not the inverse of the first
+    fail_safe,   ///< a global fail-safe command (GFC) was received
+    own_data,    ///< sender: the two objects of a pair are not complementary; nothing is sent
 };
-/// As a part of a sentence: "its second frame is not the first one inverted". [any]
+/// Returns the fault as a clause: "second frame is not the inverse of the first". [any]
 const char* to_string(SrdoFault) noexcept;
 
-/// All calls come from poll() or handle(). [realtime]
+/// Notifications about SRDOs. All calls come from poll() or handle(). [realtime]
 class SafetyEvents {
 public:
     virtual ~SafetyEvents() = default;
-    /// An SRDO was received and believed; its values are in the dictionary. Numbers count from 1.
+    /// A valid SRDO was received; its values are in the dictionary. Numbers count from 1.
     virtual void on_srdo(unsigned number, Time) noexcept { (void)number; }
-    /// Its data belongs into its safe state now. It stays so until Srdos::acknowledge() or the node leaves the operational state.
+    /// The data is invalid and must enter its safe state. It stays invalid until Srdos::acknowledge() or until the node leaves operational.
     virtual void on_srdo_fault(unsigned number, SrdoFault, Time) noexcept { (void)number; }
-    /// A global fail-safe command came; before on_srdo_fault() of each received SRDO.
+    /// A global fail-safe command was received; called before on_srdo_fault() of each received SRDO.
     virtual void on_fail_safe(Time) noexcept {}
 };
 
+/// All SRDOs of a node. Numbers count from 1. All calls belong to one thread.
 class Srdos final : public Handler {
 public:
-    static constexpr unsigned most = 64;
-    static constexpr std::uint8_t valid_mark = 0xa5;  ///< of 13FEh
+    static constexpr unsigned max_srdos = 64;
+    static constexpr std::uint8_t valid_mark = 0xa5;  ///< value of 13FEh that marks the configuration as valid
 
-    Srdos(Dictionary&, FrameQueue& out, Emcy&);  // [setup]
-    void listen(SafetyEvents& events) noexcept { events_ = &events; }  // [setup]
-    /// Communication was reset: all parameters are read anew. [realtime]
+    /// Creates the SRDOs that the dictionary describes; all arguments outlive them. [setup]
+    Srdos(Dictionary&, FrameQueue& out, Emcy&);
+    /// Sets the receiver of notifications, which outlives this. [setup]
+    void listen(SafetyEvents& events) noexcept { events_ = &events; }
+    /// Reads all parameters after a communication reset. [realtime]
     void reset(std::uint8_t node_id) noexcept;
+    /// Starts or stops the exchange of SRDOs; they exist only in the NMT state operational. [realtime]
     void set_operational(bool operational, Time now) noexcept;
-    /// True: it is one of ours. [realtime]
+    /// Processes a frame; returns true if it belongs to an SRDO or is a global fail-safe command. [realtime]
     bool handle(const Frame&, Time now) noexcept;
+    /// Sends SRDOs that are due and checks SCT and SRVT; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
 
-    /// A received SRDO has to come from now on, the first one within its SCT. Without this word the SCT counts from the first one
-    /// received. `on` false: it is not listened to. [realtime]
+    /// Expects a received SRDO from now on, the first one within the SCT; without this call the SCT starts with the first SRDO received. `on`
+    /// false: ignores it. [realtime]
     void expect(unsigned number, bool on, Time now) noexcept;
-    /// The fault is seen to; the data is believed again from the next good SRDO on. [realtime]
+    /// Acknowledges a fault; the data is valid again from the next valid SRDO on. [realtime]
     void acknowledge(unsigned number, Time now) noexcept;
-    /// A sent SRDO goes out at once, not when it is next due. False: there is no such one. [realtime]
+    /// Sends an SRDO at the next poll() instead of when it is due. Returns false if it does not exist. [realtime]
     bool trigger(unsigned number) noexcept;
-    /// The second frame is made of the first one; the mapping has no inverted objects that mean something. [setup]
+    /// Derives the second frame from the first; the inverted objects of the mapping are not used. [setup]
     void derive_inverted(unsigned number) noexcept;
-    /// The global fail-safe command, if 1300h allows it. [realtime]
+    /// Sends the global fail-safe command if 1300h allows it; returns false if not, or if the queue is full. [realtime]
     bool send_fail_safe() noexcept;
 
+    /// The state of one SRDO.
     struct Status {
         bool exists = false;
         bool active = false;    ///< the configuration is valid and the node operational
-        bool valid = false;     ///< received, no fault, and at least one came
+        bool valid = false;     ///< received: at least one arrived, and there is no fault
         SrdoDirection direction = SrdoDirection::none;
         SrdoFault fault = SrdoFault::none;
-        std::uint64_t count = 0;  ///< sent, or received and believed
+        std::uint64_t count = 0;  ///< SRDOs sent, or received and valid
     };
+    /// Returns the state of an SRDO; `exists` is false if there is none with this number. [realtime]
     Status status(unsigned number) const noexcept;
-    /// 13FEh says so and all signatures are right. [realtime]
+    /// Returns true if 13FEh marks the configuration as valid and all signatures match. [realtime]
     bool configuration_valid() const noexcept { return valid_; }
-    /// What 13FFh has to say of SRDO `number`. [realtime]
+    /// Returns the signature of SRDO `number` that 13FFh must contain. [realtime]
     std::uint16_t signature(unsigned number) const noexcept;
 
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
@@ -99,13 +108,13 @@ private:
         Time cycle = 0, validation = 0;       // refresh time or SCT; SRVT
         Mapping plain, inverted;
         SrdoFault fault = SrdoFault::none;
-        bool ignored = false, strict = false;  // by expect()
-        bool heard = false, half = false;      // at least one was believed; the first frame waits for the second
+        bool ignored = false, strict = false;  // set by expect()
+        bool heard = false, half = false;      // at least one valid SRDO arrived; the first frame awaits the second
         bool derived = false, now = false;
         std::uint64_t first = 0;
         Time first_at = 0, last = 0, next = 0;
         std::uint64_t count = 0;
-        Srdo(unsigned n, std::size_t room) : number(static_cast<std::uint8_t>(n)), plain(room), inverted(room) {}
+        Srdo(unsigned n, std::size_t capacity) : number(static_cast<std::uint8_t>(n)), plain(capacity), inverted(capacity) {}
     };
     static constexpr std::uint32_t first_id = 0x101, last_id = 0x180;
 
@@ -123,8 +132,8 @@ private:
     Emcy& emcy_;
     SafetyEvents* events_ = nullptr;
     std::vector<Srdo> srdos_;
-    std::array<std::int8_t, most + 1> of_number_{};
-    std::array<std::int8_t, last_id - first_id + 1> of_id_{};  // received ones by identifier, both frames
+    std::array<std::int8_t, max_srdos + 1> of_number_{};
+    std::array<std::int8_t, last_id - first_id + 1> of_id_{};  // received SRDOs by identifier of either frame
     bool operational_ = false, valid_ = false;
     Time now_ = 0;
 };

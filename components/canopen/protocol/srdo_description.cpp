@@ -28,7 +28,7 @@ std::uint16_t srdo_signature(const SrdoDescription& s) noexcept {
 }
 
 void add_srdos(Description& d, std::span<const SrdoDescription> srdos) {
-    const auto count = std::min<std::size_t>(srdos.size(), Srdos::most);
+    const auto count = std::min<std::size_t>(srdos.size(), Srdos::max_srdos);
     if (count == 0) return;
     d.add(0x1300, 0, u8, rw, 1, "Global fail-safe command parameter");
     d.objects[0x13ff] = "Safety configuration signature";

@@ -19,7 +19,7 @@ void Sync::reset() noexcept {
 }
 
 void Sync::set_active(bool active) noexcept {
-    if (active != active_) started_ = seen_ = told_lost_ = false, next_counter_ = 1;
+    if (active != active_) started_ = seen_ = lost_reported_ = false, next_counter_ = 1;
     active_ = active;
 }
 
@@ -30,7 +30,7 @@ bool Sync::handle(const Frame& f, Time now) noexcept {
     if (f.length != expected) emcy_.raise(0x8240, error_communication, {f.length, expected});
     else emcy_.clear(0x8240);
     counter_ = f.length >= 1 && expected == 1 ? f.data[0] : 0;
-    last_ = now, seen_ = true, told_lost_ = false;
+    last_ = now, seen_ = true, lost_reported_ = false;
     return true;
 }
 
@@ -56,8 +56,8 @@ bool Sync::poll(Time now) noexcept {
 }
 
 bool Sync::lost(Time now) noexcept {
-    if (!seen_ || told_lost_ || producer() || !active_ || period_ == 0 || now - last_ < period_ + period_ / 2) return false;
-    return told_lost_ = true;
+    if (!seen_ || lost_reported_ || producer() || !active_ || period_ == 0 || now - last_ < period_ + period_ / 2) return false;
+    return lost_reported_ = true;
 }
 
 Abort Sync::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {

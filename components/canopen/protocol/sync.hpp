@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SYNC (1005h, 1006h, 1007h, 1019h) and TIME (1012h), produced and consumed.
+// Producers and consumers of SYNC (1005h, 1006h, 1007h, 1019h) and TIME (1012h) (CiA 301).
 #pragma once
 
 #include "dictionary.hpp"
@@ -9,28 +9,40 @@
 
 namespace hal::canopen {
 
+/// The SYNC service of a node. All calls belong to one thread.
 class Sync final : public Handler {
 public:
-    Sync(Dictionary&, FrameQueue& out, Emcy&);  // [setup]
+    /// Creates the service; all arguments outlive it. [setup]
+    Sync(Dictionary&, FrameQueue& out, Emcy&);
+    /// Reads all parameters. [realtime]
     void reset() noexcept;
-    /// Pre-operational and operational nodes produce and consume. The grid of the producer starts anew. [realtime]
+    /// Enables the service, in the NMT states pre-operational and operational; restarts the period of the producer. [realtime]
     void set_active(bool active) noexcept;
-    /// True: it is a SYNC (to be taken by on_sync of the others). [realtime]
+    /// Processes a frame; returns true if it is a SYNC. [realtime]
     bool handle(const Frame&, Time now) noexcept;
-    /// True: a SYNC was produced now. A period that was missed is skipped; the grid stays. [realtime]
+    /// Sends a SYNC when it is due and returns true if it did. Missed periods are skipped; the phase is kept. [realtime]
     bool poll(Time now) noexcept;
-    /// Produces one now, for a master whose thread is the clock (1006h is 0 then). False: not the producer, or no room. [realtime]
+    /// Sends a SYNC now, for a thread that is the clock (with 1006h = 0). Returns false if this node is not the producer or the queue is full.
+    /// [realtime]
     bool produce(Time now) noexcept;
-    /// True once, when a consumer that knows the period (1006h) misses it. [realtime]
+    /// Returns true once when no SYNC arrived within one and a half times the period 1006h. [realtime]
     bool lost(Time now) noexcept;
 
+    /// Returns true if this node produces SYNC (1005h bit 30). [any]
     bool producer() const noexcept { return (cob_ & cob_flag30) != 0; }
+    /// Returns object 1005h. [any]
     std::uint32_t cob() const noexcept { return cob_; }
-    std::uint8_t counter() const noexcept { return counter_; }        ///< of the last SYNC; 0: it had none
-    std::uint8_t overflow() const noexcept { return overflow_; }      ///< 1019h
+    /// Returns the counter of the last SYNC; 0: it carried none. [any]
+    std::uint8_t counter() const noexcept { return counter_; }
+    /// Returns the counter overflow value 1019h; 0: no counter. [any]
+    std::uint8_t overflow() const noexcept { return overflow_; }
+    /// Returns the communication cycle period 1006h in ns; 0: none. [any]
     Time period() const noexcept { return period_; }
+    /// Returns the synchronous window 1007h in ns; 0: none. [any]
     Time window() const noexcept { return window_; }
+    /// Returns the time of the last SYNC. [any]
     Time last() const noexcept { return last_; }
+    /// Returns the number of periods for which no SYNC was sent. [any]
     std::uint64_t skipped() const noexcept { return skipped_; }
 
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
@@ -43,17 +55,20 @@ private:
     std::uint32_t cob_ = 0x80;
     Time period_ = 0, window_ = 0, next_ = 0, last_ = 0;
     std::uint8_t overflow_ = 0, counter_ = 0, next_counter_ = 1;
-    bool active_ = false, started_ = false, seen_ = false, told_lost_ = false;
+    bool active_ = false, started_ = false, seen_ = false, lost_reported_ = false;
     std::uint64_t skipped_ = 0;
 };
 
+/// The TIME service of a node. All calls belong to one thread.
 class TimeStamp final : public Handler {
 public:
-    TimeStamp(Dictionary&, FrameQueue& out);  // [setup]
+    /// Creates the service; both arguments outlive it. [setup]
+    TimeStamp(Dictionary&, FrameQueue& out);
+    /// Reads 1012h. [realtime]
     void reset() noexcept { cob_ = dictionary_.get<std::uint32_t>(0x1012, 0); }
-    /// True: it is a TIME and this node consumes it. [realtime]
+    /// Processes a frame; returns true and sets the time if it is a TIME message that this node consumes. [realtime]
     bool handle(const Frame&, TimeOfDay&) noexcept;
-    /// False: 1012h does not make this node the producer, or no room. [realtime]
+    /// Sends a TIME message. Returns false if this node is not the producer (1012h bit 30) or the queue is full. [realtime]
     bool produce(const TimeOfDay&) noexcept;
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
     void written(Entry&) noexcept override { reset(); }

@@ -170,4 +170,55 @@ inline MasterSetup network_of(std::vector<NodeSetup> nodes) {
     return s;
 }
 
+/// A master and three example devices as nodes 5, 6 and 7; `change` adapts the set-up of each, `network` that of the master.
+struct Three : Bed {
+    explicit Three(const std::function<void(std::uint8_t, NodeSetup&)>& change = {}, const std::function<void(MasterSetup&)>& network = {})
+        : Bed([&] {
+              std::vector<NodeSetup> nodes;
+              for (std::uint8_t id = 5; id <= 7; ++id) {
+                  nodes.push_back(example_node(id));
+                  if (change) change(id, nodes.back());
+              }
+              auto s = network_of(nodes);
+              if (network) network(s);
+              return s;
+          }()) {
+        for (std::uint8_t id = 5; id <= 7; ++id) add(id, example());
+        bus.logging = true;
+    }
+    std::vector<std::uint8_t> started() const {
+        std::vector<std::uint8_t> ids;
+        for (const auto& f : bus.sent(0))
+            if (f.data[0] == 1) ids.push_back(f.data[1]);
+        return ids;
+    }
+};
+
+/// A master and one example device as node 5.
+struct Configured : Bed {
+    explicit Configured(const std::function<void(NodeSetup&)>& change = {}, Description d = example(), bool auto_start = false)
+        : Bed([&] {
+              auto n = example_node();
+              if (change) change(n);
+              return network_of({n});
+          }()),
+          station(add(5, d, auto_start)) {
+        bus.logging = true;
+        power();
+    }
+    /// Returns the number of SDO requests with this client command specifier for `index`; index 0: for any object.
+    std::size_t requests(unsigned specifier, std::uint16_t index = 0) const {
+        const auto sent = bus.sent(0x605);
+        return static_cast<std::size_t>(std::ranges::count_if(sent, [&](const Frame& f) {
+            return f.data[0] >> 5 == specifier && (index == 0 || load<std::uint16_t>(f.data.data() + 1) == index);
+        }));
+    }
+    std::size_t writes(std::uint16_t index = 0) const { return requests(1, index); }
+    std::size_t reads(std::uint16_t index = 0) const { return requests(2, index); }
+    Station& station;
+};
+inline void two_objects(NodeSetup& n) {
+    n.writes = {object_write(0x2000, 0, std::uint32_t{9}, "gain"), object_write(0x2001, 0, std::int16_t{-5}, "offset")};
+}
+
 }  // namespace hal::canopen::test

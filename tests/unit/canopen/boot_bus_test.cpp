@@ -116,7 +116,7 @@ TEST(BootBus, A_full_network_boots_in_parallel_at_1_Mbit) {
         retries += static_cast<unsigned>(b.master.status(id).sdo_retries);
     }
     EXPECT_EQ(retries, 0U);
-    EXPECT_EQ(b.own.out().refused(), 0U);
+    EXPECT_EQ(b.own.out().rejected(), 0U);
     const auto frames = b.link->statistics().sent + b.link->statistics().received;
     // 5 identity reads, 20 times compare, write, verify and the same of 1017h: two frames each; boot-up, heartbeat, start, a reset.
     EXPECT_NEAR(static_cast<double>(frames), 127.0 * (2 * (5 + 63) + 4), 127.0 * 30);

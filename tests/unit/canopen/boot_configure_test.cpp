@@ -1,37 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What is written to a node, and what is not.
+// The configuration of a node: which objects are written, and which are not.
 #include "boot_bed.hpp"
 
 namespace hal::canopen::test {
 namespace {
 
-struct Configured : Bed {
-    explicit Configured(const std::function<void(NodeSetup&)>& change = {}, Description d = example(), bool auto_start = false)
-        : Bed([&] {
-              auto n = example_node();
-              if (change) change(n);
-              return network_of({n});
-          }()),
-          station(add(5, d, auto_start)) {
-        bus.logging = true;
-        power();
-    }
-    /// SDO requests with that command specifier to that object; 0: any.
-    std::size_t requests(unsigned specifier, std::uint16_t index = 0) const {
-        const auto sent = bus.sent(0x605);
-        return static_cast<std::size_t>(std::ranges::count_if(sent, [&](const Frame& f) {
-            return f.data[0] >> 5 == specifier && (index == 0 || load<std::uint16_t>(f.data.data() + 1) == index);
-        }));
-    }
-    std::size_t writes(std::uint16_t index = 0) const { return requests(1, index); }
-    std::size_t reads(std::uint16_t index = 0) const { return requests(2, index); }
-    Station& station;
-};
-void two_objects(NodeSetup& n) {
-    n.writes = {object_write(0x2000, 0, std::uint32_t{9}, "gain"), object_write(0x2001, 0, std::int16_t{-5}, "offset")};
-}
-
-TEST(Configure, Writes_what_differs_and_reads_it_back) {
+TEST(Configure, Writes_differing_objects_and_reads_them_back) {
     Configured b([](NodeSetup& n) {
         two_objects(n);
         n.writes.push_back(object_write(0x2008, 1, std::uint8_t{1}));  // holds that already
@@ -61,7 +35,7 @@ TEST(Configure, Writes_nothing_when_nothing_differs) {
     EXPECT_EQ(b.status(5).written, 0U);
 }
 
-TEST(Configure, Maps_a_PDO_in_the_order_that_devices_demand) {
+TEST(Configure, Maps_a_PDO_in_the_order_of_CiA_301) {
     const PdoDescription wished{.cob = 0x385, .transmission = 1, .mapping = {map_entry(0x2008, 1, 8), map_entry(0x2000, 0, 32)}};
     Configured b([&](NodeSetup& n) { n.writes = rpdo_writes(1, wished); });
     b.start();
@@ -86,7 +60,7 @@ TEST(Configure, Maps_a_PDO_in_the_order_that_devices_demand) {
     EXPECT_EQ(b.station.device.pdos().rpdo(1).count, before);
 }
 
-TEST(Configure, Makes_the_writes_of_a_PDO) {
+TEST(Configure, Generates_the_writes_of_a_PDO) {
     const auto text = [](const std::vector<ObjectWrite>& writes) {
         std::string result;
         for (const auto& w : writes) {
@@ -115,7 +89,7 @@ TEST(Configure, Makes_the_writes_of_a_PDO) {
     EXPECT_FALSE(same_value(0x2000, 1, on, std::span(on).first(2)));
 }
 
-TEST(Configure, Writes_unread_what_cannot_be_read) {
+TEST(Configure, Writes_write_only_objects_without_reading_them) {
     Configured b([](NodeSetup& n) { n.writes = {object_write(0x2003, 0, std::uint8_t{3}), object_write(0x2000, 0, std::uint32_t{5})}; });
     Spoil refuses;
     refuses.read = [](Entry&) { return Abort::access; };
@@ -128,7 +102,7 @@ TEST(Configure, Writes_unread_what_cannot_be_read) {
     EXPECT_EQ(b.value(0, 0x2000, 0), 5U);
 }
 
-TEST(Configure, Leaves_out_what_the_node_need_not_have) {
+TEST(Configure, Skips_optional_objects_that_are_missing) {
     Configured b([](NodeSetup& n) {
         n.writes = {object_write(0x5000, 0, std::uint8_t{0})};
         n.writes[0].optional = true;
@@ -138,7 +112,7 @@ TEST(Configure, Leaves_out_what_the_node_need_not_have) {
     EXPECT_EQ(b.writes(0x5000), 0U);
 }
 
-TEST(Configure, Takes_a_node_out_of_operational_when_it_started_itself) {
+TEST(Configure, Takes_a_self_started_node_out_of_operational) {
     Configured b(two_objects, example(), true);
     Spoil refuses;
     refuses.write = [&](Entry&, std::span<const std::uint8_t>) {
@@ -151,7 +125,7 @@ TEST(Configure, Takes_a_node_out_of_operational_when_it_started_itself) {
     EXPECT_EQ(b.status(5).attempts, 1U);
 }
 
-TEST(Configure, Survives_a_node_that_leaves_pre_operational_meanwhile) {
+TEST(Configure, Continues_when_the_node_leaves_pre_operational) {
     auto d = example();
     d.find(0x1017, 0)->value = {50, 0};
     Configured b(two_objects, d);
@@ -168,7 +142,7 @@ TEST(Configure, Survives_a_node_that_leaves_pre_operational_meanwhile) {
     EXPECT_GE(refused, 2);
 }
 
-TEST(Configure, Is_skipped_when_date_and_time_agree) {
+TEST(Configure, Is_skipped_when_date_and_time_match) {
     auto d = example();
     using enum Access;
     d.add(0x1020, 0, Type::unsigned8, constant, 2);
@@ -199,7 +173,7 @@ TEST(Configure, Is_skipped_when_date_and_time_agree) {
     EXPECT_EQ(without.value(0, 0x2000, 0), 9U);
 }
 
-TEST(Configure, Waits_for_a_slow_node_as_long_as_it_is_told_to) {
+TEST(Configure, Waits_for_a_slow_node_up_to_its_SDO_timeout) {
     const auto boots = [](Time own, int resends) {
         Configured b([&](NodeSetup& n) { n.sdo_timeout = own, n.sdo_resends = resends, n.heartbeat_limit = -1; });
         b.station.delay = 700 * millisecond;  // longer than the master's own patience
@@ -230,122 +204,6 @@ TEST(Configure, Restores_defaults_first_and_saves_last) {
     EXPECT_EQ(b.station.resets, (std::vector{false, true}));
 }
 
-TEST(Configure, Guards_a_node_without_heartbeat) {
-    auto d = example();
-    std::erase_if(d.entries, [](const EntryDescription& e) { return e.index == 0x1017; });
-    Configured b({}, d);
-    b.start();
-    ASSERT_TRUE(b.operational());
-    EXPECT_EQ(b.status(5).notes, note_guarded);
-    EXPECT_EQ(b.station.device.dictionary().get<std::uint16_t>(0x100c, 0), 50);
-    EXPECT_EQ(b.station.device.dictionary().get<std::uint8_t>(0x100d, 0), 3);
-    b.station.plug(false, b.now);
-    ASSERT_TRUE(b.until([&] { return b.status(5).losses == 1; }, second));
-    EXPECT_EQ(b.networks.back(), NetworkState::degraded);
-    EXPECT_EQ(b.status(5).cause, Cause::guarding);
-    b.station.plug(true, b.now);
-    EXPECT_TRUE(b.operational());
-}
-
-TEST(Configure, Guards_where_it_is_told_to_and_the_node_watches_the_master) {
-    Configured b([](NodeSetup& n) { n.guard_ms = 20, n.guard_factor = 3; });
-    b.start();
-    ASSERT_TRUE(b.operational());
-    EXPECT_EQ(b.station.device.dictionary().get<std::uint16_t>(0x1017, 0), 0);
-    b.alive = false;
-    b.own->out().clear();
-    b.run(100 * millisecond);
-    EXPECT_EQ(b.station.life, (std::vector{true}));
-    EXPECT_EQ(b.state(0), NmtState::pre_operational);
-}
-
-TEST(Configure, Loses_a_guarded_node_whose_toggle_bit_never_changes) {
-    Configured b([](NodeSetup& n) { n.guard_ms = 20, n.guard_factor = 3; });
-    b.start();
-    ASSERT_TRUE(b.operational());
-    b.station.tamper = [](Frame& f) {
-        if (f.id == 0x705) f.data[0] &= 0x7f;
-        return true;
-    };
-    const Time stuck = b.now;
-    ASSERT_TRUE(b.until([&] { return b.status(5).losses == 1; }, second));
-    EXPECT_LE(b.now - stuck, 80 * millisecond + b.dt);  // its life time and the answer before
-    EXPECT_EQ(b.status(5).cause, Cause::guard_toggle);
-    EXPECT_EQ(b.master->sentence(5),
-              "node 5 answered guarding with a toggle bit that did not change for its limit: its answers do not count; watch it by "
-              "heartbeat, or look for two devices with this id");
-    b.run(10 * second);
-    EXPECT_NE(b.master->status().state, NetworkState::operational);
-    b.station.tamper = nullptr;
-    EXPECT_TRUE(b.operational());
-}
-
-TEST(Configure, Lets_devices_fall_to_their_safe_state_when_the_master_dies) {
-    auto d = example();
-    d.add(0x1016, 1, Type::unsigned32, Access::read_write, 0x00210100);  // watches another node already: the next entry is taken
-    Configured b([](NodeSetup& n) { n.master_limit_ms = 150; }, d);
-    b.start();
-    ASSERT_TRUE(b.operational());
-    b.run(second);
-    EXPECT_EQ(b.station.communication_errors, 0);
-    std::size_t entries = 0;
-    for (std::uint8_t n = 1; n <= 4; ++n)
-        if (b.value(0, 0x1016, n) == (127U << 16 | 150)) ++entries;
-    EXPECT_EQ(entries, 1U);
-    b.alive = false;
-    b.own->out().clear();
-    b.run(149 * millisecond + 51 * millisecond);
-    EXPECT_EQ(b.station.communication_errors, 1);
-    EXPECT_EQ(b.state(0), NmtState::pre_operational);
-    // The master comes back: it sees that the node left operational and brings it in again.
-    b.alive = true;
-    ASSERT_TRUE(b.until([&] { return b.status(5).losses >= 1 && b.status(5).operational; }));
-    EXPECT_EQ(b.state(0), NmtState::operational);
-}
-
-TEST(Configure, Notes_a_node_that_cannot_watch_the_master) {
-    auto d = example();
-    std::erase_if(d.entries, [](const EntryDescription& e) { return e.index == 0x1016; });
-    Configured b([](NodeSetup& n) { n.master_limit_ms = 150; }, d);
-    b.start();
-    ASSERT_TRUE(b.operational());
-    EXPECT_EQ(b.status(5).notes, note_no_consumer);
-    EXPECT_EQ(note_sentences(b.setup.nodes[0], b.status(5))[0],
-              "node 5 has no free entry in 1016 and does not notice when the master is gone");
-}
-
-TEST(Configure, Takes_the_heartbeat_period_that_the_node_can_do) {
-    Spoil rounds;
-    const auto spoil = [&](Configured& b) {
-        rounds.after = [&](Entry& e) {
-            store(e.data, std::uint16_t{64});
-            static_cast<Handler&>(b.station.device.error_control()).written(e);
-        };
-        b.station.device.dictionary().handle(0x1017, rounds);
-        b.start();
-    };
-    Configured b;
-    spoil(b);
-    EXPECT_TRUE(b.operational());
-
-    Configured late([](NodeSetup& n) { n.heartbeat_limit = 60 * millisecond, n.on_failure = Reaction::nothing; });
-    spoil(late);
-    ASSERT_TRUE(late.ended(5));
-    EXPECT_EQ(late.status(5).result, BootResult::configuration);
-    EXPECT_EQ(late.status(5).cause, Cause::not_taken);
-}
-
-TEST(Configure, Writes_the_heartbeat_period_again_when_no_heartbeat_came) {
-    auto d = example();
-    d.find(0x1017, 0)->value = {50, 0};
-    Configured b({}, d);
-    b.station.tamper = [&](const Frame& f) { return f.id != 0x705 || f.data[0] == 0 || b.writes(0x1017) != 0; };
-    b.start();
-    ASSERT_TRUE(b.operational());
-    EXPECT_EQ(b.status(5).attempts, 2U);
-    EXPECT_EQ(b.writes(), 1U);
-}
-
 TEST(Configure, Writes_long_values) {
     Configured b([](NodeSetup& n) {
         ObjectWrite text{{0x2005, 0, {}}}, domain{{0x2006, 0, std::vector<std::uint8_t>(5000, 0x5a)}};
@@ -359,7 +217,7 @@ TEST(Configure, Writes_long_values) {
     EXPECT_EQ(b.status(5).written, 3U);
 }
 
-TEST(Configure, Takes_a_concise_DCF) {
+TEST(Configure, Accepts_a_concise_DCF) {
     const std::vector<eds::Write> writes{{0x2000, 0, {1, 0, 0, 0}}, {0x2001, 0, {2, 0}}};
     const auto parsed = eds::parse_concise(eds::concise(writes));
     ASSERT_TRUE(parsed);
@@ -367,39 +225,6 @@ TEST(Configure, Takes_a_concise_DCF) {
     b.start();
     ASSERT_TRUE(b.operational());
     EXPECT_EQ(b.value(0, 0x2000, 0), 1U);
-}
-
-TEST(Setup, Takes_the_objects_of_CiA_302) {
-    MasterSetup s = network_of({example_node(5), example_node(6)});
-    apply_assignment(s.nodes[0], 0x0064'0309 | 1U << 4 | 1U << 6 | 1U << 7);  // guarded at 100 ms, mandatory, not booted
-    EXPECT_TRUE(s.nodes[0].mandatory && s.nodes[0].keep_alive && s.nodes[0].program.update && s.nodes[0].restore);
-    EXPECT_FALSE(s.nodes[0].configure || s.nodes[0].start);
-    EXPECT_EQ(s.nodes[0].guard_ms, 100);
-    EXPECT_EQ(s.nodes[0].guard_factor, 3);
-    apply_assignment(s.nodes[1], 5);
-    EXPECT_TRUE(s.nodes[1].configure && s.nodes[1].start && !s.nodes[1].mandatory);
-    apply_startup(s, 1U << 1 | 1U << 2 | 1U << 6);
-    EXPECT_TRUE(s.start_all_at_once && !s.start_self);
-    EXPECT_EQ(s.nodes[0].on_loss, Reaction::stop_all);
-    EXPECT_EQ(s.nodes[1].on_loss, Reaction::restart);
-}
-
-TEST(Setup, Says_what_cannot_be) {
-    auto s = network_of({example_node(5), example_node(5), example_node(127), example_node(0)});
-    s.nodes[0].writes = {ObjectWrite{{0x6083, 0, {}}}};
-    s.nodes[0].guard_ms = 10, s.nodes[0].guard_factor = 0;
-    s.nodes[0].heartbeat_limit = 50 * millisecond;
-    EXPECT_EQ(
-        problems_of(s),
-        (std::vector<std::string>{
-            "node 5 gets no value for object 6083:0; give it one or take the object out", "node 5 is guarded with the factor 0; 3 is usual",
-            "node 5 is lost after 50 ms of silence but sends its heartbeat every 50 ms; the limit has to be longer",
-            "node 5 is there twice; every node has an id of its own", "node 127 has the master's own id; give one of the two another",
-            "node 0 cannot be: node ids are 1 to 127"}));
-    FrameQueue out(8);
-    MasterEvents events;
-    EXPECT_THROW(Master(s, out, events), std::invalid_argument);
-    EXPECT_TRUE(problems_of(network_of({example_node(5)})).empty());
 }
 
 }  // namespace

@@ -101,9 +101,9 @@ TEST(BootResult, B_for_a_node_that_does_not_answer) {
     ASSERT_TRUE(b.ended(5));
     EXPECT_EQ(b.status(5).result, BootResult::no_answer);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) does not answer (1000:0): check its power, cable, bit rate and node id; 'hal can scan' shows who is there "
-              "[result B, no answer]");
-    EXPECT_EQ(b.master->sentence(), "the network is booting: " + b.text() + "; it is tried again");
+              "node 5 (arm) does not respond (1000:0): check its power, cable, bit rate and node ID; 'hal can scan' lists the nodes that "
+              "respond [result B, no response]");
+    EXPECT_EQ(b.master->sentence(), "the network is booting: " + b.text() + "; retrying");
     EXPECT_EQ(b.status(5).step, Step::waiting);
     EXPECT_FALSE(b.status(5).online);
     ASSERT_TRUE(b.until([&] { return b.status(5).step == Step::failed; }));  // the boot limit is over
@@ -129,20 +129,20 @@ TEST_P(BootResultOfIdentity, Tells_what_differs) {
 INSTANTIATE_TEST_SUITE_P(
     Each, BootResultOfIdentity,
     testing::Values(Wrong{&NodeSetup::device_type, BootResult::device_type,
-                          "device type (1000:0) is 0191h where 00012345h is expected; fit the right one or correct its configuration "
-                          "[result C, wrong device type]"},
+                          "device type (1000:0) is 0191h where 00012345h is expected; connect the right device or correct its "
+                          "configuration [result C, wrong device type]"},
                     Wrong{&NodeSetup::vendor, BootResult::vendor,
-                          "vendor id (1018:1) is 0001h where 00012345h is expected; fit the right one or correct its configuration "
-                          "[result D, wrong vendor]"},
+                          "vendor ID (1018:1) is 0001h where 00012345h is expected; connect the right device or correct its "
+                          "configuration [result D, wrong vendor]"},
                     Wrong{&NodeSetup::product, BootResult::product,
-                          "product code (1018:2) is 0002h where 00012345h is expected; fit the right one or correct its configuration "
-                          "[result M, wrong product]"},
+                          "product code (1018:2) is 0002h where 00012345h is expected; connect the right device or correct its "
+                          "configuration [result M, wrong product]"},
                     Wrong{&NodeSetup::revision, BootResult::revision,
-                          "revision number (1018:3) is 0003h where 00012345h is expected; fit the right one or correct its configuration "
-                          "[result N, wrong revision]"},
+                          "revision number (1018:3) is 0003h where 00012345h is expected; connect the right device or correct its "
+                          "configuration [result N, wrong revision]"},
                     Wrong{&NodeSetup::serial, BootResult::serial,
-                          "serial number (1018:4) is 0004h where 00012345h is expected; fit the right one or correct its configuration "
-                          "[result O, wrong serial number]"}),
+                          "serial number (1018:4) is 0004h where 00012345h is expected; connect the right device or correct its "
+                          "configuration [result O, wrong serial number]"}),
     [](const auto& with) { return std::string(1, static_cast<char>(with.param.letter)); });
 
 TEST(BootResult, O_when_it_does_not_tell_its_serial_number) {
@@ -152,8 +152,8 @@ TEST(BootResult, O_when_it_does_not_tell_its_serial_number) {
     b.station.device.dictionary().handle(0x1018, identity);
     EXPECT_EQ(b.boot(), BootResult::serial);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) does not tell its serial number, 1018:4: sub-index does not exist (06090011h); it is another device, "
-              "or this is not to be checked [result O, wrong serial number]");
+              "node 5 (arm) rejects the read of its serial number, 1018:4: sub-index does not exist (06090011h); connect the right "
+              "device, or remove this check [result O, wrong serial number]");
 }
 
 TEST(BootResult, E_when_a_node_to_keep_alive_sends_no_heartbeat) {
@@ -172,8 +172,8 @@ TEST(BootResult, F_when_a_node_does_not_answer_guarding) {
     b.station.tamper = [](const Frame& f) { return f.id != 0x705; };
     EXPECT_EQ(b.boot(), BootResult::no_guarding);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) did not answer guarding at the start of error control: check its power and cable, and that it can be "
-              "guarded [result F, no answer to guarding]");
+              "node 5 (arm) did not respond to node guarding at the start of error control: check its power and cable, and that it "
+              "supports node guarding [result F, no response to node guarding]");
     One kept([](NodeSetup& n) { n.guard_ms = 20, n.keep_alive = true; });
     kept.station.tamper = b.station.tamper;
     EXPECT_EQ(kept.boot(), BootResult::no_guarding);
@@ -184,26 +184,26 @@ TEST(BootResult, G_when_the_objects_of_the_program_or_its_image_are_missing) {
     One without(wants_program_7);
     EXPECT_EQ(without.boot(), BootResult::no_program);
     EXPECT_EQ(without.text(),
-              "node 5 (arm) has no object 1F56:1, so its program cannot be checked or updated: set no program for it "
-              "[result G, no program, or no objects for it]");
+              "node 5 (arm) has no object 1F56:1, so its program cannot be checked or updated: remove the program from its configuration "
+              "[result G, program or program objects missing]");
     One no_image([](NodeSetup& n) { wants_program_7(n), n.program.image.clear(); }, with_program(6));
     EXPECT_EQ(no_image.boot(), BootResult::no_program);
     EXPECT_EQ(no_image.text(),
-              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and there is no file to download: name one "
-              "[result G, no program, or no objects for it]");
+              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and no program file is configured: configure one "
+              "[result G, program or program objects missing]");
 }
 
 TEST(BootResult, H_when_an_update_is_needed_and_not_allowed) {
     One b([](NodeSetup& n) { n.program.id = 7; }, with_program(6));
     EXPECT_EQ(b.boot(), BootResult::no_update);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and may not be updated: update it by hand or allow "
-              "the update [result H, wrong program, and no update allowed]");
+              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and updates are not allowed: update it by hand or allow "
+              "the update [result H, wrong program, update not allowed]");
     One version([](NodeSetup& n) { n.program.version = "V1.3"; }, with_program(6));
     EXPECT_EQ(version.boot(), BootResult::no_update);
     EXPECT_EQ(version.text(),
-              "node 5 (arm) runs program 'V1.2' (100A:0) where 'V1.3' is expected, and may not be updated: update it by hand "
-              "or allow the update [result H, wrong program, and no update allowed]");
+              "node 5 (arm) runs program 'V1.2' (100A:0) where 'V1.3' is expected, and updates are not allowed: update it by hand or "
+              "allow the update [result H, wrong program, update not allowed]");
     One right([](NodeSetup& n) { n.program.version = "V1.2"; }, with_program(6));
     EXPECT_EQ(right.boot(), BootResult::good);
 }
@@ -215,7 +215,7 @@ TEST(BootResult, Is_good_after_a_program_was_downloaded) {
     EXPECT_EQ(loader.commands, (std::vector{0U, 3U, 1U}));
     EXPECT_EQ(b.station.device.dictionary().find(0x1f50, 1)->size, 3000U);
     EXPECT_TRUE(b.operational());
-    EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)), (std::vector<std::string>{"node 5 (arm) got a new program"}));
+    EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)), (std::vector<std::string>{"node 5 (arm) received a new program"}));
 }
 
 TEST(BootResult, I_when_the_download_fails) {
@@ -225,30 +225,30 @@ TEST(BootResult, I_when_the_download_fails) {
     refused.station.device.dictionary().handle(0x1f51, spoil);
     EXPECT_EQ(refused.boot(), BootResult::update);
     EXPECT_EQ(refused.text(),
-              "node 5 (arm) refuses object 1F51:1 while its program was updated: data cannot be transferred or stored "
-              "because of the present device state (08000022h) [result I, program download failed]");
+              "node 5 (arm) rejects object 1F51:1 while its program was updated: data cannot be transferred or stored because of the "
+              "present device state (08000022h) [result I, program download failed]");
 
     One flash(wants_program_7, with_program(6));
     Loader bad(flash.station);
     bad.error = 5;
     EXPECT_EQ(flash.boot(), BootResult::update);
     EXPECT_EQ(flash.text(),
-              "node 5 (arm) reports for its flash: flash could not be written (1F57:1 is 000Ah); check that the file is for "
-              "this device [result I, program download failed]");
+              "node 5 (arm) reports a flash error: flash write error (1F57:1 is 000Ah); check that the file is for this device [result "
+              "I, program download failed]");
 
     One busy(wants_program_7, with_program(6));
     Loader slow(busy.station);
     slow.busy = 1 << 30;
     EXPECT_EQ(busy.boot(), BootResult::update);
-    EXPECT_EQ(busy.text(), "node 5 (arm) was busy with its flash for more than 2.00 s (1F57:1) [result I, program download failed]");
+    EXPECT_EQ(busy.text(), "node 5 (arm) reports its flash busy for more than 2.00 s (1F57:1) [result I, program download failed]");
 
     One same(wants_program_7, with_program(6));
     Loader other(same.station);
     other.good = false;
     EXPECT_EQ(same.boot(), BootResult::update);
     EXPECT_EQ(same.text(),
-              "node 5 (arm) still runs program 0006h (1F56:1) where 0007h is expected, though it was downloaded; check the file "
-              "[result I, program download failed]");
+              "node 5 (arm) still runs program 0006h (1F56:1) where 0007h is expected after the download; check the file [result I, "
+              "program download failed]");
 }
 
 TEST(BootResult, J_when_an_object_cannot_be_configured) {
@@ -256,27 +256,27 @@ TEST(BootResult, J_when_an_object_cannot_be_configured) {
     One missing(with(object_write(0x5000, 3, std::uint32_t{9}, "gain")));
     EXPECT_EQ(missing.boot(), BootResult::configuration);
     EXPECT_EQ(missing.text(),
-              "node 5 (arm) refuses 0009h for object 5000:3 (gain): object does not exist in the object dictionary (06020000h); "
-              "correct the value in its configuration or take the object out [result J, configuration failed]");
+              "node 5 (arm) rejects 0009h for object 5000:3 (gain): object does not exist in the object dictionary (06020000h); correct "
+              "the value in its configuration or remove the object [result J, configuration failed]");
     One high(with(object_write(0x2001, 0, std::int16_t{101})));
     EXPECT_EQ(high.boot(), BootResult::configuration);
     EXPECT_EQ(high.text(),
-              "node 5 (arm) refuses 0065h for object 2001:0: value of the parameter written too high (06090031h); correct the value in "
-              "its configuration or take the object out [result J, configuration failed]");
+              "node 5 (arm) rejects 0065h for object 2001:0: value of the parameter written too high (06090031h); correct the value in "
+              "its configuration or remove the object [result J, configuration failed]");
     One forgets(with(object_write(0x2000, 0, std::uint32_t{9})));
     Spoil spoil;
     spoil.after = [](Entry& e) { store(e.data, std::uint32_t{8}); };
     forgets.station.device.dictionary().handle(0x2000, spoil);
     EXPECT_EQ(forgets.boot(), BootResult::configuration);
     EXPECT_EQ(forgets.text(),
-              "node 5 (arm) took 0009h for object 2000:0 but holds 0008h; write what it can hold, or take the object out "
-              "[result J, configuration failed]");
+              "node 5 (arm) accepted 0009h for object 2000:0 but holds 0008h; write a value it can hold, or remove the object [result J, "
+              "configuration failed]");
     One silent(with(object_write(0x2000, 0, std::uint32_t{9})));
     silent.station.tamper = [](const Frame& f) { return f.id != 0x585 || f.data[1] != 0x00 || f.data[2] != 0x20; };
     EXPECT_EQ(silent.boot(), BootResult::configuration);
     EXPECT_EQ(silent.text(),
-              "node 5 (arm) fell silent at 2000:0 while it was configured: check its power and cable "
-              "[result J, configuration failed]");
+              "node 5 (arm) stopped responding at 2000:0 while it was configured: check its power and cable [result J, configuration "
+              "failed]");
 }
 
 TEST(BootResult, K_when_the_heartbeat_does_not_come) {
@@ -302,7 +302,7 @@ TEST(BootResult, L_when_a_node_to_keep_alive_is_operational_already) {
     EXPECT_EQ(b.value(0, 0x2000, 0), 0x12345678U);          // not configured,
     EXPECT_EQ(b.status(5).state, NmtState::operational);    // and watched:
     EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)),
-              (std::vector<std::string>{"node 5 (arm) was operational already and was not touched"}));
+              (std::vector<std::string>{"node 5 (arm) was already operational and was not reset"}));
     b.master->start(b.now);  // nor the second time
     b.run(second);
     EXPECT_EQ(b.status(5).result, BootResult::was_operational);
@@ -319,20 +319,20 @@ TEST(BootResult, Names_two_devices_with_one_id) {
     One b;
     b.add(5, example(77));
     EXPECT_EQ(b.boot(), BootResult::serial);
-    EXPECT_EQ(b.status(5).cause, Cause::doubled);
+    EXPECT_EQ(b.status(5).cause, Cause::duplicate_id);
     const bool order = b.status(5).expected == 4;
-    EXPECT_EQ(b.text(), std::string("node 5 (arm) is there twice: two devices answer with this id, 1018:4 is ") +
+    EXPECT_EQ(b.text(), std::string("node 5 (arm) has a duplicate node ID: two devices respond, object 1018:4 is ") +
                             (order ? "0004h and 004Dh" : "004Dh and 0004h") +
-                            "; give one of them another id [result O, wrong serial number]");
+                            "; change the node ID of one of them [result O, wrong serial number]");
 }
 
 TEST(BootResult, Notes_two_devices_with_one_id_by_their_heartbeats) {
     One b([](NodeSetup& n) { n.serial = 0; });
     b.add(5, example(77));
     EXPECT_EQ(b.boot(), BootResult::good);
-    ASSERT_TRUE(b.until([&] { return (b.status(5).notes & note_doubled) != 0; }, 5 * second));
+    ASSERT_TRUE(b.until([&] { return (b.status(5).notes & note_duplicate_id) != 0; }, 5 * second));
     EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)),
-              (std::vector<std::string>{"node 5 (arm) sends more heartbeats than it should: two devices may have this id"}));
+              (std::vector<std::string>{"node 5 (arm) sends too many heartbeats: two devices may have this node ID"}));
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST(ConfigMasters, A_flying_master_has_the_times_of_its_keys) {
     EXPECT_EQ(f.priority, 2);
     EXPECT_EQ(f.delay, second);
     EXPECT_EQ(f.silence, 50 * millisecond);
-    EXPECT_EQ(f.look_every(), 2 * second);
+    EXPECT_EQ(f.search_interval(), 2 * second);
     const Schedule schedule = schedule_of(r.config, millisecond);
     EXPECT_TRUE(std::any_of(schedule.messages.begin(), schedule.messages.end(), [](const auto& m) { return m.id == 0x71; }));
 }

@@ -55,7 +55,7 @@ public:
     }
     Abort read(std::uint16_t index, std::uint8_t sub, std::vector<std::uint8_t>& data, SdoMode mode = SdoMode::segmented) {
         data.assign(1 << 16, 0);
-        SdoRequest r{.index = index, .sub = sub, .upload = true, .mode = mode, .room = data};
+        SdoRequest r{.index = index, .sub = sub, .upload = true, .mode = mode, .buffer = data};
         const auto why = finish(r);
         data.resize(r.size);
         return why;

@@ -56,7 +56,7 @@ struct Wire : testing::Test {
 TEST_F(Wire, One_alone_leads_when_its_slot_has_come) {
     auto& a = add(10, 1);
     start();
-    run(a.setup.delay + a.setup.timeout + a.master.turn() - 2 * millisecond);
+    run(a.setup.delay + a.setup.timeout + a.master.slot_delay() - 2 * millisecond);
     EXPECT_EQ(a.master.state(), State::negotiating);
     run(5 * millisecond);
     EXPECT_EQ(a.master.state(), State::active);
@@ -87,7 +87,7 @@ TEST_F(Wire, The_next_one_takes_over_within_the_time_that_is_said) {
     run(2 * second);
     ASSERT_TRUE(a.master.active());
     a.alive = false;
-    run(b.setup.silence + b.setup.timeout + b.master.turn() + 5 * millisecond);
+    run(b.setup.silence + b.setup.timeout + b.master.slot_delay() + 5 * millisecond);
     EXPECT_TRUE(b.master.active());
     EXPECT_EQ(flyers[2].master.master(), 6);
     EXPECT_EQ(b.master.losses(), 1u);

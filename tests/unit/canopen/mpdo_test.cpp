@@ -30,24 +30,24 @@ struct Mpdo : Node {
 
 TEST_F(Mpdo, Destination_and_object_go_out_with_the_value) {
     make_multiplexed(0xff);
-    EXPECT_TRUE(device->pdos().send_to(1, 9, 0x6200, 2, 0xdeadbeef));
+    EXPECT_TRUE(device->pdos().send_dam(1, 9, 0x6200, 2, 0xdeadbeef));
     const Frame f = only(0x185);
     const std::uint8_t wanted[] = {0x89, 0x00, 0x62, 0x02, 0xef, 0xbe, 0xad, 0xde};
     ASSERT_EQ(f.length, 8);
     EXPECT_TRUE(std::equal(std::begin(wanted), std::end(wanted), f.data.begin()));
-    EXPECT_TRUE(device->pdos().send_to(1, 0, 0x6200, 2, 1));
-    EXPECT_FALSE(device->pdos().send_from(1, 0x2008, 1)) << "this one says destinations";
+    EXPECT_TRUE(device->pdos().send_dam(1, 0, 0x6200, 2, 1));
+    EXPECT_FALSE(device->pdos().send_sam(1, 0x2008, 1)) << "this one says destinations";
 }
 
 TEST_F(Mpdo, Own_node_and_object_go_out_with_the_value) {
     make_multiplexed(0xfe);
-    EXPECT_TRUE(device->pdos().send_from(1, 0x2001, 0));
+    EXPECT_TRUE(device->pdos().send_sam(1, 0x2001, 0));
     const Frame f = only(0x185);
     EXPECT_EQ(f.data[0], 5);
     EXPECT_EQ(load<std::uint16_t>(f.data.data() + 1), 0x2001);
-    EXPECT_FALSE(device->pdos().send_from(1, 0x200a, 0)) << "cannot be mapped";
-    EXPECT_FALSE(device->pdos().send_from(1, 0x5555, 0));
-    EXPECT_FALSE(device->pdos().send_to(1, 9, 0x2001, 0, 1)) << "this one says sources";
+    EXPECT_FALSE(device->pdos().send_sam(1, 0x200a, 0)) << "cannot be mapped";
+    EXPECT_FALSE(device->pdos().send_sam(1, 0x5555, 0));
+    EXPECT_FALSE(device->pdos().send_dam(1, 9, 0x2001, 0, 1)) << "this one says sources";
 }
 
 /// With a scanner list: two of the four values of 2008h, and 2001h.

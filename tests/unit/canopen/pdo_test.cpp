@@ -319,8 +319,8 @@ TEST_F(Pdo, There_can_be_512_each_way) {
     for (unsigned n = 0; n < 512; ++n) {
         d.add(static_cast<std::uint16_t>(0x3000 + n), 0, Type::unsigned16, Access::read_write, n).mappable();
         const auto entry = map_entry(static_cast<std::uint16_t>(0x3000 + n), 0, 16);
-        add_rpdo(d, n + 1, {.cob = n % 2 != 0 ? 0x20010000U + n : 0x181U + n % 0x7f, .transmission = 1, .mapping = {entry}, .room = 1});
-        add_tpdo(d, n + 1, {.cob = 0x20000000U + n, .transmission = 1, .mapping = {entry}, .room = 1});
+        add_rpdo(d, n + 1, {.cob = n % 2 != 0 ? 0x20010000U + n : 0x181U + n % 0x7f, .transmission = 1, .mapping = {entry}, .max_mapped = 1});
+        add_tpdo(d, n + 1, {.cob = 0x20000000U + n, .transmission = 1, .mapping = {entry}, .max_mapped = 1});
     }
     make(d);
     for (unsigned n = 0; n < 512; ++n) {
@@ -341,7 +341,7 @@ TEST_F(Pdo, Full_queue_loses_no_event) {
     bus.attach(*device);
     device->start(0);
     device->command(NmtCommand::start, 0);
-    while (device->out().room() != 0) device->out().push({0x1, {}});
+    while (device->out().space() != 0) device->out().push({0x1, {}});
     device->pdos().trigger(1);
     device->poll(now);
     bus.exchange(now);

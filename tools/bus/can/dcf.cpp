@@ -47,7 +47,7 @@ enum class Read { value, refused, failed };
 Read read_object(Station& station, std::uint8_t node, std::uint16_t index, std::uint8_t sub, std::vector<std::uint8_t>& bytes,
                  SdoRequest& request) {
     bytes.resize(most_bytes);
-    request = {.index = index, .sub = sub, .upload = true, .room = bytes};
+    request = {.index = index, .sub = sub, .upload = true, .buffer = bytes};
     const bool read = station.transfer(node, request);
     bytes.resize(request.ok() ? request.size : 0);
     return read ? Read::value : request.aborted_by_server ? Read::refused : Read::failed;

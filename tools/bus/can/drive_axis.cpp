@@ -39,7 +39,7 @@ bool HandAxis::refuse(const std::string& sentence) const {
 bool HandAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing) {
     std::uint8_t room[8] = {};
     const std::uint16_t at = of_axis(index, axis_);
-    SdoRequest request{.index = at, .sub = sub, .upload = true, .room = room};
+    SdoRequest request{.index = at, .sub = sub, .upload = true, .buffer = room};
     if (!station_.transfer(node_, request)) {
         const bool none = request.aborted_by_server && (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
         if (missing && none) return *missing = true, false;

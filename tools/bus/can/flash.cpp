@@ -55,7 +55,7 @@ private:
     Answer read(std::uint16_t index, std::uint32_t& value) { return read(index, program_, value); }
     Answer read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
         std::uint8_t room[8] = {};
-        last_ = {.index = index, .sub = sub, .upload = true, .room = room};
+        last_ = {.index = index, .sub = sub, .upload = true, .buffer = room};
         const bool ok = station_.transfer(node_, last_);
         if (ok) std::memcpy(&value, room, sizeof value);
         return ok ? Answer::value : last_.aborted_by_server ? Answer::refused : Answer::silent;

@@ -126,7 +126,7 @@ bool parse_item(Station& station, std::uint8_t node, const ObjectNames& names, c
     if (item.bits == 0 && item.object.index <= 0x1b) item.bits = canopen::bits_of(static_cast<canopen::Type>(item.object.index));
     if (item.bits != 0) return true;
     std::uint8_t room[8];
-    SdoRequest request{.index = item.object.index, .sub = item.object.sub, .upload = true, .room = room};
+    SdoRequest request{.index = item.object.index, .sub = item.object.sub, .upload = true, .buffer = room};
     if (station.transfer(node, request) && request.size > 0) return item.bits = static_cast<unsigned>(request.size) * 8, true;
     return problem = fmt::format("how long {0} is cannot be read ({1}); write it in bits: {2:04X}:{3:X}/16", item.object.label(),
                                  canopen::to_string(request.abort), item.object.index, item.object.sub),

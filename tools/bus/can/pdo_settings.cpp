@@ -20,7 +20,7 @@ using Source = std::function<Abort(std::uint16_t index, std::uint8_t sub, std::u
 Source of_node(Station& station, std::uint8_t node) {
     return [&station, node](std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
         std::uint8_t room[8] = {};
-        SdoRequest request{.index = index, .sub = sub, .upload = true, .room = room};
+        SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = room};
         station.transfer(node, request);
         value = canopen::load<std::uint32_t>(room);
         // Silence has to be told from a refusal.

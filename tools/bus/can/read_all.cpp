@@ -81,7 +81,7 @@ int run_can_read_all(const ReadAllOptions& options) {
             ReadObject one{.object = names.named(object.index, entry.sub), .access = eds::name_of(entry.access), .bytes = {}};
             one.asked = entry.readable();
             if (one.asked) {
-                canopen::SdoRequest request{.index = object.index, .sub = entry.sub, .upload = true, .room = {room.get(), most_bytes}};
+                canopen::SdoRequest request{.index = object.index, .sub = entry.sub, .upload = true, .buffer = {room.get(), most_bytes}};
                 const bool good = station.transfer(node, request);
                 if (!good && !request.aborted_by_server) return station.fail_transfer(node, request, one.object.label());
                 one.abort = request.abort;

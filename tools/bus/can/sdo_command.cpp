@@ -64,7 +64,7 @@ int run_can_sdo_read(const SdoReadOptions& options) {
     if (!station.open(options.words[0])) return 1;
     const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
     for (const ObjectName& object : objects) {
-        SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .mode = words.mode, .room = {room.get(), most_bytes}};
+        SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .mode = words.mode, .buffer = {room.get(), most_bytes}};
         if (!station.transfer(words.node, request)) return station.fail_transfer(words.node, request, object.label());
         const std::span<const std::uint8_t> bytes(room.get(), request.size);
         const Type type = words.type.value_or(object.type);
@@ -81,7 +81,7 @@ namespace {
 /// The type of an object nobody has described: as wide as what it holds now, signed for a negative value.
 bool width_of(Station& station, std::uint8_t node, const ObjectName& object, const std::string& value, Type& type, std::string& problem) {
     std::uint8_t room[64];
-    SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .room = room};
+    SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .buffer = room};
     const bool read = station.transfer(node, request), negative = value.starts_with('-');
     switch (read ? request.size : 0) {
     case 1: type = negative ? Type::integer8 : Type::unsigned8; return true;

@@ -46,7 +46,7 @@ void Supervision::beat(std::int64_t now) {
 
 Supervision::Read Supervision::read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
     std::uint8_t room[8] = {};
-    SdoRequest request{.index = index, .sub = sub, .upload = true, .room = room};
+    SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = room};
     if (station_.transfer(node_, request)) {
         std::memcpy(&value, room, sizeof value);
         return Read::value;

@@ -125,7 +125,7 @@ public:
         std::uint64_t transfers = 0, aborted = 0, pdos = 0;
         for (std::size_t n = 0; n < device.sdo_servers(); ++n)
             transfers += device.sdo_server(n).transfers(), aborted += device.sdo_server(n).aborted();
-        for (unsigned n = 1; n <= canopen::Pdos::most; ++n) pdos += device.pdos().tpdo(n).count;
+        for (unsigned n = 1; n <= canopen::Pdos::max_pdos; ++n) pdos += device.pdos().tpdo(n).count;
         log_.close();
         if (std::string news = program_.news(); news != news_) text_ += timed(news, now) + "\n";
         std::string text = std::exchange(text_, {});

@@ -25,7 +25,7 @@ Drive::Drive(const Description& description, const DriveSettings& settings, cons
         axes_[n]->power_up();
     }
     // Event-driven TPDOs of a drive are sent when what they carry changed.
-    for (unsigned n = 1; n <= Pdos::most; ++n) device_.pdos().send_on_change(n);
+    for (unsigned n = 1; n <= Pdos::max_pdos; ++n) device_.pdos().send_on_change(n);
 }
 
 Drive::~Drive() = default;

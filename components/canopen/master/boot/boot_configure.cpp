@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The configuration of a node: what differs is written and read back. Objects that are written more than once (PDOs: off, mapped, on) form
-// a group with all between: it is written as a whole unless the node has all its final values already.
+// The configuration of a node: objects that differ are written and read back. Objects that are written more than once (PDOs: disabled, mapped,
+// enabled) form a group with all objects in between; the group is written completely unless the node already has all its final values.
 #include <algorithm>
 #include <map>
 
@@ -24,7 +24,7 @@ void Master::Node::make_groups() {
     const bool heartbeat = setup.heartbeat_ms != 0, guard = setup.guard_ms != 0;
     const bool dated = (setup.configuration_date | setup.configuration_time) != 0;
     for (const auto& w : setup.writes) {
-        // Error control is the master's own matter; a configuration file says it, too.
+        // The master configures error control itself, even if the configuration file contains it.
         const bool ours = ((heartbeat || guard) && (w.index == 0x1017 || (guard && (w.index == 0x100c || w.index == 0x100d)))) ||
                           (dated && w.index == 0x1020);
         if (ours) continue;
@@ -64,7 +64,7 @@ bool Master::Node::applies(const Object& o) const noexcept {
     case Own::none: case Own::no_producer: case Own::consumer: return true;
     case Own::producer: return !guarding();
     case Own::guard_time: case Own::life_factor: return guarding();
-    case Own::date: case Own::time: return !skips_configuration_ && (status.notes & note_no_date) == 0;
+    case Own::date: case Own::time: return !configuration_current_ && (status.notes & note_no_date) == 0;
     }
     return false;
 }
@@ -72,11 +72,11 @@ bool Master::Node::applies(const Object& o) const noexcept {
 void Master::Node::configure() noexcept {
     if (!setup.configure) return watch();
     enter(Step::configuring);
-    tries_ = 0;
+    start_attempts_ = 0;
     guarded_ = false;
     producer_ms_ = 0;
     for (auto& o : objects_) o.unreadable = o.absent = false;
-    if (remote_.heard() && remote_.state() == NmtState::operational)  // it started itself: many objects cannot be written then
+    if (remote_.heard() && remote_.state() == NmtState::operational)  // it started itself: many objects are read-only in this state
         master_.send(NmtCommand::enter_pre_operational, setup.id);
     if (!restored_ && (setup.configuration_date | setup.configuration_time) != 0) return read(Task::date, 0x1020, 1);
     configure_anew();
@@ -85,7 +85,7 @@ void Master::Node::configure() noexcept {
 void Master::Node::configure_anew() noexcept {
     if (!setup.restore || restored_) return configure_from(0);
     enter(Step::restoring);
-    patience(storing);
+    set_sdo_timeout(storing);
     write(Task::restore, 0x1011, 1, load_signature, 4);
 }
 
@@ -125,11 +125,11 @@ void Master::Node::next_compare() noexcept {
 void Master::Node::compared() noexcept {
     auto& o = objects_[object_];
     ++status.compared;
-    bool as_wished = ok() && same_value(o.index, o.sub, o.value(), std::span(room_).first(request_.size));
-    if (silent()) return fail_write(Cause::silent);
-    if (lacks() && o.kind == Own::producer) return refused_producer();
-    if (o.kind == Own::producer && status.result == BootResult::watching) as_wished = false;  // it says so and does not do so: once more
-    if (lacks() && o.optional) {
+    bool as_wished = ok() && same_value(o.index, o.sub, o.value(), std::span(buffer_).first(request_.size));
+    if (no_response()) return fail_write(Cause::no_response);
+    if (object_missing() && o.kind == Own::producer) return producer_rejected();
+    if (o.kind == Own::producer && status.result == BootResult::watching) as_wished = false;  // the value matches, but no heartbeat arrived: write it again
+    if (object_missing() && o.optional) {
         if (o.kind == Own::date || o.kind == Own::time) status.notes |= note_no_date;
         o.absent = as_wished = true;
     } else if (!ok() && request_.aborted_by_server) o.unreadable = true;
@@ -155,15 +155,15 @@ void Master::Node::next_write() noexcept {
 void Master::Node::written() noexcept {
     auto& o = objects_[object_];
     if (!ok()) {
-        if (silent()) return fail_write(Cause::silent);
-        if (lacks() && o.kind == Own::producer) return refused_producer();
-        if (lacks() && o.optional) {
+        if (no_response()) return fail_write(Cause::no_response);
+        if (object_missing() && o.kind == Own::producer) return producer_rejected();
+        if (object_missing() && o.optional) {
             o.absent = true;
         } else {
             const bool wrong_state = remote_.state() == NmtState::operational || request_.abort == Abort::device_state ||
                                      request_.abort == Abort::local_control;
-            if (wrong_state && tries_ < most_state_changes) {  // it started itself
-                ++tries_;
+            if (wrong_state && start_attempts_ < most_state_changes) {  // it started itself
+                ++start_attempts_;
                 master_.send(NmtCommand::enter_pre_operational, setup.id);
                 return write(Task::write, o.index, o.sub, o.value());
             }
@@ -185,40 +185,40 @@ void Master::Node::next_verify() noexcept {
 
 void Master::Node::verified() noexcept {
     auto& o = objects_[object_];
-    if (silent()) return fail_write(Cause::silent);
+    if (no_response()) return fail_write(Cause::no_response);
     if (!ok() && request_.aborted_by_server) o.unreadable = true;
     else if (o.kind == Own::producer && ok() && number() != 0 &&
              (setup.heartbeat_limit == 0 || static_cast<Time>(number()) * millisecond < setup.heartbeat_limit))
-        producer_ms_ = static_cast<std::uint16_t>(number());  // some only know certain periods
-    else if (!ok() || !same_value(o.index, o.sub, o.value(), std::span(room_).first(request_.size))) return fail_write(Cause::not_taken);
+        producer_ms_ = static_cast<std::uint16_t>(number());  // some nodes support only certain periods
+    else if (!ok() || !same_value(o.index, o.sub, o.value(), std::span(buffer_).first(request_.size))) return fail_write(Cause::not_retained);
     ++object_;
     next_verify();
 }
 
 void Master::Node::fail_write(Cause cause) noexcept {
     const auto& o = objects_[object_];
-    std::uint64_t wished = 0;
-    std::memcpy(&wished, o.value().data(), std::min<std::size_t>(o.value().size(), 8));
-    about_request(wished, cause == Cause::not_taken ? number() : 0);
+    std::uint64_t expected = 0;
+    std::memcpy(&expected, o.value().data(), std::min<std::size_t>(o.value().size(), 8));
+    note_request(expected, cause == Cause::not_retained ? number() : 0);
     status.abort = request_.abort;
     if (o.write != nullptr) status.write = static_cast<std::uint16_t>(o.write - setup.writes.data() + 1);
     fail(BootResult::configuration, cause);
 }
 
-/// A node without heartbeat is guarded.
-void Master::Node::refused_producer() noexcept {
+/// A node without heartbeat producer is supervised by node guarding.
+void Master::Node::producer_rejected() noexcept {
     guarded_ = true;
     status.notes |= note_guarded;
     ++group_;
     next_group();
 }
 
-/// Which entry of 1016h is or becomes that of the master.
+/// Finds the entry of 1016h that is or becomes that of the master.
 void Master::Node::consumer_answered() noexcept {
     auto& o = objects_[object_];
     const bool count = task_ == Task::consumer_count;
     task_ = Task::none;
-    if (silent()) return fail_write(Cause::silent);
+    if (no_response()) return fail_write(Cause::no_response);
     if (count) {
         consumers_ = ok() ? static_cast<std::uint8_t>(std::min<std::uint64_t>(number(), 127)) : std::uint8_t{0};
         consumer_ = 0;
@@ -247,7 +247,7 @@ void Master::Node::consumer_answered() noexcept {
 void Master::Node::configured() noexcept {
     if (!setup.save || status.written == 0) return watch();
     enter(Step::saving);
-    patience(storing);
+    set_sdo_timeout(storing);
     write(Task::save, 0x1010, 1, save_signature, 4);
 }
 

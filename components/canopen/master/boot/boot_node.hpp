@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One node on its way from reset to operational and back. Private to the master.
+// One node in the boot procedure, from reset to operational. Private to the master.
 #pragma once
 
 #include <vector>
@@ -11,29 +11,30 @@ namespace hal::canopen {
 class Master::Node {
 public:
     enum class How : std::uint8_t {
-        reset,      ///< its communication is reset first
-        was_reset,  ///< that was done for all
-        as_it_is,   ///< nothing is known of its state
-        booted,     ///< it has just booted by itself
+        reset,      ///< reset its communication first
+        was_reset,  ///< all nodes were reset by one command
+        in_unknown_state,   ///< without reset; its state is unknown
+        booted,     ///< after its own boot-up message
     };
 
     Node(const NodeSetup&, RemoteNode&, Master&);  // [setup]
 
     void begin(How) noexcept;
     void poll() noexcept;
-    void leave(Step, Cause) noexcept;  ///< gives up what it does; nothing is tried until it is begun again
-    void start(bool told) noexcept;    ///< `told`: the command went to all
+    void leave(Step, Cause) noexcept;  ///< cancels all work; the node is idle until begin()
+    void start(bool sent_to_all) noexcept;    ///< `sent_to_all`: the command was sent to all nodes
     void lose(Cause) noexcept;
-    bool command(NmtCommand, bool told) noexcept;
+    bool command(NmtCommand, bool sent_to_all) noexcept;
 
     void on_event(NodeEvent) noexcept;
-    void on_beat(bool boot_up) noexcept;       ///< after the remote node took it
-    void on_sdo_frame(const Frame&) noexcept;  ///< before the client takes it
+    void on_foreign_command(std::uint8_t command) noexcept;
+    void on_heartbeat(bool boot_up) noexcept;       ///< after RemoteNode processed it
+    void on_sdo_frame(const Frame&) noexcept;  ///< before the SDO client processes it
     void refresh() noexcept;
 
-    /// It takes one of the places of MasterSetup::parallel.
+    /// Returns true while the node counts for MasterSetup::parallel.
     bool booting() const noexcept { return status.step >= Step::resetting && status.step <= Step::watching; }
-    /// What comes after it in the start order need not wait (any longer).
+    /// Returns true if nodes later in the start order need not wait for this one.
     bool settled() const noexcept {
         return status.operational || removed || (!setup.mandatory && (status.step >= Step::waiting || status.step == Step::off));
     }
@@ -41,7 +42,7 @@ public:
     const NodeSetup& setup;
     NodeStatus status{};
     bool removed = false;
-    bool missing = false;  ///< it never answered since start(): a command to all does not reach it
+    bool missing = false;  ///< never responded since start(): a command to all nodes does not reach it
 
 private:
     enum class Task : std::uint8_t {
@@ -51,11 +52,11 @@ private:
     };
     enum class Own : std::uint8_t { none, producer, no_producer, guard_time, life_factor, consumer, date, time };
     struct Object {
-        const ObjectWrite* write = nullptr;  // nullptr: one of ours, its value in `own`
+        const ObjectWrite* write = nullptr;  // nullptr: an object of the master, its value in `own`
         std::uint16_t index = 0;
         std::uint8_t sub = 0;
         Own kind = Own::none;
-        bool always = false, optional = false, last = true;  // last: what the object shall hold in the end
+        bool always = false, optional = false, last = true;  // last: the final write of this object
         bool unreadable = false, absent = false;
         std::array<std::uint8_t, 4> own{};
         std::uint8_t own_size = 0;
@@ -64,36 +65,36 @@ private:
         }
     };
     struct Group {
-        std::size_t begin = 0, end = 0;  // of objects_: written together or not at all
+        std::size_t begin = 0, end = 0;  // of objects_: written completely or not at all
     };
 
     void add_own(Own, std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size, bool optional);
     void make_groups();
 
     void enter(Step) noexcept;
-    void go() noexcept;
+    void begin_now() noexcept;
     void reset(NmtCommand) noexcept;
-    void drop() noexcept;  // what is under way and what was set up for it
-    void unwatch() noexcept;
-    void patience(Time) noexcept;
+    void cancel_work() noexcept;  // cancels the request and stops the supervision
+    void stop_supervision() noexcept;
+    void set_sdo_timeout(Time) noexcept;
     void submit(Task, std::uint16_t index, std::uint8_t sub) noexcept;
     void read(Task, std::uint16_t index, std::uint8_t sub) noexcept;
     void write(Task, std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t>) noexcept;
     void write(Task, std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size) noexcept;
     void answered() noexcept;
     bool ok() const noexcept { return request_.abort == Abort::none; }
-    bool silent() const noexcept { return !ok() && !request_.aborted_by_server && request_.abort != Abort::memory; }
-    bool lacks() const noexcept {
+    bool no_response() const noexcept { return !ok() && !request_.aborted_by_server && request_.abort != Abort::memory; }
+    bool object_missing() const noexcept {
         return request_.aborted_by_server && (request_.abort == Abort::no_object || request_.abort == Abort::no_sub);
     }
     std::uint64_t number() const noexcept;
-    void about(std::uint16_t index, std::uint8_t sub, std::uint64_t expected = 0, std::uint64_t found = 0) noexcept;
-    void about_request(std::uint64_t expected, std::uint64_t found) noexcept { about(request_.index, request_.sub, expected, found); }
+    void note_object(std::uint16_t index, std::uint8_t sub, std::uint64_t expected = 0, std::uint64_t found = 0) noexcept;
+    void note_request(std::uint64_t expected, std::uint64_t found) noexcept { note_object(request_.index, request_.sub, expected, found); }
     void fail(BootResult, Cause) noexcept;
     void fail_transfer(BootResult) noexcept;
     void react(Reaction, Time delay, How) noexcept;
-    void try_again(Time delay, How) noexcept;
-    void came_back(How) noexcept;
+    void retry_after(Time delay, How) noexcept;
+    void on_sign_of_life(How) noexcept;
     void booted(BootResult) noexcept;
     void run() noexcept;
 
@@ -120,16 +121,16 @@ private:
     void written() noexcept;
     void verified() noexcept;
     void consumer_answered() noexcept;
-    void refused_producer() noexcept;
+    void producer_rejected() noexcept;
     bool applies(const Object&) const noexcept;
     void configured() noexcept;
     void fail_write(Cause) noexcept;
     bool guarding() const noexcept { return setup.guard_ms != 0 || guarded_; }
     void watch() noexcept;
-    void watch_on() noexcept;
+    void resume_supervision() noexcept;
     Time guard_period() const noexcept { return (setup.guard_ms != 0 ? setup.guard_ms : setup.heartbeat_ms) * millisecond; }
-    void await_beat() noexcept;
-    void watched() noexcept;
+    void await_heartbeat() noexcept;
+    void supervised() noexcept;
     void rebooted_while_booting() noexcept;
     Time now() const noexcept { return master_.now_; }
     Time limit() const noexcept;
@@ -137,27 +138,29 @@ private:
     RemoteNode& remote_;
     Master& master_;
     SdoRequest request_{};
-    std::vector<std::uint8_t> room_;
+    std::vector<std::uint8_t> buffer_;
     std::array<std::uint8_t, 4> small_{};
     std::vector<Object> objects_;
     std::vector<Group> groups_;
-    std::size_t own_group_ = 0;  // the first of ours
+    std::size_t own_group_ = 0;  // the first group of the master's own objects
 
     Task task_ = Task::none, after_ = Task::none;
     How how_ = How::reset;
-    NmtCommand held_by_ = NmtCommand::stop;
+    NmtCommand stop_command_ = NmtCommand::stop;
     std::size_t group_ = 0, object_ = 0, asked_ = 0;
     std::uint8_t consumers_ = 0, consumer_ = 0, free_ = 0;
     std::uint16_t producer_ms_ = 0;
-    bool guarded_ = false, restored_ = false, updated_ = false, state_known_ = false, told_pre_operational_ = false, again_ = false;
-    bool was_operational_ = false, kept_ = false, skips_configuration_ = false;
-    unsigned doubts_ = 0, tries_ = 0, reboots_ = 0, beats_ = 0;
-    Time deadline_ = 0, patience_ = 0, backoff_ = 0, running_since_ = 0, beats_since_ = 0;
-    Time needed_since_ = -1;  // since when it is waited for
+    bool guarded_ = false, restored_ = false, updated_ = false, state_known_ = false, sent_pre_operational_ = false, again_ = false;
+    bool was_operational_ = false, left_running_ = false, configuration_current_ = false;
+    unsigned not_operational_ = 0, start_attempts_ = 0, reboots_ = 0, heartbeats_in_window_ = 0;
+    Time deadline_ = 0, answer_deadline_ = 0, backoff_ = 0, running_since_ = 0, window_began_ = 0;
+    Time wanted_since_ = -1;  // begin of the boot timeout; -1: not waited for
     BootResult mismatch_ = BootResult::none;
     std::array<std::uint32_t, 5> identity_{};
     unsigned identity_known_ = 0;
-    std::uint64_t beat_number_ = 0, beat_before_ = 0;
+    std::uint8_t foreign_command_ = 0;  // of another device, while the node was started; 0: none
+    Time foreign_command_at_ = 0;
+    std::uint64_t heartbeats_ = 0, heartbeats_before_ = 0;
 };
 
 }  // namespace hal::canopen

@@ -5,7 +5,7 @@ namespace hal::canopen {
 
 namespace {
 
-// CiA 302-2, the flying master's services.
+// The identifiers of the flying master services of CiA 302-2.
 constexpr std::uint32_t is_master = 0x71, negotiation = 0x72, who_is_master = 0x73, is_capable = 0x74, who_is_capable = 0x75, force = 0x76;
 constexpr std::uint32_t heartbeats = 0x700;
 
@@ -26,12 +26,12 @@ const char* to_string(FlyingMaster::State s) noexcept {
 std::vector<std::string> problems_of(const FlyingSetup& s) {
     std::vector<std::string> problems;
     if (!s.enabled) return problems;
-    if (s.id < 1 || s.id > 127) problems.emplace_back("a flying master needs a node-id from 1 to 127");
-    if (s.priority > 2) problems.emplace_back("the priority of a flying master is 0, 1 or 2");
-    if (s.timeout <= 0 || s.device_slot <= 0) problems.emplace_back("the times of a flying master must be longer than 0");
+    if (s.id < 1 || s.id > 127) problems.emplace_back("invalid node ID of the flying master; use 1 to 127");
+    if (s.priority > 2) problems.emplace_back("invalid priority of the flying master; use 0, 1 or 2");
+    if (s.timeout <= 0 || s.device_slot <= 0) problems.emplace_back("the times of a flying master must be above 0");
     if (s.priority_slot <= 127 * s.device_slot)
         problems.emplace_back(
-            "the priority slot of a flying master must be longer than 127 of its device slots, or a master of less priority could win");
+            "the priority slot of a flying master must be longer than 127 of its device slots, otherwise a master of lower priority could win");
     return problems;
 }
 
@@ -41,9 +41,9 @@ void FlyingMaster::enter(State state, Time now, Time wait) noexcept {
     if (state != State::passive && state != State::active) master_ = master_priority_ = 0;
 }
 
-void FlyingMaster::say(std::uint32_t id, bool whom) noexcept {
-    Frame f = make_frame(id, whom ? 2 : 0);
-    if (whom) f.data[0] = setup_.priority, f.data[1] = setup_.id;
+void FlyingMaster::send(std::uint32_t id, bool with_identity) noexcept {
+    Frame f = make_frame(id, with_identity ? 2 : 0);
+    if (with_identity) f.data[0] = setup_.priority, f.data[1] = setup_.id;
     out_.push(f);
 }
 
@@ -55,10 +55,10 @@ void FlyingMaster::start(Time now) noexcept {
 
 void FlyingMaster::negotiate(Time now) noexcept {
     ++negotiations_;
-    enter(State::negotiating, now, turn());
+    enter(State::negotiating, now, slot_delay());
 }
 
-void FlyingMaster::give_way(std::uint8_t priority, std::uint8_t id, Time now) noexcept {
+void FlyingMaster::become_passive(std::uint8_t priority, std::uint8_t id, Time now) noexcept {
     enter(State::passive, now, 0);
     master_ = id, master_priority_ = priority;
     heard_ = now;
@@ -67,13 +67,13 @@ void FlyingMaster::give_way(std::uint8_t priority, std::uint8_t id, Time now) no
 void FlyingMaster::win(Time now) noexcept {
     enter(State::active, now, 0);
     master_ = setup_.id, master_priority_ = setup_.priority;
-    next_look_ = now + setup_.look_every();
-    say(is_master, true);
+    next_search_ = now + setup_.search_interval();
+    send(is_master, true);
 }
 
-/// There shall be a negotiation: all wait, and whoever is through first calls for it.
+/// Forces a negotiation: every device waits for its delay, and the first one to finish starts it.
 void FlyingMaster::call_for_negotiation(Time now) noexcept {
-    say(force, false);
+    send(force, false);
     await_negotiation(now);
 }
 
@@ -82,14 +82,14 @@ void FlyingMaster::await_negotiation(Time now) noexcept {
     enter(State::waiting, now, setup_.delay);
 }
 
-/// Somebody says that it is the active master.
+/// Another device announces that it is the active master.
 void FlyingMaster::heard_master(std::uint8_t priority, std::uint8_t id, Time now) noexcept {
-    if (id == setup_.id) return;  // ours, or one with our id, which is another fault
-    if (state_ == State::active) return call_for_negotiation(now);  // two: the bus was in halves, or one was away
-    // A network that runs is taken over for a better priority only, not for a lower node-id; in a negotiation both count.
+    if (id == setup_.id) return;  // this device, or a duplicate node ID, which is reported elsewhere
+    if (state_ == State::active) return call_for_negotiation(now);  // two active masters: the bus was split, or one was disconnected
+    // A running network is taken over only for a better priority, not for a lower node ID; in a negotiation both count.
     const bool worse = state_ == State::negotiating ? !better(priority, id) : priority > setup_.priority;
     if (worse && !(state_ == State::passive && id == master_)) return call_for_negotiation(now);
-    give_way(priority, id, now);
+    become_passive(priority, id, now);
 }
 
 bool FlyingMaster::handle(const Frame& f, Time now) noexcept {
@@ -106,9 +106,9 @@ bool FlyingMaster::handle(const Frame& f, Time now) noexcept {
         break;
     case negotiation: negotiate(now); break;
     case who_is_master:
-        if (state_ == State::active) say(is_master, true);
+        if (state_ == State::active) send(is_master, true);
         break;
-    case who_is_capable: say(is_capable, true); break;
+    case who_is_capable: send(is_capable, true); break;
     case force: await_negotiation(now); break;
     default: break;
     }
@@ -122,14 +122,14 @@ void FlyingMaster::poll(Time now) noexcept {
         if (now < until_) return;
         if (forced_) {
             forced_ = false;
-            say(negotiation, false);
+            send(negotiation, false);
             return negotiate(now);
         }
-        say(who_is_master, false);
+        send(who_is_master, false);
         return enter(State::asking, now, setup_.timeout);
     case State::asking:
         if (now < until_) return;
-        say(negotiation, false);
+        send(negotiation, false);
         return negotiate(now);
     case State::negotiating:
         if (now >= until_) win(now);
@@ -138,12 +138,12 @@ void FlyingMaster::poll(Time now) noexcept {
         if (now - heard_ <= setup_.silence) return;
         ++losses_;
         forced_ = false;
-        say(who_is_master, false);  // it may only have lost its heartbeat
+        send(who_is_master, false);  // only its heartbeat may have been lost
         return enter(State::asking, now, setup_.timeout);
     case State::active:
-        if (now < next_look_) return;
-        next_look_ = now + setup_.look_every();
-        return say(who_is_master, false);
+        if (now < next_search_) return;
+        next_search_ = now + setup_.search_interval();
+        return send(who_is_master, false);
     }
 }
 

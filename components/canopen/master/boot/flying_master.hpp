@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The flying master of CiA 302-2: which of several devices that can be the NMT master is it. The one that is best by priority, then by
-// node-id, wins a negotiation; it leads until its heartbeat is missed or a better one comes. Like the other services it gets time and
-// frames from outside and puts its frames into a queue.
+// The flying master of CiA 302-2 elects one NMT master among several capable devices. The device with the best priority, then the lowest node
+// ID, wins the negotiation; it leads until its heartbeat times out or a better device joins.
 //
-// The way of a device: after its start it waits (1F90h:2), asks whether there is an active master (073h), and waits for the answer
-// (1F90h:1). An answer of a better one (071h: priority, node-id) makes it passive; to a worse one it says that there shall be a
-// negotiation (076h). Without an answer it calls for one (072h). In a negotiation everyone waits for
-//     priority * priority_slot + node-id * device_slot        (1F90h:3 to :5)
-// and who has heard nobody until then says 071h and is the master. As an active master asks for others now and then (073h, 1F90h:6), two
-// halves of a bus that are joined find out, and negotiate.
+// A device waits after its start (1F90h:2), requests the active master (073h) and waits for the response (1F90h:1). The response of a better
+// master (071h: priority, node ID) makes it passive; to a worse one it sends the force negotiation command (076h). Without a response it starts
+// a negotiation (072h), in which every device waits for
+//     priority * priority_slot + node ID * device_slot        (1F90h:3 to :5)
+// A device that has received no 071h by then sends 071h and is the active master. An active master searches for others periodically (073h,
+// 1F90h:6), so two halves of a bus that are joined detect each other and negotiate.
 #pragma once
 
 #include <string>
@@ -18,64 +17,77 @@
 
 namespace hal::canopen {
 
+/// The set-up of a flying master. Times in ns.
 struct FlyingSetup {
     bool         enabled = false;      ///< 1F80h bit 5
-    std::uint8_t id = 127;             ///< our node-id
-    std::uint8_t priority = 1;         ///< 1F90h:3: 0 is the best, 2 the last
-    Time timeout = 100 * millisecond;  ///< 1F90h:1: for the answer of an active master
-    Time delay = 500 * millisecond;    ///< 1F90h:2: before it asks for the first time, and before a negotiation that was called for by 076h
-    Time priority_slot = 1500 * millisecond;  ///< 1F90h:4: more than 127 device slots
+    std::uint8_t id = 127;             ///< node ID of this device
+    std::uint8_t priority = 1;         ///< 1F90h:3: 0 (highest) to 2
+    Time timeout = 100 * millisecond;  ///< 1F90h:1: response timeout for the active master
+    Time delay = 500 * millisecond;    ///< 1F90h:2: delay before the first request, and before a negotiation forced by 076h
+    Time priority_slot = 1500 * millisecond;  ///< 1F90h:4: longer than 127 device slots
     Time device_slot = 10 * millisecond;      ///< 1F90h:5
-    Time detect_cycle = 0;             ///< 1F90h:6: how often an active master looks for others; 0: 4 s and 10 ms times the node-id
-    Time silence = 250 * millisecond;  ///< of the active master's heartbeat after which it is taken for dead
+    Time detect_cycle = 0;             ///< 1F90h:6: interval of the search for other masters; 0: 4 s + 10 ms * node ID
+    Time silence = 250 * millisecond;  ///< heartbeat timeout of the active master
 
-    Time look_every() const noexcept { return detect_cycle > 0 ? detect_cycle : 4 * second + 10 * millisecond * id; }
+    /// Returns the interval of the search for other masters in ns. [any]
+    Time search_interval() const noexcept { return detect_cycle > 0 ? detect_cycle : 4 * second + 10 * millisecond * id; }
 };
 
-/// A sentence for each thing that cannot be. [setup]
+/// Returns a sentence for each invalid value. [setup]
 std::vector<std::string> problems_of(const FlyingSetup&);
 
+/// The election of the NMT master. All calls belong to one thread.
 class FlyingMaster {
 public:
+    /// The state of this device.
     enum class State : std::uint8_t {
         off,
-        waiting,      ///< before it asks, or before a negotiation
-        asking,       ///< is there an active master?
-        negotiating,  ///< its slot has not come yet
-        passive,      ///< another one is the active master
-        active,       ///< this one is
+        waiting,      ///< delay before the request or the negotiation
+        asking,       ///< requested the active master
+        negotiating,  ///< waits for its time slot
+        passive,      ///< another device is the active master
+        active,       ///< this device is the active master
     };
 
-    FlyingMaster(const FlyingSetup& setup, FrameQueue& out) noexcept : setup_(setup), out_(out) {}  // [setup]
+    /// Creates the service; the queue outlives it. [setup]
+    FlyingMaster(const FlyingSetup& setup, FrameQueue& out) noexcept : setup_(setup), out_(out) {}
 
-    void start(Time now) noexcept;  ///< from the beginning. [realtime]
-    /// Nobody's master any more: until start(). [realtime]
+    /// Starts from the beginning, if enabled. [realtime]
+    void start(Time now) noexcept;
+    /// Withdraws from the election until start(). [realtime]
     void stop() noexcept { enter(State::off, 0, 0); }
-    /// Hands in every frame received; true: it was for the flying master alone. [realtime]
+    /// Processes a frame; returns true if it belongs to the flying master services only. [realtime]
     bool handle(const Frame&, Time now) noexcept;
-    /// Does what is due; once a cycle. [realtime]
+    /// Checks timers; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
 
+    /// Returns the state of this device. [realtime]
     State state() const noexcept { return state_; }
+    /// Returns true if this device is the active master. [realtime]
     bool active() const noexcept { return state_ == State::active; }
-    std::uint8_t master() const noexcept { return master_; }              ///< node-id of the active master; 0: not known
+    /// Returns the node ID of the active master; 0: unknown. [realtime]
+    std::uint8_t master() const noexcept { return master_; }
+    /// Returns the priority of the active master. [realtime]
     std::uint8_t master_priority() const noexcept { return master_priority_; }
-    std::uint64_t negotiations() const noexcept { return negotiations_; }  ///< begun, by whomever
-    std::uint64_t losses() const noexcept { return losses_; }              ///< active masters that fell silent
+    /// Returns the number of negotiations on this bus. [realtime]
+    std::uint64_t negotiations() const noexcept { return negotiations_; }
+    /// Returns the number of heartbeat timeouts of active masters. [realtime]
+    std::uint64_t losses() const noexcept { return losses_; }
+    /// Returns the set-up. [any]
     const FlyingSetup& setup() const noexcept { return setup_; }
 
-    /// When its slot of a negotiation comes.
-    Time turn() const noexcept { return setup_.priority * setup_.priority_slot + setup_.id * setup_.device_slot; }
+    /// Returns the waiting time of this device in a negotiation, in ns. [any]
+    Time slot_delay() const noexcept { return setup_.priority * setup_.priority_slot + setup_.id * setup_.device_slot; }
 
 private:
     void enter(State, Time now, Time wait) noexcept;
     void negotiate(Time now) noexcept;
-    void give_way(std::uint8_t priority, std::uint8_t id, Time now) noexcept;
+    void become_passive(std::uint8_t priority, std::uint8_t id, Time now) noexcept;
     void win(Time now) noexcept;
     void call_for_negotiation(Time now) noexcept;
     void await_negotiation(Time now) noexcept;
     void heard_master(std::uint8_t priority, std::uint8_t id, Time now) noexcept;
-    void say(std::uint32_t id, bool whom) noexcept;
+    void send(std::uint32_t id, bool whom) noexcept;
     bool better(std::uint8_t priority, std::uint8_t id) const noexcept {  // than this one
         return priority != setup_.priority ? priority < setup_.priority : id < setup_.id;
     }
@@ -83,12 +95,13 @@ private:
     const FlyingSetup setup_;
     FrameQueue&       out_;
     State         state_ = State::off;
-    Time          until_ = 0, heard_ = 0, next_look_ = 0;
+    Time          until_ = 0, heard_ = 0, next_search_ = 0;
     std::uint8_t  master_ = 0, master_priority_ = 0;
-    bool          forced_ = false;  // the wait is one before a negotiation
+    bool          forced_ = false;  // the delay precedes a forced negotiation
     std::uint64_t negotiations_ = 0, losses_ = 0;
 };
 
+/// Returns the state as a phrase. [any]
 const char* to_string(FlyingMaster::State) noexcept;
 
 }  // namespace hal::canopen

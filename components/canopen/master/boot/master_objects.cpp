@@ -7,9 +7,9 @@ namespace {
 
 constexpr std::uint16_t request_nmt = 0x1f82;
 constexpr std::uint8_t all_nodes = 128;
-// What 1F82h says besides the states of NMT.
+// Values read from 1F82h besides the NMT states.
 constexpr std::uint8_t state_unknown = 0, node_missing = 1;
-// What is written to it.
+// Values written to 1F82h.
 constexpr std::uint8_t to_stopped = 4, to_operational = 5, reset_node = 6, reset_communication = 7, to_pre_operational = 127;
 
 }  // namespace

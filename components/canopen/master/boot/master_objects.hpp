@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The master's own objects of CiA 302, so that a tool or a gateway reads by SDO what the master was told, and commands nodes: 102Ah,
+// The objects of CiA 302 in the master's own dictionary, by which a tool or a gateway reads the set-up and commands nodes over SDO: 102Ah,
 // 1F80h, 1F81h, 1F82h (request NMT), 1F84h–1F89h.
 //
 //     Description d = basic_device({...});
@@ -13,17 +13,19 @@
 
 namespace hal::canopen {
 
-/// What apply_startup() and apply_assignment() understand, the other way round. [setup]
+/// Returns the value of 1F80h (NMT startup); the inverse of apply_startup(). [setup]
 std::uint32_t startup_of(const MasterSetup&);
+/// Returns the value of 1F81h (NMT slave assignment); the inverse of apply_assignment(). [setup]
 std::uint32_t assignment_of(const NodeSetup&);
 
-/// [setup]
+/// Adds the objects to the description of the master. [setup]
 void add_master_objects(Description&, const MasterSetup&);
 
-/// Serves 1F82h:n, the state of node n and, written, a command to it; 1F82h:128 commands all.
+/// Serves 1F82h: sub-index n returns the state of node n and, written, commands it; sub-index 128 commands all nodes (CiA 302-2).
 class MasterObjects final : private Handler {
 public:
-    MasterObjects(Dictionary&, Master&);  // [setup] both outlive it
+    /// Installs the handler; both arguments outlive it. [setup]
+    MasterObjects(Dictionary&, Master&);
 
 private:
     Abort reading(Entry&) noexcept override;

@@ -41,7 +41,7 @@ void Master::start(Time now) noexcept {
 }
 
 void Master::boot_all(bool reset) noexcept {
-    auto how = reset ? Node::How::reset : Node::How::as_it_is;
+    auto how = reset ? Node::How::reset : Node::How::in_unknown_state;
     status_.operational_since = 0;
     started_together_ = false;
     was_operational_ = false;
@@ -127,8 +127,9 @@ bool Master::handle(const Frame& f, Time now) noexcept {
     now_ = now;
     if (f.error || f.extended || f.fd) return false;
     if (f.id == 0) {
-        if (!f.remote && f.length == 2) ++status_.foreign_commands;
-        return !f.remote;
+        if (f.remote) return false;
+        if (f.length == 2) on_foreign_command(f.data[0], f.data[1]);
+        return true;
     }
     auto* node = by_id_[f.id & 0x7f];
     if (node == nullptr) return network_.handle(f, now);
@@ -141,8 +142,14 @@ bool Master::handle(const Frame& f, Time now) noexcept {
     const auto wrong = remote->wrong_toggles();
     if (!network_.handle(f, now)) return false;
     node->refresh();
-    if (service == 0x700 >> 7 && !f.remote && f.length >= 1 && remote->wrong_toggles() == wrong) node->on_beat(f.data[0] == 0);
+    if (service == 0x700 >> 7 && !f.remote && f.length >= 1 && remote->wrong_toggles() == wrong) node->on_heartbeat(f.data[0] == 0);
     return true;
+}
+
+void Master::on_foreign_command(std::uint8_t command, std::uint8_t id) noexcept {
+    ++status_.foreign_commands;
+    for (auto& n : nodes_)
+        if (id == 0 || n->setup.id == id) n->on_foreign_command(command);
 }
 
 void Master::poll(Time now) noexcept {
@@ -161,11 +168,11 @@ void Master::on_node(std::uint8_t id, NodeEvent event, NmtState state, Time now)
 }
 void Master::on_emergency(std::uint8_t id, const Emergency& e) noexcept { events_.on_emergency(id, e); }
 
-/// Nodes that are ready and whose turn it is are told to start.
+/// Starts the nodes that are ready, in their start order.
 void Master::schedule() noexcept {
     if (ready_ == 0) return;
     bool all = setup_.start_all_at_once && !started_together_, reach = true;
-    unsigned lowest = UINT_MAX;  // start order of the first that others wait for
+    unsigned lowest = UINT_MAX;  // lowest start order that is not settled
     for (auto& n : nodes_) {
         if (n->removed) continue;
         const auto step = n->status.step;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The NMT master of CiA 302-2 and 302-3: boots all nodes side by side, starts them, watches them, brings lost ones back.
-// It owns no bus, no clock and no thread, and puts its frames into a queue that somebody else empties; usually that of the
-// master's own node:
+// The NMT master of CiA 302-2 and CiA 302-3: boots all nodes concurrently, starts and supervises them, and recovers lost ones. It owns neither
+// bus, clock nor thread; its frames go to a queue, usually that of the master's own node:
 //
 //     Device own(description, {.node_id = setup.id, .nmt_slave = false}, events);   // [setup]
 //     Master master(setup, own.out(), events);
@@ -9,7 +8,7 @@
 //     each cycle:
 //         while (link.receive(frame, now)) own.handle(frame, now), master.handle(frame, now);
 //         own.poll(now), master.poll(now);
-//         ... send what is in own.out() ...
+//         while (own.out().pop(frame)) link.send(frame, now);
 //
 // The application may submit its own SDO requests at any time: master.network().node(5)->sdo().submit(request).
 #pragma once
@@ -24,55 +23,58 @@
 
 namespace hal::canopen {
 
-/// What the master tells. The calls of Events about nodes come, too: on_node(), on_emergency(). All from poll(), handle() or a command.
-/// [realtime]
+/// Notifications of the master, besides Events::on_node() and on_emergency(). All calls come from poll(), handle() or a command. [realtime]
 class MasterEvents : public Events {
 public:
-    /// `step` is a new one; the rest of it may be new, too.
+    /// NodeStatus::step changed; other members may have changed as well.
     virtual void on_step(const NodeStatus&) noexcept {}
-    /// NetworkStatus::state is a new one.
+    /// NetworkStatus::state changed.
     virtual void on_network(const NetworkStatus&) noexcept {}
-    /// What our own node shall be now: apply it, e.g. Device::command(). Not called when MasterSetup::start_self is false.
+    /// The master's own node must enter this NMT state, for example by Device::command(). Not called if MasterSetup::start_self is false.
     virtual void on_own_state(NmtState) noexcept {}
 };
 
+/// The NMT master. All calls belong to one thread.
 class Master final : private Events {
 public:
-    /// Takes all memory. Throws std::invalid_argument with the first of problems_of(). [setup]
+    /// Allocates all memory; queue and events outlive it. Throws std::invalid_argument with the first of problems_of(). [setup]
     Master(const MasterSetup&, FrameQueue& out, MasterEvents&);
     ~Master() override;
 
-    /// Boots the network, from the beginning if it was started before. [realtime]
+    /// Boots the network, from the beginning if it was already started. [realtime]
     void start(Time now) noexcept;
-    /// Hands in every frame received; true: it was for the master. [realtime]
+    /// Processes a received frame; returns true if it belongs to the master. [realtime]
     bool handle(const Frame&, Time now) noexcept;
-    /// Does what is due; once a cycle. [realtime]
+    /// Does what is due; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
 
-    /// Stops all nodes and leaves them stopped: until start(). [realtime]
+    /// Stops all nodes until start(). [realtime]
     void stop(Time now) noexcept;
-    /// The network is another master's: nothing is asked or told any more, until start(). [realtime]
+    /// Leaves the network to another master: sends nothing until start(). [realtime]
     void stand_by(Time now) noexcept;
-    /// A command to one node, or with id 0 to all. A node commanded so is not brought back by itself: stop and pre-operational hold until
-    /// `start` or restart(); after a reset it is booted again. False: no such node. [realtime]
+    /// Sends an NMT command to one node, or with id 0 to all. Stop and pre-operational persist until start or restart(); after a reset the node is
+    /// booted again. Returns false if the node is not in the set-up. [realtime]
     bool command(NmtCommand, std::uint8_t id, Time now) noexcept;
-    /// Boots it anew, even when it had failed: resets its communication first. False: no such node. [realtime]
+    /// Resets the communication of a node and boots it, even if it had failed. Returns false if the node is not in the set-up. [realtime]
     bool restart(std::uint8_t id, Time now) noexcept;
-    /// Stops it and forgets it until restart(): it counts as not there, and not as mandatory. [realtime]
+    /// Stops a node and removes it until restart(); it no longer counts as mandatory. Returns false if the node is not in the set-up. [realtime]
     bool remove(std::uint8_t id, Time now) noexcept;
 
-    /// [realtime]
+    /// Returns the state of the network. [realtime]
     const NetworkStatus& status() const noexcept { return status_; }
-    /// Of a node that is not in the setup: one with result A. [realtime]
+    /// Returns the state of a node; result A if it is not in the set-up. [realtime]
     const NodeStatus& status(std::uint8_t id) const noexcept;
-    /// nullptr when it is not in the setup. [any]
+    /// Returns the set-up of a node; nullptr if there is none. [any]
     const NodeSetup* setup(std::uint8_t id) const noexcept;
+    /// Returns the set-up. [any]
     const MasterSetup& setup() const noexcept { return setup_; }
+    /// Returns the remote nodes, for SDO requests of the application. [realtime]
     Network& network() noexcept { return network_; }
-    /// The newest time it was told. [realtime]
+    /// Returns the time of the last call. [realtime]
     Time now() const noexcept { return now_; }
-    /// The node in words, the network in words; see status.hpp. [setup]
+    /// Returns the state of a node as a sentence; see node_status.hpp. [setup]
     std::string sentence(std::uint8_t id) const;
+    /// Returns the state of the network as a sentence. [setup]
     std::string sentence() const;
 
 private:
@@ -83,6 +85,7 @@ private:
     };
     void on_node(std::uint8_t, NodeEvent, NmtState, Time) noexcept override;
     void on_emergency(std::uint8_t, const Emergency&) noexcept override;
+    void on_foreign_command(std::uint8_t command, std::uint8_t id) noexcept;
     void boot_all(bool reset) noexcept;
     void halt(NetworkState, std::uint8_t because_of) noexcept;
     void reset_all(std::uint8_t because_of) noexcept;
@@ -100,7 +103,7 @@ private:
     std::vector<std::unique_ptr<Node>> nodes_;
     std::array<Node*, 128> by_id_{};
     NetworkStatus status_{};
-    std::vector<Command> commands_;  // that the inhibit time or a full queue holds back
+    std::vector<Command> commands_;  // delayed by the inhibit time or a full queue
     std::size_t commands_waiting_ = 0;
     NmtState own_state_ = NmtState::initialising;
     unsigned booting_ = 0, ready_ = 0;

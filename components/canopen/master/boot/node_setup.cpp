@@ -45,27 +45,27 @@ void apply_assignment(NodeSetup& node, std::uint32_t object_1f81) {
 
 std::vector<std::string> problems_of(const MasterSetup& setup) {
     std::vector<std::string> problems;
-    const auto say = [&](const NodeSetup& n, const std::string& what) { problems.push_back("node " + std::to_string(n.id) + ' ' + what); };
-    if (setup.id > 127) problems.push_back("the master's node id is " + std::to_string(setup.id) + "; it has to be 1 to 127");
+    const auto add = [&](const NodeSetup& n, const std::string& what) { problems.push_back("node " + std::to_string(n.id) + ' ' + what); };
+    if (setup.id > 127) problems.push_back("invalid node ID " + std::to_string(setup.id) + " of the master; use 1 to 127");
     std::array<bool, 256> seen{};
     for (const auto& n : setup.nodes) {
-        if (n.id < 1 || n.id > 127) say(n, "cannot be: node ids are 1 to 127");
-        else if (n.id == setup.id) say(n, "has the master's own id; give one of the two another");
-        if (seen[n.id]) say(n, "is there twice; every node has an id of its own");
+        if (n.id < 1 || n.id > 127) add(n, "has an invalid node ID; use 1 to 127");
+        else if (n.id == setup.id) add(n, "has the node ID of the master; change one of them");
+        if (seen[n.id]) add(n, "is configured twice: duplicate node ID; change one of them");
         seen[n.id] = true;
         for (const auto& w : n.writes) {
             if (!w.data.empty()) continue;
             std::array<char, 16> object{};
             std::snprintf(object.data(), object.size(), "%04X:%u", w.index, w.sub);
-            say(n, "gets no value for object " + std::string(object.data()) + "; give it one or take the object out");
+            add(n, "has no value for object " + std::string(object.data()) + "; enter one or remove the object");
         }
-        if (n.writes.size() > 60000) say(n, "gets " + std::to_string(n.writes.size()) + " objects; 60000 are the most");
-        if (n.master_limit_ms != 0 && setup.id == 0) say(n, "is to watch the master, which has no node id; give the master one");
-        if (n.guard_ms != 0 && n.guard_factor == 0) say(n, "is guarded with the factor 0; 3 is usual");
+        if (n.writes.size() > 60000) add(n, "has " + std::to_string(n.writes.size()) + " objects to write; the limit is 60000");
+        if (n.master_limit_ms != 0 && setup.id == 0) add(n, "is to monitor the master, which has no node ID; set one");
+        if (n.guard_ms != 0 && n.guard_factor == 0) add(n, "has the life time factor 0; 3 is usual");
         if (n.heartbeat_limit > 0 && n.heartbeat_limit <= n.heartbeat_ms * millisecond)
-            say(n, "is lost after " + std::to_string(n.heartbeat_limit / millisecond) + " ms of silence but sends its heartbeat every " +
-                       std::to_string(n.heartbeat_ms) + " ms; the limit has to be longer");
-        if (n.retry <= 0 || n.boot_limit < 0) say(n, "has no time to be tried again: retry and boot limit are above 0");
+            add(n, "has a heartbeat timeout of " + std::to_string(n.heartbeat_limit / millisecond) + " ms, not longer than its heartbeat period of " +
+                       std::to_string(n.heartbeat_ms) + " ms; use a longer timeout");
+        if (n.retry <= 0 || n.boot_limit < 0) add(n, "has an invalid retry interval or boot timeout; both must be above 0");
     }
     return problems;
 }

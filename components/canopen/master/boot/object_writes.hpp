@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a master writes to a node before it starts it: a list of object writes, in order.
+// The objects that a master writes to a node before it starts it, in order.
 //
 //     std::vector<ObjectWrite> writes = rpdo_writes(1, {.cob = 0x205, .mapping = {map_entry(0x6040, 0, 16)}});
 //     writes.push_back(object_write(0x6083, 0, std::uint32_t{1000}, "profile acceleration"));
@@ -15,13 +15,14 @@
 
 namespace hal::canopen {
 
+/// One object to write.
 struct ObjectWrite : eds::Write {
     std::string name{};     ///< for messages
-    bool always = false;    ///< written unread and not verified: an object that acts, or reads as something else
-    bool optional = false;  ///< a node without this object will do
+    bool always = false;    ///< written without comparing or verifying: a command, or an object that reads back as another value
+    bool optional = false;  ///< skipped if the node does not have the object
 };
 
-/// One object, its value little endian in as many bytes as T has. [setup]
+/// Returns the write of a value of type T, little endian. [setup]
 template <class T>
 ObjectWrite object_write(std::uint16_t index, std::uint8_t sub, T value, std::string name = {}) {
     ObjectWrite w{{index, sub, std::vector<std::uint8_t>(sizeof(T))}, std::move(name)};
@@ -29,17 +30,18 @@ ObjectWrite object_write(std::uint16_t index, std::uint8_t sub, T value, std::st
     return w;
 }
 
-/// The writes that give PDO `number` (from 1, as the node sees it) these parameters, in the order CiA 301 demands: off, mapping cleared,
-/// entries, their count, communication parameters, on. `node` is added to `cob` where that says so; without a cob PDO 1–4 get the
-/// predefined one and others stay off. An empty mapping switches the PDO off and leaves its mapping as it is. [setup]
+/// Returns the writes that configure RPDO `number` of a node, 1..512, in the remapping order of CiA 301: disable, clear the mapping, entries,
+/// count, communication parameters, enable. `node` is the node ID that PdoDescription::plus_node_id adds. With cob 0, PDOs 1..4 get the predefined
+/// COB-ID and others stay disabled. An empty mapping disables the PDO and leaves its mapping unchanged. [setup]
 std::vector<ObjectWrite> rpdo_writes(unsigned number, const PdoDescription&, std::uint8_t node = 0);
+/// Returns the writes that configure TPDO `number` of a node; see rpdo_writes(). [setup]
 std::vector<ObjectWrite> tpdo_writes(unsigned number, const PdoDescription&, std::uint8_t node = 0);
 
-/// Those of a DCF or of object 1F22h. [setup]
+/// Converts the writes of a DCF or of object 1F22h (concise DCF). [setup]
 std::vector<ObjectWrite> object_writes(std::span<const eds::Write>);
 
-/// Whether a node that returns `found` for this object has the value `wished`. Of the COB-ID of a PDO that is off only that counts, and
-/// bit 30 never: many devices answer with their own. [realtime]
-bool same_value(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> wished, std::span<const std::uint8_t> found) noexcept;
+/// Returns true if the value `found` in the node equals the value `expected`. Of a disabled PDO only bit 31 of the COB-ID is compared, and bit 30
+/// never: many devices return their own. [realtime]
+bool same_value(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> expected, std::span<const std::uint8_t> found) noexcept;
 
 }  // namespace hal::canopen

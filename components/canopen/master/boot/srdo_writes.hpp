@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The writes by which a master gives the SRDOs of its configuration to a node.
+// The writes by which a master configures the SRDOs of a node (EN 50325-5).
 #pragma once
 
 #include <vector>
@@ -9,9 +9,10 @@
 
 namespace hal::canopen {
 
-/// The writes that give SRDO `number` of a node these parameters and its signature. What makes them valid is srdo_valid_write(), once,
-/// after those of all SRDOs. [setup]
+/// Returns the writes that set the parameters and the signature of SRDO `number`. They become valid by srdo_valid_write(), once after the writes
+/// of all SRDOs. [setup]
 std::vector<ObjectWrite> srdo_writes(unsigned number, const SrdoDescription&);
+/// Returns the write of 13FEh that makes the configuration valid. [setup]
 ObjectWrite srdo_valid_write();
 
 }  // namespace hal::canopen

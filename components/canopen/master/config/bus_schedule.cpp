@@ -44,8 +44,8 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
     if (sync != 0) add(config.sync_cob, config.sync_counter != 0 ? 1 : 0, sync, "SYNC", config.at, true);
     if (config.time_period != 0) add(0x100, 6, config.time_period, "TIME", config.at, false);
     if (const FlyingSetup& f = config.flying; f.enabled) {  // while there is an active master; a negotiation is over by then
-        add(0x71, 2, f.look_every(), "who is the NMT master", config.at, false);
-        add(0x73, 0, f.look_every(), "NMT master wanted", config.at, false);
+        add(0x71, 2, f.search_interval(), "who is the NMT master", config.at, false);
+        add(0x73, 0, f.search_interval(), "NMT master wanted", config.at, false);
     }
     for (const Node& n : config.nodes)
         for (const Pdo& p : n.pdos) {

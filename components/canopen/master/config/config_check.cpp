@@ -120,7 +120,7 @@ void check_network(const MasterConfig& config, Report& report) {
                      "the nodes send " + std::to_string(multiplexed) + " objects in multiplexed PDOs; the limit is " +
                          std::to_string(most_multiplexed),
                      "move some nodes to a second bus with its own configuration");
-    if (safety > Srdos::most)
+    if (safety > Srdos::max_srdos)
         report.error(Topic::node, config.at, "the nodes have " + std::to_string(safety) + " SRDOs; the limit of a bus is 64");
     if (!report.failed())
         for (const std::string& problem : problems_of(config.setup())) report.error(Topic::node, config.at, problem);

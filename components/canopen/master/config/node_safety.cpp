@@ -16,7 +16,7 @@ std::string name_of(const Pdo& pdo) { return (pdo.to_node ? "rsrdo" : "tsrdo") +
 }  // namespace
 
 void NodeReader::srdos() {
-    const auto wished = wishes("srdo", Srdos::most);
+    const auto wished = wishes("srdo", Srdos::max_srdos);
     for (const auto& [key, wish] : wished) {
         if (key.first && wished.contains({false, key.second})) {
             const Line& line = wish.objects != nullptr ? *wish.objects : *wish.options.begin()->second;

@@ -54,7 +54,7 @@ private:
         const FlyingSetup& f = config_.flying;
         set(d, 0x1f80, 0, startup_of(config_.setup()) | 1U << 5, 4);
         d.add(0x1f90, 0, Type::unsigned8, Access::constant, 6, "NMT flying master timing parameters");
-        const Time times[] = {f.timeout, f.delay, f.priority * millisecond, f.priority_slot, f.device_slot, f.look_every()};
+        const Time times[] = {f.timeout, f.delay, f.priority * millisecond, f.priority_slot, f.device_slot, f.search_interval()};
         for (std::uint8_t n = 0; n < std::size(times); ++n)
             d.add(0x1f90, static_cast<std::uint8_t>(n + 1), Type::unsigned16, Access::read_only,
                   static_cast<std::uint64_t>(times[n] / millisecond));

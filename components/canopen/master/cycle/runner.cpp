@@ -215,7 +215,7 @@ void Runner::tell_alone(Time now) noexcept {
         if (!statuses_[s.node]->operational || (a.told && value == a.said)) continue;
         const auto sent = device_.pdos().tpdo(a.number);
         if (a.inhibit != 0 && sent.count != 0 && now - sent.last < a.inhibit) continue;
-        if (!device_.pdos().send_to(a.number, statuses_[s.node]->id, s.object->index, s.object->sub, value)) return;
+        if (!device_.pdos().send_dam(a.number, statuses_[s.node]->id, s.object->index, s.object->sub, value)) return;
         a.said = value, a.told = true;
     }
 }

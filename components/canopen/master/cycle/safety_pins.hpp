@@ -27,7 +27,7 @@ public:
             Row& row = rows_.emplace_back(c, shows, name);
             if (!s.pdo->to_node) row.received.emplace(c, shows, name);
             for (std::size_t n = 0; n < row.words.size(); ++n)
-                row.words[n] = who + to_string(static_cast<SrdoFault>(n)) + (s.pdo->to_node ? "" : "; its pins have their safe values");
+                row.words[n] = who + to_string(static_cast<SrdoFault>(n)) + (s.pdo->to_node ? "" : "; its pins were set to their safe values");
         }
         fail_safe_.emplace(c, shows, "fail-safe",
                            "rising edge: sends the global fail-safe command; whoever hears it goes to its safe state");

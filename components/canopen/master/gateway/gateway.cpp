@@ -360,7 +360,7 @@ void Gateway::start_transfer(int client, Command&& command, Net& net, std::uint8
     p.request.mode = net.block ? SdoMode::block : SdoMode::segmented;
     if (p.request.upload) {
         p.room = std::make_unique_for_overwrite<std::uint8_t[]>(net.command_size);
-        p.request.room = {p.room.get(), net.command_size};
+        p.request.buffer = {p.room.get(), net.command_size};
     } else {
         p.request.data = p.command.value;
     }
