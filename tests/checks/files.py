@@ -1,18 +1,31 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""files.py ROOT: every folder has a short README that names only files that exist; every page links to what is there; every source has its
-licence line and at most 600 lines."""
+"""files.py ROOT: every folder has a short README that names only files that exist; every page links to existing files; every source has its
+licence line and at most 400 lines, except those named in this script."""
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-MAX_LINES = 600
+MAX_LINES = 400
+# One algorithm or one interface that is read as a whole, and tables.
+WHOLE = {"runtime/execute/core.cpp", "runtime/sdk/hal/component.hpp", "runtime/text/code_pages.hpp"}
+# Still to be split, and limited to 600 lines until then. No file is added here.
+TO_SPLIT = {
+    "components/canopen/device/drive/drive_modes.cpp", "components/canopen/master/boot/boot_node.cpp",
+    "components/canopen/master/gateway/gateway.cpp", "components/canopen/plugins/canopen.cpp", "components/canopen/protocol/pdo.cpp",
+    "components/canopen/protocol/sdo_client.cpp", "components/canopen/protocol/sdo_server.cpp", "components/dds/engine/participant.cpp",
+    "components/fieldbus/tdma/plugins/tdma.cpp", "runtime/machine/process_life.cpp", "runtime/machine/session.cpp",
+    "runtime/sdk/linuxcnc/component.c", "runtime/sdk/linuxcnc/program.c", "tests/buses/cane_test.cpp", "tests/buses/segment_test.cpp",
+    "tests/cli/drive_test.py", "tests/unit/canopen/axis_test.cpp", "tests/unit/canopen/boot_configure_test.cpp",
+    "tests/unit/canopen/boot_network_test.cpp", "tests/unit/canopen/drive_fault_test.cpp", "tests/unit/canopen/drive_profile_test.cpp",
+    "tests/unit/canopen/sdo_transfer_test.cpp", "tests/unit/shell_server.cpp", "tests/unit/shell_transactions.cpp",
+    "tests/unit/tdma/station_faults.cpp"}
 MAX_README = 40  # a folder's README is read in a minute; the glossary and the root's are longer
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
 LONGER_READMES = {"README.md", "runtime/README.md"}
-# Folders whose parent's README speaks for them: data, one folder per case, and what only holds other folders' files.
+# Folders that the parent's README describes: data, one folder per case, and folders of folders.
 NO_README = ("runtime/abi/hal", "runtime/sdk/hal", "tests/netlists/", "tests/errors/", "tests/fuzz/", "tests/cli/", ".ci", "cmake", "docs/")
 
 # References of a page: `file.ext` in backticks, and [links](to files).
@@ -20,13 +33,13 @@ MENTIONED = re.compile(r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\
 
 
 def absent(root, page, files):
-    """(line number, name) of each file that `page` links to or, in a README, mentions and that is neither near it (in the folder above or below
-    that), nor at that path from the root or from where the sdk is included."""
+    """(line number, name) of each file that `page` links to or, in a README, mentions and that exists neither near it (in the folder above or below
+    that), nor at that path from the root or from an include path of the sdk."""
     near = [f.as_posix() for f in files if page.parent.parent in f.parents]
     for number, line in enumerate((root / page).read_text(errors="replace").splitlines(), 1):
         for quoted, link in MENTIONED.findall(line):
             if quoted and page.name != "README.md":
-                continue  # a tutorial names files that its reader makes
+                continue  # a tutorial names files that its reader creates
             name = quoted or link
             exists = any((root / base / name).exists() for base in (page.parent, ".", "runtime/abi", "runtime/sdk"))
             if not exists and not any(f.endswith("/" + name) for f in near if quoted):
@@ -34,7 +47,7 @@ def absent(root, page, files):
 
 
 def tracked(root):
-    """Files of the repository, or of an unpacked archive all files outside build/."""
+    """Returns the files of the repository, or of an unpacked archive all files outside build/."""
     command = ["git", "-c", "safe.directory=*", "-C", str(root), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     if (root / ".git").exists():
         names = subprocess.run(command, check=True, capture_output=True).stdout.decode().split("\0")
@@ -50,17 +63,18 @@ def main(root):
         if path.suffix not in SOURCES and path.name != "CMakeLists.txt":
             continue
         lines = (root / path).read_text(errors="replace").splitlines()
-        if len(lines) > MAX_LINES:
-            errors.append(f"{path}: {len(lines)} lines, {MAX_LINES} is the limit: split it")
+        limit = 600 if path.as_posix() in WHOLE | TO_SPLIT else MAX_LINES
+        if len(lines) > limit:
+            errors.append(f"{path}: {len(lines)} lines, the limit is {limit}; split it")
         if not any("SPDX-License-Identifier: MIT" in line for line in lines[:2]):
-            errors.append(f"{path}:1: the first line names the licence: SPDX-License-Identifier: MIT")
+            errors.append(f"{path}:1: missing licence in the first line: SPDX-License-Identifier: MIT")
     for folder in sorted({parent for path in files for parent in path.parents}):
         name = folder.as_posix()
         if name != "." and name.startswith(NO_README) and name + "/" not in NO_README:
             continue
         readme = folder / "README.md"
         if readme not in files:
-            errors.append(f"{name}: has no README.md: what it is for, what it must not do, where to start reading")
+            errors.append(f"{name}: missing README.md: purpose, what the folder must not do, where to start reading")
         elif readme.as_posix() not in LONGER_READMES and len((root / readme).read_text().splitlines()) > MAX_README:
             errors.append(f"{readme}: longer than {MAX_README} lines")
     for page in files:
