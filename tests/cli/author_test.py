@@ -48,7 +48,7 @@ class Author(Case):
         self.write("mine.cpp", HEAD + body + TAIL)
         return self.run_program("compile", "--output", "plugins", "mine.cpp", *words)
 
-    def test_what_cannot_be_loaded_is_not_installed(self):
+    def test_rejects_a_plugin_that_cannot_be_loaded(self):
         for name, (body, message) in REJECTED.items():
             with self.subTest(name):
                 done = self.compile(body)
@@ -57,7 +57,7 @@ class Author(Case):
                 self.assertEqual([f"hal compile: {message}; nothing was installed"], own, done.stderr)
                 self.assertFalse((self.folder / "plugins/mine.so").exists())
 
-    def test_an_error_is_not_followed_by_a_false_one(self):
+    def test_an_error_causes_no_misleading_second_error(self):
         for name, body in {"no noexcept": GOOD.replace(" noexcept", ""), "no documentation": GOOD.replace(', "the output"', ""),
                            "another signature": GOOD.replace("hal::Cycle", "int")}.items():
             with self.subTest(name):
@@ -93,7 +93,7 @@ class Author(Case):
                 self.assertIn(f"hal compile: '{name}' cannot be a component's name: ", done.stderr)
                 self.assertFalse((self.folder / "plugins").exists() and list((self.folder / "plugins").iterdir()))
 
-    def test_a_start_that_fails_here_does_not_keep_it_from_being_installed(self):
+    def test_a_failing_start_does_not_prevent_the_installation(self):
         failing = GOOD + '    void start() { throw std::runtime_error("no device here"); }\n'
         done = self.compile(failing, "--check-rt")
         self.assertEqual("hal compile: mine: start() failed, so its functions were not checked: no device here\n"

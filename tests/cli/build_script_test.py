@@ -121,7 +121,7 @@ class Script(unittest.TestCase):
     def test_an_edit_typed_as_a_command_is_read_too(self):
         self.assertEqual(self.BUILD + "hal component_scale", self.hal("shell", "loadrt", "scale")[-1])
 
-    def test_build_makes_everything_and_then_nothing_is_missing(self):
+    def test_build_builds_everything(self):
         self.assertEqual(self.BUILD + "hal everything", self.hal("build")[-1])
         self.assertIn("hal: left out: seeing (./hal build NAME installs the Debian packages that one needs)\n", self.said)
         self.assertEqual([], self.hal("run", "b.hal"))
@@ -151,14 +151,14 @@ class Script(unittest.TestCase):
         (self.tools / "broken").unlink()
         self.assertEqual([self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal"))
 
-    def test_sources_that_cannot_be_compiled_as_one_are_compiled_each_for_itself(self):
+    def test_sources_that_cannot_be_compiled_together_are_compiled_one_by_one(self):
         (self.tools / "together").write_text("")
         self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal",
                           "cmake --preset release -DHALCYON_QUICK=OFF", self.BUILD + "hal"], self.hal("version"))
         self.assertIn("hal: compiling source by source, because some sources cannot be compiled together (see ", self.said)
         self.assertIn("started: version\n", self.printed)
 
-    def test_a_long_build_prints_now_and_then_how_long_it_will_take(self):
+    def test_a_long_build_prints_the_remaining_time_periodically(self):
         (self.tools / "steps").write_text("".join(f"[{i}/100 {i * 2}.3] compile\n" for i in range(1, 101)))
         self.hal("version")
         self.assertEqual(["building the program in build/release"] + [f"{done} of 100 steps, about {left} left" for done, left in
@@ -205,13 +205,13 @@ class Needs(unittest.TestCase):
             with self.subTest(path.relative_to(ROOT)):
                 self.assertEqual(self.loaded(path, set()), self.needs("run", str(path)) - {"python", "bus"})
 
-    def test_an_ini_file_names_its_netlists_and_what_variables_stand_for(self):
+    def test_an_ini_file_names_its_netlists_and_the_values_of_variables(self):
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "m.ini").write_text("[HAL]\nHALFILE = m.hal\nHALCMD = loadrt or2\n[KINS]\nKINEMATICS = trivial-kins coordinates=xyz\n")
             Path(folder, "m.hal").write_text("loadrt [KINS]KINEMATICS\nloadrt 'pid' count=3\n")
             self.assertLessEqual({"or2", "pid", "trivial_kins"}, self.needs("run", f"{folder}/m.ini"))
 
-    def test_programs_that_a_netlist_starts_are_looked_into(self):
+    def test_programs_that_a_netlist_starts_are_read(self):
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "p.py").write_text("import time\nimport hal\n")
             Path(folder, "m.hal").write_text("loadusr -W python3 p.py\nloadusr -W hal node io --link sim:a --id 3\n")
@@ -220,7 +220,7 @@ class Needs(unittest.TestCase):
     def test_a_node_of_several_exchanges_signals_with_the_others(self):
         self.assertEqual({"node", "dds_publish", "dds_subscribe"}, self.needs("run", "nothing.hal", "--node", "cell"))
 
-    def test_a_folder_with_the_name_of_an_argument_is_no_netlist(self):
+    def test_a_folder_with_the_name_of_an_argument_is_not_a_netlist(self):
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "build").mkdir()
             self.assertEqual({"pid"}, self.needs("build", "pid", cwd=folder))

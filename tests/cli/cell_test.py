@@ -50,7 +50,7 @@ class Language(Case):
         self.assertEqual(f"{path}: no errors\nnodes: sender, taker\n  sender -> taker: count:float\n"
                          "  taker -> sender: doubled:float\n", done.stderr)
 
-    def test_check_says_errors_of_all_nodes_and_those_of_common_lines_once(self):
+    def test_check_reports_errors_of_all_nodes_and_those_of_common_lines_once(self):
         path = self.write("cell.hal", CELL.replace("period1=1000000\n", "period1=1000000\nsetp nowhere 1\n", 1)
                           .replace("net doubled twice.out", "net doubled twice.outt").replace("addf back  servo", "addf bakc  servo"))
         said = self.bad("check", path)
@@ -58,7 +58,7 @@ class Language(Case):
         self.assertIn("did you mean 'twice.out'?", said)
         self.assertIn("unknown function 'bakc'", said)
 
-    def test_sim_passes_the_signals_and_comes_out_the_same(self):
+    def test_sim_passes_the_signals_and_is_deterministic(self):
         path = self.write("cell.hal", CELL)
         words = ("sim", path, "--for", "1s", "-e", "taker: getp twice.in", "-e", "sender: getp back.in0", "-e", "sender: getp alive.in0")
         first = self.good(*words)
@@ -97,16 +97,16 @@ class Language(Case):
         self.assertIn("taker.online", self.good("graph", path, "--node", "sender"))
         self.assertIn("[several-nodes]", self.bad("graph", path))
 
-    def test_execute_says_which_node(self):
+    def test_execute_selects_the_node(self):
         path = self.write("cell.hal", CELL)
         self.assertIn("write --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
 
-    def test_dds_without_a_node_is_refused(self):
+    def test_rejects_dds_without_a_node(self):
         self.assertEqual("hal run: --dds applies to nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take "
                          "domain=3 themselves\n", self.bad("run", self.write("cell.hal", CELL), "--dds", "domain=3"))
 
     @unittest.skipIf(HAVE_DDS, "DDS is there")
-    def test_run_without_dds_says_which_package(self):
+    def test_run_without_dds_names_the_package(self):
         said = self.bad("run", self.write("cell.hal", CELL), "--node", "taker", "--for", "1s")
         self.assertIn("sudo apt install libfastrtps-dev", said)
 
@@ -141,7 +141,7 @@ class Running(Case):
     def until(self, node, pin, good, what):
         return wait_until(lambda: good(self.value(pin, instance=node)), f"{what} ({pin} of {node} is {self.value(pin, instance=node)})")
 
-    def test_signals_pass_a_lost_node_is_noticed_and_comes_back(self):
+    def test_signals_pass_and_a_lost_node_is_detected_and_reconnects(self):
         taker = self.node("taker")
         self.assertEqual("-1", self.value("twice.in", instance="taker"))
         self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
@@ -179,7 +179,7 @@ class Running(Case):
         out, err = self.end(taker)
         self.assertNotIn("ERROR", err)
 
-    def test_another_version_is_refused_by_name(self):
+    def test_rejects_another_version_by_name(self):
         self.node("taker")
         text = CELL
         for old, new in (("loadrt integ names=clock", "loadrt conv_float_s32 names=clock\nloadrt integ names=t"),
@@ -197,11 +197,11 @@ class Running(Case):
                         "signal 'count' is s32 on node 'sender' and float on node 'taker'; run the same file on both", path, "--node", "sender")
         self.assertEqual("FALSE", self.value("node.sender.online", instance="taker"))
 
-    def test_settings_that_are_none_are_named(self):
+    def test_names_invalid_settings(self):
         self.assertIn("--dds: invalid setting 'foo'; use KEY=VALUE with one of the keys: domain",
                       self.bad("run", self.path, "--node", "taker", "--dds", "domain=3 foo"))
 
-    def test_a_node_runs_once(self):
+    def test_rejects_a_second_instance_of_a_node(self):
         self.node("taker")
         self.until_said("node 'taker' of 'cell' runs (already:|twice: here and as) instance 'taker' on ", self.path, "--node", "taker",
                         "--name", "twin")
@@ -231,7 +231,7 @@ class Namespaces(Case):
         self.assertEqual(4, said.count("all are there again"), said)
         self.assertIn("cell/robot2", said)
 
-    def test_wrong_words_are_named(self):
+    def test_names_unexpected_words(self):
         done = subprocess.run([ROOT / "halfiles/cell/bring-up", "--kill", "nobody"], env={**self.environment, "HAL": str(HAL)}, text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if done.returncode == 77:
@@ -258,14 +258,14 @@ class Cell(Case):
             self.assertAlmostEqual(true, seen, delta=0.02)
 
     @unittest.skipUnless(HAVE_VISION, "built without OpenCV")
-    def test_without_a_bottle_nobody_drives(self):
+    def test_without_a_bottle_no_robot_drives(self):
         for file in ("cell.hal", "field.ground"):
             self.write(file, (ROOT / "halfiles/cell" / file).read_text().replace("setp hall.object-1-kind 1\n", ""))
         self.assertEqual(["1", "FALSE", "FALSE", "0.2"], self.sim("cell.hal", "camera: getp eye.count", "cell: getp go.out",
                                                                   "robot1: getp pilot.enable", "robot1: getp base.x"))
 
     @unittest.skipIf(HAVE_VISION, "OpenCV is there")
-    def test_without_opencv_check_says_which_package(self):
+    def test_without_opencv_check_names_the_package(self):
         self.assertIn("libopencv-contrib-dev", self.bad("check", ROOT / "halfiles/cell/cell.hal"))
 
 
@@ -283,7 +283,7 @@ class Top(Case):
         self.assertEqual("[]\n", self.good("top", "--json"))
 
     @unittest.skipUnless(HAVE_DDS, "built without Fast DDS")
-    def test_settings_that_are_none_are_named(self):
+    def test_names_invalid_settings(self):
         for words, said in (("domain=abc", "'domain=abc': write domain=NUMBER, 0 to 232"), ("domain", "'domain': write domain=NUMBER, 0 to 232"),
                             ("domain=3x", "'domain=3x': write domain=NUMBER, 0 to 232"), ("domain=999", "domain=999 is outside 0..232"),
                             ("interface=lo", "'interface=lo' is no setting; the settings are domain= interfaces= "),

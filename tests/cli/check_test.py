@@ -56,7 +56,7 @@ class Check(Case):
     def errors(self, text):
         return [line for line in text.splitlines() if ": error: " in line or line.startswith("error: ")]
 
-    def test_one_cause_one_error(self):
+    def test_reports_one_error_per_cause(self):
         said = self.bad("check", "machine.ini")
         self.assertEqual(["trivkins", "motmod", "hal_card"], [line.split("'")[1] for line in self.errors(said)], said)
         self.assertIn("9 lines refer to names that no loaded component has; they were not checked", said)
@@ -101,7 +101,7 @@ class Check(Case):
         self.assertIn("no errors", self.run_program("check", "y.ini").stderr)
         self.assertIn("HALCMD MSG: found", self.run_program("y.ini", name="halrun").stderr)
 
-    def test_what_has_errors_is_still_there_for_the_next_file(self):
+    def test_a_file_with_errors_is_used_for_the_next_file(self):
         self.write("a.hal", SERVO + "setp adder.nothing 1\n")
         said = self.bad("check", "a.hal", self.write("b.hal", "net total => adder.in0\n"))
         self.assertEqual(1, len(self.errors(said)), said)

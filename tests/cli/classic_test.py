@@ -52,7 +52,7 @@ class Halcmd(Case):
         self.assertIn('loadrt sum2 names="x y"\n', saved)
         self.assertEqual("0\n", self.good("sim", self.write("again.hal", saved + "getp adder.in0\n")))
 
-    def test_goes_on_after_an_unset_ini_key(self):
+    def test_continues_after_an_unset_ini_key(self):
         ini = self.write("x.ini", "[A]\nB = 1\nC = # not a comment\n")
         path = self.write("y.hal", "print one\nprint [A]NONE\nprint [A]B\nprint [A]C\n")
         done = self.halcmd("-i", ini, "-kf", path)
@@ -87,7 +87,7 @@ class Halcmd(Case):
         self.assertEqual(255, self.halcmd("-f", "nowhere.hal").returncode)
         self.assertEqual(255, self.halcmd("-i", "x.ini", "show").returncode)
 
-    def test_release_is_nothing(self):
+    def test_release_has_no_effect(self):
         self.assertEqual((0, "", ""), (lambda d: (d.returncode, d.stdout, d.stderr))(self.halcmd("-R")))
 
     def test_help(self):
@@ -152,7 +152,7 @@ class Halrun(Case):
         done = self.halrun(given="loadrt sum2 names=a\ngetp a.in0\nquit\n")
         self.assertEqual((0, "0\n"), (done.returncode, done.stdout))
 
-    def test_second_one_is_refused_and_u_ends_the_first(self):
+    def test_rejects_a_second_instance_and_u_ends_the_first(self):
         first = self.start("-I", self.write("a.hal", SERVO + "start\n"), name="halrun", stdin=subprocess.PIPE)
         error = self.halrun(self.write("b.hal", ""))
         self.assertEqual(1, error.returncode)

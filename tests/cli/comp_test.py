@@ -114,12 +114,12 @@ class Comp(Case):
                      "Two **paragraphs**.", "in-## (bit in), as many as personality & 0xf and at most 8: the inputs", "An Author"):
             self.assertIn(line, page)
 
-    def test_what_EXTRA_SETUP_refuses_is_not_made(self):
+    def test_an_instance_rejected_by_EXTRA_SETUP_is_not_created(self):
         self.compiled("everything", EVERYTHING)
         (self.folder / "test.hal").write_text("loadrt everything names=x personality=99\n")
         self.assertIn("cannot make 'x': x: not 99 (EXTRA_SETUP: Invalid argument)", self.bad("check", "test.hal"))
 
-    def test_more_pins_than_there_is_room_for_are_refused(self):
+    def test_rejects_more_pins_than_the_array_holds(self):
         self.compiled("everything", EVERYTHING)
         (self.folder / "test.hal").write_text("loadrt everything names=x personality=9\n")
         self.assertIn("personality asks for 9 pins in-##, there are at most 8", self.bad("check", "test.hal"))

@@ -57,13 +57,13 @@ class Compile(harness.Case):
         self.assertIn("missing line in the component: using Component::Component;", done.stderr)
         self.assertTrue(done.stderr.endswith("hal compile: 'lag.cpp' does not compile; nothing was installed\n"), done.stderr)
 
-    def test_what_is_no_component_is_not_installed(self):
+    def test_rejects_a_file_that_is_not_a_component(self):
         self.write("none.cpp", "int x;\n")
         done = self.compile("none.cpp")
         self.assertEqual(done.stderr, "hal compile: 'none.cpp' compiles, but is not a component: it exports no symbol hal_plugin, "
                                       "which HAL_COMPONENT(Type, \"name\", \"summary\") makes; nothing was installed\n")
 
-    def test_a_missing_compiler_is_said_in_one_sentence(self):
+    def test_reports_a_missing_compiler_in_one_sentence(self):
         self.write("lag.cpp", LAG)
         done = self.compile("lag.cpp", PATH="/nowhere")
         self.assertEqual(done.stderr, "hal compile: no C++ compiler found; install one: sudo apt install g++\n")
@@ -112,7 +112,7 @@ HAL_COMPONENT(Bad, "bad", "Throws")
         done = self.run_program("sim", "two.hal", environment={"HALCYON_PLUGIN_PATH": "plugins"})
         self.assertEqual((done.stdout, done.stderr), ("10.5\n0.5\n4.5\n", ""))
 
-    def test_its_refusal_is_a_diagnostic(self):
+    def test_its_rejection_is_a_diagnostic(self):
         self.compile("--output", "plugins", str(EDGES))
         self.write("many.hal", "loadrt edges num_chan=5\n")
         done = self.run_program("sim", "many.hal", environment={"HALCYON_PLUGIN_PATH": "plugins"})

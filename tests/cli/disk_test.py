@@ -63,7 +63,7 @@ class Full(Case):
         self.assertEqual(0o640, stat.S_IMODE(path.stat().st_mode), words)
         self.assertEqual(before, sorted(p.name for p in self.disk.iterdir()), words)
 
-    def test_what_is_replaced_stays_as_it_was(self):
+    def test_a_failed_write_leaves_the_file_unchanged(self):
         a = self.write("a.hal", NETLIST)
         saved, drawn = self.old("saved.hal"), self.old("drawn.dot")
         page = self.old("and2.md")
@@ -83,7 +83,7 @@ class Full(Case):
         self.fill()
         return path
 
-    def test_what_is_replaced_keeps_mode_and_link_and_is_made_with_the_umask(self):
+    def test_a_replaced_file_keeps_mode_and_link_and_a_new_one_has_the_umask(self):
         saved = self.old("saved.hal", mode=0o604)
         (self.disk / "link.hal").symlink_to("saved.hal")
         script = self.write("save.hal", f"{NETLIST}save all {self.disk}/link.hal\nsave all {self.disk}/new.hal\n")
@@ -98,7 +98,7 @@ class Full(Case):
         self.assertEqual(["link.hal", "new.hal", "saved.hal"], sorted(p.name for p in self.disk.iterdir()))
         self.assertEqual(0, self.hal("sim", self.write("device.hal", NETLIST + "save all /dev/null\n")).returncode)
 
-    def test_output_that_is_lost_is_an_error(self):
+    def test_lost_output_is_an_error(self):
         a = self.write("a.hal", "loadrt threads name1=t period1=1000000\nloadrt and2 count=1\naddf and2.0 t\ngetp and2.0.in0\n")
         for words in (["sim", a], ["run", a, "--for", "10ms"], ["run", "--for", "10ms", a, "--name", "other"]):
             with open("/dev/full", "w") as full:

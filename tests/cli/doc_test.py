@@ -71,7 +71,7 @@ class Reference(Case):
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.assertEqual(len(pages), done.stdout.count("SYNOPSIS"))
 
-    def test_pages_of_some_and_what_is_refused(self):
+    def test_pages_of_some_components_and_rejected_options(self):
         self.good("doc", "sum2", "--markdown", "-o", "some")
         self.assertEqual(["sum2.md"], os.listdir(self.folder / "some"))
         self.assertTrue(self.good("doc", "sum2", "--html").startswith("<!DOCTYPE html>"))

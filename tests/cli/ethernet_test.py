@@ -59,7 +59,7 @@ class Segment(Case):
         left = subprocess.run(["ip", "netns", "list"], stdout=subprocess.PIPE, text=True).stdout
         self.assertNotIn("hal-cnc-", left)
 
-    def test_a_folder_that_cannot_be_is_named(self):
+    def test_names_a_folder_that_cannot_be_created(self):
         done = subprocess.run([ROOT / "halfiles/ethernet-furuta/bring-up"], env={**self.environment, "HAL": str(HAL), "TMPDIR": "/nowhere"},
                               text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if done.returncode == 77:
@@ -67,7 +67,7 @@ class Segment(Case):
         self.assertEqual(1, done.returncode)
         self.assertIn("nothing can be written in '/nowhere', where what the processes say would be; set TMPDIR=FOLDER\n", done.stdout)
 
-    def test_wrong_words_are_named(self):
+    def test_names_unexpected_words(self):
         for machine, option in (("cnc", "--lose-clock"), ("furuta", "--swing-up")):
             done = subprocess.run([ROOT / f"halfiles/ethernet-{machine}/bring-up", "fast"], env={**self.environment, "HAL": str(HAL)}, text=True,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
@@ -75,7 +75,7 @@ class Segment(Case):
                 self.skipTest("no network namespaces here")
             self.assertEqual((1, True), (done.returncode, f"'fast' means nothing; write bring-up [{option}] [SECONDS]" in done.stdout), done.stdout)
 
-    def test_a_station_says_what_to_type(self):
+    def test_a_station_prints_what_to_type(self):
         tdma = self.folder / "one.tdma"
         tdma.write_text("master:\nname control\ncycle 1000\nslot 0 250 1/1 300\n\nslave:\nname x\nphase 330\nslot 0 450 1/1 250\n")
         node = lambda *words: subprocess.run(["hal", "node", "axis-io", "--id", "1", *words], executable=str(HAL), env=self.environment, text=True,

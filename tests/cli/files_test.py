@@ -153,7 +153,7 @@ net loose second.in1
         self.assertIn("<b>a&lt;b&amp;c</b>", text)
         self.assertIn('label="s<&>x"', text)
 
-    def test_other_endings_and_bad_netlists_are_refused(self):
+    def test_rejects_other_endings_and_bad_netlists(self):
         path = self.write("loop.hal", self.LOOP)
         self.assertIn("neither .svg nor .dot", self.bad("graph", path, "-o", "loop.png"))
         self.assertIn("bad.hal:3", self.bad("graph", self.write("bad.hal", BAD)))

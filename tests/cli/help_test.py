@@ -32,7 +32,7 @@ class Help(Case):
 
 
 class BusProgram(Case):
-    def test_a_missing_one_is_said(self):
+    def test_reports_a_missing_program(self):
         alone = self.folder / "hal"
         shutil.copy(HAL, alone)
         done = subprocess.run([alone, "can", "dump", "can:can0"], capture_output=True, text=True,
@@ -118,7 +118,7 @@ class CompletionScript(Case):
     def test_components(self):
         self.assertIn("and2", self.complete("hal doc an"))
 
-    def test_other_shells_are_refused(self):
+    def test_rejects_other_shells(self):
         self.assertIn("hal completion bash", self.bad("completion", "fish"))
 
 

@@ -269,7 +269,7 @@ class KilledMachine(LifeCase):
             return None
         return wait_until(find, "the program runs")
 
-    def test_a_program_started_by_hand_goes_to_its_declared_state_and_comes_back(self):
+    def test_a_program_started_by_hand_takes_safe_values_and_reconnects(self):
         machine = self.machine()
         self.write("watch.py", "import hal, time\nc = hal.component('watch')\nc.newpin('go', hal.HAL_BIT, hal.HAL_IN, safe=False)\n"
                    "c.newpin('other', hal.HAL_BIT, hal.HAL_IN)\nc.ready()\nwhile True:\n print(c['go'], c['other'], flush=True)\n time.sleep(0.05)\n")
@@ -284,7 +284,7 @@ class KilledMachine(LifeCase):
         self.machine()
         wait_until(lambda: self.state("watch") == "ready", "it is there again")
 
-    def test_a_program_started_by_hand_ends_when_it_should(self):
+    def test_a_program_started_by_hand_ends_with_its_machine(self):
         machine = self.machine()
         program = self.background(sys.executable, "echo.py", HALCYON_LOST="end")
         wait_until(lambda: self.state("echo") == "ready", "it is ready")

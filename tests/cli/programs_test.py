@@ -91,7 +91,7 @@ class Programs(Case):
         self.assertEqual(0, program.wait(10))
         self.assertNotIn("follow", self.say("show", "comp"))
 
-    def test_without_a_machine_it_says_so(self):
+    def test_reports_a_missing_machine(self):
         self.good("compile", "--output", ".", FOLLOW)
         done = subprocess.run([self.folder / "follow"], env=self.environment, stderr=subprocess.PIPE, text=True, timeout=10)
         self.assertEqual((1, "follow: no machine 'default' is running (hal run FILE.hal; HALCYON_INSTANCE names another)\n"), (done.returncode, done.stderr))

@@ -185,7 +185,7 @@ class Reload(Case):
         self.say("loadrt", "part", "names=p")
         self.assertEqual("7", self.value("p.extra"))
 
-    def test_no_cycle_is_lost_and_none_is_done_twice(self):
+    def test_no_cycle_is_lost_or_repeated(self):
         self.machine("first", "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=100000\naddf p servo\naddf sampler.0 servo\n"
                               "net c p.count => sampler.0.pin.0\nstart\n")
         for i in range(20):

@@ -15,7 +15,7 @@ net pendulum-angle siggen.0.cosine
 
 
 class Run(Case):
-    def test_says_what_is_loaded_and_how_it_ran(self):
+    def test_prints_the_loaded_instances_and_the_report(self):
         done = self.run_program("run", self.write("a.hal", SERVO), "--for", "200ms")
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.assertRegex(done.stdout, r"(?m)^1 instance of 1 component, 1 signal, 1 thread$")
@@ -108,7 +108,7 @@ class End(Case):
 
 
 class Instances(Case):
-    def test_same_name_is_refused(self):
+    def test_rejects_a_second_instance_of_the_same_name(self):
         path = self.write("a.hal", SERVO)
         self.start("run", path)
         error = self.bad("run", path)
@@ -124,7 +124,7 @@ class Instances(Case):
         wait_until(lambda: self.value("adder.out", "left") == "103", "left has the new sum")
         self.assertEqual("5", self.value("adder.out", "right"))
 
-    def test_bad_name_is_refused(self):
+    def test_rejects_an_invalid_name(self):
         path = self.write("a.hal", SERVO)
         for name in ("a/b", "..", "a b", "x" * 65):
             error = self.bad("run", path, "--name", name)
@@ -164,7 +164,7 @@ class Picture(Case):
         self.assertIn("arm, from above", frame)
         self.assertNotIn("⠀", frame)
 
-    def test_not_when_told_so(self):
+    def test_disabled_by_option(self):
         terminal = Terminal(self, "run", "--no-picture", "--for", "100ms", self.write("a.hal", FURUTA_SIGNALS))
         self.assertEqual(0, terminal.wait())
         self.assertNotIn("from above", terminal.seen)

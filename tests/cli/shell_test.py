@@ -8,7 +8,7 @@ from harness import HAL, SERVO, Case, wait_until
 
 
 class NoInstance(Case):
-    def test_says_what_to_type(self):
+    def test_prints_what_to_type(self):
         error = self.bad("shell", "show", "pin")
         self.assertIn("hal run", error)
         self.assertEqual(1, error.count("\n"))
@@ -151,7 +151,7 @@ class Scripts(Case):
         self.assertTrue(pipe.stderr.endswith("hal shell: a pipe is read line by line: lines 1 to 3 were carried out before the error in line 4\n"), pipe.stderr)
         self.assertEqual("10", self.value("adder.in0"))
 
-    def test_a_pipe_says_what_became_of_an_open_begin(self):
+    def test_a_pipe_reports_an_open_begin(self):
         before = self.value("adder.in0")
         for text, said in (("begin\nsetp adder.in0 7\n", "hal shell: 'begin' in line 1 without 'commit': what was collected had no effect\n"),
                            ("\nbegin\nsetp adder.in0 7\nquit\n", "hal shell: 'begin' in line 2 without 'commit': what was collected had no effect\n"),

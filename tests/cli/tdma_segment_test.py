@@ -111,7 +111,7 @@ class Tdma(Segment):
         self.wait_for("x", "running", "TRUE")
         self.assertEqual([1, 1], [self.said(name).count(words) for name, words in (("m", NO_CARRIER), ("x", self.lost))])
 
-    def test_a_process_that_was_held_up_accuses_nobody(self):
+    def test_a_stalled_process_reports_no_hung_thread(self):
         """What its ring holds then is of many cycles: a process that begins late finds the same."""
         x = self.processes["x"]
         x.send_signal(signal.SIGSTOP)

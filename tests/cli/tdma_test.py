@@ -122,7 +122,7 @@ class Tdma(Case):
         self.start("run", "--no-picture", "plain.hal")
         self.assertEqual("hal tdma ping: instance 'default' has no station of a segment (loadrt tdma)\n", self.bad("tdma", "ping", "x"))
 
-    def test_a_recording_says_what_is_missing(self):
+    def test_a_recording_reports_missing_samples(self):
         for words, problem in (("", "into which file? write file=seen.pcapng"),
                                ("file=none/seen.pcapng", "none/seen.pcapng cannot be written: No such file or directory"),
                                ("file=seen.pcapng link=sim:", "sim:: the name of the segment is missing; write sim:net0")):

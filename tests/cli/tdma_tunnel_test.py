@@ -84,7 +84,7 @@ class Tunnel(Segment):
         print(done.stdout, file=sys.stderr)
         self.assertEqual(0, done.returncode, done.stdout + self.all_said())
 
-    def test_ping_and_tcp_cross_the_bus_and_nobody_is_disturbed(self):
+    def test_ping_and_tcp_cross_the_bus_without_disturbance(self):
         self.both()
         for name, mask in (("m", "10.9.0.1/24"), ("x", "10.9.0.2/24")):
             shown = self.at(name, "ip", "addr", "show", "hal0").stdout
