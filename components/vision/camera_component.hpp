@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The base of every component that looks at frames: source, helper thread, mailbox, and the pins that all of them have.
+// The base of all components with a camera: source, helper thread, mailbox, and common pins.
 //
 //     struct Found { bool found = false; double x = 0; };                       // result: trivially copyable, `found` first
 //     struct Settings { double limit = 0; bool operator==(const Settings&) const = default; };
@@ -33,29 +33,29 @@ public:
           instance_(name_of(host)),
           texts_(*this),
           source_(*this, "source", "v4l2:/dev/video0",
-                  "where frames come from: v4l2:/dev/video0?width=640&height=480&fps=30, frames:FOLDER?fps=30&loop, sim:SCENE",
+                  "frame source: v4l2:/dev/video0?width=640&height=480&fps=30, frames:FOLDER?fps=30&loop, sim:SCENE",
                   {.per_instance = true}),
           worker_(instance_, make_source(source_.get(), [this](const std::string& place) { return texts_.find(place); }),
                   [this](const Frame& frame) { work(frame); }, [this](const Status& status) { deliver(status); }),
           background_([this](std::int64_t now, bool may_wait) { turn(now, may_wait); }),
-          update_(*this, "update", &CameraComponent::update, "takes the newest result, if there is one"),
-          seq(*this, update_, "seq", "counts results: one per frame that was worked on"),
-          stamp_ns(*this, update_, "stamp-ns", "when the frame of the result was exposed, on the runtime's clock", {.unit = "ns"}),
-          age_ms(*this, update_, "age-ms", "time since then; before the first result: since the first cycle", {.unit = "ms"}),
-          valid(*this, update_, "valid", "the newest frame shows what is looked for, is younger than max-age-ms, and the source is well",
+          update_(*this, "update", &CameraComponent::update, "copies the newest result to the pins"),
+          seq(*this, update_, "seq", "number of results, one per processed frame"),
+          stamp_ns(*this, update_, "stamp-ns", "exposure time of the result's frame on the runtime's clock", {.unit = "ns"}),
+          age_ms(*this, update_, "age-ms", "age of the result; before the first result: time since the first cycle", {.unit = "ms"}),
+          valid(*this, update_, "valid", "TRUE: the newest frame has a result, is not older than max-age-ms, and the source is OK",
                 {.safe = false}),
-          dropped(*this, update_, "dropped", "frames that were not looked at, because a newer one was there or the camera lost them"),
-          proc_ms(*this, update_, "proc-ms", "what the work on the frame took; 0 on the virtual clock", {.unit = "ms"}),
-          frames(*this, update_, "frames", "frames that were of use"),
-          bad_frames(*this, update_, "bad-frames", "frames that were not: damaged, huge, black, frozen, of the wrong size"),
-          source_ok(*this, update_, "source-ok", "the source is open and its last frame was of use"),
+          dropped(*this, update_, "dropped", "number of frames skipped for a newer one or lost by the camera"),
+          proc_ms(*this, update_, "proc-ms", "processing time of the frame; 0 on the virtual clock", {.unit = "ms"}),
+          frames(*this, update_, "frames", "number of valid frames"),
+          bad_frames(*this, update_, "bad-frames", "number of invalid frames: damaged, too large, black, frozen, wrong size"),
+          source_ok(*this, update_, "source-ok", "TRUE: the source is open and its last frame was valid"),
           trouble(
-              *this, update_, "trouble",
-              "what is wrong: 0 nothing, 1 absent, 2 refused, 3 unplugged, 4 silent, 5 damaged, 6 huge, 7 black, 8 frozen, 9 not of the "
-              "calibration's size, 10 ended"),
-          max_age_ms(*this, update_, "max-age-ms", "a result that is older is not valid", {.initial = 200.0, .unit = "ms"}),
+              *this, update_, "error-code",
+              "error code: 0 none, 1 missing, 2 unusable, 3 unplugged, 4 no frames, 5 damaged, 6 too large, 7 black, 8 frozen, 9 wrong "
+              "size for the calibration, 10 end of the files"),
+          max_age_ms(*this, update_, "max-age-ms", "maximum age of a valid result", {.initial = 200.0, .unit = "ms"}),
           frozen_frames(*this, update_, "frozen-frames",
-                        "equal frames in a row that are a frozen camera; 0: never; initially 10 for a camera or a scene, 0 for files",
+                        "number of identical frames that count as frozen; 0: never; initially 10 for a camera or a scene, 0 for files",
                         {.initial = worker_.source_frozen_after()}) {}
 
     void start() {
@@ -100,7 +100,7 @@ public:
 protected:
     const hal::Texts&  texts() const { return texts_; }
     const std::string& instance() const { return instance_; }
-    /// Frames of another size are refused, as the calibration `file` is not about them. In the constructor. [setup]
+    /// Rejects frames of a size other than that of the calibration `file`. In the constructor. [setup]
     void expect(int width, int height, const std::string& file) { worker_.expect(width, height, file); }
 
 private:
@@ -150,7 +150,7 @@ private:
         static constexpr const char* reasons[trouble_count] = {"",
                                                                "there is no such source; valid is FALSE",
                                                                "the source cannot be used; valid is FALSE",
-                                                               "the source went away; valid is FALSE",
+                                                               "the source disconnected; valid is FALSE",
                                                                "no frames come; valid is FALSE",
                                                                "a frame is damaged; valid is FALSE",
                                                                "a frame is huge; valid is FALSE",

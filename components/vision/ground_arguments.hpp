@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where the ground is, for components that look at it: a camera on a mast, or points that were measured.
+// The mapping from pixels to the ground: by the mounting of the camera, or by measured points.
 #pragma once
 
 #include <optional>
@@ -15,17 +15,17 @@ class GroundArguments {
 public:
     GroundArguments(hal::Component& component, const hal::Texts& texts)
         : focal_(component, "focal", 280.0, "focal length of the camera, px"),
-          height_(component, "camera_height", 0.3, "of the camera above the ground, m"),
-          pitch_(component, "pitch", 0.6, "how far the camera looks down, rad"),
-          forward_(component, "forward", 0.0, "how far the camera is in front of the robot's middle, m"),
+          height_(component, "camera_height", 0.3, "height of the camera above the ground, m"),
+          pitch_(component, "pitch", 0.6, "downward tilt of the camera, rad"),
+          forward_(component, "forward", 0.0, "distance of the camera in front of the robot's centre, m"),
           file_(component, "ground", "",
                 "file beside the netlist with points of the ground, u v x y with x forward and y to the left in mm, as of "
                 "vision_homography; in "
                 "place of focal, camera_height, pitch and forward") {
-        if (!(focal_ > 0.0)) throw hal::ArgumentError("focal", "focal= is not above 0; it is in px, often about the width of the picture");
-        if (!(height_ > 0.0)) throw hal::ArgumentError("camera_height", "camera_height= is not above 0; it is in m above the ground");
+        if (!(focal_ > 0.0)) throw hal::ArgumentError("focal", "focal= is not above 0; give it in px, usually about the width of the frame");
+        if (!(height_ > 0.0)) throw hal::ArgumentError("camera_height", "camera_height= is not above 0; give it in m above the ground");
         if (!(pitch_ > 0.0 && pitch_ < 1.6))
-            throw hal::ArgumentError("pitch", "pitch= is not above 0 and below 1.6; it is in rad, and the camera looks down: 0 is straight ahead");
+            throw hal::ArgumentError("pitch", "pitch= is not above 0 and below 1.6; give it in rad, 0 is horizontal and positive is downwards");
         if (file_.get().empty()) return;
         const std::string text = texts.read("ground", file_.get());
         GroundText        read = read_ground(text);

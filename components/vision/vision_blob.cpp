@@ -32,45 +32,45 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
     using CameraComponent::CameraComponent;
 
     GroundArguments ground{*this, texts()};
-    hal::Argument   kinds{*this, "kinds", 2, "kinds of things, each of one colour", {.min = 1, .max = most_kinds}};
-    hal::Argument   count{*this, "tracks", 8, "things at a time", {.min = 1, .max = static_cast<std::int64_t>(most_tracks)}};
+    hal::Argument   kinds{*this, "kinds", 2, "number of object kinds, each of one colour", {.min = 1, .max = most_kinds}};
+    hal::Argument   count{*this, "tracks", 8, "maximum number of tracked objects", {.min = 1, .max = static_cast<std::int64_t>(most_tracks)}};
 
-    hal::Outs<std::uint32_t> id{*this, "track-#-id", count, "number of the thing in place #, counted from 1; 0: there is none"};
-    hal::Outs<std::uint32_t> kind{*this, "track-#-kind", count, "what the thing in place # is"};
+    hal::Outs<std::uint32_t> id{*this, "track-#-id", count, "id of the object in track #, from 1; 0: no object"};
+    hal::Outs<std::uint32_t> kind{*this, "track-#-kind", count, "kind of the object in track #"};
     hal::Outs<double>        x{
-        *this, "track-#-x", count, "where the thing in place # stands, in front of the robot's middle", {.unit = "m", .finite = true}};
-    hal::Outs<double> y{*this, "track-#-y", count, "where the thing in place # stands, to the left", {.unit = "m", .finite = true}};
-    hal::Outs<double> age{*this, "track-#-age", count, "time since the thing in place # was seen first", {.unit = "s", .finite = true}};
+        *this, "track-#-x", count, "position of the object in track #, forward of the robot's centre", {.unit = "m", .finite = true}};
+    hal::Outs<double> y{*this, "track-#-y", count, "position of the object in track #, to the left", {.unit = "m", .finite = true}};
+    hal::Outs<double> age{*this, "track-#-age", count, "time since the first detection of the object in track #", {.unit = "s", .finite = true}};
     hal::Outs<double> unseen{
-        *this, "track-#-unseen", count, "time since the frame that showed it last was taken", {.unit = "s", .finite = true}};
-    hal::Outs<std::uint32_t> sightings{*this, "track-#-sightings", count, "frames that showed the thing in place #"};
-    hal::Out<std::uint32_t>  things{*this, "count", "things that are known"};
-    hal::Out<std::uint32_t>  crowded{*this, "crowded", "sightings for which no place was left"};
+        *this, "track-#-unseen", count, "time since the last frame with the object in track #", {.unit = "s", .finite = true}};
+    hal::Outs<std::uint32_t> sightings{*this, "track-#-sightings", count, "number of frames with the object in track #"};
+    hal::Out<std::uint32_t>  things{*this, "count", "number of tracked objects"};
+    hal::Out<std::uint32_t>  crowded{*this, "overflows", "number of detections without a free track"};
 
-    hal::Params<double> hue{*this, "kind-#-hue", kinds, "colour of kind #: 0 red, 120 green, 240 blue", {.unit = "deg"}};
+    hal::Params<double> hue{*this, "kind-#-hue", kinds, "hue of kind #: 0 red, 120 green, 240 blue", {.unit = "deg"}};
     hal::Params<double> tolerance{
-        *this, "kind-#-tolerance", kinds, "the colour of kind # may be off by so much", {.initial = 35.0, .unit = "deg"}};
-    hal::Params<double> radius{*this, "kind-#-radius", kinds, "of kind #, on the ground", {.initial = 0.033, .unit = "m"}};
+        *this, "kind-#-tolerance", kinds, "tolerance of the hue of kind #", {.initial = 35.0, .unit = "deg"}};
+    hal::Params<double> radius{*this, "kind-#-radius", kinds, "radius of kind # on the ground", {.initial = 0.033, .unit = "m"}};
 
-    hal::Param<std::uint32_t> threshold{*this, "threshold", "how strong a colour has to be, of 255", {.initial = 40}};
-    hal::Param<std::uint32_t> least_area{*this, "least-area", "how many pixels of a thing have to be seen", {.initial = 40}};
-    hal::Param<double>        most_distance{*this, "most-distance", "what is farther away is not told", {.initial = 3.0, .unit = "m"}};
+    hal::Param<std::uint32_t> threshold{*this, "threshold", "minimum strength of the colour, 0..255", {.initial = 40}};
+    hal::Param<std::uint32_t> least_area{*this, "min-area", "minimum area of an object in pixels", {.initial = 40}};
+    hal::Param<double>        most_distance{*this, "max-distance", "maximum distance of objects", {.initial = 3.0, .unit = "m"}};
     hal::Param<double>        gate{
-        *this, "gate", "farther than that from where a thing was seen, it is another one", {.initial = 0.15, .unit = "m"}};
-    hal::Param<double> gain{*this, "gain", "how much of the way to where it is seen a thing's place goes, 0 to 1", {.initial = 0.5}};
-    hal::Param<double> forget{*this, "forget", "a thing that was not seen for so long is gone", {.initial = 1.0, .unit = "s"}};
+        *this, "gate", "maximum distance between two detections of the same object", {.initial = 0.15, .unit = "m"}};
+    hal::Param<double> gain{*this, "gain", "weight of a new detection in the position of a track, 0..1", {.initial = 0.5}};
+    hal::Param<double> forget{*this, "forget", "time without detection after which a track ends", {.initial = 1.0, .unit = "s"}};
 
     void detect(const Frame& frame, const Settings& of, Found& result) {
         if (frame.format != Format::bgr)
             throw std::runtime_error(
-                "things are told by their colours and these frames have none; take a camera of colours, without grey in source=");
+                "frames are greyscale, but objects are detected by colour; use a colour camera, without grey in source=");
         const BlobRules rules{static_cast<int>(std::min(of.threshold, 254u)), static_cast<int>(std::clamp(of.area, 1u, 10'000'000u)),
                               of.distance};
         const auto      seen = find_blobs(frame, ground.in(frame), {of.kinds.data(), static_cast<std::size_t>(kinds)}, rules);
         tracks_.see(seen, frame.stamp_ns, of.track);
         std::copy(tracks_.all().begin(), tracks_.all().end(), result.tracks.begin());
         result.crowded = tracks_.crowded();
-        result.found = true;  // no things are a finding too
+        result.found = true;  // no objects are a valid result, too
     }
 
     Settings settings() const noexcept {
@@ -102,16 +102,16 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(VisionBlob, "vision_blob", "Coloured things on the ground, told apart and followed: bottles and cans", R"(
-A thing is an upright cylinder of one colour; each kind has a hue and a radius. It stands where its picture ends below, half a thing
-behind that on the ground. Where a pixel is on the ground follows from how the camera is mounted (`focal`, `camera_height`, `pitch`,
-`forward`), or from points that were measured (`ground=`, a file as vision_homography's).
+HAL_COMPONENT(VisionBlob, "vision_blob", "Detects and tracks coloured objects on the ground, such as bottles and cans", R"(
+An object is an upright cylinder of one colour; each kind has a hue and a radius. Its position is one radius behind the lower edge of its image, on
+the ground. The mapping from pixels to the ground follows from the mounting of the camera (`focal`, `camera_height`, `pitch`,
+`forward`), or from measured points (`ground=`, a file as for vision_homography).
 
-A thing keeps its place in the row of tracks, and its id, while it is seen again within `forget` and within `gate` of where it was; of two
-things that could be the same the nearer is. In the meantime `track-#-unseen` grows. `valid` says that frames come and are of use, not
-that there is a thing: that is `count`.
+An object keeps its track and its id while it is detected again within `forget` and within `gate` of its last position; of two
+candidates the nearer one is used. Without detections `track-#-unseen` increases. `valid` is TRUE while valid frames arrive, even
+without objects; their number is `count`.
 
-Two things of one kind that touch in the picture are one; a thing that goes beyond the lower edge of the picture is not told.
+Two objects of one kind that touch in the image count as one; an object that crosses the lower edge of the image is ignored.
 
     loadrt vision_scene show=floor objects=2
     loadrt vision_blob source=sim:floor camera_height=0.3 pitch=0.6 kinds=2

@@ -29,8 +29,8 @@ private:
         if (!camera_.get().empty()) camera = camera_from(texts, camera_.get());
         const std::string &file = file_.get(), &points = points_.get();
         if (!file.empty() && !points.empty())
-            throw hal::ArgumentError("file", "file= and points= are both given; one of them says where the ground is");
-        // a bare loadrt: a ground of a millimetre per pixel, so that the component can be looked at
+            throw hal::ArgumentError("file", "file= and points= are both given; use one of them");
+        // a bare loadrt: a ground of one millimetre per pixel, so that the component can be inspected
         const std::string text = !file.empty()    ? texts.read("file", file)
                                  : points.empty() ? "0 0 0 0; 1 0 1 0; 1 1 1 1; 0 1 0 1"
                                                   : points;
@@ -43,39 +43,39 @@ private:
     }
 
     hal::TextArgument points_{*this, "points", "",
-                              "u,v:x,y of four points or more, with ; between them: pixel from the left, from the top, place in mm"};
-    hal::TextArgument file_{*this, "file", "", "the same in a file beside the netlist, a line for each: u v x y"};
-    hal::TextArgument camera_{*this, "camera", "", "calibration of the camera, a file beside the netlist, if its lens distorts"};
-    hal::Argument     channels_{*this, "channels", 1, "how many pixels are turned into places", {.min = 1, .max = 64}};
+                              "u,v:x,y of at least four points, separated by ;: pixel from the left and top, position in mm"};
+    hal::TextArgument file_{*this, "file", "", "file with the points, relative to the netlist, one per line: u v x y"};
+    hal::TextArgument camera_{*this, "camera", "", "file with the camera's calibration, relative to the netlist, for a lens with distortion"};
+    hal::Argument     channels_{*this, "channels", 1, "number of pixels to convert", {.min = 1, .max = 64}};
     Ground            ground_;
 
 public:
-    hal::Ins<double>  u{*this, "u-#", channels_, "a pixel, from the left", {.unit = "px"}};
-    hal::Ins<double>  v{*this, "v-#", channels_, "the same pixel, from the top", {.unit = "px"}};
-    hal::Ins<bool>    enable{*this, "enable-#", channels_, "this pixel is one: link it to valid of what finds it", {.initial = true}};
-    hal::Outs<double> x{*this, "x-#", channels_, "the place on the ground that is seen there", {.unit = "mm"}};
-    hal::Outs<double> y{*this, "y-#", channels_, "the same", {.unit = "mm"}};
+    hal::Ins<double>  u{*this, "u-#", channels_, "pixel to convert, from the left", {.unit = "px"}};
+    hal::Ins<double>  v{*this, "v-#", channels_, "pixel to convert, from the top", {.unit = "px"}};
+    hal::Ins<bool>    enable{*this, "enable-#", channels_, "TRUE converts the pixel; link it to valid of the detector", {.initial = true}};
+    hal::Outs<double> x{*this, "x-#", channels_, "position on the ground, x", {.unit = "mm"}};
+    hal::Outs<double> y{*this, "y-#", channels_, "position on the ground, y", {.unit = "mm"}};
     hal::Outs<bool>   valid{*this,
                           "valid-#",
                           channels_,
-                          "it is enabled and shows the ground, not the horizon or what is above it; else x and y stay",
+                          "TRUE: enabled, and the pixel is below the horizon; otherwise x and y are held",
                             {.safe = false}};
-    hal::Out<double>  error{*this, "error", "how far the points of the calibration are from where they should be", {.unit = "mm"}};
-    hal::Function     run{*this, "update", &VisionHomography::update, "turns pixels into places"};
+    hal::Out<double>  error{*this, "error", "residual error of the calibration points", {.unit = "mm"}};
+    hal::Function     run{*this, "update", &VisionHomography::update, "converts pixels to positions"};
 };
 
 }  // namespace
 
-HAL_COMPONENT(VisionHomography, "vision_homography", "Pixels to places on the ground, from four points", R"(
-A camera that looks at a table or a floor sees each place of it at one pixel. Four points of which both are known give the way from one
-to the other, a homography; with more of them the errors even out, and `error` says what is left of them. Lay four marks on the ground, as far
-apart as the camera sees, measure where they lie, and read their pixels off vision_marker's `u` and `v`.
+HAL_COMPONENT(VisionHomography, "vision_homography", "Converts pixels to positions on the ground by a homography", R"(
+A camera above a table or a floor maps each position on it to one pixel. Four points with known pixel and position define this mapping,
+a homography; more points average out errors, and `error` is the residual. Put four marks on the ground, as far
+apart as possible in the image, measure their positions, and read their pixels from `u` and `v` of vision_marker.
 
-`channels=` pixels, `u-N` and `v-N`, become places, `x-N` and `y-N`. `valid-N` is FALSE when the pixel shows no ground (it is at the horizon
-or above), is no number, or `enable-N` is FALSE; then the place stays. It holds for what lies on the ground: the top of a can is
-seen where the ground behind it is.
+`channels=` pixels, `u-N` and `v-N`, are converted to positions, `x-N` and `y-N`. `valid-N` is FALSE if the pixel is at or above the horizon
+or NaN, or if `enable-N` is FALSE; then the position is held. The conversion is valid for points on the ground only: the top of a can
+appears at the position of the ground behind it.
 
-A lens that distorts bends straight lines. Give its calibration, `camera=` (see vision_marker).
+For a lens with visible distortion, give its calibration, `camera=` (see vision_marker).
 
     loadrt vision_homography names=table channels=2 points="102,388:0,0;541,380:600,0;455,120:600,400;188,124:0,400"
     addf table.update servo

@@ -25,22 +25,22 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
     GroundArguments ground{*this, texts()};
 
     hal::Out<double> offset{
-        *this, "offset", "of the line from the robot's middle, `ahead` of it; positive: to the left", {.unit = "m", .finite = true}};
+        *this, "offset", "offset of the line from the robot's centre, at the distance ahead; positive to the left", {.unit = "m", .finite = true}};
     hal::Out<double> heading{
-        *this, "heading", "of the line there, seen from the robot; positive: it leads to the left", {.unit = "rad", .finite = true}};
-    hal::Out<double> curvature{*this, "curvature", "of the line there; positive: it bends to the left", {.unit = "1/m", .finite = true}};
-    hal::Out<double> quality{*this, "quality", "part of the bands of the newest frame that agree on it", {.finite = true}};
-    hal::Out<bool>   fresh_out{*this, "new", "TRUE in the cycle in which there are new values, and only then"};
-    hal::Out<std::uint32_t> missed{*this, "missed", "frames without a line"};
+        *this, "heading", "heading of the line there, relative to the robot; positive to the left", {.unit = "rad", .finite = true}};
+    hal::Out<double> curvature{*this, "curvature", "curvature of the line there; positive to the left", {.unit = "1/m", .finite = true}};
+    hal::Out<double> quality{*this, "quality", "fraction of the bands of the newest frame that agree with the line", {.finite = true}};
+    hal::Out<bool>   fresh_out{*this, "new", "TRUE in the cycle with a new result"};
+    hal::Out<std::uint32_t> missed{*this, "missed", "number of frames without a line"};
 
     hal::Param<bool>   light{*this, "light-line", "TRUE: the line is lighter than the floor; FALSE: darker"};
-    hal::Param<double> width{*this, "width", "of the line; what is half or twice as wide is none", {.initial = 0.02, .unit = "m"}};
+    hal::Param<double> width{*this, "width", "width of the line; candidates narrower than half or wider than twice this width are rejected", {.initial = 0.02, .unit = "m"}};
     hal::Param<double> ahead{
-        *this, "ahead", "how far in front of the robot's middle offset and heading are told", {.initial = 0.3, .unit = "m"}};
-    hal::Param<double>        reach{*this, "reach", "what is farther away is not looked at", {.initial = 0.6, .unit = "m"}};
-    hal::Param<double>        contrast{*this, "contrast", "least difference from the floor, of 255", {.initial = 20.0}};
-    hal::Param<double>        least_quality{*this, "least-quality", "with less it is not found", {.initial = 0.4}};
-    hal::Param<std::uint32_t> bands{*this, "bands", "strips of the picture that are looked at, 3 to 32", {.initial = 12}};
+        *this, "ahead", "distance ahead of the robot's centre for offset and heading", {.initial = 0.3, .unit = "m"}};
+    hal::Param<double>        reach{*this, "reach", "maximum distance of the evaluated part of the image", {.initial = 0.6, .unit = "m"}};
+    hal::Param<double>        contrast{*this, "contrast", "minimum difference from the floor, 0..255", {.initial = 20.0}};
+    hal::Param<double>        least_quality{*this, "min-quality", "minimum quality of a valid line", {.initial = 0.4}};
+    hal::Param<std::uint32_t> bands{*this, "bands", "number of horizontal bands to evaluate, 3..32", {.initial = 12}};
 
     void detect(const Frame& frame, const Settings& of, Found& result) {
         LineRules rules;
@@ -76,15 +76,14 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(VisionLine, "vision_line", "A line on the floor, for a robot that follows it", R"(
-The picture is cut into `bands`. In each, what stands out from the floor by `contrast` and is about as wide as the line may be the line;
-the parabola on the ground that most bands agree on is it. `offset`, `heading` and `curvature` are those of the parabola `ahead` of the
-robot's middle. Gaps, shadows and things beside the line are bands that do not agree; below `least-quality` of them that do, `valid` falls.
+HAL_COMPONENT(VisionLine, "vision_line", "Detects a line on the floor for a line-following robot", R"(
+The image is divided into `bands`. In each band, areas that differ from the floor by `contrast` and are about as wide as the line are candidates;
+the line is the parabola on the ground that most bands agree with. `offset`, `heading` and `curvature` are those of the parabola `ahead` of the
+robot's centre. Gaps, shadows and objects beside the line are bands that disagree; if fewer than `min-quality` agree, `valid` is FALSE.
 
-Where a pixel is on the ground follows from how the camera is mounted (`focal`, `camera_height`, `pitch`, `forward`), or from points
-that were measured (`ground=`, a file as vision_homography's). A robot that turns with angular speed = k1 offset + k2 heading follows the line.
+The mapping from pixels to the ground follows from the mounting of the camera (`focal`, `camera_height`, `pitch`, `forward`), or from measured
+points (`ground=`, a file as for vision_homography). A robot with the turning speed k1 offset + k2 heading follows the line.
 
-    loadrt vision_scene show=floor
     loadrt vision_line source=sim:floor camera_height=0.3 pitch=0.6
     addf vision-scene.0.update servo
     addf vision-line.0.update servo

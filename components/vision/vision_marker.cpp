@@ -60,61 +60,61 @@ public:
     }
 
     hal::In<std::int32_t> wanted{
-        *this, "wanted", "only the marker with this id; -1: the one with the smallest id that is seen", {.initial = -1}};
-    hal::In<double>    size{*this, "size", "length of a marker's black side", {.initial = 50.0, .unit = "mm"}};
+        *this, "target-id", "id of the marker to detect; -1: the lowest id in the frame", {.initial = -1}};
+    hal::In<double>    size{*this, "size", "side length of the marker's black square", {.initial = 50.0, .unit = "mm"}};
     hal::Param<double> max_error{
-        *this, "max-error", "a marker whose corners fit worse than that is not found; 0: any", {.initial = 2.0, .unit = "px"}};
-    hal::Out<std::int32_t>  id{*this, "id", "of the marker the pins below are about", {.initial = -1}};
-    hal::Out<std::uint32_t> count{*this, "count", "markers in the frame that are wanted"};
-    hal::Out<double>        x{*this, "x", "from the camera to the right", {.unit = "mm"}};
-    hal::Out<double>        y{*this, "y", "from the camera down", {.unit = "mm"}};
-    hal::Out<double>        z{*this, "z", "from the camera ahead", {.unit = "mm"}};
-    hal::Out<double>        roll{*this, "roll", "turn about the camera's x axis, the first of three", {.unit = "deg"}};
-    hal::Out<double>        pitch{*this, "pitch", "turn about the y axis, the second", {.unit = "deg"}};
-    hal::Out<double>        yaw{*this, "yaw", "turn about the z axis, the third", {.unit = "deg"}};
-    hal::Out<double>        u{*this, "u", "where its middle is in the frame, from the left", {.unit = "px"}};
-    hal::Out<double>        v{*this, "v", "from the top", {.unit = "px"}};
-    hal::Out<double>        error{*this, "error", "distance of its corners from those of this pose, root mean square", {.unit = "px"}};
+        *this, "max-error", "maximum error of a valid marker; 0: no limit", {.initial = 2.0, .unit = "px"}};
+    hal::Out<std::int32_t>  id{*this, "id", "id of the detected marker", {.initial = -1}};
+    hal::Out<std::uint32_t> count{*this, "count", "number of matching markers in the frame"};
+    hal::Out<double>        x{*this, "x", "position to the right of the camera", {.unit = "mm"}};
+    hal::Out<double>        y{*this, "y", "position below the camera", {.unit = "mm"}};
+    hal::Out<double>        z{*this, "z", "distance in front of the camera", {.unit = "mm"}};
+    hal::Out<double>        roll{*this, "roll", "rotation about the camera's x axis, applied first", {.unit = "deg"}};
+    hal::Out<double>        pitch{*this, "pitch", "rotation about the y axis, applied second", {.unit = "deg"}};
+    hal::Out<double>        yaw{*this, "yaw", "rotation about the z axis, applied third", {.unit = "deg"}};
+    hal::Out<double>        u{*this, "u", "centre of the marker in the frame, from the left", {.unit = "px"}};
+    hal::Out<double>        v{*this, "v", "centre of the marker in the frame, from the top", {.unit = "px"}};
+    hal::Out<double>        error{*this, "error", "reprojection error of the corners, root mean square", {.unit = "px"}};
     hal::Out<double>        ambiguity{*this, "ambiguity",
-                               "error of this pose over the last frames divided by that of its mirror image: 0 certain, 1 either may be right"};
+                               "ratio of the errors of this pose and its mirror image over the last frames: 0 unambiguous, 1 ambiguous"};
 
 private:
-    hal::TextArgument dictionary_{*this, "dictionary", "4x4_50", "which markers: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
+    hal::TextArgument dictionary_{*this, "dictionary", "4x4_50", "marker dictionary: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
     hal::TextArgument camera_{
-        *this, "camera", "", "calibration of the camera, a file beside the netlist; without it there is no pose", {.per_instance = true}};
+        *this, "camera", "", "file with the camera's calibration, relative to the netlist; required for the pose", {.per_instance = true}};
     std::optional<MarkerDetector> detector_;  // of the helper thread, once started
 };
 
 }  // namespace
 
-HAL_COMPONENT(VisionMarker, "vision_marker", "Finds a square marker and its pose before the camera", R"(
-Looks for ArUco markers in the frames of `source=`, and gives the pose of one of them: `x` to the right, `y` down, `z` ahead of the
-camera in mm; the turn from the marker (x right, y up, z out of its face) to the camera as R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. A marker that
-faces the camera upright has roll 180.
+HAL_COMPONENT(VisionMarker, "vision_marker", "Detects a square marker and its pose relative to the camera", R"(
+Detects ArUco markers in the frames of `source=` and computes the pose of one of them: `x` to the right, `y` down, `z` in front of the
+camera in mm; the rotation from the marker (x right, y up, z out of its face) to the camera is R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. An upright marker
+that faces the camera has roll 180.
 
-For a pose it needs the camera's calibration in a file, `camera=`:
+The pose requires a file with the camera's calibration, `camera=`:
 
     size 640 480
     focal 600 600
     centre 319.5 239.5
     distortion 0.05 -0.12 0 0 0     # k1 k2 p1 p2 k3
 
-or the YAML that OpenCV's calibration writes. And `size`, the length of a black side. Without a calibration there are `id`, `u` and `v`
-only.
+or the YAML file of OpenCV's calibration, and `size`, the side length of the black square. Without a calibration only `id`, `u` and `v`
+are available.
 
-**Ambiguity.** The picture of a small, distant or nearly frontal square fits two poses nearly equally well: the right one and its mirror image
-about the line of sight, with the same place and another tilt (T. Collins and A. Bartoli, 2014). Both are followed from frame to frame, and the
-pins show the one with the smaller error over the last frames (each frame counts 0.8 times as much as the next). `ambiguity` is the ratio of the
-two errors. A controller that uses the tilt compares it with a limit, 0.7 for example; `x`, `y`, `z` and `yaw` do not depend on it much.
+**Ambiguity.** The image of a small, distant or nearly frontal square matches two poses almost equally well: the correct one and its mirror image
+about the line of sight, with the same position and a different tilt (T. Collins and A. Bartoli, 2014). Both are tracked from frame to frame, and the
+pins have the one with the smaller error over the last frames (each frame has 0.8 times the weight of the next). `ambiguity` is the ratio of the
+two errors. A controller that uses the tilt should compare it with a limit, for example 0.7; `x`, `y`, `z` and `yaw` hardly depend on it.
 
-The work is done in a thread of its own, of which the newest frame is the only one that counts; `update` copies the last result to the pins.
-What a controller acts on is `valid`: it is TRUE when the newest frame that was looked at shows the marker and is not older than
-`max-age-ms`. While it is FALSE the pins keep their last values. When the camera is unplugged, covered or hangs, one line says so, `valid` falls, and
-everything goes on by itself when the frames are good again. Several components may name the same camera, all with the same options.
+A separate thread processes the newest frame; `update` copies the last result to the pins.
+Controllers should use `valid`: it is TRUE if the newest processed frame contains the marker and is not older than
+`max-age-ms`. While it is FALSE the pins keep their last values. If the camera is unplugged, covered or hangs, a message is printed, `valid` becomes FALSE, and
+operation resumes automatically with valid frames. Several components may use the same camera, all with the same options.
 
     loadrt threads name1=servo period1=1000000
     loadrt vision_marker names=dock source=v4l2:/dev/video0?width=640&height=480
     addf dock.update servo
-    setp dock.wanted 7
+    setp dock.target-id 7
     setp dock.size 80
 )")

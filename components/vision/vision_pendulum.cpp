@@ -29,22 +29,22 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     }
 
     hal::RealArgument focal{*this, "focal", 280.0, "focal length of the camera, px"};
-    hal::RealArgument distance{*this, "distance", 1.2, "from the motor's axis to the camera, m"};
-    hal::RealArgument height{*this, "camera_height", 0.3, "of the camera above the arm, m"};
-    hal::RealArgument arm_length{*this, "arm_length", 0.2, "from the motor's axis to the ball at the pendulum's pivot, m"};
-    hal::RealArgument rod_length{*this, "rod_length", 0.3, "from there to the ball at the pendulum's end, m"};
+    hal::RealArgument distance{*this, "distance", 1.2, "distance from the motor axis to the camera, m"};
+    hal::RealArgument height{*this, "camera_height", 0.3, "height of the camera above the arm, m"};
+    hal::RealArgument arm_length{*this, "arm_length", 0.2, "distance from the motor axis to the ball at the pendulum's pivot, m"};
+    hal::RealArgument rod_length{*this, "rod_length", 0.3, "distance from the pivot's ball to the ball at the pendulum's end, m"};
 
     hal::Out<double> pendulum{
-        *this, "pendulum-angle", "of the pendulum in the newest frame that showed it; 0 hangs, -pi to pi", {.unit = "rad", .finite = true}};
+        *this, "pendulum-angle", "pendulum angle in the newest valid frame; 0 hanging down, -pi..pi", {.unit = "rad", .finite = true}};
     hal::Out<double> arm{
-        *this, "arm-angle", "of the arm in that frame; 0 points at the camera, -pi to pi", {.unit = "rad", .finite = true}};
-    hal::Out<bool>   fresh_out{*this, "new", "TRUE in the cycle in which there are new angles, and only then"};
-    hal::Out<double> age{*this, "age", "how old they are; the age of a measurement of an ekf", {.unit = "s", .finite = true}};
-    hal::Out<double> residual{*this, "residual", "how far the balls are from where these angles put them", {.unit = "px", .finite = true}};
-    hal::Out<double> pivot_u{*this, "pivot-u", "where the ball at the pivot is", {.unit = "px"}};
-    hal::Out<double> pivot_v{*this, "pivot-v", "where the ball at the pivot is", {.unit = "px"}};
-    hal::Out<double> tip_u{*this, "tip-u", "where the ball at the end is", {.unit = "px"}};
-    hal::Out<double> tip_v{*this, "tip-v", "where the ball at the end is", {.unit = "px"}};
+        *this, "arm-angle", "arm angle in that frame; 0 towards the camera, -pi..pi", {.unit = "rad", .finite = true}};
+    hal::Out<bool>   fresh_out{*this, "new", "TRUE in the cycle with new angles"};
+    hal::Out<double> age{*this, "age", "age of the angles; link it to the age of an ekf measurement", {.unit = "s", .finite = true}};
+    hal::Out<double> residual{*this, "residual", "distance of the balls from their positions for these angles", {.unit = "px", .finite = true}};
+    hal::Out<double> pivot_u{*this, "pivot-u", "ball at the pivot, from the left", {.unit = "px"}};
+    hal::Out<double> pivot_v{*this, "pivot-v", "ball at the pivot, from the top", {.unit = "px"}};
+    hal::Out<double> tip_u{*this, "tip-u", "ball at the end, from the left", {.unit = "px"}};
+    hal::Out<double> tip_v{*this, "tip-v", "ball at the end, from the top", {.unit = "px"}};
     hal::Out<std::uint32_t> missed{*this, "missed", "frames that did not show it, or not so that the angles fit"};
 
     hal::Param<double> pivot_hue{
@@ -52,14 +52,14 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     hal::Param<double>        tip_hue{*this, "tip-hue", "colour of the ball at the end", {.initial = 120.0, .unit = "deg"}};
     hal::Param<double>        tolerance{*this, "hue-tolerance", "a colour may be off by so much", {.initial = 40.0, .unit = "deg"}};
     hal::Param<std::uint32_t> threshold{*this, "threshold", "how strong a ball's colour has to be, of 255", {.initial = 30}};
-    hal::Param<std::uint32_t> least_area{*this, "least-area", "how many pixels of a ball have to be seen", {.initial = 12}};
+    hal::Param<std::uint32_t> least_area{*this, "min-area", "minimum area of a ball in pixels", {.initial = 12}};
     hal::Param<double>        lost_time{
-        *this, "lost-time", "a pendulum that no frame showed for so long is told as a fault; 0: never", {.initial = 0.25, .unit = "s"}};
+        *this, "lost-time", "time without the pendulum after which a fault is raised; 0: never", {.initial = 0.25, .unit = "s"}};
     hal::Param<double> most_residual{
         *this, "most-residual", "a frame with a greater residual does not count", {.initial = 1.5, .unit = "px"}};
     hal::Param<double> most_sigma{*this,
-                                  "most-sigma",
-                                  "nor one from which an angle follows worse than that, for balls known to 0.05 px",
+                                  "max-sigma",
+                                  "maximum uncertainty of an angle, assuming 0.05 px for the balls; other frames are ignored",
                                   {.initial = 0.005, .unit = "rad"}};
 
     void start() {
@@ -72,7 +72,7 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
     void detect(const Frame& frame, const Settings& of, Found& result) {
         if (frame.format != Format::bgr)
             throw std::runtime_error(
-                "the balls are told by their colours and these frames have none; take a camera of colours, without grey in source=");
+                "frames are greyscale, but the balls are detected by colour; use a colour camera, without grey in source=");
         PendulumView   view;
         PendulumLimits limits;
         view.focal_u = view.focal_v = focal;
@@ -119,17 +119,17 @@ private:
 }  // namespace
 
 HAL_COMPONENT(VisionPendulum, "vision_pendulum", "Both angles of a Furuta pendulum from a camera", R"(
-A red ball marks the pendulum's pivot, a green one its end (other colours: `pivot-hue`, `tip-hue`). Their middles, weighted by colour, are
-known to a few hundredths of a pixel; the angles are those that put both balls where they are seen, by least squares. What is left is
-`residual`. At 320 x 240 with noise of 3 of 255 both angles are right to 0.5 mrad (rms).
+A red ball marks the pendulum's pivot, a green one its end (other colours: `pivot-hue`, `tip-hue`). Their centres, weighted by colour, are
+accurate to a few hundredths of a pixel; the angles follow by least squares, and `residual` is the remaining error.
+At 320 x 240 with noise of 3 of 255 the error of both angles is 0.5 mrad (rms).
 
 The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above the arm, and looks at where axis and arm
 meet; the arm's zero points at it. Near an arm of 90 degrees the pendulum swings to and from the camera, and two attitudes look the same:
-such a frame does not count, nor does one from which an angle follows badly (`most-sigma`). The filter has to bridge them.
+such a frame does not count, nor does one from which an angle follows badly (`max-sigma`). The filter has to bridge them.
 
-For an ekf: link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`. `new` is TRUE in one cycle per frame; what a
-frame is late, the filter makes up for. `valid` falls when the newest frame does not show the pendulum, or is older than `max-age-ms`; after
-`lost-time` without it there is a fault, once, for `show fault` and the safety chain.
+For an ekf, link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`. `new` is TRUE in one cycle per frame; the filter compensates the
+latency. `valid` becomes FALSE if the newest frame does not contain the pendulum or is older than `max-age-ms`; after
+`lost-time` without it a fault is raised once, for `show fault` and the safety chain.
 
     loadrt vision_scene show=furuta
     loadrt vision_pendulum source=sim:furuta

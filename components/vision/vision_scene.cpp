@@ -14,18 +14,18 @@ public:
     explicit VisionScene(const hal_host* host)
         : Component(host),
           show_(*this, "show", "furuta", "furuta, floor or markers"),
-          camera_(*this, "camera", "", "what the camera is called: sim:NAME; usually what it shows", {.per_instance = true}),
-          width_(*this, "width", 320, "of a picture, px", {.min = 16, .max = 4096}),
-          height_(*this, "height", 240, "of a picture, px", {.min = 16, .max = 4096}),
-          fps_(*this, "fps", 100.0, "pictures in a second"),
+          camera_(*this, "camera", "", "name of the camera, for source=sim:NAME; default: the scene", {.per_instance = true}),
+          width_(*this, "width", 320, "width of a frame, px", {.min = 16, .max = 4096}),
+          height_(*this, "height", 240, "height of a frame, px", {.min = 16, .max = 4096}),
+          fps_(*this, "fps", 100.0, "frames per second"),
           focal_(*this, "focal", 280.0, "focal length, px"),
-          seed_(*this, "seed", 1, "of the noise"),
-          grey_(*this, "grey", 0, "1: the camera sees no colours", {.min = 0, .max = 1}),
-          distance_(*this, "distance", 1.2, "furuta: from the motor's axis to the camera, m"),
-          camera_height_(*this, "camera_height", 0.3, "of the camera above the arm (furuta), above the floor (floor), m"),
-          pitch_(*this, "pitch", 0.6, "floor: how far the camera looks down, rad"),
-          objects_(*this, "objects", 0, "floor: bottles and cans", {.min = 0, .max = static_cast<std::int64_t>(most_objects)}),
-          markers_(*this, "markers", 1, "markers: how many", {.min = 1, .max = static_cast<std::int64_t>(most_markers)}),
+          seed_(*this, "seed", 1, "seed of the noise"),
+          grey_(*this, "grey", 0, "1: greyscale camera", {.min = 0, .max = 1}),
+          distance_(*this, "distance", 1.2, "furuta: distance from the motor axis to the camera, m"),
+          camera_height_(*this, "camera_height", 0.3, "height of the camera above the arm (furuta) or the floor (floor), m"),
+          pitch_(*this, "pitch", 0.6, "floor: downward tilt of the camera, rad"),
+          objects_(*this, "objects", 0, "floor: number of bottles and cans", {.min = 0, .max = static_cast<std::int64_t>(most_objects)}),
+          markers_(*this, "markers", 1, "markers: number of markers", {.min = 1, .max = static_cast<std::int64_t>(most_markers)}),
           settings_(settled()) {
         switch (settings_.kind) {
         case Kind::furuta: declare_furuta(); break;
@@ -66,7 +66,7 @@ private:
         if (what == "furuta") of.kind = Kind::furuta;
         else if (what == "floor") of.kind = Kind::floor;
         else if (what == "markers") of.kind = Kind::markers;
-        else throw hal::ArgumentError("show", "show=" + what + " is no scene; there are furuta, floor and markers");
+        else throw hal::ArgumentError("show", "show=" + what + " is not a valid scene; use furuta, floor or markers");
         name_ = camera_.get().empty() ? what : camera_.get();
         of.width = static_cast<int>(width_), of.height = static_cast<int>(height_);
         of.fps = within("fps", fps_, 0.1, 1000.0);
@@ -90,7 +90,7 @@ private:
         if (text.back() == '.') text.pop_back();
         return text;
     }
-    void take(std::size_t i, double value) noexcept {  // what is no number changes nothing
+    void take(std::size_t i, double value) noexcept {  // NaN changes nothing
         if (std::isfinite(value)) values_[i] = value;
     }
     std::size_t first_pose() const noexcept { return settings_.kind == Kind::markers ? at::markers : at::poses; }
@@ -98,21 +98,21 @@ private:
         poses_.emplace_back(*this, name.c_str(), doc.c_str(), hal::PinOptions<double>{.initial = initial, .unit = unit});
     }
     void declare_furuta() {
-        pose("arm-angle", "of the arm; 0 points at the camera", "rad");
-        pose("pendulum-angle", "of the pendulum; 0 hangs", "rad");
+        pose("arm-angle", "arm angle; 0 towards the camera", "rad");
+        pose("pendulum-angle", "pendulum angle; 0 hanging down", "rad");
     }
     void declare_floor() {
         pose("x", "where the robot with the camera is", "m");
         pose("y", "where the robot with the camera is", "m");
-        pose("heading", "of the robot; 0 along x, positive to the left", "rad");
-        pose("line-width", "of the line on the floor; 0: there is none", "m", 0.02);
+        pose("heading", "heading of the robot; 0 along x, positive to the left", "rad");
+        pose("line-width", "width of the line on the floor; 0: no line", "m", 0.02);
         pose("line-amplitude", "the line is y = amplitude sin(2 pi x / length)", "m");
         pose("line-length", "see line-amplitude", "m", 2.0);
         pose("line-dark", "1: a dark line on a light floor; 0: a light one on a dark floor", "", 1.0);
-        pose("line-gap", "so much of each half metre is without line", "m");
+        pose("line-gap", "length of the gap in the line in each half metre", "m");
         for (int i = 0; i < settings_.objects; ++i) {
             const std::string name = "object-" + std::to_string(i);
-            pose(name + "-kind", "0: not there, 1: a bottle, 2: a can", "");
+            pose(name + "-kind", "0: none, 1: bottle, 2: can", "");
             pose(name + "-x", "where it stands", "m");
             pose(name + "-y", "where it stands", "m");
         }
@@ -120,14 +120,14 @@ private:
     void declare_markers() {
         for (int i = 0; i < settings_.markers; ++i) {
             const std::string name = "marker-" + std::to_string(i);
-            pose(name + "-id", "in the dictionary 4x4_50; below 0: not there", "", i == 0 ? 0.0 : -1.0);
-            pose(name + "-size", "of its black square", "m", 0.05);
-            pose(name + "-x", "of its middle, to the right as the camera sees it", "m");
-            pose(name + "-y", "of its middle, down as the camera sees it", "m");
-            pose(name + "-z", "of its middle, away from the camera", "m", 0.5);
-            pose(name + "-roll", "about the camera's x; pi: it faces the camera", "rad", 3.14159265358979312);
-            pose(name + "-pitch", "about the camera's y, after roll", "rad");
-            pose(name + "-yaw", "about the camera's z, after pitch", "rad");
+            pose(name + "-id", "id in the dictionary 4x4_50; below 0: none", "", i == 0 ? 0.0 : -1.0);
+            pose(name + "-size", "side length of the black square", "m", 0.05);
+            pose(name + "-x", "centre, to the right in camera view", "m");
+            pose(name + "-y", "centre, downwards in camera view", "m");
+            pose(name + "-z", "centre, distance from the camera", "m", 0.5);
+            pose(name + "-roll", "rotation about the camera's x axis; pi: faces the camera", "rad", 3.14159265358979312);
+            pose(name + "-pitch", "rotation about the camera's y axis, after roll", "rad");
+            pose(name + "-yaw", "rotation about the camera's z axis, after pitch", "rad");
         }
     }
 
@@ -146,31 +146,31 @@ private:
     bool                            opened_ = false;
 
 public:
-    hal::In<double> light{*this, "light", "brightness of the lamps; 1: as it should be, 0: dark", {.initial = 1.0}};
+    hal::In<double> light{*this, "light", "brightness; 1: nominal, 0: dark", {.initial = 1.0}};
     hal::In<double> noise{*this,
                           "noise",
-                          "standard deviation of the sensor's noise, of 255; without any, a scene at rest looks like a frozen camera",
+                          "standard deviation of the sensor noise, of 255; without noise, a static scene is detected as a frozen camera",
                           {.initial = 3.0}};
     hal::In<double> blur{*this, "blur", "standard deviation of the lens's blur", {.initial = 0.6, .unit = "px"}};
-    hal::In<double> covered{*this, "covered", "what part of the picture something dark hides, from the left; 1: all"};
-    hal::In<bool>   frozen{*this, "frozen", "TRUE: the camera gives the same picture again and again"};
-    hal::In<bool>   unplugged{*this, "unplugged", "TRUE: the camera is not there"};
-    hal::In<double> exposure{*this, "exposure", "how long the shutter is open: what moves is smeared", {.initial = 0.002, .unit = "s"}};
+    hal::In<double> covered{*this, "covered", "covered part of the frame, from the left; 1: all"};
+    hal::In<bool>   frozen{*this, "frozen", "TRUE: the camera repeats the same frame"};
+    hal::In<bool>   unplugged{*this, "unplugged", "TRUE: the camera is unplugged"};
+    hal::In<double> exposure{*this, "exposure", "exposure time, which causes motion blur", {.initial = 0.002, .unit = "s"}};
     hal::In<double> delay{
-        *this, "delay", "from the end of the exposure until the picture is in the computer", {.initial = 0.01, .unit = "s"}};
-    hal::Function run{*this, "update", &VisionScene::update, "shows the camera the state of this cycle"};
+        *this, "delay", "latency from the end of the exposure to the arrival of the frame", {.initial = 0.01, .unit = "s"}};
+    hal::Function run{*this, "update", &VisionScene::update, "updates the scene"};
 };
 
 }  // namespace
 
 HAL_COMPONENT(VisionScene, "vision_scene",
-              "What a simulated camera sees: a Furuta pendulum, a floor with bottles, cans and a line, or markers", R"(
-Stands in for camera and world. Link the pins to the plant of the netlist; the vision components take their pictures with
-`source=sim:NAME`, where NAME is `camera=`, or what `show=` says. All is a function of the runtime's clock and of `seed`: on the virtual
-clock the same netlist gives the same pictures.
+              "Simulated camera: a Furuta pendulum, a floor with bottles, cans and a line, or markers", R"(
+Simulates a camera and its scene. Link the pins to the plant of the netlist; the vision components read the frames with
+`source=sim:NAME`, where NAME is `camera=`, or by default `show=`. Frames are a function of the runtime's clock and of `seed`: on the virtual
+clock the same netlist renders the same frames.
 
-A picture is due every 1/fps s. It shows the mean of what was there from then on for `exposure`, its stamp is the middle of that,
-and it arrives `delay` after its end.
+A frame is due every 1/fps s. It is the mean of the scene during `exposure`, its timestamp is the middle of the exposure,
+and it arrives `delay` after the end of the exposure.
 
 **furuta.** The camera stands `distance` from the motor's axis, `camera_height` above the arm, and looks at where they meet. The arm is
 0.2 m long, the pendulum 0.3 m; a red ball marks the pendulum's pivot and a green one its end.
