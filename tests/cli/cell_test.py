@@ -99,7 +99,7 @@ class Language(Case):
 
     def test_execute_selects_the_node(self):
         path = self.write("cell.hal", CELL)
-        self.assertIn("write --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
+        self.assertIn("use --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x"))
 
     def test_rejects_dds_without_a_node(self):
         self.assertEqual("hal run: --dds applies to nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take "

@@ -83,7 +83,7 @@ class Check(Case):
     def test_assume(self):
         said = self.run_program("check", "--assume", "trivkins", "--assume", "motmod", "--assume", "hal_card", "machine.ini")
         self.assertEqual((0, []), (said.returncode, self.errors(said.stderr)), said.stderr)
-        self.assertIn("9 lines name what nothing loaded has", said.stderr)
+        self.assertIn("9 lines refer to names that no loaded component has", said.stderr)
         self.write("c.hal", "loadrt and2 names=a\nnet s far.out => a.in0\n")
         self.assertIn("far.out", self.bad("check", "c.hal"))
         said = self.run_program("check", "--assume", "far", "c.hal")

@@ -172,7 +172,7 @@ class Halrun(Case):
     def test_wrong_files(self):
         self.assertIn("Tcl is not supported", self.halrun("x.tcl").stderr)
         self.assertIn("Tcl is not supported", self.halrun("-T").stderr)
-        self.assertIn("ends with .hal or .ini", self.halrun("x.txt").stderr)
+        self.assertIn("must end with .hal or .ini", self.halrun("x.txt").stderr)
         self.assertIn("nowhere.hal", self.halrun("nowhere.hal").stderr)
 
 

@@ -219,7 +219,7 @@ FUNCTION(_) {
 
     def test_mistakes_in_declarations_are_all_reported(self):
         said = self.refused("wrong", 'component wrong;\npin inn bit a;\npin in bti b;\nfunction _;\nlicense "MIT";\n;;\n')
-        self.assertIn("wrong.comp:2:5: error: a pin is in, out or io [bad-component-source]", said)
+        self.assertIn("wrong.comp:2:5: error: invalid direction: a pin is in, out or io [bad-component-source]", said)
         self.assertIn("did you mean 'bit'?", said)
         self.assertIn("'wrong.comp' has 2 errors; nothing was installed", said)
 

@@ -76,7 +76,7 @@ class Reference(Case):
         self.assertEqual(["sum2.md"], os.listdir(self.folder / "some"))
         self.assertTrue(self.good("doc", "sum2", "--html").startswith("<!DOCTYPE html>"))
         self.assertEqual("hal doc: --all needs a folder; type: hal doc --all --output DIR\n", self.bad("doc", "--all"))
-        self.assertIn("leave out their names, or --all", self.bad("doc", "--all", "sum2", "-o", "x"))
+        self.assertIn("leave one out", self.bad("doc", "--all", "sum2", "-o", "x"))
         self.assertIn("exclude each other", self.bad("doc", "sum2", "--html", "--man"))
         self.write("file", "")
         self.assertEqual("hal doc: cannot create 'file/x': Not a directory\n", self.bad("doc", "--all", "-o", "file/x"))

@@ -128,7 +128,7 @@ class Doctor(Case):
         for subject in ("kernel", "SCHED_FIFO", "memory locking", "capabilities", "raw Ethernet", "throttling", "frequency", "isolated cpus",
                         "clock source", "idle states"):
             self.assertRegex(text, rf"(?m)^(good|fair|poor)  {subject} ")
-        self.assertRegex(text, r"(?m)^wake-up at 1 kHz, SCHED_\w+")
+        self.assertRegex(text, r"(?m)^wake-up latency at 1 kHz, SCHED_\w+")
         self.assertRegex(text, r"(?m)^  sleeping, then spinning the last 200 us .*s$")
 
     def test_every_poor_verdict_has_a_remedy(self):

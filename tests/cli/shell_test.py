@@ -153,13 +153,13 @@ class Scripts(Case):
 
     def test_a_pipe_reports_an_open_begin(self):
         before = self.value("adder.in0")
-        for text, said in (("begin\nsetp adder.in0 7\n", "hal shell: 'begin' in line 1 without 'commit': what was collected had no effect\n"),
-                           ("\nbegin\nsetp adder.in0 7\nquit\n", "hal shell: 'begin' in line 2 without 'commit': what was collected had no effect\n"),
+        for text, said in (("begin\nsetp adder.in0 7\n", "hal shell: 'begin' in line 1 without 'commit': the collected edits had no effect\n"),
+                           ("\nbegin\nsetp adder.in0 7\nquit\n", "hal shell: 'begin' in line 2 without 'commit': the collected edits had no effect\n"),
                            ("begin\nsetp adder.in0 7\nsetp nothing 1\ncommit\n",
-                            "hal shell: a pipe is read line by line: what was collected from line 1 on had no effect\n"),
+                            "hal shell: a pipe is read line by line: the edits collected from line 1 on had no effect\n"),
                            ("getp adder.in0\nbegin\nsetp adder.in0 7\nfrobnicate\ncommit\n",
                             "hal shell: a pipe is read line by line: line 1 was carried out before the error in line 4; "
-                            "what was collected from line 2 on had no effect\n")):
+                            "the edits collected from line 2 on had no effect\n")):
             pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input=text, text=True, capture_output=True)
             self.assertEqual(1, pipe.returncode, text)
             self.assertTrue(pipe.stderr.endswith(said), pipe.stderr)
