@@ -61,7 +61,7 @@ class Rtcfg(Segment):
 
         # Switched off and on again.
         Segment.stop(x, signal.SIGKILL)
-        self.wait_for_words("m", f"tdma.0: station x ({self.mac('x')}) is dead: no heartbeat for 3000 ms; all were told, and it is invited again\n")
+        self.wait_for_words("m", f"tdma.0: station x ({self.mac('x')}) is dead: no heartbeat for 3000 ms; all stations were notified, and it is invited again\n")
         self.station("x", NETLIST.format("station=auto stage2=received"))
         self.wait_for_words("x", written, 2)
         self.wait_for("m", "stations-dead", "0")
@@ -85,7 +85,7 @@ class Rtcfg(Segment):
         self.wait_for_words("node", "hal node: runs: its slots may be used\n")
         # The master begins anew with another schedule, and with another cycle.
         self.stop(master)
-        self.wait_for_words("node", f"hal node: the sync of {self.mac('m')} is lost; this station is silent until there is one again\n")
+        self.wait_for_words("node", f"hal node: lost the sync of {self.mac('m')}; this station stops sending until the next sync\n")
         self.write("cell.tdma", CELL.format(self.mac("x")))  # here its slot is far behind the beginning of its cycle
         self.station("m", NETLIST.format("config=cell.tdma station=m"))
         self.wait_for_words("node", f"hal node: configured by {self.mac('m')}: it is station x with 1 slot, the cycle is 5000 us\n")

@@ -29,8 +29,8 @@ addf tdma.0.receive servo 1
 addf tdma.0.transmit servo -1
 """
 
-NO_CARRIER = "tdma.0: the line has no carrier: nothing is sent or received; is the cable in, the switch on?\n"
-CARRIER = "tdma.0: the line has a carrier again\n"
+NO_CARRIER = "tdma.0: no carrier: nothing is sent or received; check the cable and the switch\n"
+CARRIER = "tdma.0: carrier detected again\n"
 RUNS = "tdma.0: runs: its slots may be used\n"
 
 
@@ -39,15 +39,15 @@ class Tdma(Segment):
         super().setUp()
         self.write("cell.tdma", CELL)
         self.processes = {name: self.station(name, NETLIST.format(name)) for name in self.names}
-        self.lost = f"tdma.0: the sync of {self.mac('m')} is lost; this station is silent until there is one again\n"
-        self.followed = f"tdma.0: the sync of {self.mac('m')} is followed\n"
+        self.lost = f"tdma.0: lost the sync of {self.mac('m')}; this station stops sending until the next sync\n"
+        self.followed = f"tdma.0: synchronised to {self.mac('m')}\n"
         for name in self.names:
             self.wait_for_words(name, RUNS)
             self.wait_for(name, "running", "TRUE")
 
     def tearDown(self):
         for name in self.names:
-            self.assertNotIn("babbles", self.said(name), "nobody does")
+            self.assertNotIn("babbling", self.said(name), "nobody does")
         super().tearDown()
 
     def master_was_not_disturbed(self):

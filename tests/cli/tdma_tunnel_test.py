@@ -107,7 +107,7 @@ class Tunnel(Segment):
                              self.said(name))
             self.assertEqual([0] * 3, [self.number(name, pin) for pin in ("losses", "tunnel-refused", "frames-foreign")], self.said(name))
             self.assertGreater(self.number(name, "tunnel-sent"), 90)  # 120 kB are 83 packets each way; five pings
-            self.assertNotIn("babbles", self.said(name))
+            self.assertNotIn("babbling", self.said(name))
 
     def test_its_mtu_is_its_slots_size(self):
         self.both(size=200)

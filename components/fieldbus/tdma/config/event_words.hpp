@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What happened on the segment, in sentences.
+// Formats the events of a segment.
 #pragma once
 
 #include <algorithm>
@@ -10,38 +10,38 @@
 
 namespace hal::tdma {
 
-/// What a station told, as the cycle keeps it.
+/// An event as the cycle records it.
 struct Happened {
     Event   event = Event::running;
     Address who{};
     Time    value = 0;
 };
 
-/// One line is printed per subject and second. [setup]
+/// Returns the key for rate limiting: one line is printed per subject and second. [setup]
 inline std::string subject(const Happened& h) {
     return std::to_string(static_cast<int>(h.event)) + ' ' + ethernet::to_string(h.who);
 }
 
 class EventWords {
 public:
-    /// The schedule outlives it. `again`: what is typed to make a withdrawn master begin anew; `known_as`: the IP address of a station
-    /// without a schedule, when it goes by that. [setup]
+    /// The schedule must outlive it. `again`: the command that resumes a master that stepped down; `known_as`: the IP address of a station
+    /// without a schedule, if it is identified by that. [setup]
     EventWords(const config::Schedule& schedule, std::string again, std::string known_as = {})
         : schedule_(schedule), again_(std::move(again)), known_as_(std::move(known_as)) {}
 
-    /// What is said of it. [setup]
+    /// Formats the message of an event. [setup]
     std::string operator()(const Happened& h) const {
         const std::string who = called(h.who), value = std::to_string(h.value);
         switch (h.event) {
-        case Event::synchronised: return "the sync of " + who + " is followed";
+        case Event::synchronised: return "synchronised to " + who;
         case Event::calibrated: return "calibrated: frames take " + config::microseconds(h.value) + " from or to " + who;
         case Event::running: return "runs: its slots may be used";
         case Event::uncalibrated:
-            return who + " does not answer calibrations, " + value + " by now; it is asked on. Is there another " +
-                   "station in this one's first slot, or a line that carries frames one way only?";
-        case Event::sync_lost: return "the sync of " + who + " is lost; this station is silent until there is one again";
-        case Event::leading: return "sends the syncs from now on";
-        case Event::yielded: return "a master with more right sends the syncs again: " + who;
+            return "calibration failing: " + who + " did not answer " + value + " requests; still trying. Check for another " +
+                   "station in the first slot of this one, and for a cable that carries frames in one direction only";
+        case Event::sync_lost: return "lost the sync of " + who + "; this station stops sending until the next sync";
+        case Event::leading: return "active as master";
+        case Event::yielded: return "higher-priority master " + who + " resumed; returning to standby";
         case Event::other_master:
             return "second master on the segment: " + who +
                    " sends the syncs of another schedule; they are not followed. Remove it, or make it a backup-master:";
@@ -52,41 +52,41 @@ public:
         case Event::stranger_sync:
             return "sync from " + who + " ignored: it is not one of the addresses (mac) that the configuration gives the master and its backups";
         case Event::foreign_frame: return who + " sends in slot " + value + " of this station; compare the configurations of both";
-        case Event::babbling: return who + " babbles: " + value + " frames in one cycle";
-        case Event::master_changed: return "the syncs come from " + who + " now";
+        case Event::babbling: return "babbling station: " + who + " sends " + value + " frames in one cycle";
+        case Event::master_changed: return "new master: " + who;
         case Event::master_there:
             return "the segment has a master already, " + who + "; this station starts to send when that one is gone, or by: " + again_ +
                    ". To keep both, make one of them a backup-master:";
         case Event::other_schedule:
-            return "the syncs of " + who + " are not followed: one comes every " + config::microseconds(h.value) +
-                   ", this station's cycle is another; give both the same";
-        case Event::no_carrier: return "the line has no carrier: nothing is sent or received; is the cable in, the switch on?";
-        case Event::carrier: return "the line has a carrier again";
+            return "syncs of " + who + " ignored: its cycle is " + config::microseconds(h.value) +
+                   ", that of this station differs; configure the same cycle on both";
+        case Event::no_carrier: return "no carrier: nothing is sent or received; check the cable and the switch";
+        case Event::carrier: return "carrier detected again";
         case Event::out_of_step:
-            return "the sync of " + who + " is heard, but this thread is " + config::microseconds(h.value) +
-                   " off and comes no nearer; do the threads of this process follow another instance?";
+            return "cannot synchronise to " + who + ": the offset of this thread stays at " + config::microseconds(h.value) +
+                   "; check whether the threads of this process follow another instance";
         case Event::wrong_period:
-            return "the thread's period is " + config::microseconds(h.value) + ", the configuration's cycle is " +
-                   (schedule_.cycle != 0 ? config::microseconds(schedule_.cycle) : "another, as the master sent it") +
-                   "; nothing is sent: make them equal";
-        case Event::unheard: return "no sync is heard; does the segment's master run, and is this its segment?";
+            return "the period of the thread is " + config::microseconds(h.value) + ", the cycle of the schedule " +
+                   (schedule_.cycle != 0 ? "is " + config::microseconds(schedule_.cycle) : "of the master differs") +
+                   "; nothing is sent until they are equal";
+        case Event::unheard: return "no sync received; check that the master runs and is on this segment";
         case Event::unconfigured:
             return "has no schedule and waits for the master of the segment to send it one (RTcfg); the master's file must have a block "
                    "with '" +
                    (known_as_.empty() ? "mac " + who : "ip " + known_as_) + "'";
-        case Event::other_server: return "a second RTcfg server, " + who + ", is not listened to; this station has its configuration";
+        case Event::other_server: return "second RTcfg server " + who + " ignored; this station already has a configuration";
         case Event::other_configuration:
             return who +
-                   " sends another configuration than the one in use; it is taken when the sync was lost: stop the master for a moment";
-        case Event::reported_dead: return "the master says that " + who + " is dead";
+                   " sends a configuration that differs from the one in use; it is applied after a loss of sync: stop the master briefly";
+        case Event::reported_dead: return "the master reports " + who + " dead";
         case Event::station_ready: return "station " + of_schedule(h) + " is configured";
         case Event::station_dead:
             return "station " + of_schedule(h) + " is dead: no heartbeat for " + std::to_string(2 * schedule_.heartbeat_ms) +
-                   " ms; all were told, and it is invited again";
+                   " ms; all stations were notified, and it is invited again";
         case Event::station_too_long:
-            return "nothing is heard of " + schedule_.stations.at(static_cast<std::size_t>(h.value)).name +
-                   "; if it waits for its configuration: this master's slot 0 is too short for it, " + std::to_string(longest_stage_1()) +
-                   " bytes are needed";
+            return "no frame from " + schedule_.stations.at(static_cast<std::size_t>(h.value)).name +
+                   "; its configuration needs a slot 0 of " + std::to_string(longest_stage_1()) +
+                   " bytes at the master, which is too short";
         }
         return {};
     }

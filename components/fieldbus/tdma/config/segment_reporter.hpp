@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What happened on the segment, on standard error: told by the cycle, worded outside of it.
+// Prints the events of a segment on standard error: recorded by the cycle, formatted outside of it.
 #pragma once
 
 #include <string>
