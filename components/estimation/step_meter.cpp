@@ -52,8 +52,8 @@ HAL_COMPONENT(StepMeter, "step_meter", "Overshoot, rise time, settling time and 
 Each change of `command` starts a measurement from the current value; the outputs converge during the step. A settling time
 equal to `time` means that the value has not settled. NaN and infinite values are ignored.
 
-    loadrt step_meter names=judge
-    addf judge.update servo
-    net push-wanted => judge.command
-    net push        => judge.value
+    loadrt step_meter names=meter
+    addf meter.update servo
+    net push-wanted => meter.command
+    net push        => meter.value
 )")
