@@ -1,111 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The control socket: who gets in, what clients may do to it, and that the machine goes on whatever they do.
-#include <cstdlib>
-#include <memory>
-#include <thread>
-
-#include <nlohmann/json.hpp>
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
-
-#include "machine.hpp"
-#include "machine/address.hpp"
-#include "control/client.hpp"
-#include "control/server.hpp"
-#include "shell_machine.hpp"
+// The control server: what clients can do, and that the machine keeps running whatever they do.
+#include "shell_server.hpp"
 
 namespace hal::test {
 namespace {
-
-using Json = nlohmann::json;
-
-/// A raw connection: what a badly behaved program would do.
-class Wire {
-public:
-    explicit Wire(const std::string& path) : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        path.copy(address.sun_path, sizeof address.sun_path - 1);
-        connected = ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-    }
-    ~Wire() { close(fd_); }
-    Wire(const Wire&) = delete;
-    /// False when the other side has closed.
-    bool send(std::string_view text) {
-        while (!text.empty()) {
-            const ssize_t gone = ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL);
-            if (gone <= 0) return false;
-            text.remove_prefix(static_cast<std::size_t>(gone));
-        }
-        return true;
-    }
-    /// As much as the kernel takes without waiting.
-    std::size_t push(std::string_view text) {
-        const ssize_t gone = ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-        return gone > 0 ? static_cast<std::size_t>(gone) : 0;
-    }
-    /// The next line; empty when the other side has closed.
-    std::string line() {
-        std::size_t end;
-        while ((end = in_.find('\n')) == in_.npos) {
-            char part[4096];
-            const ssize_t got = recv(fd_, part, sizeof part, 0);
-            if (got <= 0) return "";
-            in_.append(part, static_cast<std::size_t>(got));
-        }
-        const std::string text = in_.substr(0, end);
-        in_.erase(0, end + 1);
-        return text;
-    }
-    void shut() { shutdown(fd_, SHUT_RDWR); }
-
-    bool connected = false;
-
-private:
-    int fd_;
-    std::string in_;
-};
-
-struct ServerTest : testing::Test {
-    ServerTest() {
-        setenv("XDG_RUNTIME_DIR", folder.path.c_str(), 1);
-        machine = std::make_unique<ShellMachine>();
-        machine->must("loadrt and2 names=a,b\nloadrt sum2 names=s\nnewthread t 1000000\naddf s t\n");
-    }
-    ~ServerTest() override { server.reset(); }
-    void serve(ServerOptions options = {}) {
-        options.log = [this](std::string_view sentence) {
-            const std::scoped_lock lock(log_mutex);
-            logged += std::string(sentence) + "\n";
-        };
-        server = std::make_unique<Server>(machine->shell, std::move(options));
-        Diagnostics diagnostics;
-        ASSERT_TRUE(server->start(diagnostics)) << render(diagnostics, machine->session.sources);
-    }
-    std::unique_ptr<Client> client() {
-        std::string problem;
-        auto made = Client::connect("test", problem);
-        EXPECT_NE(made, nullptr) << problem;
-        return made;
-    }
-    /// True when an ordinary client is still served.
-    bool alive() {
-        const auto probe = client();
-        return probe && probe->run("getp a.out").out == "FALSE\n";
-    }
-    std::string log() {
-        const std::scoped_lock lock(log_mutex);
-        return logged;
-    }
-
-    Folder folder;
-    std::unique_ptr<ShellMachine> machine;
-    std::mutex log_mutex;
-    std::string logged;
-    std::unique_ptr<Server> server;
-};
 
 TEST_F(ServerTest, a_client_runs_commands_reads_and_completes) {
     serve();
@@ -129,7 +27,7 @@ TEST_F(ServerTest, a_client_runs_commands_reads_and_completes) {
     EXPECT_TRUE(c->run("begin").collecting);
 }
 
-TEST_F(ServerTest, requests_in_a_row_are_answered_in_a_row) {
+TEST_F(ServerTest, pipelined_requests_are_answered_in_order) {
     serve();
     const auto c = client();
     std::vector<std::uint64_t> ids;
@@ -180,7 +78,7 @@ TEST_F(ServerTest, a_waiting_command_holds_up_nobody_else_and_ends_with_its_clie
     EXPECT_TRUE(alive());
 }
 
-TEST_F(ServerTest, an_open_begin_goes_with_its_client) {
+TEST_F(ServerTest, an_open_transaction_is_discarded_when_its_client_disconnects) {
     serve();
     auto c = client();
     c->run("begin");
@@ -192,7 +90,7 @@ TEST_F(ServerTest, an_open_begin_goes_with_its_client) {
 
 // --- clients that behave badly ---------------------------------------------------------------------------------------------
 
-TEST_F(ServerTest, rubbish_is_answered_and_the_connection_goes_on) {
+TEST_F(ServerTest, invalid_requests_get_an_error_and_the_connection_continues) {
     serve();
     Wire wire(server->path());
     ASSERT_TRUE(wire.connected);
@@ -204,7 +102,7 @@ TEST_F(ServerTest, rubbish_is_answered_and_the_connection_goes_on) {
     EXPECT_TRUE(eventually([&] { return server->counts().rubbish == 2; }));
 }
 
-TEST_F(ServerTest, a_line_in_pieces_is_one_request) {
+TEST_F(ServerTest, a_line_received_in_parts_is_one_request) {
     serve();
     Wire wire(server->path());
     wire.line();
@@ -212,7 +110,7 @@ TEST_F(ServerTest, a_line_in_pieces_is_one_request) {
     EXPECT_EQ(Json::parse(wire.line())["out"], "FALSE\n");
 }
 
-TEST_F(ServerTest, half_a_request_is_never_executed) {
+TEST_F(ServerTest, a_truncated_request_is_never_executed) {
     serve();
     {
         Wire wire(server->path());
@@ -224,7 +122,7 @@ TEST_F(ServerTest, half_a_request_is_never_executed) {
     EXPECT_EQ(server->counts().requests, 1U);
 }
 
-TEST_F(ServerTest, a_line_of_100_megabytes_is_refused_and_skipped) {
+TEST_F(ServerTest, a_line_of_100_megabytes_is_rejected_and_skipped) {
     serve();
     Wire wire(server->path());
     wire.line();
@@ -239,7 +137,7 @@ TEST_F(ServerTest, a_line_of_100_megabytes_is_refused_and_skipped) {
     EXPECT_EQ(Json::parse(wire.line())["id"], 2);
 }
 
-TEST_F(ServerTest, a_client_that_never_reads_is_dropped_with_a_reason) {
+TEST_F(ServerTest, a_client_that_never_reads_is_disconnected_and_the_reason_is_logged) {
     ServerOptions options;
     options.queue = 10'000;
     options.stall_ms = 20;
@@ -273,7 +171,7 @@ TEST_F(ServerTest, a_subscriber_that_sleeps_misses_values_but_stays) {
     EXPECT_EQ(server->counts().dropped, 0U);
 }
 
-TEST_F(ServerTest, clients_that_come_and_go_leave_nothing) {
+TEST_F(ServerTest, clients_that_connect_and_disconnect_leak_nothing) {
     serve();
     for (int i = 0; i < 200; ++i) {
         Wire wire(server->path());
@@ -342,105 +240,6 @@ TEST_F(ServerTest, a_reserved_place_is_not_kept_by_a_subscription) {
     EXPECT_TRUE(eventually([&] { return server->counts().requests == 2; }));
     EXPECT_EQ(client()->run("getp a.out").out, "FALSE\n");
     EXPECT_EQ(server->counts().reclaimed, 1U);
-}
-
-// --- the socket itself -----------------------------------------------------------------------------------------------------
-
-TEST_F(ServerTest, the_socket_is_its_users_alone) {
-    serve();
-    struct stat about{};
-    ASSERT_EQ(stat(server->path().c_str(), &about), 0);
-    EXPECT_EQ(about.st_mode & 0777, 0600U);
-    ASSERT_EQ(stat(socket_folder().c_str(), &about), 0);
-    EXPECT_EQ(about.st_mode & 0777, 0700U);
-    EXPECT_EQ(server->path(), folder.path + "/halcyon/test.sock");
-}
-
-TEST_F(ServerTest, a_second_instance_of_the_name_is_refused_and_another_name_is_not) {
-    serve();
-    ShellMachine second;
-    Server refused(second.shell);
-    Diagnostics diagnostics;
-    EXPECT_FALSE(refused.start(diagnostics));
-    const std::string said = render(diagnostics, second.session.sources);
-    EXPECT_NE(said.find("an instance named 'test' is already running (process " + std::to_string(getpid()) + ") [instance-running]"), std::string::npos) << said;
-    EXPECT_TRUE(alive());
-    ShellMachine third({}, shell_session("third"));
-    Server other(third.shell);
-    Diagnostics none;
-    EXPECT_TRUE(other.start(none));
-    EXPECT_EQ(running_instances(), (std::vector<std::string>{"test", "third"}));
-    std::string problem;
-    EXPECT_EQ(Client::connect("fourth", problem), nullptr);
-    EXPECT_EQ(problem, "no instance 'fourth' is running; running: test, third (choose with --name)");
-}
-
-TEST_F(ServerTest, what_a_dead_process_left_is_replaced) {
-    std::filesystem::create_directory(folder.path + "/halcyon");
-    std::filesystem::permissions(folder.path + "/halcyon", std::filesystem::perms::owner_all);
-    folder.write("halcyon/test.lock", "1\n");
-    {  // a socket nobody listens on
-        const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        (folder.path + "/halcyon/test.sock").copy(address.sun_path, sizeof address.sun_path - 1);
-        ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-        close(fd);
-    }
-    EXPECT_TRUE(running_instances().empty());
-    serve();
-    EXPECT_TRUE(alive());
-    server.reset();
-    EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/test.sock"));
-    EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/test.lock"));
-    std::string problem;
-    EXPECT_EQ(Client::connect("test", problem), nullptr);
-    EXPECT_EQ(problem, "no instance 'test' is running; start one with `hal run FILE.hal`");
-}
-
-TEST_F(ServerTest, a_folder_that_is_not_ours_is_refused) {
-    const auto said = [&](const std::string& name) {
-        ShellMachine other({}, shell_session(name));
-        Server refused(other.shell);
-        Diagnostics diagnostics;
-        EXPECT_FALSE(refused.start(diagnostics));
-        return render(diagnostics, other.session.sources);
-    };
-    std::filesystem::create_directory_symlink("/tmp", folder.path + "/halcyon");
-    EXPECT_NE(said("x").find("belongs to another user or is accessible to others [no-socket]"), std::string::npos) << said("x");
-    std::filesystem::remove(folder.path + "/halcyon");
-    folder.write("halcyon", "a file");
-    EXPECT_NE(said("x").find("[no-socket]"), std::string::npos);
-    for (const char* name : {"../x", "", ".x", "a b", "x/y"}) EXPECT_NE(said(name).find("no name for an instance"), std::string::npos) << name;
-    EXPECT_NE(said(std::string(65, 'x')).find("[no-socket]"), std::string::npos);
-    setenv("XDG_RUNTIME_DIR", (folder.path + "/" + std::string(100, 'd')).c_str(), 1);
-    EXPECT_NE(said("x").find("too long"), std::string::npos);
-}
-
-TEST_F(ServerTest, stop_calls_back_and_the_end_is_clean) {
-    std::atomic<bool> stopped{false};
-    ServerOptions options;
-    options.stop = [&] { stopped = true; };
-    serve(std::move(options));
-    const auto c = client();
-    EXPECT_EQ(c->stop().status, 0);
-    EXPECT_TRUE(eventually([&] { return stopped.load(); }));
-    server.reset();
-    EXPECT_EQ(c->run("getp a.out").err, "the connection to instance 'test' is lost\n");
-    EXPECT_FALSE(c->connected());
-    Json event;
-    EXPECT_FALSE(c->next_event(event, -1));
-}
-
-TEST_F(ServerTest, the_instance_meant_is_the_named_one_or_the_only_one) {
-    EXPECT_EQ(instance_wanted("x"), "x");
-    unsetenv("HALCYON_INSTANCE");
-    EXPECT_EQ(instance_wanted(""), "default");
-    serve();
-    EXPECT_EQ(instance_wanted(""), "test");
-    setenv("HALCYON_INSTANCE", "from-environment", 1);
-    EXPECT_EQ(instance_wanted(""), "from-environment");
-    unsetenv("HALCYON_INSTANCE");
 }
 
 }  // namespace
