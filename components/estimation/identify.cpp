@@ -107,11 +107,11 @@ private:
     }
     void watch(double y, double dt) noexcept {
         keep(y - start_);
-        if (time_ >= step_time) judge(dt * static_cast<double>(thin_));
+        if (time_ >= step_time) evaluate(dt * static_cast<double>(thin_));
     }
     /// Areas of the step response (K. Åström, T. Hägglund, *PID Controllers: Theory, Design, and Tuning*, 2.4): with the end value y1,
     ///     A0 = integral of y1 - y = y1 (T + L),   A1 = integral of y up to T + L = y1 T / e
-    void judge(double h) noexcept {
+    void evaluate(double h) noexcept {
         const std::size_t n = count_, tail = std::max<std::size_t>(n / 10, 1);
         if (n < 20 || amplitude == 0.0) return fail(Failure::no_answer);
         double end = 0.0, before = 0.0;

@@ -81,7 +81,7 @@ public:
 
     const Moment& now() const noexcept { return at(number_); }
 
-    /// A new moment; to be followed by tell() for each measurement and then settle(). [realtime]
+    /// Starts a new step; call the measurement function for each measurement, then settle(). [realtime]
     void advance(const Vector& u) noexcept {
         ++number_;
         Moment& moment = at(number_);

@@ -14,7 +14,7 @@
 
 namespace sim {
 
-/// What the rig is made of, SI units; furuta.cpp says where each number is from.
+/// Parameters of the rig in SI units; furuta.cpp documents their sources.
 struct FurutaConstants {
     double supply = 24.0, current_limit = 4.0, torque_constant = 0.0677, resistance = 0.68, inductance = 0.001, rotor_inertia = 7.5e-5;
     double arm_length = 0.2, arm_mass = 0.2, arm_centre = 0.1, arm_inertia = 6.667e-4, arm_viscous = 5e-4, arm_coulomb = 0.008;
@@ -84,7 +84,7 @@ public:
     void tap(const FurutaConstants& of, double speed) noexcept {
         if (of.pendulum_centre > 0.0 && std::isfinite(speed)) state_ = of.dynamics().pushed(state_, speed / of.pendulum_centre);
     }
-    /// One period under that voltage. `enable` false: the motor carries no current. False: the state was no number any more.
+    /// Simulates one period with that voltage. `enable` false: the motor current is 0. Returns false if the state became NaN or infinite.
     bool step(const FurutaConstants& of, double voltage, bool enable, std::int64_t period_ns) noexcept {
         const FurutaDynamics rig = of.dynamics();
         const Winding winding{of.resistance, of.inductance, of.torque_constant, of.current_limit};
@@ -122,7 +122,7 @@ public:
 private:
     static constexpr std::int64_t longest_step_ns = 100'000;  // the fastest mode is some 100 rad/s: an error far below 1e-9
 
-    /// Up to ten seconds; what is no number is none.
+    /// Limits to ten seconds; NaN counts as 0.
     static std::int64_t nanoseconds(double seconds) noexcept {
         return seconds > 0.0 ? static_cast<std::int64_t>(std::min(seconds, 10.0) * 1e9) : 0;
     }

@@ -85,7 +85,7 @@ private:
             spare_known_ = false;
             return spare_;
         }
-        for (int tries = 0; tries < 64; ++tries) {  // one of five is refused: 64 in a row never are
+        for (int tries = 0; tries < 64; ++tries) {  // one in five is rejected; 64 in a row do not occur
             const double u = bits_.even(), v = bits_.even(), s = u * u + v * v;
             if (!(s > 0.0 && s < 1.0)) continue;
             const double factor = std::sqrt(-2 * std::log(s) / s);

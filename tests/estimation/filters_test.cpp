@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kalman filters and filters with bad, late and missing measurements; what netlists cannot say: NaN, and comparisons sample by sample.
+// Kalman filters and filters with bad, late and missing measurements; NaN, and comparisons sample by sample.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -161,12 +161,12 @@ TEST(Lqr, New_weights_make_a_new_gain_outside_of_the_cycle_and_bad_ones_leave_th
     for (const double bad : {-1.0, nan}) {
         lqr.set("r-0", bad);
         wait();
-        EXPECT_TRUE(lqr.get<bool>("refused"));
+        EXPECT_TRUE(lqr.get<bool>("rejected"));
         EXPECT_NEAR(lqr.get<double>("gain-0-0"), 3.0, 1e-12);
     }
     lqr.set("r-0", 1.0);
     wait();
-    EXPECT_FALSE(lqr.get<bool>("refused"));
+    EXPECT_FALSE(lqr.get<bool>("rejected"));
     lqr.set("x-0", 2.0);
     lqr.run("update");
     EXPECT_NEAR(lqr.get<double>("u-0"), -6.0, 1e-12);
@@ -215,7 +215,7 @@ TEST(Joseph, Keeps_a_covariance_symmetric_and_positive_where_the_short_form_does
             for (Eigen::Index j = 0; j < n; ++j) lost = lost || naive(i, j) != naive(j, i) || naive(i, i) < 0.0;
     }
     Eigen::internal::set_is_malloc_allowed(true);
-    EXPECT_TRUE(lost);  // else this test would say nothing
+    EXPECT_TRUE(lost);  // otherwise this test would prove nothing
 }
 
 TEST(Ekf, Follows_a_pendulum_that_it_sees_late_and_noisily) {

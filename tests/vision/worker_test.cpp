@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::int64_t ms = 1'000'000, second = 1000 * ms;
 
-/// A camera of 8 x 6 pixels at 100 frames a second that does as it is told.
+/// A camera of 8 x 6 pixels at 100 frames a second that follows the test's script.
 class Puppet : public Source {
 public:
     bool there = true, cut = false, starved = false;

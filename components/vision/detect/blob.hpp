@@ -23,7 +23,7 @@ struct BlobKind {
 struct BlobRules {
     int    threshold = 40;     ///< of the colour, of 255
     int    least_area = 40;    ///< px
-    double most_distance = 3;  ///< m: farther away it is not told
+    double most_distance = 3;  ///< m: maximum distance of objects
 };
 
 /// What of each kind stands in the picture: its axis is `radius` behind the place where it ends below. One that goes beyond the picture's

@@ -11,9 +11,9 @@ namespace hal::vision {
 
 struct LineRules {
     bool   dark = true;          ///< darker than the floor; else lighter
-    double width = 0.02;         ///< m; what is half or twice as wide is no line
-    double ahead = 0.3;          ///< m: where offset and heading are told
-    double reach = 0.6;          ///< m: what is farther away is not looked at: there a parabola is no line's shape
+    double width = 0.02;         ///< m; candidates narrower than half or wider than twice this width are rejected
+    double ahead = 0.3;          ///< m: distance at which offset and heading are measured
+    double reach = 0.6;          ///< m: maximum distance; farther away a parabola does not describe the line
     double contrast = 20.0;      ///< least difference from the floor, of 255
     double least_quality = 0.4;  ///< part of the bands that has to show it
     int    bands = 12;           ///< strips of the picture that are looked at, 3 to 32

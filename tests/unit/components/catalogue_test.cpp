@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What netlist tests cannot say of the smaller components: values that are not numbers, and load arguments that are refused.
+// The smaller components: NaN values and rejected load arguments, which netlist tests cannot express.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,8 +24,8 @@ void expect_refused(const std::string& component, const char* argument, const ch
 }
 
 TEST(Catalogue, Refuses_load_arguments_that_make_no_sense) {
-    expect_refused("logic", "personality", "0x100", "its low byte says 1 to 16");
-    expect_refused("logic", "personality", "0x111", "its low byte says 1 to 16");
+    expect_refused("logic", "personality", "0x100", "inputs in its low byte; expected 1 to 16");
+    expect_refused("logic", "personality", "0x111", "inputs in its low byte; expected 1 to 16");
     expect_refused("bitslice", "personality", "33", "outside 1..32");
     expect_refused("lincurve", "personality", "0", "outside 1..16");
     for (const char* config : {"", "f", "ff", "8", "fx8", "ffb8", "ff0", "ff1025", "ff99999"}) expect_refused("mux_generic", "config", config, "config=");
@@ -37,7 +37,7 @@ TEST(Catalogue, Names_ways_and_labels_as_the_arguments_say) {
     EXPECT_TRUE(mux.has_pin("in-u32-02"));
     EXPECT_FALSE(mux.has_pin("in-u32-03"));
     EXPECT_TRUE(mux.has_pin("out-s32"));
-    EXPECT_FALSE(mux.has_pin("sel-bit-00"));  // three is no power of two
+    EXPECT_FALSE(mux.has_pin("sel-bit-00"));  // three is not a power of two
     Instance code("enum", {{"enums", "E;a;;c"}});
     EXPECT_EQ(code.get<std::uint32_t>("c-val"), 2u);
     EXPECT_TRUE(code.has_pin("a-in"));

@@ -122,7 +122,7 @@ TEST(Encoder, Index_zeroes_at_the_rising_edge_and_clears_the_request) {
     e.set("index-enable", true);
     e.capture();
     e.turn(7, 8);
-    EXPECT_EQ(e.counts(), 8);  // the level alone is no edge
+    EXPECT_EQ(e.counts(), 8);  // the level alone is not an edge
     EXPECT_TRUE(e.get<bool>("index-enable"));
     e.set("phase-Z", false);
     e.turn(8, 20);
@@ -226,7 +226,7 @@ TEST(Encoder, Velocity_begins_with_the_second_edge_and_falls_as_the_next_edge_wo
     for (int i = 0; i < 10; ++i) e.show(0);
     e.turn(0, 1, 4);
     e.capture();
-    EXPECT_EQ(e.get<double>("velocity"), 0.0) << "one edge tells nothing of the way before it";
+    EXPECT_EQ(e.get<double>("velocity"), 0.0) << "one edge gives no velocity";
     e.turn(1, 2, 4);
     e.capture();
     EXPECT_NEAR(e.get<double>("velocity"), 5000.0, 1e-6) << "the next edge may still come in time, in the next cycle";
