@@ -20,10 +20,10 @@ void RemoteNode::on_error_control(const Frame& f, Time now, Events& events) noex
         // Behind a gap an answer got lost, and the toggle bit went on without us.
         const bool wrong = toggle_known_ && toggle != toggle_ && now - guard_heard_ < guard_period_ * 3 / 2;
         guard_heard_ = now;
-        toggle_ = toggle ^ 0x80;  // the next one, whatever this one was: an answer that never changes is never right again
+        toggle_ = toggle ^ 0x80;  // from this response on: a toggle bit that never alternates stays wrong
         toggle_known_ = true;
         if (wrong) {
-            ++wrong_toggles_;  // an answer that came twice, or of a node whose guarding stands still: none (CiA 301)
+            ++wrong_toggles_;  // a repeated response, or a node whose toggle bit does not alternate (CiA 301)
             wrong_at_ = now;
             return;
         }

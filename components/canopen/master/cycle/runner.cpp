@@ -124,7 +124,7 @@ void Runner::fly(Time now) noexcept {
     if (flying_.active() == was_active_) return;
     was_active_ = flying_.active();
     if (was_active_) return boot(now);
-    master_.stand_by(now);  // the nodes are the other one's: nothing is said to them
+    master_.stand_by(now);  // the other master controls the nodes
     device_.command(NmtCommand::enter_pre_operational, now);
 }
 
@@ -171,7 +171,7 @@ std::size_t Runner::take_frames(Time now) noexcept {
 }
 
 void Runner::take(const can::Frame& f, Time now) noexcept {
-    // Another master of this process makes our heartbeat, and its NMT commands are no stranger's.
+    // Another master of this process may send the heartbeat, and its NMT commands are not foreign.
     const bool own_beat = f.id == 0x700U + config_.node_id && !f.extended;
     if ((own_beat && (f.own || !leads_)) || (f.id == 0 && !leads_)) return;
     note_sync(f, now);
@@ -206,7 +206,7 @@ void Runner::take_wishes() noexcept {
     }
 }
 
-/// In turn, so that one that changes in every cycle keeps none of the others back.
+/// Round robin, so that an object that changes in every cycle does not block the others.
 void Runner::tell_alone(Time now) noexcept {
     for (std::size_t n = alone_.size(); n > 0; --n, next_alone_ = (next_alone_ + 1) % alone_.size()) {
         Alone&      a = alone_[next_alone_ % alone_.size()];
@@ -220,7 +220,7 @@ void Runner::tell_alone(Time now) noexcept {
     }
 }
 
-/// PDOs that nodes send on request.
+/// Requests the PDOs that nodes send on request.
 void Runner::ask(Time now) noexcept {
     for (Asked& a : asked_) {
         if (!statuses_[a.node]->operational || now < a.next || !device_.pdos().request(a.number)) continue;
@@ -228,7 +228,7 @@ void Runner::ask(Time now) noexcept {
     }
 }
 
-/// Of a node that works every SRDO is expected; what is not believed shows its safe values in this very cycle.
+/// Expects every SRDO of an operational node; invalid data is replaced by its safe values in the same cycle.
 void Runner::watch_srdos(Time now) noexcept {
     if (own_.srdos.empty()) return;
     for (const OwnSrdo& s : own_.srdos) device_.srdos().expect(s.number, statuses_[s.node]->operational, now);
@@ -257,7 +257,7 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
 
 void Runner::produce_sync(Time now, Time period) noexcept {
     if (config_.sync == config::SyncMode::timed) {
-        // On a grid of its own, but never more than half a thread period early: the period may be no multiple of it.
+        // The phase is kept, but a SYNC is never more than half a thread period early: its period need not be a multiple of that of the thread.
         if (!sync_begun_) next_sync_ = now;
         if (now + period / 2 < next_sync_) return;
         const Time behind = now > next_sync_ ? (now - next_sync_ + period / 2) / config_.sync_period : 0;

@@ -58,13 +58,13 @@ public:
     struct Foreign {
         std::uint16_t               id = 0;
         std::array<std::uint8_t, 2> data{};
-        std::uint32_t               frames = 0;  ///< since it was told last
+        std::uint32_t               frames = 0;  ///< since the last report
         bool                        sync = false, rpdo = false, begins = false;
     };
     virtual void on_foreign(const Foreign&) noexcept {}
     /// Another device has the master's own node-id.
     virtual void on_own_id_collision() noexcept {}
-    /// An SRDO is not to be believed (any more); its objects have their safe values. `place` is that in OwnNode::srdos.
+    /// The data of an SRDO is invalid; its objects have their safe values. `place` is that in OwnNode::srdos.
     virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
     virtual void on_bus_state(can::State) noexcept {}
     /// The link did not pass on what its sender may not send.
@@ -97,7 +97,7 @@ public:
     const NodeStatus&           status(std::size_t node) const noexcept { return *statuses_[node]; }
     const NetworkStatus&        network() const noexcept { return master_.status(); }
     const can::Statistics&      link_statistics() const noexcept { return statistics_; }
-    /// Process data and SYNCs that were not sent because the bus took nothing: what they said would have come too late.
+    /// Returns the number of process data frames and SYNCs withheld because the bus accepted none; they would be stale. [any]
     std::uint64_t               withheld() const noexcept { return withheld_; }
     std::uint64_t               syncs() const noexcept { return syncs_; }
     std::uint64_t               sync_overruns() const noexcept { return overruns_; }
@@ -120,7 +120,7 @@ public:
         if (active()) boot(now);
     }
     Srdos::Status               srdo(std::size_t place) const noexcept { return device_.srdos().status(own_.srdos[place].number); }
-    /// Its fault is seen to: it is believed from the next good one on. [realtime]
+    /// Acknowledges the fault of an SRDO; its data is valid from the next valid SRDO on. [realtime]
     void acknowledge_srdo(std::size_t place, Time now) noexcept { device_.srdos().acknowledge(own_.srdos[place].number, now); }
     /// The global fail-safe command goes out with the next transmit(). [realtime]
     bool send_fail_safe() noexcept { return device_.srdos().send_fail_safe(); }

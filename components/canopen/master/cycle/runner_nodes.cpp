@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whom process data goes to and comes from, what others send in the master's place, and a boot in slow threads.
+// Opens and closes the process data of nodes, detects foreign senders, and serves the boot in slow threads.
 #include <algorithm>
 #include <time.h>
 #include <utility>
@@ -8,7 +8,7 @@
 
 namespace hal::canopen {
 
-/// CiA 302-2: nothing is sent to a node before it is configured, and what it sends by then is laid out by somebody else. After a loss its
+/// CiA 302-2: no process data is sent to a node before it is configured, and its own PDOs have an unknown mapping until then. After a loss its
 /// outputs get their safe values until it is reset.
 void Runner::open_and_close() noexcept {
     if (!std::exchange(steps_changed_, false)) return;
@@ -36,7 +36,7 @@ bool Runner::mandatory_are_configured() const noexcept {
     return true;
 }
 
-/// Told when it begins, and once a second while it goes on.
+/// Reports a foreign sender when it begins, and once per second while it continues.
 void Runner::note_foreign(const can::Frame& f, Time now) noexcept {
     if (f.extended || f.error || f.remote || f.id >= ours_.size() || !ours_[f.id] || now < foreign_from_) return;
     ForeignCount& c = foreign_[f.id];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is known of the SRDOs of the nodes (EN 50325-5), as pins.
+// The pins of the SRDOs of the nodes (EN 50325-5).
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace hal::canopen {
 
 class SafetyPins {
 public:
-    /// None where no node has an SRDO. [setup]
+    /// Declares the pins; none if no node has an SRDO. [setup]
     SafetyPins(Component& c, const Function& shows, const Runner& runner) {
         const auto& srdos = runner.own().srdos;
         if (srdos.empty()) return;
@@ -30,7 +30,7 @@ public:
                 row.words[n] = who + to_string(static_cast<SrdoFault>(n)) + (s.pdo->to_node ? "" : "; its pins were set to their safe values");
         }
         fail_safe_.emplace(c, shows, "fail-safe",
-                           "rising edge: sends the global fail-safe command; whoever hears it goes to its safe state");
+                           "rising edge: sends the global fail-safe command; all receivers enter their safe state");
     }
 
     /// [realtime]
@@ -50,7 +50,7 @@ public:
         was_fail_safe_ = *fail_safe_;
     }
 
-    /// A fault in words, made before the first cycle. [realtime]
+    /// Returns the message of a fault, formatted before the first cycle. [realtime]
     const char* words(std::size_t place, SrdoFault fault) const noexcept {
         return rows_[place].words[static_cast<std::size_t>(fault) & 7].c_str();
     }
@@ -61,11 +61,11 @@ private:
         hal::Out<std::uint32_t> fault;
         hal::In<bool>           reset;
         Received(Component& c, const Function& f, const std::string& n)
-            : valid(c, f, (n + "-valid").c_str(), "its data is believed; otherwise its pins have their safe values", {.safe = false}),
+            : valid(c, f, (n + "-valid").c_str(), "SRDO data valid; otherwise its pins have their safe values", {.safe = false}),
               fault(c, f, (n + "-fault").c_str(),
-                    "why it is not believed: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, 5 not inverted, "
+                    "why the data is invalid: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, 5 not inverted, "
                     "6 global fail-safe command"),
-              reset(c, f, (n + "-reset").c_str(), "rising edge: the fault is seen to, it is believed from the next good one on") {}
+              reset(c, f, (n + "-reset").c_str(), "rising edge: acknowledges the fault; the data is valid from the next valid SRDO on") {}
     };
     struct Row {
         hal::Out<std::uint32_t>    count;
@@ -73,7 +73,7 @@ private:
         std::array<std::string, 8> words;
         bool                       was_reset = false;
         Row(Component& c, const Function& f, const std::string& n)
-            : count(c, f, (n + "-count").c_str(), "those sent, or received and believed") {}
+            : count(c, f, (n + "-count").c_str(), "SRDOs sent, or received and valid") {}
     };
     std::deque<Row>               rows_;  // a pin may not move once it is declared
     std::optional<hal::In<bool>>  fail_safe_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One controller for several masters of this process: two that are each other's strangers would send NMT commands, SYNCs and heartbeats
-// with one identifier at the same time, which no bus can carry.
+// One CAN controller for several masters of this process: two independent masters would send NMT commands, SYNCs and heartbeats with the same
+// identifier at the same time, which CAN does not allow.
 #pragma once
 
 #include <array>
@@ -44,7 +44,7 @@ private:
     explicit SharedLink(std::shared_ptr<SharedBus>);
 
     const std::shared_ptr<SharedBus> bus_;
-    link::Ring<can::Frame> incoming_{2048};  // pushed and popped by whoever holds the bus
+    link::Ring<can::Frame> incoming_{2048};  // pushed and popped by the holder of the bus
 };
 
 }  // namespace hal::canopen

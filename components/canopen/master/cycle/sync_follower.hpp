@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `sync = follow`: another node's SYNC is the beat of this machine's threads.
+// `sync = follow`: disciplines the threads of this machine by the SYNC of another node.
 #pragma once
 
 #include <utility>
@@ -10,23 +10,23 @@
 
 namespace hal::canopen {
 
-/// Holds the thread's cycles at a constant time after the SYNC, and tells how well.
+/// Keeps the cycles of the thread at a constant delay after the SYNC, and reports the error.
 class SyncFollower {
 public:
     enum class Said : std::uint8_t {
         nothing,
-        lost,      ///< five SYNCs in a row did not come: the threads run by their own clock
-        in_vain,   ///< the SYNC moves with the threads
-        unequal,   ///< its period is no multiple of the thread's
+        lost,      ///< five SYNCs in a row missing: the threads run by their own clock
+        in_vain,   ///< feedback loop: the SYNC follows these threads
+        unequal,   ///< its period and that of the thread do not match
     };
 
     SyncFollower(Component& component, const Function& shows, const config::MasterConfig& config)
         : config_(config),
-          locked_(component, shows, "sync-locked", "the cycles are at their time after the SYNC"),
-          error_(component, shows, "sync-error-us", "how much later than at that time the newest SYNC came", {.unit = "us"}),
-          rate_(component, shows, "sync-rate-ppm", "how much slower its clock runs than ours", {.unit = "ppm"}) {}
+          locked_(component, shows, "sync-locked", "the cycles are synchronised to the SYNC"),
+          error_(component, shows, "sync-error-us", "lateness of the newest SYNC", {.unit = "us"}),
+          rate_(component, shows, "sync-rate-ppm", "drift of the clock of the SYNC producer; positive: slower than this host", {.unit = "ppm"}) {}
 
-    /// Throws when the threads follow somebody else. [setup]
+    /// Throws if the threads already follow another reference. [setup]
     void start() {
         beat_.lose();
         seen_ = 0;
@@ -54,7 +54,7 @@ public:
         rate_ = beat_.rate() * 1e6;
         return said;
     }
-    /// Time since the newest SYNC, s.
+    /// Returns the time since the newest SYNC in s. [realtime]
     double silence(Time now) const noexcept { return static_cast<double>(now - came_) * 1e-9; }
 
 private:

@@ -23,8 +23,6 @@ std::string upper(const char* text) {
 
 }  // namespace
 
-// The nets, and what they tell.
-
 Gateway::Net::Net(Gateway& owner, unsigned n)
     : gateway(owner), number(n), network(out, *this), lss(out), pdos(out), own(own_objects(owner.identity_)) {
     for (std::uint8_t node = 1; node <= 127; ++node) network.add(node);
@@ -34,19 +32,19 @@ void Gateway::Net::on_node(std::uint8_t node, NodeEvent event, NmtState state, T
     const std::string who = std::to_string(number) + " " + std::to_string(node) + " ";
     const bool        guarded = watches[node];
     if (event == NodeEvent::boot_up) {
-        if (boot_up) gateway.say(who + "BOOT_UP");
+        if (boot_up) gateway.send_event(who + "BOOT_UP");
     } else if (event == NodeEvent::lost) {
         const Error what = network.node(node)->guarded() ? Error::lost_guarding : Error::lost_heartbeat;
-        gateway.say(who + "ERROR " + std::to_string(static_cast<unsigned>(what)) + " #" + to_string(what));
+        gateway.send_event(who + "ERROR " + std::to_string(static_cast<unsigned>(what)) + " #" + to_string(what));
     } else if (guarded) {
-        gateway.say(who + upper(canopen::to_string(state)));
+        gateway.send_event(who + upper(canopen::to_string(state)));
     }
 }
 
 void Gateway::Net::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
     std::string text = format_text("%u %u EMCY 0x%04X 0x%02X", number, node, e.code, e.error_register);
     for (const auto byte : e.manufacturer) text += " " + std::to_string(byte);
-    gateway.say(text + " #" + emergency_text(e.code));
+    gateway.send_event(text + " #" + emergency_text(e.code));
 }
 
 Gateway::Gateway(unsigned nets, Identity identity) : identity_(std::move(identity)) {
@@ -61,7 +59,7 @@ void Gateway::handle(unsigned net, const Frame& f, Time now) {
     Net& n = *nets_[net - 1];
     if (n.lss.listens_to(f)) return n.lss.handle(f, now);
     n.network.handle(f, now);
-    n.pdos.handle(f, [&](const std::string& text) { say(std::to_string(net) + " " + text); });
+    n.pdos.handle(f, [&](const std::string& text) { send_event(std::to_string(net) + " " + text); });
 }
 
 void Gateway::poll(Time now) {
@@ -84,82 +82,21 @@ void Gateway::poll(Time now) {
     }
 }
 
-// The clients.
-
-int Gateway::connect() {
-    const auto free = std::find_if(clients_.begin(), clients_.end(), [](const Client& c) { return !c.there; });
-    const auto place = free == clients_.end() ? clients_.insert(clients_.end(), Client{}) : free;
-    *place = {};
-    place->there = true;
-    place->net = nets_.size() == 1 ? 1 : 0;
-    return static_cast<int>(place - clients_.begin());
-}
-
-void Gateway::disconnect(int client) {
-    for (auto p = pending_.begin(); p != pending_.end();) {
-        if (p->client != client) {
-            ++p;
-            continue;
-        }
-        cancel(*p);
-        p = pending_.erase(p);
-    }
-    clients_[static_cast<std::size_t>(client)] = {};
-}
-
-void Gateway::receive(int client, std::string_view bytes, Time now) {
-    for (std::size_t n = 0; n < bytes.size();) {
-        Client&    c = clients_[static_cast<std::size_t>(client)];
-        const auto end = bytes.find('\n', n);
-        const auto piece = bytes.substr(n, end == bytes.npos ? end : end - n);
-        n = end == bytes.npos ? bytes.size() : end + 1;
-        if (!c.skips) c.in += piece;
-        if (c.in.size() > most_line && !c.skips) {
-            c.skips = true;
-            c.in.clear();
-            refuse(client, 0, Error::syntax, "the line is longer than " + std::to_string(most_line) + " bytes");
-        }
-        if (end == bytes.npos) continue;
-        const std::string text = std::move(c.in);
-        const bool        skips = c.skips;
-        c.in.clear(), c.skips = false;
-        if (!skips) line(client, text, now);
-    }
-}
-
-void Gateway::configure(std::string_view commands, Time now) {
-    const int client = connect();
-    receive(client, commands, now);
-    disconnect(client);
-}
-
-void Gateway::answer(int client, std::uint32_t sequence, const std::string& text) {
-    output(client) += "[" + std::to_string(sequence) + "] " + text + "\r\n";
-}
-void Gateway::refuse(int client, std::uint32_t sequence, Error error, const std::string& why) {
-    answer(client, sequence,
-           "ERROR:" + std::to_string(static_cast<unsigned>(error)) + " #" + to_string(error) + (why.empty() ? "" : ": " + why));
-}
-void Gateway::say(const std::string& event) {
-    for (Client& c : clients_)
-        if (c.there) c.out += event + "\r\n";
-}
-
 void Gateway::line(int client, std::string_view text, Time now) {
     Parsed parsed = parse(text);
-    if (parsed.error != Error::none) return refuse(client, parsed.command.sequence, parsed.error, parsed.why);
+    if (parsed.error != Error::none) return reject(client, parsed.command.sequence, parsed.error, parsed.why);
     execute(client, std::move(parsed.command), now);
 }
 
-/// The net and the node a command is for: as it says, or the client's defaults. False after refusing.
+/// Determines net and node of a command, or the defaults of the client. Returns false after rejecting the command.
 bool Gateway::address(Client& c, const Command& command, int client, bool with_node, unsigned& net, std::uint8_t& node) {
     net = command.net.value_or(c.net);
-    if (net == 0 && !command.net) return refuse(client, command.sequence, Error::no_net), false;
-    if (net < 1 || net > nets_.size()) return refuse(client, command.sequence, Error::bad_net), false;
+    if (net == 0 && !command.net) return reject(client, command.sequence, Error::no_net), false;
+    if (net < 1 || net > nets_.size()) return reject(client, command.sequence, Error::bad_net), false;
     if (!with_node) return true;
-    if (!command.node && c.node == 0) return refuse(client, command.sequence, Error::no_node), false;
+    if (!command.node && c.node == 0) return reject(client, command.sequence, Error::no_node), false;
     const auto id = command.node.value_or(c.node);
-    if (id > 127) return refuse(client, command.sequence, Error::bad_node), false;
+    if (id > 127) return reject(client, command.sequence, Error::bad_node), false;
     node = static_cast<std::uint8_t>(id);
     return true;
 }
@@ -178,7 +115,7 @@ void Gateway::execute(int client, Command&& command, Time now) {
         return answer(client, command.sequence, text.insert(2, "\r\n# ").substr(0, text.size() - 4));
     }
     case Verb::set_network:
-        if (command.numbers[0] < 1 || command.numbers[0] > nets_.size()) return refuse(client, command.sequence, Error::bad_net);
+        if (command.numbers[0] < 1 || command.numbers[0] > nets_.size()) return reject(client, command.sequence, Error::bad_net);
         c.net = command.numbers[0];
         return answer(client, command.sequence, "OK");
     default: break;
@@ -187,7 +124,7 @@ void Gateway::execute(int client, Command&& command, Time now) {
     Net& n = *nets_[net - 1];
     switch (command.verb) {
     case Verb::set_node:
-        if (command.numbers[0] < 1 || command.numbers[0] > 127) return refuse(client, command.sequence, Error::bad_node);
+        if (command.numbers[0] < 1 || command.numbers[0] > 127) return reject(client, command.sequence, Error::bad_node);
         c.net = net, c.node = command.numbers[0];
         return answer(client, command.sequence, "OK");
     case Verb::read:
@@ -211,8 +148,6 @@ void Gateway::execute(int client, Command&& command, Time now) {
     setting(client, command, n, now);
 }
 
-// What is done at once.
-
 void Gateway::network_command(int client, const Command& c, Net& net, std::uint8_t node, Time) {
     const NmtCommand what = c.verb == Verb::start            ? NmtCommand::start
                             : c.verb == Verb::stop           ? NmtCommand::stop
@@ -220,25 +155,25 @@ void Gateway::network_command(int client, const Command& c, Net& net, std::uint8
                             : c.verb == Verb::reset_node     ? NmtCommand::reset_node
                                                              : NmtCommand::reset_communication;
     if (node != 0 && node == net.id)
-        return refuse(client, c.sequence, Error::state, "node " + std::to_string(node) + " is the gateway itself, always operational");
-    if (!net.network.command(what, node)) return refuse(client, c.sequence, Error::no_memory, "the bus does not take it");
+        return reject(client, c.sequence, Error::state, "node " + std::to_string(node) + " is the gateway itself, always operational");
+    if (!net.network.command(what, node)) return reject(client, c.sequence, Error::no_memory, "the bus does not take it");
     answer(client, c.sequence, "OK");
 }
 
 void Gateway::error_control(int client, const Command& c, Net& net, std::uint8_t node, Time now) {
-    if (node == 0) return refuse(client, c.sequence, Error::bad_node);
+    if (node == 0) return reject(client, c.sequence, Error::bad_node);
     if (node == net.id)
-        return refuse(client, c.sequence, Error::state, "node " + std::to_string(node) + " is the gateway itself, which does not monitor itself");
+        return reject(client, c.sequence, Error::state, "node " + std::to_string(node) + " is the gateway itself, which does not monitor itself");
     RemoteNode& remote = *net.network.node(node);
     switch (c.verb) {
     case Verb::enable_guarding:
         if (c.numbers[0] < 1 || c.numbers[0] > 65535 || c.numbers[1] < 1 || c.numbers[1] > 255)
-            return refuse(client, c.sequence, Error::syntax, "1 to 65535 ms, factor 1 to 255");
+            return reject(client, c.sequence, Error::syntax, "1 to 65535 ms, factor 1 to 255");
         remote.guard(c.numbers[0] * millisecond, static_cast<std::uint8_t>(c.numbers[1]), now);
         break;
     case Verb::disable_guarding: remote.guard(0, 0, now); break;
     case Verb::enable_heartbeat:
-        if (c.numbers[0] < 1 || c.numbers[0] > 65535) return refuse(client, c.sequence, Error::syntax, "1 to 65535 ms");
+        if (c.numbers[0] < 1 || c.numbers[0] > 65535) return reject(client, c.sequence, Error::syntax, "1 to 65535 ms");
         remote.expect_heartbeat(c.numbers[0] * millisecond);
         break;
     default: remote.expect_heartbeat(0); break;
@@ -254,7 +189,7 @@ void Gateway::reset(Net& net, Time now) {
             continue;
         }
         cancel(*p);
-        refuse(p->client, p->command.sequence, Error::state, "ended by init");
+        reject(p->client, p->command.sequence, Error::state, "ended by init");
         Client& client = clients_[static_cast<std::size_t>(p->client)];
         if (client.pending > 0) --client.pending;
         p = pending_.erase(p);
@@ -287,12 +222,12 @@ void Gateway::setting(int client, const Command& c, Net& net, Time now) {
     const std::uint32_t value = c.numbers.empty() ? 0 : c.numbers[0];
     const auto          range = [&](std::uint32_t least, std::uint32_t most) {
         if (value >= least && value <= most) return true;
-        return refuse(client, c.sequence, Error::syntax, std::to_string(least) + " to " + std::to_string(most)), false;
+        return reject(client, c.sequence, Error::syntax, std::to_string(least) + " to " + std::to_string(most)), false;
     };
     switch (c.verb) {
     case Verb::init:
         if (!range(0, 9)) return;
-        if (!initialise(net.number, value)) return refuse(client, c.sequence, Error::init_failed, "the bus runs at another bit rate");
+        if (!initialise(net.number, value)) return reject(client, c.sequence, Error::init_failed, "the bus runs at another bit rate");
         reset(net, now);
         break;
     case Verb::set_heartbeat:
@@ -319,10 +254,10 @@ void Gateway::setting(int client, const Command& c, Net& net, Time now) {
         break;
     case Verb::boot_up_indication: net.boot_up = value != 0; break;
     case Verb::store:
-        if (!keep(commands())) return refuse(client, c.sequence, Error::state, "there is no place to store in");
+        if (!keep(commands())) return reject(client, c.sequence, Error::state, "there is no place to store in");
         break;
     case Verb::restore: {
-        if (!keep("")) return refuse(client, c.sequence, Error::state, "there is no place to store in");
+        if (!keep("")) return reject(client, c.sequence, Error::state, "there is no place to store in");
         break;
     }
     case Verb::info_version:
@@ -330,17 +265,15 @@ void Gateway::setting(int client, const Command& c, Net& net, Time now) {
         return answer(client, c.sequence,
                       format_text("%u %u %u.%u %u 3 3.0 1.0", identity_.vendor, identity_.product, identity_.revision >> 16, identity_.revision & 0xffff,
                                   identity_.serial));
-    default: return refuse(client, c.sequence, Error::not_supported);
+    default: return reject(client, c.sequence, Error::not_supported);
     }
     answer(client, c.sequence, "OK");
 }
 
-// What takes its time.
-
 bool Gateway::enqueue(int client, Command&& command, Net& net, std::uint8_t node, Time now) {
     Client& c = clients_[static_cast<std::size_t>(client)];
     if (c.pending >= most_pending)
-        return refuse(client, command.sequence, Error::no_memory, "too many commands wait for their answers"), false;
+        return reject(client, command.sequence, Error::no_memory, "too many commands wait for their answers"), false;
     ++c.pending;
     Pending& p = pending_.emplace_back();
     p.client = client, p.net = net.number, p.node = node, p.command = std::move(command);
@@ -349,9 +282,9 @@ bool Gateway::enqueue(int client, Command&& command, Net& net, std::uint8_t node
 }
 
 void Gateway::start_transfer(int client, Command&& command, Net& net, std::uint8_t node, Time now) {
-    if (node == 0) return refuse(client, command.sequence, Error::bad_node);
+    if (node == 0) return reject(client, command.sequence, Error::bad_node);
     if (command.value.size() > net.command_size)
-        return refuse(client, command.sequence, Error::no_memory, "set command_size allows " + std::to_string(net.command_size) + " bytes");
+        return reject(client, command.sequence, Error::no_memory, "set command_size allows " + std::to_string(net.command_size) + " bytes");
     if (node == net.id) return own_transfer(client, command, net, now);
     if (!enqueue(client, std::move(command), net, node, now)) return;
     Pending& p = pending_.back();
@@ -383,7 +316,7 @@ void Gateway::pdo_command(int client, Command&& c, Net& net, Time now) {
         if (error == Error::none) return answer(client, c.sequence, std::to_string(net.number) + " " + text);
         text = "nothing has come yet, or set rpdo is missing";
     }
-    if (error != Error::none) return refuse(client, c.sequence, error, text);
+    if (error != Error::none) return reject(client, c.sequence, error, text);
     answer(client, c.sequence, "OK");
 }
 
@@ -400,7 +333,7 @@ void Gateway::cancel(Pending& p) {
 bool Gateway::proceed(Pending& p, Time now) {
     if (p.limit != 0 && now - p.since >= p.limit && !p.request.done()) {
         cancel(p);
-        refuse(p.client, p.command.sequence, Error::timeout);
+        reject(p.client, p.command.sequence, Error::timeout);
         return true;
     }
     switch (p.command.verb) {
@@ -414,7 +347,7 @@ bool Gateway::proceed(Pending& p, Time now) {
             return true;
         }
         if (now - p.since < net.sdo_timeout) return false;
-        refuse(p.client, p.command.sequence, Error::timeout);
+        reject(p.client, p.command.sequence, Error::timeout);
         return true;
     }
     default: return proceed_lss(p, now);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CiA 309-3: a gateway that text lines command and a CANopen network obeys. It owns no bus, no socket and no clock; it takes memory as it
-// needs it, so it is for programs without a cycle.
+// The text gateway of CiA 309-3: clients send commands as text lines, the gateway executes them on CANopen networks. It owns neither bus, socket
+// nor clock. It allocates memory, so it is for programs without a cycle; all calls are [setup] and belong to one thread.
 //
 //     Gateway gateway(1);
 //     const int client = gateway.connect();
@@ -22,49 +22,55 @@
 
 namespace hal::canopen::gateway {
 
-/// `ERROR:0x06020000 #object does not exist …`, as an answer.
+/// Returns the response to an SDO abort: `ERROR:0x06020000 #object does not exist …`.
 std::string abort_text(Abort);
-/// What a gateway reports of itself: `info version`, and in its own node 1018h, 1008h (product name) and 2000h (the three names).
+/// The identity of a gateway in `info version`, and in its own node as 1018h, 1008h (product name) and 2000h (the three names).
 struct Identity {
     static constexpr std::size_t most_name = 200;  ///< bytes of a name
     std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;  ///< as registered with CiA; 0: none. revision: major << 16 | minor
     std::string   vendor_name = "Halcyon", product_name = "Halcyon CiA 309-3 gateway", order_code = "";
 };
-/// What Net::own holds.
+/// Returns the objects of the own node of a gateway.
 Description own_objects(const Identity&);
 
+/// The gateway: nets count from 1, clients are numbers from connect().
 class Gateway {
 public:
     static constexpr std::size_t most_line = 4 << 20, most_output = 32 << 20, most_pending = 64;
 
-    /// Nets count from 1. With one net it is every client's default.
+    /// Creates a gateway with `nets` networks. A single net is the default of every client.
     explicit Gateway(unsigned nets, Identity identity = {});
     ~Gateway();
 
-    /// What `init` does to the bus: the index of a bit rate as in CiA 305, 9 is automatic. False: it cannot be had.
+    /// Sets the bit rate of a bus for the command `init`: an index of CiA 305, 9 is automatic. Returns false if it is not available.
     std::function<bool(unsigned net, std::uint32_t bit_rate_index)> initialise = [](unsigned, std::uint32_t) { return true; };
-    /// What `store` keeps: commands that set the gateway up again. False: there is no place for them.
+    /// Stores the settings for the command `store`, as commands for configure(). Returns false if there is no storage.
     std::function<bool(const std::string& commands)> keep = [](const std::string&) { return false; };
-    /// Carries out what `keep` was given.
+    /// Executes stored settings.
     void configure(std::string_view commands, Time now);
 
+    /// Adds a client and returns its number.
     int connect();
-    /// Ends what the client waits for.
+    /// Removes a client and cancels its pending commands.
     void disconnect(int client);
-    /// Bytes of the client, whole lines or not.
+    /// Processes bytes from a client, complete lines or parts.
     void receive(int client, std::string_view bytes, Time now);
-    /// Lines for the client; the caller takes them out. More than most_output: it does not read, and is better left.
+    /// Returns the output for a client; the caller removes what it sent. A client whose output exceeds most_output does not read and should be
+    /// disconnected.
     std::string& output(int client) { return clients_[static_cast<std::size_t>(client)].out; }
 
+    /// Returns the transmit queue of a net.
     FrameQueue& out(unsigned net) { return nets_[net - 1]->out; }
+    /// Processes a received frame.
     void        handle(unsigned net, const Frame&, Time now);
+    /// Continues pending commands and checks timeouts.
     void        poll(Time now);
-    /// Nobody waits for anything.
+    /// Returns true if no command is pending.
     bool idle() const { return pending_.empty(); }
 
 private:
     struct Client {
-        bool        there = false, skips = false;  ///< skips: the rest of a line that was too long
+        bool        connected = false, skips = false;  ///< skips: discards the rest of a line that was too long
         std::string in, out;
         unsigned    net = 0, node = 0;         ///< defaults; 0: none
         std::size_t pending = 0;
@@ -82,14 +88,14 @@ private:
         LssMaster      lss;
         Pdos           pdos;
         std::uint8_t   id = 0;     ///< own node; 0: none
-        Dictionary     own;        ///< its objects, for this gateway's clients; the bus does not reach them
+        Dictionary     own;        ///< its objects, for clients of this gateway only, not for the bus
         Time           heartbeat = 0, next_heartbeat = 0;
         Time           command_timeout = 0, sdo_timeout = 500 * millisecond;
         std::size_t    command_size = 1 << 20;
         bool           block = false, boot_up = true, watches[128] = {};
-        const Pending* lss_owner = nullptr;  ///< whose service it is
+        const Pending* lss_owner = nullptr;  ///< the command that uses the LSS master
     };
-    /// A command that has no answer yet.
+    /// A command without a response yet.
     struct Pending {
         int                             client = 0;
         unsigned                        net = 0;
@@ -107,8 +113,8 @@ private:
     void execute(int client, Command&&, Time now);
     bool address(Client&, const Command&, int client, bool node, unsigned& net_number, std::uint8_t& node_id);
     void answer(int client, std::uint32_t sequence, const std::string& text);
-    void refuse(int client, std::uint32_t sequence, Error, const std::string& why = "");
-    void say(const std::string& event);
+    void reject(int client, std::uint32_t sequence, Error, const std::string& why = "");
+    void send_event(const std::string& event);
 
     void network_command(int client, const Command&, Net&, std::uint8_t node, Time now);
     void error_control(int client, const Command&, Net&, std::uint8_t node, Time now);
@@ -118,7 +124,7 @@ private:
     void start_lss(int client, Command&&, Net&, Time now);
     void own_transfer(int client, const Command&, Net&, Time now);
     bool enqueue(int client, Command&&, Net&, std::uint8_t node, Time now);
-    /// True: it has its answer.
+    /// Returns true once the command has its response.
     bool        proceed(Pending&, Time now);
     bool        proceed_transfer(Pending&, Time now);
     bool        proceed_lss(Pending&, Time now);

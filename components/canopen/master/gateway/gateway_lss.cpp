@@ -40,7 +40,7 @@ bool fits(const Command& c) {
 void Gateway::start_lss(int client, Command&& c, Net& net, Time now) {
     if (fits(c)) enqueue(client, std::move(c), net, 0, now);
     else
-        refuse(client, c.sequence,
+        reject(client, c.sequence,
                c.verb == Verb::lss_bit_rate   ? Error::lss_bit_rate
                : c.verb == Verb::lss_set_node ? Error::lss_node_id
                                               : Error::syntax);
@@ -78,7 +78,7 @@ bool Gateway::proceed_lss(Pending& p, Time now) {
     const LssMaster::Result& r = net.lss.result();
     const auto               end = [&](Error error, const std::string& text = "OK") {
         net.lss_owner = nullptr;
-        if (error != Error::none) refuse(p.client, p.command.sequence, error);
+        if (error != Error::none) reject(p.client, p.command.sequence, error);
         else answer(p.client, p.command.sequence, text);
         return true;
     };

@@ -134,7 +134,7 @@ std::vector<std::size_t> sufficient_order(std::span<const Message> messages, con
     std::stable_sort(open.begin(), open.end(),
                      [&](std::size_t x, std::size_t y) { return items[x].limit - items[x].j < items[y].limit - items[y].j; });
     std::int64_t blocking = 0;
-    while (!open.empty()) {  // whoever is in time with all the others above takes the lowest free place; the patient ones are tried first
+    while (!open.empty()) {  // a message that meets its deadline below all others gets the lowest free priority; those with late deadlines are tried first
         bool found = false;
         for (std::size_t place = open.size(); place-- > 0 && !found;) {
             const std::size_t i = open[place];
