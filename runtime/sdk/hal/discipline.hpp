@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A clock that follows an outside beat (a CANopen SYNC, a TDMA sync frame, EtherCAT's reference clock): Discipline makes of measured
-// phase errors the steps that bring the clock to the beat and keep it there; DisciplinedClock makes those steps with all threads of
-// the runtime.
+// Disciplines the clock of the threads to an external reference (CANopen SYNC, TDMA sync frames, the reference clock of EtherCAT):
+// Discipline computes clock adjustments from measured phase errors; DisciplinedClock applies them to all threads of the runtime.
 //
 //     hal::DisciplinedClock clock_;                       // in the component
-//     hal::Discipline       beat_;
+//     hal::Discipline       discipline_;
 //     void start() { clock_.claim(); }                    // throws when another instance leads
 //     void receive(hal::Cycle cycle) noexcept {
-//         if (a beat came, at `came_ns`)
-//             clock_.step(beat_.follow(came_ns + lead - cycle.start_ns(), cycle.period_ns(), clock_.limit_ns()));
+//         if (a reference event arrived, at `came_ns`)
+//             clock_.step(discipline_.follow(came_ns + lead - cycle.start_ns(), cycle.period_ns(), clock_.limit_ns()));
 //     }
 #pragma once
 
@@ -21,22 +20,22 @@
 
 namespace hal {
 
-/// The threads' clock in the hands of the one instance that disciplines it.
+/// The clock of the threads, for the one instance that disciplines it.
 class DisciplinedClock {
 public:
-    /// In start(): the threads follow this instance until it is stopped. Throws when they follow another. [setup]
+    /// Claims the clock in start(), until this instance is stopped. Throws if another instance leads. [setup]
     void claim() {
         clock_ = hal::extension<hal_clock>("hal.clock/1");
-        if (!clock_) throw std::runtime_error("the threads here cannot follow an outside beat");
+        if (!clock_) throw std::runtime_error("this host does not support external clock adjustment");
         if (!clock_->claim(clock_, detail::creating)) detail::refused();
     }
-    /// What is due after this cycle comes so much later, in all threads; beyond limit_ns() per cycle it is cut off. [realtime]
+    /// Delays all later deadlines of all threads by `ns` (negative: advances them), limited to limit_ns() per cycle. [realtime]
     void step(std::int64_t ns) const noexcept {
         if (clock_ && ns != 0) clock_->step(clock_, ns);
     }
-    /// Most that the steps of one cycle do: a tenth of the fastest thread's period. [any]
+    /// Returns the largest adjustment per cycle: a tenth of the period of the fastest thread. [any]
     std::int64_t limit_ns() const noexcept { return clock_ ? __atomic_load_n(&clock_->limit_ns, __ATOMIC_RELAXED) : 0; }
-    /// Sum of all steps. [any]
+    /// Returns the sum of all adjustments. [any]
     std::int64_t shift_ns() const noexcept { return clock_ ? __atomic_load_n(&clock_->shift_ns, __ATOMIC_RELAXED) : 0; }
 
 private:
@@ -44,38 +43,38 @@ private:
 };
 
 struct DisciplineOptions {
-    double memory = 40;          ///< beats that an estimate is made of, 2 or more: more are calmer, fewer follow a changing rate sooner
-    double max_rate = 1e-3;      ///< the beat's clock is at most so fast or slow: quartz is within 100e-6
-    std::int64_t lock_ns = 0;    ///< locked while the beats are on average so near to where they are expected; 0: period / 20
+    double memory = 40;          ///< number of events per estimate, 2 or more: more reduce noise, fewer track a changing rate sooner
+    double max_rate = 1e-3;      ///< largest rate deviation of the reference; quartz is within 100e-6
+    std::int64_t lock_ns = 0;    ///< mean phase error below which the clock is locked; 0: period / 20
 };
 
-/// Follows a beat by its measured phase errors.
+/// Tracks an external reference by its measured phase errors.
 ///
-/// A phase error is when the beat came less when it should have come by this clock, which all steps so far have moved; the caller brings
-/// it within half a period. With p the phase error expected, r the beat's drift per period, a and b gains, and m the residual limited:
+/// A phase error is the arrival time of an event minus its expected time by this clock, which includes all adjustments so far; the caller
+/// A phase error is the arrival time of an event minus its expected time by this clock, all adjustments included; the caller
 ///
 ///     m = clip(error - p, 4 s)        p += a m        r += b m        step = clip(p + r, limit)        p += r - step
 ///
-/// Unless the limit cuts, p is 0 afterwards and this is a PI controller: step = (a + b) error + sum of b error. As p knows of the steps,
-/// a limited one neither winds up the integral nor disturbs the estimate: the same formula acquires and holds. The gains are those of
-/// the growing-memory filter, a straight line fitted to all n beats so far, until n reaches `memory`: a = 2(2n-1)/(n(n+1)),
-/// b = 6/(n(n+1)); so the first beat sets the phase, the second the rate, and noise falls with every further one. s is the mean size of
-/// the residuals: a beat that was held up counts as four times that and no more; four such in a row on one side are the beat's new
-/// place, which is taken over at once with the rate kept. There is no dead band.
+/// Unless the limit applies, p is 0 afterwards and this is a PI controller: step = (a + b) error + sum of b error. As p includes the steps,
+/// a limited one neither winds up the integral nor disturbs the estimate: the same formula acquires and tracks. The gains are those of
+/// the growing-memory filter, a straight line fitted to all n events so far, until n reaches `memory`: a = 2(2n-1)/(n(n+1)),
+/// b = 6/(n(n+1)); so the first event sets the phase, the second the rate, and noise falls with every further one. s is the mean size of
+/// the residuals: the residual of a delayed event is limited to four times that; four such events in a row on one side are a phase jump
+/// of the reference, which is adopted at once while the rate is kept. There is no dead band.
 /// Source: Brookner, Tracking and Kalman Filtering Made Easy, 1.2.6 (growing memory), 1.2.10 (limits on noise); the clipping is Huber's.
 class Discipline {
 public:
     explicit Discipline(DisciplineOptions options = {}) noexcept : options_(options) {}
 
-    /// A beat was measured, `error_ns` late by this clock. Returns the step to make now. `period_ns` is the time between two beats; a
-    /// step has at most `limit_ns`, 0: a tenth of the period. [realtime]
+    /// Takes the phase error `error_ns` of an event and returns the adjustment to apply now, at most `limit_ns` (0: a tenth of the
+    /// period). `period_ns` is the interval of the reference. [realtime]
     std::int64_t follow(std::int64_t error_ns, std::int64_t period_ns, std::int64_t limit_ns = 0) noexcept {
         const auto error = static_cast<double>(error_ns), period = static_cast<double>(period_ns);
         double residual = error - phase_;
-        if (beats_ == 0) {
+        if (events_ == 0) {
             phase_ = error;
-            beats_ = rate_known_ ? options_.memory / 2 : 1;
-            if (!rate_known_) scatter_ = period * 1e-2;  // not known yet either: rather too large
+            events_ = rate_known_ ? options_.memory / 2 : 1;
+            if (!rate_known_) scatter_ = period * 1e-2;  // unknown yet, too: assume a large value
         } else {
             const double gate = std::max(4 * scatter_, period * 1e-3);
             const bool beyond = std::abs(residual) > gate;
@@ -84,12 +83,12 @@ public:
             if (std::abs(beyond_) >= 4) {
                 phase_ = error;
                 beyond_ = 0;
-                beats_ = std::min(beats_, options_.memory / 2);
+                events_ = std::min(events_, options_.memory / 2);
             } else {
                 residual = std::clamp(residual, -gate, gate);
-                beats_ = std::min(beats_ + 1, std::max(options_.memory, 2.0));
-                const double by = beats_ * (beats_ + 1);
-                phase_ += residual * 2 * (2 * beats_ - 1) / by;
+                events_ = std::min(events_ + 1, std::max(options_.memory, 2.0));
+                const double by = events_ * (events_ + 1);
+                phase_ += residual * 2 * (2 * events_ - 1) / by;
                 drift_ += residual * 6 / by;
             }
         }
@@ -102,30 +101,30 @@ public:
         return step;
     }
 
-    /// A beat was due and did not come: goes on at the rate that was found. Returns the step to make now. [realtime]
+    /// Continues at the estimated rate after a missing event. Returns the adjustment to apply now. [realtime]
     std::int64_t coast(std::int64_t period_ns, std::int64_t limit_ns = 0) noexcept {
-        return beats_ < 2 || in_vain_ ? 0 : advance(static_cast<double>(period_ns), limit_ns);
+        return events_ < 2 || in_vain_ ? 0 : advance(static_cast<double>(period_ns), limit_ns);
     }
 
-    /// The beat is gone: no longer locked. The next one is acquired anew, with the rate known so far as a start. [realtime]
+    /// Unlocks after loss of the reference. The next event starts a new acquisition from the last known rate. [realtime]
     void lose() noexcept {
-        rate_known_ = rate_known_ || beats_ >= options_.memory / 2;
+        rate_known_ = rate_known_ || events_ >= options_.memory / 2;
         phase_ = 0;
-        beats_ = 0;
+        events_ = 0;
         beyond_ = 0;
         judged_ = 0;
         pulled_ = 0;
         locked_ = in_vain_ = false;
     }
 
-    /// The beats have for 16 in a row been on average within `lock_ns` of this clock; ends when they are twice as far off. [any]
+    /// True after 16 consecutive events whose mean error is within `lock_ns`; false again at twice that error. [any]
     bool locked() const noexcept { return locked_; }
-    /// Steps of two periods in all have brought the beat no nearer: it moves with this clock, because it is made by it. No more steps are
-    /// made until lose(). [any]
+    /// True for a feedback loop: adjustments of two periods in total have not reduced the error, since this clock itself drives the
+    /// reference. No more adjustments are made until lose(). [any]
     bool in_vain() const noexcept { return in_vain_; }
-    std::int64_t error_ns() const noexcept { return error_ns_; }  ///< of the last beat, as it was measured
-    double scatter_ns() const noexcept { return scatter_; }       ///< mean distance of a beat from where it was expected
-    double rate() const noexcept { return rate_; }                ///< 200e-6: the beat's second is 200 us longer than this clock's
+    std::int64_t error_ns() const noexcept { return error_ns_; }  ///< measured error of the last event
+    double scatter_ns() const noexcept { return scatter_; }       ///< mean residual
+    double rate() const noexcept { return rate_; }  ///< 200e-6: a second of the reference is 200 us longer than one of this clock
 
 private:
     std::int64_t advance(double period, std::int64_t limit_ns) noexcept {
@@ -146,10 +145,10 @@ private:
     DisciplineOptions options_;
     double phase_ = 0, drift_ = 0;        // p and r of the formula, ns and ns per period
     double scatter_ = 0, distance_ = 0, rate_ = 0;
-    double beats_ = 0;                    // n
-    double pulled_ = 0;                   // by steps beyond the drift, since it was last locked
-    bool rate_known_ = false;             // from before the beat was lost
-    int beyond_ = 0;                      // residuals beyond the gate in a row, with their sign
+    double events_ = 0;                    // n
+    double pulled_ = 0;                   // adjustments beyond the drift since the last lock
+    bool rate_known_ = false;             // kept from before the loss of the reference
+    int beyond_ = 0;                      // consecutive residuals beyond the gate, with their sign
     int judged_ = 0;
     std::int64_t error_ns_ = 0;
     bool locked_ = false, in_vain_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading a file that a user names. Opening a FIFO would block until somebody writes into it, and a device may never end: only regular
+// Reading a file that a user names. Opening a FIFO would block until another process writes into it, and a device may never end: only regular
 // files are read.
 #pragma once
 
