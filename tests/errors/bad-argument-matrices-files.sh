@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# files of matrices and models that are not there, a folder, or something else altogether
+# files of matrices and models: missing, a folder, or not text at all
 cp bad-argument-matrices-files.inc "$HOME/files.hal"
 cd "$HOME"
 mkdir folder

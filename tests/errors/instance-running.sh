@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# two instances of one name; the first lives until the second has been refused
+# two instances of one name; the first runs until the second has been rejected
 mkfifo "$HOME/ready"
 hal run --name twice instance-running.hal >"$HOME/ready" 2>/dev/null &
 grep -q running "$HOME/ready"

@@ -28,7 +28,7 @@ TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
 def run(hal, command):
     """Standard error and exit status of a command line."""
     with tempfile.TemporaryDirectory() as folder:
-        # a file that is no plugin, and the components made for tests
+        # a file that is not a plugin, and the components made for tests
         plugins = {"HALCYON_PLUGIN_PATH": f"plugins:{hal.parent.parent / 'tests' / 'plugins'}"}
         try:
             done = subprocess.run(["/usr/bin/env", *command], cwd=HERE, env=environment(hal, folder) | plugins, stdin=subprocess.DEVNULL,

@@ -87,6 +87,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     now += 10 * second, step(nullptr, false);
     for (std::size_t n = 0; n < device.sdo_servers(); ++n) require(!device.sdo_server(n).busy(), "a server gives up on a silent client");
     for (const auto& r : requests)
-        require(r.done() && r.size <= std::max(r.buffer.size(), r.data.size()), "no more bytes than there is room");
+        require(r.done() && r.size <= std::max(r.buffer.size(), r.data.size()), "the transfer exceeds its buffer");
     return 0;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Configurations of CANopen networks: whatever is in the file, it is read or refused with a place, and what was read can be used.
+// Configurations of CANopen networks: any file is read, or rejected with a position, and what was read can be used.
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const config::Reading reading = config::read(text, "folder/net.canopen", file);
     for (const config::Message& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= size, "a place lies in the text");
-        require(!m.sentence.empty(), "a message says something");
+        require(!m.sentence.empty(), "a message is not empty");
     }
     if (!reading.good()) return 0;
     std::size_t pdos = 0;

@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
     hal::Diagnostics found;
     const auto made = hal::comp::translate(sources, source, found);
-    require(made.has_value() != found.failed(), "a text is translated or refused");
+    require(made.has_value() != found.failed(), "a text is translated or rejected");
     require(!of_parser.failed() || !made, "what cannot be read is not translated");
     if (made && tree.code.known()) require(made->c.find(sources.text(tree.code)) != std::string::npos, "the code is taken as it is");
     for (const char c : hal::render(found, sources)) require(static_cast<unsigned char>(c) >= 0x20 || c == '\n', "nothing raw reaches the terminal");

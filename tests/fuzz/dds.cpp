@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DDS: whatever comes as a sample is decoded within its bytes or refused with nothing changed; what was decoded of plain fields is encoded the
-// same again. Whatever is given as fields is refused with a sentence or makes a type whose own sample can be decoded. Whatever comes as the
+// DDS: any sample is decoded within its bytes, or rejected without a change; what was decoded of plain fields is encoded the
+// same again. Any list of fields is rejected with a message or yields a type whose own sample can be decoded. Whatever comes as the
 // status of an instance is read within its bytes, and what is shown of it does not steer a terminal.
 #include <algorithm>
 #include <cstring>
@@ -22,7 +22,7 @@ void sample(const Schema& schema, std::span<const std::uint8_t> given) {
     std::vector<hal_value> values(schema.fields.size());
     for (hal_value& v : values) v.raw = 0x0123456789abcdef;
     if (!decode(schema, bytes, values)) {
-        for (const hal_value& v : values) require(v.raw == 0x0123456789abcdef, "what is refused changes nothing");
+        for (const hal_value& v : values) require(v.raw == 0x0123456789abcdef, "a rejected sample changes nothing");
         return;
     }
     if (!schema.ros.empty()) return;
@@ -43,7 +43,7 @@ void fields(std::string_view text) {
         std::vector<hal_value> values(schema.fields.size());
         require(schema.fields.size() == schema.places.size(), "a place for each field");
         require(decode(schema, schema.sample, values), "a type's own sample is of the type");
-    } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a refusal says why"); }
+    } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a rejection has a reason"); }
 }
 
 bool plain(std::string_view text) {

@@ -19,10 +19,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const Reading reading = read_description({reinterpret_cast<const char*>(data), size});
     for (const Message& message : reading.messages) {
         require(message.at.offset + std::size_t{message.at.length} <= reading.text.size(), "a place lies in the text");
-        require(!message.sentence.empty(), "a message says something");
+        require(!message.sentence.empty(), "a message is not empty");
     }
     if (!reading.description) {
-        require(reading.count(Severity::error) > 0, "who refuses says why");
+        require(reading.count(Severity::error) > 0, "a rejection has a reason");
         return 0;
     }
     for (const Object& object : reading.description->objects)

@@ -18,7 +18,7 @@ template <class Problems>
 void places(const Problems& problems, std::size_t size) {
     for (const auto& p : problems) {
         require(p.begin <= p.end && p.end <= size, "a problem has a place in the text");
-        require(!p.sentence.empty() && !p.help.empty(), "it says what is wrong and what to do");
+        require(!p.sentence.empty() && !p.help.empty(), "a problem has a message and a help text");
     }
 }
 

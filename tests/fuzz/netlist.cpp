@@ -57,7 +57,7 @@ void check_value(const std::string& text) {
         const hal::Parsed parsed = hal::parse_value(row.type, text);
         if (!parsed.problem.empty()) continue;
         const hal::Parsed again = hal::parse_value(row.type, hal::format_exact(row.type, parsed.value));
-        // NaN has no sign in text; everything else comes back bit by bit.
+        // NaN has no sign in text; everything else is restored bit by bit.
         const bool nan = row.type == HAL_TYPE_FLOAT && parsed.value.real != parsed.value.real;
         require(again.problem.empty() && (nan || again.value.raw == parsed.value.raw), "a value is read back as it was");
     }
@@ -83,7 +83,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const hal::Command& command : commands) {
         hal::Diagnostics of_command;
         const std::vector<hal::Command> plain = hal::expand(command, of_command);
-        require(plain.empty() == of_command.failed(), "a command is expanded or refused");
+        require(plain.empty() == of_command.failed(), "a command is expanded or rejected");
         for (const hal::Command& one : plain)
             require(one.span.begin == command.span.begin && !one.name.text.empty(), "expansion keeps the place");
         found.take(of_command);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// TDMA: whatever comes from the wire is read or refused within its bytes, and what was read is written the same again; whatever is in a
-// schedule, it is read or refused with a place, and what is accepted can be used.
+// TDMA: any frame is read within its bytes or rejected, and what was read is written identically; any
+// schedule is read, or rejected with a position, and an accepted one can be used.
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -49,7 +49,7 @@ void frames(std::span<const std::uint8_t> given) {
 struct Nothing final : rtcfg::ClientEvents {
     void on_stage_1(std::span<const std::uint8_t> bytes, const Address&) noexcept override { require(bytes.size() <= 65535, "one frame"); }
     void on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address&) noexcept override {
-        require(length <= file.size(), "what came has room");
+        require(length <= file.size(), "the received part fits into the file");
     }
     void on_dead_station(const Address&) noexcept override {}
     void on_other_server(const Address&) noexcept override {}
@@ -89,7 +89,7 @@ void schedule(std::string_view text) {
     const config::Reading reading = config::read(text);
     for (const config::Message& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= text.size(), "a place lies in the text");
-        require(!m.sentence.empty(), "a message says something");
+        require(!m.sentence.empty(), "a message is not empty");
     }
     if (!reading.good()) return;
     const plan::Plan p = plan::plan_of(reading.schedule);

@@ -21,12 +21,12 @@ using hal::fuzz::require;
 void picture(const std::uint8_t* bytes, std::size_t count) {
     Frame frame;
     if (const auto problem = read_pnm(bytes, count, frame)) {
-        require(problem->kind == Trouble::damaged || problem->kind == Trouble::huge, "what is wrong is said");
+        require(problem->kind == Trouble::damaged || problem->kind == Trouble::huge, "the kind of the problem is reported");
         require(frame.pixels.size() <= 3 * most_pixels, "no picture takes more memory than one may have");
         return;
     }
     require(Frame::fits(frame.width, frame.height), "a picture has a size that one may have");
-    require(frame.pixels.size() == frame.stride() * static_cast<std::size_t>(frame.height), "it has as many pixels as its size says");
+    require(frame.pixels.size() == frame.stride() * static_cast<std::size_t>(frame.height), "the number of pixels matches the size");
     const std::string written = write_pnm(frame);
     Frame again;
     require(!read_pnm(reinterpret_cast<const std::uint8_t*>(written.data()), written.size(), again) && again.pixels == frame.pixels,
@@ -66,7 +66,7 @@ void address(const std::string& text) {
     try {
         const auto source = make_source(text, {});
         require(source != nullptr, "an address that is taken is a source");
-    } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a refusal says why"); }
+    } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a rejection has a reason"); }
 }
 
 }  // namespace

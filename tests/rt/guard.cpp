@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Stands before the C library for this program and the plugins it loads. The executor says when a cycle begins and ends
+// Stands before the C library for this program and the plugins it loads. The executor reports the beginning and end of a cycle
 // by the two functions that the real-time sanitizer defines when it is there.
 #include "rt/guard.hpp"
 
