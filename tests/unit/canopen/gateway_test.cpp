@@ -106,14 +106,14 @@ TEST_F(Gate, Aborts_and_errors_have_their_numbers) {
     EXPECT_EQ(ask("[5] 2 5 r 0x1000 0"), "[5] ERROR:106 #unsupported net");
     EXPECT_EQ(ask("[6] 200 r 0x1000 0"), "[6] ERROR:107 #unsupported node");
     EXPECT_EQ(ask("[7] 5 r 0x1000"), "[7] ERROR:101 #syntax error: the sub-index is missing");
-    EXPECT_EQ(ask("[8] 5 w 0x2000 0 u8 256"), "[8] ERROR:101 #syntax error: this is no value of type u8");
+    EXPECT_EQ(ask("[8] 5 w 0x2000 0 u8 256"), "[8] ERROR:101 #syntax error: invalid value for type u8");
     EXPECT_EQ(ask("[9] fly"), "[9] ERROR:100 #request not supported: unknown command 'fly'; see: help");
     EXPECT_EQ(ask("[10] set speed 5"), "[10] ERROR:100 #request not supported: what to set is not 'speed'; see: help");
     EXPECT_EQ(ask("[x] start"), "[0] ERROR:101 #syntax error: a line begins with [NUMBER]");
     EXPECT_EQ(ask("[11] set network 7"), "[11] ERROR:106 #unsupported net");
     EXPECT_EQ(ask("[12] 5 w 0x2005 0 vs \"open"), "[12] ERROR:101 #syntax error: a quotation mark is not closed");
     EXPECT_EQ(ask("[13] set command_timeout 20"), "[13] OK");
-    EXPECT_EQ(ask("[14] 9 r 0x1000 0"), "[14] ERROR:103 #time-out");
+    EXPECT_EQ(ask("[14] 9 r 0x1000 0"), "[14] ERROR:103 #timeout");
     EXPECT_EQ(ask(""), "");
     EXPECT_EQ(ask("# only a comment"), "");
 }
@@ -188,7 +188,7 @@ TEST_F(Gate, Pdos_are_sent_received_and_asked_for) {
     run(1);
     EXPECT_EQ(bus.sent(0x305).size(), 1U);
     EXPECT_EQ(ask("[11] set rpdo 3 0x181 rtr 1 u8"), "[11] OK");
-    EXPECT_EQ(ask("[12] r p 3"), "[12] ERROR:103 #time-out");
+    EXPECT_EQ(ask("[12] r p 3"), "[12] ERROR:103 #timeout");
     EXPECT_EQ(ask("[13] set rpdo 4 0x191 sync 1 u8"), "[13] OK");
     bus.inject({0x191, {7}}, now);
     EXPECT_EQ(taken(), "");
@@ -255,7 +255,7 @@ TEST_F(LssGate, Node_without_id_is_found_gets_one_and_talks) {
     EXPECT_EQ(ask("[11] lss_switch_glob 0"), "[11] OK|1 9 BOOT_UP");
     EXPECT_EQ(ask("[12] 9 r 0x2002 0 u8"), "[12] 7");
     EXPECT_EQ(ask("[13] lss_identity 1 2 0 9 0 9"), "[13] OK");
-    EXPECT_EQ(ask("[14] lss_identity 1 2 0 9 7 9"), "[14] ERROR:103 #time-out");
+    EXPECT_EQ(ask("[14] lss_identity 1 2 0 9 7 9"), "[14] ERROR:103 #timeout");
     EXPECT_EQ(ask("[15] lss_switch_sel 1 2 3 4"), "[15] OK");
     EXPECT_EQ(ask("[16] lss_activate_bitrate 10"), "[16] OK");
     EXPECT_EQ(events.activated_rate, 500'000U);

@@ -132,11 +132,11 @@ struct Reader {
         c.index = static_cast<std::uint16_t>(index), c.sub = static_cast<std::uint8_t>(sub);
         if (!more()) return !writes || fail("data type and value are missing");
         c.format = format(words[at]);
-        if (!c.format) return fail("'" + words[at].substr(0, 40) + "' is no data type; see: help");
+        if (!c.format) return fail("unknown data type '" + words[at].substr(0, 40) + "'; see: help");
         ++at;
         if (!writes) return end();
         if (!bytes_of(std::span(words).subspan(at), *c.format, c.value))
-            return fail("this is no value of type " + std::string(c.format->word));
+            return fail("invalid value for type " + std::string(c.format->word));
         at = words.size();
         return true;
     }
@@ -146,7 +146,7 @@ struct Reader {
         if (word == "event") type = on_event;
         else if (word == "rtr") type = on_request;
         else if (word.starts_with("sync") && (word.size() == 4 || number(word.substr(4), 240, type))) type = word.size() == 4 ? 1 : type;
-        else return fail("'" + word.substr(0, 40) + "' is no transmission type: event, rtr, sync0 to sync240");
+        else return fail("invalid transmission type '" + word.substr(0, 40) + "': use event, rtr, sync0 to sync240");
         return ++at, true;
     }
     bool pdo_setup() {
@@ -158,7 +158,7 @@ struct Reader {
         for (; count > 0; --count, ++at) {
             if (!more()) return fail("a data type is missing");
             const Format* f = format(words[at]);
-            if (!f || bits_of(f->type) == 0) return fail("'" + words[at].substr(0, 40) + "' is no data type of a fixed length");
+            if (!f || bits_of(f->type) == 0) return fail("'" + words[at].substr(0, 40) + "' is not a data type of fixed length");
             c.formats.push_back(f);
         }
         return end();
@@ -234,7 +234,7 @@ const char* to_string(Error error) {
     case Error::not_supported: return "request not supported";
     case Error::syntax: return "syntax error";
     case Error::state: return "request not processed due to internal state";
-    case Error::timeout: return "time-out";
+    case Error::timeout: return "timeout";
     case Error::no_net: return "no default net set";
     case Error::no_node: return "no default node set";
     case Error::bad_net: return "unsupported net";
