@@ -36,12 +36,12 @@ public:
 
     /// Gives `past` what there is in this cycle. [realtime]
     template <class Filter>
-    void tell(Filter& past, hal::Cycle cycle) noexcept {
+    void feed(Filter& past, hal::Cycle cycle) noexcept {
         for (std::size_t i = 0; i < rows_.size(); ++i) {
             if (!rows_[i]->fresh) continue;
             const double z = rows_[i]->z;
             if (!std::isfinite(z)) skipped = skipped + 1;
-            else if (!past.tell(static_cast<Eigen::Index>(i), z, cycles(*rows_[i], cycle))) late = late + 1;
+            else if (!past.add(static_cast<Eigen::Index>(i), z, cycles(*rows_[i], cycle))) late = late + 1;
         }
     }
     /// The same for measurements that make sense together only: `mix` times all of them. [realtime]
@@ -62,7 +62,7 @@ public:
         Vector mixed;
         multiply(mixed, mix, told_);
         bool known = true;
-        for (Eigen::Index i = 0; i < mixed.size(); ++i) known = past.tell(i, mixed(i), cycles(*rows_[0], cycle)) && known;
+        for (Eigen::Index i = 0; i < mixed.size(); ++i) known = past.add(i, mixed(i), cycles(*rows_[0], cycle)) && known;
         if (!known) late = late + 1;
     }
     /// Shows what became of it. [realtime]

@@ -128,7 +128,7 @@ public:
         for (std::size_t i = 0; i < inputs_.size(); ++i)
             if (const double value = inputs_[i]; std::isfinite(value)) input_(static_cast<Eigen::Index>(i)) = value;
         past_.advance(input_);
-        channels_.tell(past_, cycle);
+        channels_.feed(past_, cycle);
         past_.settle(std::fmax(channels_.gate, 0.0));
         channels_.count(past_, cycle);
         const Moment& now = past_.now();

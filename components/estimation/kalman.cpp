@@ -62,7 +62,7 @@ public:
         for (std::size_t i = 0; i < u.size(); ++i)
             if (const double value = u[i]; std::isfinite(value)) input_(static_cast<Eigen::Index>(i)) = value;
         past_.advance(input_);
-        if (whole_ == nullptr) channels_.tell(past_, cycle);
+        if (whole_ == nullptr) channels_.feed(past_, cycle);
         else channels_.tell_whole(past_, cycle, *whole_);
         past_.settle(std::fmax(channels_.gate, 0.0));
         channels_.count(past_, cycle);

@@ -81,7 +81,7 @@ public:
 
     const Moment& now() const noexcept { return at(number_); }
 
-    /// Starts a new step; call the measurement function for each measurement, then settle(). [realtime]
+    /// Starts a new step; followed by `add` for each measurement, then `settle`. [realtime]
     void advance(const Vector& u) noexcept {
         ++number_;
         Moment& moment = at(number_);
@@ -91,7 +91,7 @@ public:
         known_ = known_ < moments_.size() ? known_ + 1 : known_;
     }
     /// Adds measurement `channel`, `cycles` old. False if it is older than the history. [realtime]
-    bool tell(Eigen::Index channel, double z, std::int64_t cycles) noexcept {
+    bool add(Eigen::Index channel, double z, std::int64_t cycles) noexcept {
         if (cycles < 0) cycles = 0;
         // the oldest step cannot be repeated: its predecessor is no longer stored
         if (cycles >= static_cast<std::int64_t>(known_) - (full() ? 1 : 0)) return false;
