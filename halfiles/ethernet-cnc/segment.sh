@@ -2,22 +2,22 @@
 # Sourced by bring-up: an Ethernet segment on one computer, a network namespace for each station and one for the switch between them.
 # Before: `machine` a short name, `stations` a list of names, `here` the machine's folder, "$@" what bring-up was called with.
 
-say() { echo "bring-up: $*"; }
+report() { echo "bring-up: $*"; }
 
 # Without root everything happens in a user namespace of its own, which is gone when this ends.
 if [ "$(id -u)" != 0 ]; then
     if [ -z "${HAL_BRING_UP:-}" ] && unshare --user --map-root-user --net --mount true 2>/dev/null; then
-        say "not root: in a user namespace; without the right to real-time priorities the cycles are less exact"
+        report "not root: in a user namespace; without the right to real-time priorities the cycles are less exact"
         export HAL_BRING_UP=1
         exec unshare --user --map-root-user --net --mount "$0" "$@"
     fi
-    say "this makes network namespaces; run it as root (sudo $0), or where user namespaces are allowed" >&2
+    report "this makes network namespaces; run it as root (sudo $0), or where user namespaces are allowed" >&2
     exit 77
 fi
 if [ -n "${HAL_BRING_UP:-}" ]; then mount -t tmpfs tmpfs /run; fi
 
 hal=${HAL:-hal}
-command -v "$hal" >/dev/null || { say "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
+command -v "$hal" >/dev/null || { report "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
 switch=hal-$machine-switch
 pids=()
 carriers=()
@@ -30,7 +30,7 @@ raise_carriers() {
         pid=${comm//[!0-9]/}
         case $name in ksoftirqd/*) chrt -p "$pid" | grep -q SCHED_OTHER && chrt -f -p 70 "$pid" && carriers+=("$pid") ;; esac
     done 2>/dev/null
-    if [ ${#carriers[@]} -gt 0 ]; then say "ksoftirqd, which carries the frames, has real-time priority until this ends"; fi
+    if [ ${#carriers[@]} -gt 0 ]; then report "ksoftirqd, which carries the frames, has real-time priority until this ends"; fi
 }
 
 # How many CPUs other programs use, in tenths, over half a second.
@@ -50,7 +50,7 @@ warn_if_busy() {
     local busy
     busy=$(busy_tenths)
     if [ "$busy" -gt $((cpus * 3)) ]; then
-        say "this computer is busy: other programs use $((busy / 10)).$((busy % 10)) of its $cpus CPUs. Cycles will be missed, and the machine" \
+        report "this computer is busy: other programs use $((busy / 10)).$((busy % 10)) of its $cpus CPUs. Cycles will be missed, and the machine" \
             "may stop; the figures below are those of a busy computer"
     fi
 }
@@ -62,22 +62,22 @@ clean_up() {
     for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null; done
     for name in "${stations[@]}"; do ip netns delete "hal-$machine-$name" 2>/dev/null; done
     ip netns delete "$switch" 2>/dev/null
-    say "processes ended, namespaces deleted; what each said is in $folder"
+    report "processes ended, namespaces deleted; their output is in $folder"
 }
 
 make_segment() {
     if ip netns list | grep -q "^hal-$machine-"; then
-        say "there are namespaces hal-$machine-… already: another bring-up runs; or remove them: ip -all netns delete" >&2
+        report "namespaces hal-$machine-… already exist: another bring-up is running; otherwise remove them: ip -all netns delete" >&2
         exit 1
     fi
     folder=$(mktemp -d "${TMPDIR:-/tmp}/hal-$machine.XXXXXX" 2>/dev/null) ||
-        { say "nothing can be written in '${TMPDIR:-/tmp}', where what the processes say would be; set TMPDIR=FOLDER" >&2; exit 1; }
+        { report "cannot create a folder for the output of the processes in '${TMPDIR:-/tmp}'; set TMPDIR=FOLDER" >&2; exit 1; }
     if [ -n "${HAL_BRING_UP:-}" ]; then export XDG_RUNTIME_DIR=$folder; fi  # the folder of the control sockets may be the real root's
     trap clean_up EXIT
     trap 'exit 130' INT TERM
     warn_if_busy
-    say "a switch, and ${#stations[@]} stations on it: ${stations[*]}"
-    ip netns add "$switch" || { say "network namespaces are not to be had here" >&2; exit 77; }
+    report "a switch, and ${#stations[@]} stations on it: ${stations[*]}"
+    ip netns add "$switch" || { report "network namespaces are not to be had here" >&2; exit 77; }
     ip -n "$switch" link add bridge0 type bridge stp_state 0 forward_delay 0 mcast_snooping 0 || exit 77
     ip netns exec "$switch" sysctl -qw net.ipv6.conf.all.disable_ipv6=1 2>/dev/null
     ip -n "$switch" link set bridge0 up
@@ -91,8 +91,8 @@ make_segment() {
     raise_carriers
 }
 
-# start [--cpu N] NAME COMMAND…: in the station's namespace; its output goes to a file. `hal run` puts its thread on the last CPU: whoever
-# must not wait for it belongs on another, N.
+# start [--cpu N] NAME COMMAND…: in the station's namespace; its output goes to a file. `hal run` puts its thread on the last CPU:
+# a process that must not wait for it belongs on another one, N.
 start() {
     local place=()
     if [ "$1" = --cpu ]; then
