@@ -65,7 +65,7 @@ class Segment(Case):
         if done.returncode == 77:
             self.skipTest("no network namespaces here")
         self.assertEqual(1, done.returncode)
-        self.assertIn("nothing can be written in '/nowhere', where what the processes say would be; set TMPDIR=FOLDER\n", done.stdout)
+        self.assertIn("cannot create a folder for the output of the processes in '/nowhere'; set TMPDIR=FOLDER\n", done.stdout)
 
     def test_names_unexpected_words(self):
         for machine, option in (("cnc", "--lose-clock"), ("furuta", "--swing-up")):
