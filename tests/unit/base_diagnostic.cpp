@@ -156,7 +156,7 @@ TEST_F(Rendering, shortens_a_name_of_10000_characters) {
     const auto source = add("x");
     Diagnostics found;
     found.error("two-writers", find(sources, source, "x"), "unknown pin '" + std::string(10'000, 'n') + "'");
-    EXPECT_EQ(render(found, sources), "test.hal:1:1: error: unknown pin '" + std::string(136, 'n') + "…" + std::string(49, 'n') +
+    EXPECT_EQ(render(found, sources), "test.hal:1:1: error: unknown pin '" + std::string(132, 'n') + "…" + std::string(49, 'n') +
                                           "' [two-writers]\n    1 | x\n      | ^\n");
 }
 
