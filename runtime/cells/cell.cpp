@@ -7,6 +7,8 @@
 
 #include <unistd.h>
 
+#include "machine/programs.hpp"
+
 namespace hal {
 namespace {
 
@@ -64,7 +66,7 @@ Cell::Cell(std::string name, std::vector<NodeLine> nodes, const SessionOptions& 
 
 Cell::~Cell() {
     for (Machine& machine : machines_) {
-        const std::lock_guard lock(machine.session->mutex);
+        const auto lock = machine.session->lock();
         machine.session->shut_down();
     }
 }
@@ -80,18 +82,18 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
     for (std::size_t i = 0; i < size(); ++i) {
         Machine& machine = machines_[i];
         {
-            const std::lock_guard lock(machine.session->mutex);
+            const auto lock = machine.session->lock();
             Transaction transaction = machine.session->begin();
-            machine.session->add_process(transaction, watch, ::getpid(), {});
+            machine.session->programs().add_component(transaction, watch, ::getpid(), {});
             for (const NodeLine& other : nodes_) {
                 if (other.name == nodes_[i].name) continue;
                 std::string problem;
-                OutsidePin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
-                OutsidePin refused{"node." + other.name + ".refused", HAL_TYPE_BIT, HAL_DIR_OUT};
-                OutsidePin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
-                machine.pins[other.name + ".online"] = machine.session->add_outside_pin(transaction, watch, online, problem);
-                machine.pins[other.name + ".refused"] = machine.session->add_outside_pin(transaction, watch, refused, problem);
-                machine.pins[other.name + ".age-ms"] = machine.session->add_outside_pin(transaction, watch, age, problem);
+                ProgramPin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
+                ProgramPin refused{"node." + other.name + ".refused", HAL_TYPE_BIT, HAL_DIR_OUT};
+                ProgramPin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
+                machine.pins[other.name + ".online"] = machine.session->programs().add_pin(transaction, watch, online, problem);
+                machine.pins[other.name + ".refused"] = machine.session->programs().add_pin(transaction, watch, refused, problem);
+                machine.pins[other.name + ".age-ms"] = machine.session->programs().add_pin(transaction, watch, age, problem);
             }
             Diagnostics none;
             transaction.commit(none);
@@ -134,22 +136,22 @@ bool Cell::start(Output& output) {
         for (const NodeField& field : topic.fields)
             for (const NodeReader& reader : field.readers) {
                 Machine& machine = machines_[reader.node];
-                const std::lock_guard lock(machine.session->mutex);
+                const auto lock = machine.session->lock();
                 const std::string& from = nodes_[topic.from].name;
                 std::string problem;
-                OutsidePin pin{"node." + from + "." + field.signal, field.type, HAL_DIR_OUT};
+                ProgramPin pin{"node." + from + "." + field.signal, field.type, HAL_DIR_OUT};
                 pin.initial = reader.safe;
                 Transaction transaction = machine.session->begin();
-                machine.pins[from + "." + field.signal] = machine.session->add_outside_pin(transaction, watch, pin, problem);
+                machine.pins[from + "." + field.signal] = machine.session->programs().add_pin(transaction, watch, pin, problem);
                 Diagnostics none;
                 transaction.commit(none);
                 links[reader.node] += "net " + field.signal + " node." + from + "." + field.signal + "\n";
             }
     for (std::size_t i = 0; i < size(); ++i) {
         if (!links[i].empty()) good = machines_[i].shell->run_text("<links of node " + nodes_[i].name + ">", links[i], output) == 0 && good;
-        const std::lock_guard lock(machines_[i].session->mutex);
-        if (!machines_[i].session->running() && !machines_[i].session->model().threads.empty()) machines_[i].session->start_threads();
-        machines_[i].session->note_latencies(node_latencies(*this, i, true));
+        machines_[i].shell->add_latencies(node_latencies(*this, i, true));
+        const auto lock = machines_[i].session->lock();
+        if (!machines_[i].session->threads().running() && !machines_[i].session->model().threads.empty()) machines_[i].session->threads().start();
         for (const auto& thread : machines_[i].session->model().threads) step_ns_ = std::gcd(step_ns_, thread->options.period_ns);
     }
     if (step_ns_ == 0) step_ns_ = 1'000'000;
@@ -161,8 +163,8 @@ void Cell::advance(std::int64_t ns) {
         const std::int64_t step = std::min(step_ns_, until - now_ns_);
         for (std::size_t i = 0; i < size(); ++i) {
             if (alone_ != SIZE_MAX && i != alone_) continue;
-            const std::lock_guard lock(machines_[i].session->mutex);
-            machines_[i].session->advance_ns(step);
+            const auto lock = machines_[i].session->lock();
+            machines_[i].session->threads().advance_ns(step);
         }
         const bool first = now_ns_ == 0;
         now_ns_ += step;
@@ -179,8 +181,8 @@ void Cell::greet() {
         std::vector<std::pair<Pin*, hal_value>> online;
         for (const auto& [name, pin] : machine.pins)
             if (name.ends_with(".online") && pin) online.emplace_back(pin, hal_value{.raw = 1});
-        const std::lock_guard lock(machine.session->mutex);
-        machine.session->write_outside(online);
+        const auto lock = machine.session->lock();
+        machine.session->values().write(online);
     }
 }
 
@@ -190,8 +192,8 @@ void Cell::deliver(const NodeTopic& topic) {
     std::vector<std::optional<Reading>> values;
     {
         Session& from = *machines_[topic.from].session;
-        const std::lock_guard lock(from.mutex);
-        values = from.read(names);
+        const auto lock = from.lock();
+        values = from.values().read(names);
     }
     std::vector<std::vector<std::pair<Pin*, hal_value>>> rows(size());
     for (std::size_t i = 0; i < topic.fields.size(); ++i)
@@ -200,8 +202,8 @@ void Cell::deliver(const NodeTopic& topic) {
                 rows[reader.node].emplace_back(pin, values[i]->value);
     for (std::size_t i = 0; i < size(); ++i) {
         if (rows[i].empty()) continue;
-        const std::lock_guard lock(machines_[i].session->mutex);
-        machines_[i].session->write_outside(rows[i]);
+        const auto lock = machines_[i].session->lock();
+        machines_[i].session->values().write(rows[i]);
     }
 }
 

@@ -9,7 +9,7 @@
 #include "text/fault_pages.hpp"
 #include "commands/files.hpp"
 #include "commands/listing.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "commands/shell_state.hpp"
 
 namespace hal {
@@ -19,7 +19,7 @@ constexpr std::size_t most = 100'000;  // candidates of one answer
 
 struct Search {
     const Session& session;
-    const Processes& processes;
+    const Programs& programs;
     const ShellOptions& options;
     std::vector<std::string> words;  ///< before the one being typed, arrows left out, the command first
     std::string typed;
@@ -122,7 +122,7 @@ void add_listed(Search& search) {
 }
 
 void add_load_arguments(Search& search) {
-    const auto declared = search.words.size() > 1 ? search.session.declared(search.words[1]) : std::nullopt;
+    const auto declared = search.words.size() > 1 ? search.session.host().declared(search.words[1]) : std::nullopt;
     if (declared)
         for (const auto& argument : declared->arguments) search.add(argument.name + "=", argument.doc);
     if (declared && (declared->singleton || declared->whole_names)) return;
@@ -139,7 +139,7 @@ constexpr Kind kinds[] = {
     {"COMPONENT",
      [](Search& s) {
     if (s.words[0] == "loadrt") {
-        for (const auto& name : s.session.available_components()) s.add(name);
+        for (const auto& name : s.session.host().available_components()) s.add(name);
         return;
     }
     const bool programs = s.words[0] != "reload";
@@ -153,7 +153,7 @@ constexpr Kind kinds[] = {
     {"ARGUMENT=VALUE", add_load_arguments},
     {"PROCESS",
      [](Search& s) {
-    for (const auto& name : s.processes.names()) s.add(name);
+    for (const auto& name : s.programs.names()) s.add(name);
 }},
     {"PROGRAM", add_files},
     {"FILE", add_files},
@@ -262,8 +262,8 @@ Completion Shell::complete(std::string_view line, std::size_t cursor) const {
     const auto last = line.find_last_of(" \t");
     completion.begin = last == line.npos ? 0 : last + 1;
 
-    const std::scoped_lock lock(state_->session.mutex);
-    Search search{state_->session, *state_->processes, options, {}, std::string(line.substr(completion.begin)), completion.candidates};
+    const auto lock = state_->session.lock();
+    Search search{state_->session, state_->session.programs(), options, {}, std::string(line.substr(completion.begin)), completion.candidates};
     for (std::size_t at = 0; at < completion.begin;) {
         const auto end = std::min(line.find_first_of(" \t", at), completion.begin);
         if (end > at && !is_arrow(line.substr(at, end - at))) search.words.emplace_back(line.substr(at, end - at));

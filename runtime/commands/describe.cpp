@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "machine/session.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 
 namespace hal {
 namespace {
@@ -42,7 +42,7 @@ void keep_type(std::vector<const T*>& objects, std::optional<hal_type> type) {
 void describe_pins(std::string& to, Session& session, bool parameters, const Patterns& patterns, std::optional<hal_type> type) {
     auto pins = pins_by_name(session.model(), parameters, patterns);
     keep_type(pins, type);
-    const auto values = session.read_pins(pins);
+    const auto values = session.values().read_pins(pins);
     array(to, pins, [&](const Pin* pin, std::size_t i) {
         Object object;
         object["name"] = pin->name;
@@ -63,7 +63,7 @@ void describe_pins(std::string& to, Session& session, bool parameters, const Pat
 void describe_signals(std::string& to, Session& session, const Patterns& patterns, std::optional<hal_type> type) {
     auto signals = signals_by_name(session.model(), patterns);
     keep_type(signals, type);
-    const auto values = session.read_signals(signals);
+    const auto values = session.values().read_signals(signals);
     array(to, signals, [&](const Signal* signal, std::size_t i) {
         Object object;
         object["name"] = signal->name;
@@ -75,12 +75,12 @@ void describe_signals(std::string& to, Session& session, const Patterns& pattern
     });
 }
 
-void describe_components(std::string& to, Session& session, Processes& processes, const Patterns& patterns) {
+void describe_components(std::string& to, Session& session, const Patterns& patterns) {
     array(to, components_newest_first(session.model(), patterns), [&](const LoadedComponent* component, std::size_t) {
         Object object;
         object["name"] = component->name;
         if (component->process) {
-            const auto* const program = processes.find(component->name);
+            const auto* const program = session.programs().find(component->name);
             object["pid"] = component->process;
             object["ready"] = program && program->responds();
             object["state"] = program ? program->state() : "initializing";
@@ -112,9 +112,9 @@ void describe_functions(std::string& to, Session& session, const Patterns& patte
 }
 
 void describe_threads(std::string& to, Session& session, const Patterns& patterns) {
-    const auto clock = session.clock_report();
+    const auto clock = session.reports().clock();
     array(to, threads_slowest_first(session.model(), patterns), [&](const Thread* thread, std::size_t) {
-        const ThreadReport report = session.thread_report(*thread);
+        const ThreadReport report = session.reports().thread(*thread);
         Object object;
         object["name"] = thread->name;
         object["period_ns"] = thread->options.period_ns;
@@ -202,10 +202,10 @@ std::vector<std::string> names_of(const Model& model, Listed kind, const Pattern
     return names;
 }
 
-void describe(std::string& to, Session& session, Processes& processes, Listed kind, const Patterns& patterns,
+void describe(std::string& to, Session& session, Listed kind, const Patterns& patterns,
               std::optional<hal_type> type) {
     switch (kind) {
-    case Listed::components: return describe_components(to, session, processes, patterns);
+    case Listed::components: return describe_components(to, session, patterns);
     case Listed::pins: return describe_pins(to, session, false, patterns, type);
     case Listed::parameters: return describe_pins(to, session, true, patterns, type);
     case Listed::signals: return describe_signals(to, session, patterns, type);
@@ -220,7 +220,7 @@ void describe(std::string& to, Session& session, Processes& processes, Listed ki
     std::string_view before = "{";
     for (const auto& [name, part] : parts) {
         json_quote(to += before, name);
-        describe(to += ':', session, processes, part, patterns, type);
+        describe(to += ':', session, part, patterns, type);
         before = ",";
     }
     to += '}';

@@ -66,7 +66,7 @@ std::vector<const Thread*> threads_slowest_first(const Model& model, const Patte
 }
 
 std::string clock_text(const Session& session) {
-    const auto clock = session.clock_report();
+    const auto clock = session.reports().clock();
     if (!clock) return {};
     const auto shift = static_cast<double>(clock->shift_ns);
     return fmt::format("Clock disciplined by {}: {} {} than the local clock, drift {:+.1f} ppm\n", clock->leader,

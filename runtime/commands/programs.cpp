@@ -10,7 +10,7 @@
 #include <fcntl.h>
 
 #include "commands/table.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 
 namespace hal {
 namespace {
@@ -185,7 +185,7 @@ void timed_out(Context& context, std::int64_t limit_ns, const std::string& what,
 /// Waits until the name that the program is to have is free or a dead program's. False after reporting.
 bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
     while (true) {
-        const auto* const entry = context.processes.find(plan.name);
+        const auto* const entry = context.programs.find(plan.name);
         const bool dead = entry && entry->dead(), runs = entry && entry->child && !entry->ended;
         const bool comes_back = dead && (entry->restart_ns != 0 || (runs && entry->restart.when != Restart::no));
         if (dead && !comes_back && !runs) return true;
@@ -206,7 +206,7 @@ bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
                    (entry->stopping ? " received SIGTERM but is still running" : " lost its connection but is still running");
         });
         if (context.interrupted()) return false;
-        context.processes.wait(context.lock, 100ms);
+        context.programs.wait(context.lock, 100ms);
     }
 }
 
@@ -214,10 +214,10 @@ constexpr const char* initializing = "has registered it and is initializing";
 
 /// Why the awaited component is not ready yet: what the program has done so far.
 std::string progress(Context& context, const Plan& plan, pid_t pid) {
-    const auto* const entry = context.processes.find(plan.name);
+    const auto* const entry = context.programs.find(plan.name);
     if (entry && entry->owner != 0 && !entry->dead()) return initializing;
-    if (const std::string why = context.processes.refusal_of(pid); !why.empty()) return "could not register: " + why;
-    const auto names = context.processes.registered_by(pid);
+    if (const std::string why = context.programs.refusal_of(pid); !why.empty()) return "could not register: " + why;
+    const auto names = context.programs.registered_by(pid);
     if (names.empty()) return "has not registered a component";
     return "has registered " + (names.size() == 1 ? "'" + names[0] + "'" : listed(names)) + " instead";
 }
@@ -227,11 +227,11 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
     const std::string& program = context.argument(plan.program);
     std::string last = "has not registered a component";
     while (true) {
-        const auto* const child = context.processes.find(pid);
-        if (child || !context.processes.refusal_of(pid).empty()) last = progress(context, plan, pid);
-        auto* const entry = context.processes.find_number(number);
+        const auto* const child = context.programs.find(pid);
+        if (child || !context.programs.refusal_of(pid).empty()) last = progress(context, plan, pid);
+        auto* const entry = context.programs.find_number(number);
         if (entry && entry->ready) return;
-        const auto* const named = plan.any_name ? nullptr : context.processes.find(plan.name);
+        const auto* const named = plan.any_name ? nullptr : context.programs.find(plan.name);
         if (named && named->ready) return;
         if (!child && !(entry && entry->dead() && (entry->restart_ns != 0 || !entry->ended))) {
             const bool registered = last == initializing || (fresh && entry && entry->dead());
@@ -240,11 +240,11 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
                 registered                                 ? "it registered the component and ended while it was initializing"
                 : last == "has not registered a component" ? "a program registers over the control socket; omit -W if it does not"
                                                            : "it " + last);
-            if (fresh && entry && entry->dead()) context.processes.give_up(*entry);
+            if (fresh && entry && entry->dead()) context.programs.give_up(*entry);
             return;
         }
         if (timeout.over()) {
-            if (entry) context.processes.give_up(*entry);
+            if (entry) context.programs.give_up(*entry);
             return timed_out(context, plan.timeout_ns, "component '" + plan.name + "' was not ready",
                              "'" + program + "' " + last + "; it was terminated");
         }
@@ -252,22 +252,22 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
             return "waiting for component '" + plan.name + "': '" + program + "' (process " + std::to_string(pid) + ") " + last;
         });
         if (context.interrupted()) return;
-        context.processes.wait(context.lock, 100ms);
+        context.programs.wait(context.lock, 100ms);
     }
 }
 
 void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes, const Timeout& timeout) {
     while (true) {
-        const auto* const entry = context.processes.find(pid);
+        const auto* const entry = context.programs.find(pid);
         if (entry->ended) break;
         if (timeout.over()) {
             timed_out(context, plan.timeout_ns, "'" + context.argument(plan.program) + "' did not end", "the program was terminated");
-            context.processes.give_up(*context.processes.find(pid));
-            return context.processes.abandon(pid);
+            context.programs.give_up(*context.programs.find(pid));
+            return context.programs.abandon(pid);
         }
         if (context.interrupted()) {
-            context.processes.terminate(*context.processes.find(pid));
-            return context.processes.abandon(pid);
+            context.programs.terminate(*context.programs.find(pid));
+            return context.programs.abandon(pid);
         }
         if (pipes) {
             context.lock.unlock();
@@ -275,10 +275,10 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
             context.lock.lock();
             if (open) continue;
         }
-        context.processes.wait(context.lock, 100ms);
+        context.programs.wait(context.lock, 100ms);
     }
-    const int status = context.processes.find(pid)->status;
-    context.processes.collect(pid);
+    const int status = context.programs.find(pid)->status;
+    context.programs.collect(pid);
     if (pipes) pipes->pass_on(context.output, 0);
     if (status == 0 || plan.ignore_status) return;
     const std::string how =
@@ -308,9 +308,9 @@ void command_loadusr(Context& context) {
 
     Timeout timeout(plan.timeout_ns);
     if (!plan.any_name && !plan.wait_end && !wait_for_name(context, plan, timeout)) return;
-    const bool fresh = !plan.any_name && !context.processes.find(plan.name);
+    const bool fresh = !plan.any_name && !context.programs.find(plan.name);
     std::string problem;
-    const pid_t pid = context.processes.start(start, plan.wait_end, problem);
+    const pid_t pid = context.programs.start(start, plan.wait_end, problem);
     if (pid == 0) {
         context.diagnostics.error("no-program", context.span(plan.program), "'" + start.arguments[0] + "' cannot be started: " + problem);
         return;
@@ -318,8 +318,8 @@ void command_loadusr(Context& context) {
     if (pipes) pipes->close_writers();
     if (plan.wait_end) return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr, timeout);
     // A program that registers its own name later is listed under the name of its process until then.
-    const std::uint64_t number = context.processes.add(pid, plan.name, context.command, !plan.any_name);
-    context.processes.keep_alive(pid, start, plan.restart);
+    const std::uint64_t number = context.programs.add(pid, plan.name, context.command, !plan.any_name);
+    context.programs.keep_alive(pid, start, plan.restart);
     if (plan.wait_ready) wait_until_ready(context, plan, pid, number, fresh, timeout);
 }
 
@@ -333,7 +333,7 @@ void command_waitusr(Context& context) {
     }
     const std::size_t at = limited ? 2 : 0;
     const std::string& name = context.argument(at);
-    if (!context.processes.find(name)) {
+    if (!context.programs.find(name)) {
         const bool component = context.session.model().find_component(name) != nullptr;
         if (component)
             context.diagnostics.error("not-a-program", context.span(at), "'" + name + "' is a component in this process, not a program", "",
@@ -342,9 +342,9 @@ void command_waitusr(Context& context) {
     }
     const Timeout timeout(limit_ns);
     // the one that has the name now; another that takes the name over meanwhile is not waited for
-    const std::uint64_t number = context.processes.find(name)->number;
-    const auto living = [&]() -> const Processes::Entry* {
-        const auto* const entry = context.processes.find_number(number);
+    const std::uint64_t number = context.programs.find(name)->number;
+    const auto living = [&]() -> const Programs::Entry* {
+        const auto* const entry = context.programs.find_number(number);
         const bool lives = entry && entry->name == name && (!entry->dead() || entry->restart_ns != 0 || (entry->child && !entry->ended));
         return lives ? entry : nullptr;
     };
@@ -353,14 +353,14 @@ void command_waitusr(Context& context) {
             return timed_out(context, limit_ns,
                              "'" + name + "' (process " + std::to_string(entry->pid) + ", " + entry->state() + ") did not end", "");
         if (context.interrupted()) return;
-        context.processes.wait(context.lock, 100ms);
+        context.programs.wait(context.lock, 100ms);
     }
 }
 
 namespace {
 
 void no_program(Context& context, const std::string& name) {
-    const auto names = context.processes.names();
+    const auto names = context.programs.names();
     context.diagnostics.error("not-a-program", context.span(0), "unknown program '" + name + "'", did_you_mean(name, names),
                               names.empty() ? "no program is running" : "programs: " + listed(names));
 }
@@ -369,13 +369,13 @@ void no_program(Context& context, const std::string& name) {
 
 void command_unloadusr(Context& context) {
     const std::string& name = context.argument(0);
-    const auto unload = [&](Processes::Entry& entry) {
-        const std::string why = context.processes.unload(*context.transaction, entry);
+    const auto unload = [&](Programs::Entry& entry) {
+        const std::string why = context.programs.unload(*context.transaction, entry);
         if (!why.empty()) context.diagnostics.error("not-a-program", context.span(0), why, "", "end it as that user, or as root");
     };
     if (name == "all") {
-        for (const auto& each : context.processes.names()) unload(*context.processes.find(each));
-    } else if (auto* const entry = context.processes.find(name)) {
+        for (const auto& each : context.programs.names()) unload(*context.programs.find(each));
+    } else if (auto* const entry = context.programs.find(name)) {
         unload(*entry);
     } else {
         no_program(context, name);
@@ -385,7 +385,7 @@ void command_unloadusr(Context& context) {
 bool unload_processes(Context& context) {
     if (context.count() != 1) return false;
     const std::string& name = context.argument(0);
-    if (name != "all" && !(context.processes.find(name) && context.session.model().find_component(name))) return false;
+    if (name != "all" && !(context.programs.find(name) && context.session.model().find_component(name))) return false;
     command_unloadusr(context);
     return name != "all";
 }

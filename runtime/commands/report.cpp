@@ -59,8 +59,8 @@ void memory_status(std::string& text, const Model& model) {
 
 std::string status_json(const Session& session) {
     const Counts c = count(session.model());
-    return json_text({{"instance", session.options().name}, {"running", session.running()}, {"lock", session.lock},
-                      {"faults", session.fault_count()}, {"components", c.components}, {"instances", c.instances}, {"pins", c.pins},
+    return json_text({{"instance", session.options().name}, {"running", session.threads().running()}, {"lock", session.locked},
+                      {"faults", session.reports().fault_count()}, {"components", c.components}, {"instances", c.instances}, {"pins", c.pins},
                       {"parameters", c.parameters}, {"aliases", c.aliases}, {"signals", c.signals}, {"functions", c.functions},
                       {"threads", c.threads}}) +
            "\n";
@@ -85,7 +85,7 @@ std::string state_of(const ThreadReport& r) {
 
 void command_status(Context& context) {
     const std::string_view what = context.argument_or(0, "all");
-    if (what == "instance") return context.output.out(context.session.status_text());
+    if (what == "instance") return context.output.out(context.session.reports().status_text());
     if (what != "all" && what != "lock" && what != "mem") {
         context.diagnostics.error("unknown-word", context.span(0), "unknown status '" + std::string(what) + "'", "",
                                   "the choices are: lock, mem, instance, all");
@@ -104,14 +104,14 @@ void show_timing(Context& context) {
     const Patterns patterns(std::move(words));
     std::string text;
     if (context.options().json) {
-        describe(text, context.session, context.processes, Listed::threads, patterns, std::nullopt);
+        describe(text, context.session, Listed::threads, patterns, std::nullopt);
         return context.output.out(text + "\n");
     }
     const auto threads = threads_slowest_first(context.session.model(), patterns);
     text += "Threads:                                                 wake-up lateness              execution time\n"
             "Name                     Period     Cycles   Missed       p50       p99       max       p50       p99       max  Scheduling\n";
     for (const Thread* const thread : threads) {
-        const ThreadReport r = context.session.thread_report(*thread);
+        const ThreadReport r = context.session.reports().thread(*thread);
         text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name, format_duration(static_cast<double>(r.period_ns)),
                             r.cycles, r.missed, figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
                             figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
@@ -128,7 +128,7 @@ void show_timing(Context& context) {
             functions.push_back(function);
             maxima.push_back(tmax);
         }
-    const auto values = context.session.read_pins(maxima);
+    const auto values = context.session.values().read_pins(maxima);
     for (std::size_t i = 0; i < functions.size(); ++i) {
         const LoadedFunction& function = *functions[i];
         const auto samples = function.times->samples.load(std::memory_order_relaxed);
@@ -145,13 +145,13 @@ void show_latency(Context& context) {
     for (std::size_t i = 1; i < context.count(); ++i) words.push_back(context.argument(i));
     const Patterns patterns(std::move(words));
     std::string text;
-    for (const auto& line : context.session.latency_lines())
+    for (const auto& line : context.shell.latencies())
         if (patterns.match(line)) text += line + "\n";
     context.output.out(text);
 }
 
 void show_faults(Context& context) {
-    const auto records = context.session.faults();
+    const auto records = context.session.reports().faults();
     std::string text;
     if (context.options().json) {
         auto rows = nlohmann::ordered_json::array();
@@ -163,13 +163,13 @@ void show_faults(Context& context) {
     for (const auto& record : records)
         text += fmt::format("{:>4}  {} ago  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)), record.line());
     if (records.empty()) text = "no faults\n";
-    else text += fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", context.session.fault_count());
+    else text += fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", context.session.reports().fault_count());
     context.output.out(text);
 }
 
 void command_fault(Context& context) {
     Session& session = context.session;
-    if (context.argument(0) == "clear") return context.transaction->when_committed([&session] { session.clear_faults(); });
+    if (context.argument(0) == "clear") return context.transaction->when_committed([&session] { session.reports().clear_faults(); });
     context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' is not an action on faults", "",
                               "type `fault clear`; `show fault` lists the faults");
 }

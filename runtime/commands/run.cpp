@@ -18,7 +18,7 @@ std::optional<std::uint64_t> whole_number(std::string_view text) {
     return status == std::errc{} && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
 }
 
-/// Waits, without holding the mutex of the session, until `done` (called with it) returns true.
+/// Waits, without holding the lock of the session, until `done` (called with it) returns true.
 template <class Done>
 void wait_for(Context& context, Done&& done) {
     while (!done() && !context.interrupted()) {
@@ -34,14 +34,14 @@ void advance_ns(Context& context, std::int64_t ns) {
     if (session.options().virtual_clock) {
         constexpr std::int64_t piece = 100'000'000;
         for (; ns > 0 && !context.interrupted(); ns -= piece) {
-            session.advance_ns(std::min(ns, piece));
+            session.threads().advance_ns(std::min(ns, piece));
             context.lock.unlock();
             context.lock.lock();
         }
         return;
     }
-    const std::int64_t end = session.now_ns() + ns;
-    wait_for(context, [&] { return session.now_ns() >= end; });
+    const std::int64_t end = session.threads().now_ns() + ns;
+    wait_for(context, [&] { return session.threads().now_ns() >= end; });
 }
 
 void advance_cycles(Context& context, std::uint64_t cycles) {
@@ -54,19 +54,19 @@ void advance_cycles(Context& context, std::uint64_t cycles) {
     if (session.options().virtual_clock) {
         constexpr std::uint64_t piece = 1000;
         for (; cycles > 0 && !context.interrupted(); cycles -= std::min(cycles, piece)) {
-            session.advance_cycles(std::min(cycles, piece));
+            session.threads().advance_cycles(std::min(cycles, piece));
             context.lock.unlock();
             context.lock.lock();
         }
         return;
     }
     const std::string fastest = session.model().threads.front()->name;
-    const std::uint64_t end = session.thread_report(*session.model().threads.front()).cycles + cycles;
+    const std::uint64_t end = session.reports().thread(*session.model().threads.front()).cycles + cycles;
     wait_for(context, [&] {
         const Thread* const thread = session.model().find_thread(fastest);
         if (!thread) return true;
-        const ThreadReport report = session.thread_report(*thread);
-        return report.cycles >= end || (report.hung && session.hung_threads(context.diagnostics));
+        const ThreadReport report = session.reports().thread(*thread);
+        return report.cycles >= end || (report.hung && session.threads().report_hung(context.diagnostics));
     });
 }
 
@@ -75,21 +75,21 @@ void advance_cycles(Context& context, std::uint64_t cycles) {
 void command_start(Context& context) {
     Session& session = context.session;
     if (!context.transaction) {
-        session.start_threads(&context.diagnostics);
+        session.threads().start(&context.diagnostics);
         return;
     }
     context.transaction->needs_threads();
-    context.transaction->when_committed([&session] { session.start_threads(); });
+    context.transaction->when_committed([&session] { session.threads().start(); });
 }
 
 void command_stop(Context& context) {
     Session& session = context.session;
     if (!context.transaction) {
-        session.stop_threads(&context.diagnostics);
+        session.threads().stop(&context.diagnostics);
         return;
     }
     context.transaction->needs_threads();
-    context.transaction->when_committed([&session] { session.stop_threads(); });
+    context.transaction->when_committed([&session] { session.threads().stop(); });
 }
 
 void command_advance(Context& context) {

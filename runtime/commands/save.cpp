@@ -143,7 +143,7 @@ void save_netla(Context& context, Text& text) {
 }
 
 void save_values(Context& context, Text& text, const std::vector<const Pin*>& pins) {
-    const auto values = context.session.read_pins(pins);
+    const auto values = context.session.values().read_pins(pins);
     for (std::size_t i = 0; i < pins.size(); ++i)
         if (pins[i]->type != HAL_TYPE_PORT) text.add("setp {} {:>20}\n", shown_name(*pins[i]), saved_value(pins[i]->type, values[i]));
 }
@@ -168,7 +168,7 @@ void save_signal_values(Context& context, Text& text) {
     auto signals = signals_by_name(context.session.model(), {});
     std::erase_if(signals,
                   [](const Signal* signal) { return signal->type == HAL_TYPE_PORT ? !signal->port : signal->writer || signal->ios > 0; });
-    const auto values = context.session.read_signals(signals);
+    const auto values = context.session.values().read_signals(signals);
     for (std::size_t i = 0; i < signals.size(); ++i) {
         const Signal& signal = *signals[i];
         text.add("sets {} {:>20}\n", signal.name,

@@ -26,7 +26,7 @@ Script::Script(Shell& shell, Shell::State& state, Output& output)
       state_(state),
       session_(state.session),
       output_(output),
-      lock_(state.session.mutex),
+      lock_(state.session.lock()),
       collected_before_(state.collected.size()) {}
 
 Script::~Script() = default;
@@ -168,7 +168,7 @@ void Script::edit(const Command& command, const CommandRow& row) {
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
     if ((row.flags & command_programs) && !shell_.options.check) {
-        Context context{*this, shell_, session_, *state_.processes, output_, row, command, pending_, lock_, &transaction()};
+        Context context{*this, shell_, session_, session_.programs(), output_, row, command, pending_, lock_, &transaction()};
         if (unload_processes(context)) return;
     }
     if (!(row.flags & command_traceless)) text_is_kept_ = true;
@@ -180,8 +180,8 @@ void Script::defer(const Command& command, const CommandRow& row) {
     lines_.push_back(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
-    if (!locks_) locks_ = session_.lock;
-    Context context{*this, shell_, session_, *state_.processes, output_, row, command, pending_, lock_, &transaction(), &*locks_};
+    if (!locks_) locks_ = session_.locked;
+    Context context{*this, shell_, session_, session_.programs(), output_, row, command, pending_, lock_, &transaction(), &*locks_};
     row.function.act(context);
 }
 
@@ -209,12 +209,12 @@ void Script::act(const Command& command, const CommandRow& row) {
         if (one.args.size() > 1 && about_one) {  // a range among the arguments is a list of names
             for (const Token& name : one.args) {
                 const Command single{one.name, {name}, one.span};
-                Context context{*this, shell_, session_, *state_.processes, output_, row, single, pending_, lock_};
+                Context context{*this, shell_, session_, session_.programs(), output_, row, single, pending_, lock_};
                 row.function.act(context);
             }
             continue;
         }
-        Context context{*this, shell_, session_, *state_.processes, output_, row, one, pending_, lock_};
+        Context context{*this, shell_, session_, session_.programs(), output_, row, one, pending_, lock_};
         row.function.act(context);
     }
     if (row.function.act == command_loadusr) text_is_kept_ = true;  // its component remembers the place
@@ -298,7 +298,7 @@ void Script::source(Context& context) {
         const std::string beside = resolve_path(given, folder_of(files_.back().path));
         std::string ignored;
         if (given.starts_with('/') || !read_text_file(beside, text, ignored)) {
-            if (shell_.options.check) session_.note_missing_text(given);
+            if (shell_.options.check) session_.absences().note_missing_text(given);
             context.diagnostics.error("unreadable-file", context.span(0), "'" + given + "' cannot be read: " + problem);
             return;
         }

@@ -5,11 +5,10 @@
 // Consecutive edits are one transaction. It ends before a command that acts on the machine and at the end of the text;
 // with -k after every line. Commands that only look do not end it: they see the machine with the edits made so far
 // (docs/decisions/0019). All its problems are printed together, and the last line states which lines took effect. A `source`d
-// file belongs to the text at its place. From the first edit to the end of its transaction the session's mutex is held.
+// file belongs to the text at its place. From the first edit to the end of its transaction the session's lock is held.
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,7 +22,7 @@ namespace hal {
 class Script {
 public:
     /// The locks as the commands carried out so far leave them: `lock` and `unlock` take effect with their transaction.
-    unsigned locks() const { return locks_.value_or(session_.lock); }
+    unsigned locks() const { return locks_.value_or(session_.locked); }
     Script(Shell& shell, Shell::State& state, Output& output);
     ~Script();
     Script(const Script&) = delete;
@@ -82,11 +81,11 @@ private:
     Shell::State& state_;
     Session& session_;
     Output& output_;
-    std::unique_lock<std::mutex> lock_;
+    SessionLock lock_;
     std::optional<Transaction> transaction_;
     Diagnostics pending_;           ///< of the open transaction
     std::size_t edits_ = 0;         ///< in it
-    std::optional<unsigned> locks_; ///< Session::lock when it has taken effect, if it has `lock` or `unlock`
+    std::optional<unsigned> locks_; ///< Session::locked when it has taken effect, if it has `lock` or `unlock`
     std::vector<Span> lines_;       ///< in it
     std::vector<Span> effective_;   ///< lines that took effect
     std::vector<Span> idle_;        ///< lines that had none: of transactions that failed, or were forgotten by `abort`

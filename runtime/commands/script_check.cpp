@@ -18,7 +18,7 @@ void Script::note_program(const Command& command) {
         names.push_back(std::filesystem::path(word).stem().string());
         if (program.empty()) program = word;
     }
-    session_.note_program(program, names);
+    session_.absences().note_program(program, names);
 }
 
 }  // namespace hal

@@ -59,7 +59,7 @@ void Script::finish() {
     if (!transaction_ && edits_ == 0 && pending_.all().empty()) return;
     const std::size_t edits = std::exchange(edits_, 0);
     const bool open = transaction_.has_value();
-    if (locks_ && transaction_) transaction_->when_committed([&session = session_, locks = *locks_] { session.lock = locks; });
+    if (locks_ && transaction_) transaction_->when_committed([&session = session_, locks = *locks_] { session.locked = locks; });
     const bool took_effect = open && transaction_->commit(pending_);
     transaction_.reset();
     locks_.reset();

@@ -48,15 +48,14 @@ void ProcessOutput::out(std::string_view text) {
 void ProcessOutput::err(std::string_view text) { write_all(stderr, stdout, text); }
 
 Shell::Shell(Session& session, ShellOptions o)
-    : options(std::move(o)), state_(new State{session, std::make_shared<Processes>(session), false, {}, false, {}, {}}) {}
+    : options(std::move(o)), state_(new State{.session = session}) {}
 
 Shell::Shell(Shell& sibling, ShellOptions o)
-    : options(std::move(o)), state_(new State{sibling.session(), sibling.state_->processes, false, {}, false, {}, {}}) {}
+    : options(std::move(o)), state_(new State{.session = sibling.session(), .latencies = sibling.state_->latencies}) {}
 
 Shell::~Shell() = default;
 
 Session& Shell::session() const { return state_->session; }
-Processes& Shell::processes() const { return *state_->processes; }
 bool Shell::collecting() const { return state_->collecting; }
 void Shell::collect(const std::vector<Command>& commands) {
     state_->collected.insert(state_->collected.end(), commands.begin(), commands.end());
@@ -65,6 +64,18 @@ bool Shell::quit() const { return state_->quit; }
 void Shell::cancel(bool on) { state_->cancelled.store(on, std::memory_order_relaxed); }
 
 void Shell::look_up(std::function<std::optional<std::string>(const std::string&)> variable) { state_->variable = std::move(variable); }
+
+void Shell::add_latencies(std::vector<std::string> lines) {
+    const auto lock = state_->session.lock();
+    *state_->latencies = std::move(lines);
+}
+
+std::vector<std::string> Shell::latencies() const {
+    std::vector<std::string> lines = state_->session.reports().latencies();
+    lines.insert(lines.end(), state_->latencies->begin(), state_->latencies->end());
+    std::sort(lines.begin(), lines.end());
+    return lines;
+}
 
 void Shell::look_in(std::optional<Ini> ini) { state_->ini = std::move(ini); }
 
@@ -105,7 +116,7 @@ namespace {
 int cannot_read(Shell& shell, Output& output, const std::string& path, const std::string& problem, Code code, std::string help) {
     Diagnostics diagnostics;
     diagnostics.error(code, {}, "'" + path + "' cannot be read: " + problem, "", std::move(help));
-    const std::scoped_lock lock(shell.session().mutex);
+    const auto lock = shell.session().lock();
     if (shell.options.level != Level::nothing) output.err(render(diagnostics, shell.session().sources, shell.options.color));
     return 1;
 }
@@ -118,7 +129,7 @@ namespace {
 void note_programs(Session& session, const Ini& ini) {
     const auto started = [&](const char* section, const char* key, const char* otherwise, std::vector<std::string> names) {
         const std::string program = ini.get(section, key).value_or(otherwise);
-        if (!program.empty()) session.note_program(program.substr(0, program.find(' ')), names);
+        if (!program.empty()) session.absences().note_program(program.substr(0, program.find(' ')), names);
     };
     started("EMCIO", "EMCIO", "", {"iocontrol"});
     started("HAL", "HALUI", "", {"halui"});
@@ -135,7 +146,7 @@ int Shell::run_file(const std::string& path, Output& output) {
                            "only .hal and .ini files are supported; write loops and name lists with [0..5] and {x,y,z}");
     std::string text, problem;
     if (!read_text_file(resolve_path(path, options.directory), text, problem, true)) {
-        if (options.check) state_->session.note_missing_text(path);
+        if (options.check) state_->session.absences().note_missing_text(path);
         return cannot_read(*this, output, path, problem, "unreadable-file", "");
     }
     return run_text(path, std::move(text), output);
@@ -143,7 +154,7 @@ int Shell::run_file(const std::string& path, Output& output) {
 
 int Shell::read_ini(const std::string& path, Output& output) {
     Diagnostics diagnostics;
-    const std::scoped_lock lock(state_->session.mutex);
+    const auto lock = state_->session.lock();
     Ini ini = Ini::read(state_->session.sources, resolve_path(path, options.directory), diagnostics);
     if (!diagnostics.all().empty() && options.level != Level::nothing)
         output.err(render(diagnostics, state_->session.sources, options.color));
@@ -173,7 +184,7 @@ int Shell::run_ini(const std::string& path, Output& output) {
                 texts.emplace_back(at == beside ? resolve_path(file, folder_of(path)) : at, std::move(text));
                 continue;
             }
-            if (options.check) state_->session.note_missing_text(file);
+            if (options.check) state_->session.absences().note_missing_text(file);
             status = script ? cannot_read(*this, output, file, problem, "unsupported-file",
                                           "rewrite it as a .hal file; loops become ranges: pid.[0..5].command")
                             : cannot_read(*this, output, file, problem, "unreadable-file",

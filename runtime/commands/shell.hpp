@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The command language on a session: a line, a file, completion. The command table is in commands.hpp.
 // One Shell per user of the session (the program itself, each connection of the server); they share the machine and the
-// processes started by loadusr, but neither options nor an open `begin`. All members take Session::mutex themselves, and
+// processes started by loadusr, but neither options nor an open `begin`. All members take the session's lock themselves, and
 // only while they work: a command that waits (loadusr -w, waitusr, advance on a real clock) lets others go on.
 // [setup], one thread at a time per Shell, but for cancel().
 #pragma once
@@ -65,8 +65,6 @@ struct ShellOptions {
     std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
 };
 
-struct Processes;
-
 class Shell {
 public:
     /// The session must outlive it.
@@ -116,7 +114,10 @@ public:
     /// What [SECTION]KEY means in commands; without a value, the INI file of the session. A client of the socket brings its own.
     void look_in(std::optional<Ini> ini);
 
-    Processes& processes() const;
+    /// Sets the lines that latencies() of this shell and its siblings adds: about signals between the machines of a cell.
+    void add_latencies(std::vector<std::string> lines);
+    /// Returns what `show latency` prints: one line per signal, sorted. The session's lock must be held.
+    std::vector<std::string> latencies() const;
     struct State;
 
 private:

@@ -9,20 +9,20 @@
 #include <vector>
 
 #include "netlist/netlist.hpp"
-#include "machine/processes.hpp"
 #include "commands/shell.hpp"
 
 namespace hal {
 
 struct Shell::State {
     Session& session;
-    std::shared_ptr<Processes> processes;  ///< of all shells of the session
     bool collecting = false;               ///< after `begin`
-    std::vector<Command> collected;
+    std::vector<Command> collected = {};
     bool quit = false;
     std::atomic<bool> cancelled{false};    ///< set by any thread, read by a command that waits
     /// What $NAME means to this shell; empty: the environment of the process. A client of the socket brings its own.
     std::function<std::optional<std::string>(const std::string&)> variable = {};
+    /// Lines of `show latency` about signals between machines, shared by all shells of the session and read with its lock held.
+    std::shared_ptr<std::vector<std::string>> latencies = std::make_shared<std::vector<std::string>>();
     std::optional<Ini> ini = {};           ///< what [SECTION]KEY means to this shell, when it is not the session's INI file
 };
 

@@ -9,7 +9,7 @@
 #include "commands/table.hpp"
 #include "commands/describe.hpp"
 #include "commands/listing.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "commands/text_writer.hpp"
 
 namespace hal {
@@ -41,7 +41,7 @@ std::string value_text(const Request& request, hal_type type, const hal_value& v
 void show_comp(Request& request) {
     request.title("Loaded HAL Components:\nID      Type  Name                                            PID   State\n");
     for (const LoadedComponent* const component : components_newest_first(request.model(), request.patterns)) {
-        const auto* const program = component->process ? request.context.processes.find(component->name) : nullptr;
+        const auto* const program = component->process ? request.context.programs.find(component->name) : nullptr;
         const std::string pid = component->process ? std::to_string(component->process) : "";
         request.add("{:>6}  {:<4}  {:<47} {:>5} {}\n", component->id, component->process ? "User" : "RT", component->name, pid,
                     component->process == 0 ? "ready" : program ? program->state() : "initializing");
@@ -54,7 +54,7 @@ void show_pins(Request& request, bool parameters) {
     request.title("Owner   Type  Dir                 Value  Name\n");
     auto pins = pins_by_name(request.model(), parameters, request.patterns);
     keep_type(pins, request.type);
-    const auto values = request.context.session.read_pins(pins);
+    const auto values = request.context.session.values().read_pins(pins);
     for (std::size_t i = 0; i < pins.size(); ++i) {
         const Pin& pin = *pins[i];
         const LoadedComponent* const whose = owner(pin);
@@ -78,7 +78,7 @@ void show_sig(Request& request) {
     request.title("Signals:\nType                  Value  Name     (linked to)\n");
     auto signals = signals_by_name(request.model(), request.patterns);
     keep_type(signals, request.type);
-    const auto values = request.context.session.read_signals(signals);
+    const auto values = request.context.session.values().read_signals(signals);
     std::vector<const Pin*> pins;
     for (std::size_t i = 0; i < signals.size(); ++i) {
         const Signal& signal = *signals[i];
@@ -115,7 +115,7 @@ void show_thread(Request& request) {
     std::vector<const Pin*> times;
     for (const Thread* const thread : threads)
         for (const char* const pin : {".time", ".tmax"}) times.push_back(request.model().find_pin(thread->name + pin));
-    const auto values = request.context.session.read_pins(times);
+    const auto values = request.context.session.values().read_pins(times);
     for (std::size_t i = 0; i < threads.size(); ++i) {
         const Thread* const thread = threads[i];
         const std::int32_t last = values[2 * i].s32, longest = values[2 * i + 1].s32;
@@ -230,7 +230,7 @@ void command_show(Context& context) {
     request.patterns = Patterns(std::move(patterns));
     if (context.options().json) {
         std::string text;
-        describe(text, context.session, context.processes, kind->listed, request.patterns, request.type);
+        describe(text, context.session, kind->listed, request.patterns, request.type);
         return context.output.out(text + "\n");
     }
     kind->show(request);

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstddef>
-#include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,23 +17,23 @@
 
 namespace hal {
 
-struct Processes;
+struct Programs;
 class Script;
 struct CommandRow;
 
-/// One command that is being executed by its function. The mutex of the session is held; a command that waits releases it meanwhile.
+/// One command that is being executed by its function. The lock of the session is held; a command that waits releases it meanwhile.
 struct Context {
     Script& script;
     Shell& shell;
     Session& session;
-    Processes& processes;
+    Programs& programs;
     Output& output;
     const CommandRow& row;
     const Command& command;
     Diagnostics& diagnostics;            ///< an error in here is the command's failure
-    std::unique_lock<std::mutex>& lock;
+    SessionLock& lock;
     Transaction* transaction = nullptr;  ///< of a deferred command: the transaction that queues its action
-    unsigned* locks = nullptr;           ///< of a deferred command: Session::lock after the commit
+    unsigned* locks = nullptr;           ///< of a deferred command: Session::locked after the commit
 
     const ShellOptions& options() const { return shell.options; }
     std::size_t count() const { return command.args.size(); }

@@ -47,11 +47,11 @@ void print_type(Context& context, hal_type type) {
 }  // namespace
 
 void command_getp(Context& context) {
-    if (const Pin* const pin = pin_named(context)) print_value(context, pin->type, context.session.read_pins({pin})[0]);
+    if (const Pin* const pin = pin_named(context)) print_value(context, pin->type, context.session.values().read_pins({pin})[0]);
 }
 
 void command_gets(Context& context) {
-    if (const Signal* const signal = signal_named(context)) print_value(context, signal->type, context.session.read_signals({signal})[0]);
+    if (const Signal* const signal = signal_named(context)) print_value(context, signal->type, context.session.values().read_signals({signal})[0]);
 }
 
 void command_ptype(Context& context) {

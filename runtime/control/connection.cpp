@@ -100,16 +100,16 @@ const Verb& verb_of(const Json& body) {
 Connection::Connection(Shell& shell, pid_t peer) : state_(new State(shell, peer)) {}
 
 Connection::~Connection() {
-    const std::scoped_lock lock(state_->session.mutex);
-    state_->shell.processes().withdraw(state_->owner);
+    const auto lock = state_->session.lock();
+    state_->session.programs().withdraw(state_->owner);
 }
 
 void Connection::on_event(std::function<void(std::string)> take) { state_->event = std::move(take); }
 
 bool Connection::idle() const {
     if (state_->engaged || !state_->subscriptions.empty()) return false;
-    const std::scoped_lock lock(state_->session.mutex);
-    return !state_->shell.processes().answers(state_->owner);
+    const auto lock = state_->session.lock();
+    return !state_->session.programs().answers(state_->owner);
 }
 
 std::string Connection::hello() const {

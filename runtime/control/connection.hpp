@@ -45,13 +45,13 @@ public:
     /// Where lines go that a command which waits has for the client meanwhile; called in the thread that is in handle().
     void on_event(std::function<void(std::string line)> take);
     /// True while nothing depends on this connection: no request being executed, no subscription, no component, no open `begin`. Takes
-    /// Session::mutex. [any]
+    /// the session's lock. [any]
     bool idle() const;
 
     /// When the next subscription is due, on the steady clock; INT64_MAX without a subscription. [any]
     std::int64_t next_due_ns() const;
     /// Appends the values of all subscriptions that are due. `congested`: counts them as skipped instead. Takes
-    /// Session::mutex. [any]
+    /// the session's lock. [any]
     void publish(std::int64_t now_ns, bool congested, std::string& events);
 
     std::uint64_t requests() const;  ///< [any]

@@ -15,7 +15,7 @@
 #include "control/connection.hpp"
 #include "control/request.hpp"
 #include "control/subscriptions.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -28,7 +28,7 @@ struct Connection::State {
     Shell shell;
     Session& session;
     pid_t peer;
-    const std::uint64_t owner = shell.processes().new_owner();  ///< of the components that this client answers for
+    const std::uint64_t owner = session.programs().new_owner();  ///< of the components that this client answers for
     Subscriptions subscriptions;
     std::atomic<std::uint64_t> requests{0}, rubbish{0};
     std::atomic<bool> engaged{false};  ///< a request is being executed, or `begin` is open since the last one

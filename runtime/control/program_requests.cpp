@@ -8,7 +8,7 @@
 
 #include "machine/session.hpp"
 #include "commands/json_text.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "control/request.hpp"
 #include "commands/shell.hpp"
 #include "control/streams.hpp"
@@ -48,9 +48,9 @@ bool good_pin_name(const std::string& name) {
            std::all_of(name.begin(), name.end(), [](unsigned char c) { return c > ' ' && c != 127 && c != '"' && c != '\\'; });
 }
 
-OutsidePin pin_of(const Json& given, const std::string& prefix) {
+ProgramPin pin_of(const Json& given, const std::string& prefix) {
     if (!given.is_object()) throw RequestError{"a pin must be an object with name, type and dir"};
-    OutsidePin pin;
+    ProgramPin pin;
     const std::string& name = text_of(member(given, "name"), "the name of a pin");
     if (!good_pin_name(name)) throw RequestError{"'" + name.substr(0, 60) + "' is not a valid pin name"};
     pin.name = prefix + "." + name;
@@ -75,15 +75,15 @@ OutsidePin pin_of(const Json& given, const std::string& prefix) {
     return pin;
 }
 
-Processes::Entry& owned(const Program& by, const std::string& name) {
-    Processes::Entry* const entry = by.shell.processes().owned(name, by.owner);
+Programs::Entry& owned(const Program& by, const std::string& name) {
+    Programs::Entry* const entry = by.session.programs().owned(name, by.owner);
     if (!entry) throw RequestError{"this connection has no component '" + name.substr(0, 60) + "'; send {\"component\":…} first"};
     return *entry;
 }
 
 /// The component's pin of that name that a dead program left behind, or a new one.
-Pin* add_pin(const Program& by, Transaction& transaction, const Processes::Entry& entry, std::unordered_set<const Pin*>& taken,
-             const OutsidePin& wanted) {
+Pin* add_pin(const Program& by, Transaction& transaction, const Programs::Entry& entry, std::unordered_set<const Pin*>& taken,
+             const ProgramPin& wanted) {
     Pin* const there = by.session.model().find_pin(wanted.name);
     const bool left = there && there->name == wanted.name && there->instance && there->instance->component->process != 0 &&
                       there->instance->component->name == entry.name && !taken.contains(there);
@@ -95,16 +95,16 @@ Pin* add_pin(const Program& by, Transaction& transaction, const Processes::Entry
             });
             return there;
         }
-        by.session.remove_outside_pins(transaction, entry.name, {there});
+        by.session.programs().remove_pins(transaction, entry.name, {there});
     }
     std::string problem;
-    Pin* const made = by.session.add_outside_pin(transaction, entry.name, wanted, problem);
+    Pin* const made = by.session.programs().add_pin(transaction, entry.name, wanted, problem);
     if (!made) throw RequestError{problem};
     return made;
 }
 
 /// Declared values for pins that are there: numbers and values in turn.
-std::vector<std::pair<Pin*, hal_value>> declared_values(const Processes::Entry& entry, const Json& safe) {
+std::vector<std::pair<Pin*, hal_value>> declared_values(const Programs::Entry& entry, const Json& safe) {
     std::vector<std::pair<Pin*, hal_value>> values;
     for (std::size_t i = 0; i < safe.size(); i += 2) {
         const auto number =
@@ -116,12 +116,12 @@ std::vector<std::pair<Pin*, hal_value>> declared_values(const Processes::Entry& 
 }
 
 /// Gives the component all of these pins, or throws and gives it none.
-void add_pins(const Program& by, Processes::Entry& entry, const std::vector<OutsidePin>& wanted) {
+void add_pins(const Program& by, Programs::Entry& entry, const std::vector<ProgramPin>& wanted) {
     if (wanted.empty()) return;
     Transaction transaction = by.session.begin();
     std::unordered_set<const Pin*> taken(entry.pins.begin(), entry.pins.end());
     std::vector<Pin*> made;
-    for (const OutsidePin& pin : wanted) {
+    for (const ProgramPin& pin : wanted) {
         made.push_back(add_pin(by, transaction, entry, taken, pin));
         taken.insert(made.back());
     }
@@ -144,21 +144,21 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
     if (!good_pin_name(before)) throw RequestError{"'" + before.substr(0, 60) + "' is not a valid prefix"};
     const std::int64_t timeout_ms = timeout.is_null() ? 0 : whole(timeout, "timeout_ms", -1, 86'400'000);
     const std::int64_t every_ms = every.is_null() ? 0 : whole(every, "every_ms", 0, 86'400'000);
-    std::vector<OutsidePin> wanted;
+    std::vector<ProgramPin> wanted;
     if (!pins.is_null()) {
         if (!pins.is_array() || pins.size() > most_pins) throw RequestError{"pins must be an array of at most " + std::to_string(most_pins)};
         for (const Json& pin : pins) wanted.push_back(pin_of(pin, before));
     }
 
-    const std::scoped_lock lock(by.session.mutex);
-    Processes& processes = by.shell.processes();
-    Processes::Entry* entry = processes.owned(name, by.owner);
+    const auto lock = by.session.lock();
+    Programs& programs = by.session.programs();
+    Programs::Entry* entry = programs.owned(name, by.owner);
     const bool fresh = !entry;
-    const Processes::Entry* const there = processes.find(name);
+    const Programs::Entry* const there = programs.find(name);
     const bool was_dead = there && there->dead();
     if (fresh) {
-        if (const std::string why = processes.announce(by.peer, name, by.owner, false); !why.empty()) throw RequestError{why};
-        entry = processes.owned(name, by.owner);
+        if (const std::string why = programs.announce(by.peer, name, by.owner, false); !why.empty()) throw RequestError{why};
+        entry = programs.owned(name, by.owner);
     }
     const std::size_t first = entry->pins.size();
     try {
@@ -169,16 +169,16 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
             pin->flags |= HAL_PIN_SAFE;
         }
     } catch (const RequestError&) {
-        if (fresh && was_dead) processes.die(*entry, "its pins were rejected");  // it keeps the pins and links it had
-        else if (fresh) processes.leave(*entry);
+        if (fresh && was_dead) programs.die(*entry, "its pins were rejected");  // it keeps the pins and links it had
+        else if (fresh) programs.leave(*entry);
         throw;
     }
     if (!timeout.is_null()) entry->timeout_ns = timeout_ms < 0 ? -1 : timeout_ms * 1'000'000;
-    if (!every.is_null()) processes.set_rate(*entry, every_ms * 1'000'000);
-    else processes.hear(*entry);
+    if (!every.is_null()) programs.set_rate(*entry, every_ms * 1'000'000);
+    else programs.hear(*entry);
     if (!pins.is_null()) {
         const std::vector<Pin*> added(entry->pins.begin() + static_cast<std::ptrdiff_t>(first), entry->pins.end());
-        const auto values = by.session.peek_pins(added);
+        const auto values = by.session.values().peek(added);
         reply += ",\"first\":" + std::to_string(first) + ",\"values\":[";
         for (std::size_t i = 0; i < added.size(); ++i) {
             if (i > 0) reply += ',';
@@ -186,7 +186,7 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
         }
         reply += ']';
     }
-    if (!ready.is_null() || fresh) processes.set_ready(*entry, ready.is_null() || ready.get<bool>());
+    if (!ready.is_null() || fresh) programs.set_ready(*entry, ready.is_null() || ready.get<bool>());
 }
 
 void exchange_values(const Program& by, const Json& body, std::string& reply) {
@@ -197,8 +197,8 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
         throw RequestError{"write must be an array of alternating pin numbers and values"};
     if (!read.is_null() && !read.is_boolean()) throw RequestError{"read must be true or false"};
 
-    const std::scoped_lock lock(by.session.mutex);
-    Processes::Entry& entry = owned(by, name);
+    const auto lock = by.session.lock();
+    Programs::Entry& entry = owned(by, name);
     std::vector<std::pair<Pin*, hal_value>> values;
     for (std::size_t i = 0; i < write.size(); i += 2) {
         const auto number =
@@ -206,7 +206,7 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
         Pin* const pin = entry.pins[number];
         values.emplace_back(pin, value_of(write[i + 1], pin->type, pin->name));
     }
-    if (alive.is_null() || alive.get<bool>()) by.shell.processes().hear(entry);
+    if (alive.is_null() || alive.get<bool>()) by.session.programs().hear(entry);
     if (!entry.silence.empty())  // its pins keep their declared values; what it writes waits until it responds
         for (auto& [pin, value] : entry.before_silence) {
             const auto written = std::find_if(values.begin(), values.end(), [&, p = pin](const auto& one) { return one.first == p; });
@@ -214,7 +214,7 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
             value = written->second;
             values.erase(written);
         }
-    by.session.write_outside(values);
+    by.session.values().write(values);
     if (!read.is_boolean() || !read.get<bool>()) return;
     std::vector<Pin*> asked;
     bool loops = false;
@@ -224,7 +224,7 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
             loops = loops || std::any_of(pin->signal->pins.begin(), pin->signal->pins.end(),
                                          [&](const Pin* other) { return other != pin && other->instance == pin->instance; });
     }
-    const auto readings = by.session.peek_pins(asked);
+    const auto readings = by.session.values().peek(asked);
     reply += ",\"values\":[";
     for (std::size_t i = 0; i < asked.size(); ++i) {
         if (i > 0) reply += ',';
@@ -236,8 +236,8 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
 
 void leave_component(const Program& by, const Json& body) {
     const std::string& name = text_of(body["exit"], "exit");
-    const std::scoped_lock lock(by.session.mutex);
-    by.shell.processes().leave(owned(by, name));
+    const auto lock = by.session.lock();
+    by.session.programs().leave(owned(by, name));
 }
 
 // --- byte streams ----------------------------------------------------------------------------------------------------------
@@ -271,7 +271,7 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
     const Json &read = member(body, "read"), &peek = member(body, "peek"), &write = member(body, "write");
     if (!read.is_null() + !peek.is_null() + !write.is_null() > 1) throw RequestError{"a request either reads, peeks into or writes a port"};
     const bool takes = !read.is_null() || !peek.is_null();
-    const std::scoped_lock lock(by.session.mutex);
+    const auto lock = by.session.lock();
     Pin* const pin = by.session.model().find_pin(name);
     if (!pin || !pin->instance) throw RequestError{"unknown pin '" + name.substr(0, 60) + "'"};
     owned(by, pin->instance->component->name);
@@ -310,7 +310,7 @@ namespace {
 
 void create_stream(const Program& by, const std::string& name, const Json& wanted, const Json& owner) {
     if (!wanted.is_object()) throw RequestError{"create must be an object with types and depth"};
-    Processes::Entry& entry = owned(by, text_of(owner, "owner"));
+    Programs::Entry& entry = owned(by, text_of(owner, "owner"));
     const std::string& letters = text_of(member(wanted, "types"), "types");
     const auto depth = static_cast<std::uint32_t>(whole(member(wanted, "depth"), "depth", 1, 1'000'000));
     if (letters.empty() || letters.size() > 100) throw RequestError{"a stream has 1..100 columns"};
@@ -318,7 +318,7 @@ void create_stream(const Program& by, const std::string& name, const Json& wante
         if (std::none_of(types.begin(), types.end(), [&](const TypeRow& row) { return row.number && row.letter == letter; }))
             throw RequestError{std::string("'") + letter + "' is not a valid column type; valid types: b f s u l k"};
     if (!good_pin_name(name)) throw RequestError{"'" + name.substr(0, 60) + "' is not a valid stream name"};
-    if (by.session.find_stream(name) || by.shell.processes().find_stream(name)) throw RequestError{"stream '" + name + "' already exists"};
+    if (by.session.host().find_stream(name) || by.session.programs().find_stream(name)) throw RequestError{"stream '" + name + "' already exists"};
     auto made = std::make_shared<ProgramStream>();
     made->name = name;
     made->types = letters;
@@ -335,16 +335,16 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
     const Json &take = member(body, "take"), &records = member(body, "records"), &create = member(body, "create");
     if (!take.is_null() + !records.is_null() + !create.is_null() > 1)
         throw RequestError{"a request either reads (take), feeds (records) or creates (create) a stream"};
-    const std::scoped_lock lock(by.session.mutex);
+    const auto lock = by.session.lock();
     if (!create.is_null()) create_stream(by, name, create, member(body, "owner"));
-    hal_stream* stream = by.session.find_stream(name);
-    if (ProgramStream* const of_program = stream ? nullptr : by.shell.processes().find_stream(name)) {
+    hal_stream* stream = by.session.host().find_stream(name);
+    if (ProgramStream* const of_program = stream ? nullptr : by.session.programs().find_stream(name)) {
         stream = &of_program->stream;
         stream->to_machine = take.is_null();  // programs are at both of its ends
     }
     if (!stream) {
-        auto names = by.session.stream_names();
-        const auto more = by.shell.processes().stream_names();
+        auto names = by.session.host().stream_names();
+        const auto more = by.session.programs().stream_names();
         names.insert(names.end(), more.begin(), more.end());
         const std::string meant = did_you_mean(name, names);
         throw RequestError{"unknown stream '" + name.substr(0, 60) + "'; " +

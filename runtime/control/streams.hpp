@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The far end of a sampler's or streamer's FIFO: records to JSON and back. The session's mutex must be held: it keeps the
+// The far end of a sampler's or streamer's FIFO: records to JSON and back. The session's lock must be held: it keeps the
 // stream alive and makes its callers one.
 #pragma once
 

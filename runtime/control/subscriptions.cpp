@@ -65,9 +65,9 @@ void Subscriptions::publish(Session& session, std::int64_t now_ns, bool congeste
         std::vector<std::optional<Reading>> readings;
         std::int64_t time_ns = 0;
         {
-            const std::scoped_lock lock(session.mutex);
-            readings = session.read(one.names);
-            time_ns = session.now_ns();
+            const auto lock = session.lock();
+            readings = session.values().read(one.names);
+            time_ns = session.threads().now_ns();
         }
         if (one.changes_only && same(readings, one.last)) continue;
         events += "{\"event\":\"values\",\"subscription\":" + std::to_string(one.id) + ",\"time_ns\":" + std::to_string(time_ns) + ",\"values\":";

@@ -13,7 +13,7 @@
 namespace hal {
 
 /// Nothing of it is reached but through its members, and each of them takes its mutex: they may be called from any thread, also while
-/// another thread executes a request of the same client. publish() takes Session::mutex after it; who holds Session::mutex must
+/// another thread executes a request of the same client. publish() takes the session's lock after it; who holds that lock must
 /// not call anything here. [any]
 class Subscriptions {
 public:

@@ -14,8 +14,8 @@ namespace hal {
 
 void Connection::State::read(const Json& body, std::string& reply) {
     const auto names = names_in(body["read"], "read");
-    const std::scoped_lock lock(session.mutex);
-    const auto readings = session.read(names);
+    const auto lock = session.lock();
+    const auto readings = session.values().read(names);
     append_values(reply += ",\"values\":", readings);
     reply += ",\"types\":[";
     for (const auto& reading : readings) {
@@ -39,13 +39,13 @@ void Connection::State::set(const Json& body, std::string& reply) {
         reply += ",\"count\":" + std::to_string(commands.size()) + ",\"collecting\":true";
         return;
     }
-    const std::scoped_lock lock(session.mutex);
+    const auto lock = session.lock();
     Diagnostics diagnostics;
     Transaction transaction = session.begin();
     for (Command& command : commands) {
         resolve_set(session.model(), command);
         const CommandRow& row = *find_command(command.name.text);
-        if (!check_lock(row, command, session.lock, session.model(), diagnostics)) break;
+        if (!check_lock(row, command, session.locked, session.model(), diagnostics)) break;
         transaction.apply(row.form(), command, diagnostics);
     }
     if (!transaction.commit(diagnostics)) throw RequestError{render(diagnostics, session.sources) + "nothing was changed"};
@@ -86,7 +86,7 @@ Patterns patterns_of(const Json& body) {
 void Connection::State::list(const Json& body, std::string& reply) {
     const Listed kind = kind_of(body["list"], "list");
     const Patterns patterns = patterns_of(body);
-    const std::scoped_lock lock(session.mutex);
+    const auto lock = session.lock();
     reply += ",\"names\":[";
     for (const auto& name : names_of(session.model(), kind, patterns)) {
         if (reply.back() != '[') reply += ',';
@@ -103,8 +103,8 @@ void Connection::State::describe_kind(const Json& body, std::string& reply) {
         type = type_named(text_of(wanted, "type"));
         if (!type) throw RequestError{"type must be bit, float, s32, u32, s64, u64 or port"};
     }
-    const std::scoped_lock lock(session.mutex);
-    describe(reply += ",\"objects\":", session, shell.processes(), kind, patterns, type);
+    const auto lock = session.lock();
+    describe(reply += ",\"objects\":", session, kind, patterns, type);
 }
 
 }  // namespace hal

@@ -16,7 +16,7 @@
 namespace hal {
 namespace {
 
-std::atomic<Session::State*> watched[64];  // the machines of this process; further ones are not named in reports
+std::atomic<SessionState*> watched[64];  // the machines of this process; further ones are not named in reports
 
 void say(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
 
@@ -44,7 +44,7 @@ const char* signal_text(int signal) noexcept {
 // The process is dying: the model is read without a lock, by pointer only.
 void name_function(const Core* core, std::uint32_t id) noexcept {
     for (const auto& one : watched) {
-        const Session::State* const state = one.load();
+        const SessionState* const state = one.load();
         if (!state || std::none_of(state->cores.begin(), state->cores.end(), [&](const auto& pair) { return pair.second == core; })) continue;
         for (const auto& component : state->model.components)
             for (const auto& function : component->functions)
@@ -99,7 +99,7 @@ void on_signal(int signal) {
 CycleNames names_of(const CycleNow& now) {
     CycleNames names;
     for (const auto& one : watched) {
-        const Session::State* const state = one.load();
+        const SessionState* const state = one.load();
         if (!state) continue;
         const auto of = std::find_if(state->cores.begin(), state->cores.end(), [&](const auto& pair) { return pair.second == now.core; });
         if (of == state->cores.end()) continue;
@@ -111,7 +111,7 @@ CycleNames names_of(const CycleNow& now) {
     return names;
 }
 
-void watch_for_crashes(Session::State* state) {
+void watch_for_crashes(SessionState* state) {
     static const bool installed = [] {
         std::set_terminate(on_terminate);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -128,14 +128,14 @@ void watch_for_crashes(Session::State* state) {
     }();
     (void)installed;
     for (auto& place : watched) {
-        Session::State* empty = nullptr;
+        SessionState* empty = nullptr;
         if (place.compare_exchange_strong(empty, state)) return;
     }
 }
 
-void end_watch_for_crashes(Session::State* state) {
+void end_watch_for_crashes(SessionState* state) {
     for (auto& place : watched) {
-        Session::State* expected = state;
+        SessionState* expected = state;
         if (place.compare_exchange_strong(expected, nullptr)) return;
     }
 }

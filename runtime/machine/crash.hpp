@@ -17,6 +17,6 @@ struct CycleNames {
 CycleNames names_of(const CycleNow& now);
 
 /// After watch_for_crashes(): the machine is going.
-void end_watch_for_crashes(Session::State* state);
+void end_watch_for_crashes(SessionState* state);
 
 }  // namespace hal

@@ -20,7 +20,7 @@ bool acquires(const LoadedComponent& component) {
 
 }  // namespace
 
-bool Session::State::start_replaced(Diagnostics& diagnostics) {
+bool SessionState::start_replaced(Diagnostics& diagnostics) {
     const auto start = [&](const LoadedComponent& component) {
         for (const auto& instance : component.instances) {
             if (instance->started) continue;
@@ -58,7 +58,7 @@ bool Session::State::start_replaced(Diagnostics& diagnostics) {
 }
 
 // After undo(): the old instances are in the model again, the new ones beside it, and perhaps in the threads.
-void Session::State::restart_replaced(Diagnostics& diagnostics) {
+void SessionState::restart_replaced(Diagnostics& diagnostics) {
     std::unordered_set<const LoadedFunction*> out;
     for (const Edit::Replaced& one : edit->replaced())
         if (one.stopped)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the machine is doing in a component outside of the cycle: its constructor, start, stop or destructor. It holds the session's mutex
+// What the machine is doing in a component outside of the cycle: its constructor, start, stop or destructor. It holds the session's lock
 // meanwhile, so when the call does not return, this is all that can be told.
 #pragma once
 
@@ -22,7 +22,7 @@ struct SetupCallNow {
 
 class SetupCall {
 public:
-    /// There is one at a time in a process: the session's mutex is held.
+    /// There is one at a time in a process: the session's lock is held.
     SetupCall(const std::string& instance, const std::string& component, const char* what) noexcept {
         copy(instance, now.instance);
         copy(component, now.component);

@@ -21,7 +21,7 @@
 
 #include "paths.hpp"
 #include "machine/plugins.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 
 namespace hal {
 namespace {

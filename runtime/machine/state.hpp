@@ -2,7 +2,6 @@
 // What a Session holds; private to this folder.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,14 +14,15 @@
 #include "hal/status.h"
 #include "model/compile.hpp"
 #include "machine/elaborate.hpp"
+#include "machine/fault_log.hpp"
 #include "machine/plugins.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
 
-struct Session::State {
-    explicit State(SessionOptions o);
-    ~State();
+struct SessionState {
+    explicit SessionState(SessionOptions o);
+    ~SessionState();
 
     SessionOptions options;
     Plugins plugins;
@@ -51,17 +51,10 @@ struct Session::State {
     bool touched = false;                    ///< threads may have been made, ended or given a plan for the open transaction
     std::unique_ptr<char[]> reserve;         ///< given back when memory has run out, so that undoing has some
 
-    struct LoggedFault {
-        FaultRecord record;   ///< its age is the time of the first
-        FaultEvent event;     ///< compared with those that follow; no code: no other one belongs to it
-    };
-    std::deque<LoggedFault> fault_log;
-    std::uint64_t fault_number = 0;          ///< of the newest
+    FaultLog faults{*this};
     hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
-    std::vector<std::string> latencies;      ///< of signals that pass between machines
     std::vector<std::string> refused;        ///< by the system: "memory locking"
     bool shut = false;
-    int watchdog = -1;                       ///< the open device, until it is disarmed
     bool abandoned = false;                  ///< a thread hangs and may go on using everything here
 
     Core* core(const Thread* thread) const;
@@ -77,7 +70,6 @@ struct Session::State {
     void withdraw(Diagnostics* diagnostics = nullptr);
     /// Reports that there is no memory left, and makes some.
     void out_of_memory(Diagnostics& diagnostics);
-    void collect_faults();
     /// One error for a thread that hangs.
     void hung_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const;
     /// New values of what threads own, into their queues.
@@ -98,20 +90,11 @@ private:
     void keep_values();
     void observe_unknowns(Compiled& compiled);
     void settle(Compiled& compiled, const std::vector<Core*>& silent);
-    void collect_faults(const Thread& thread);
     void silent_thread(const Core* core, Diagnostics& diagnostics) const;
-    void collect_stalls();
-
-public:
-    /// The orderly end: the device does not reset the host.
-    void disarm_watchdog();
 };
 
-/// hal_status::text; its data is the Session.
-std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t room);
-
 /// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any more.
-void watch_for_crashes(Session::State* state);
+void watch_for_crashes(SessionState* state);
 
 /// How long a thread may take to answer beyond two of its periods.
 inline constexpr std::int64_t answer_timeout_ns = 1'000'000'000;

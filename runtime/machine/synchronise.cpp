@@ -9,12 +9,12 @@
 
 namespace hal {
 
-Core* Session::State::core(const Thread* thread) const {
+Core* SessionState::core(const Thread* thread) const {
     const auto at = cores.find(thread);
     return at == cores.end() ? nullptr : at->second;
 }
 
-bool Session::State::make_threads(Diagnostics& diagnostics) {
+bool SessionState::make_threads(Diagnostics& diagnostics) {
     if (options.check_only) return true;
     // priorities fall with the rate, from 98 as LinuxCNC has it
     int priority = 98;
@@ -44,12 +44,12 @@ bool Session::State::make_threads(Diagnostics& diagnostics) {
     return true;
 }
 
-bool Session::State::end_threads(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics) {
+bool SessionState::end_threads(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics) {
     for (const auto& owned : threads) {
         Thread* const thread = owned.get();
         Core* const leaving = core(thread);
         if (!leaving) continue;
-        collect_faults(*thread);
+        faults.collect(*thread);
         if (leaving->hung() || !executor->remove(*leaving, answer_timeout_ns)) {
             if (leaving->hung()) {
                 hung_thread(*thread, *leaving, diagnostics);
@@ -82,13 +82,13 @@ bool Session::State::end_threads(std::vector<std::unique_ptr<Thread>>& threads, 
 }
 
 // Nothing may have changed when a thread turns out to hang, so this is seen first.
-bool Session::State::all_answer(Diagnostics& diagnostics) {
+bool SessionState::all_answer(Diagnostics& diagnostics) {
     const std::vector<Core*> hang = executor->hanging(answer_timeout_ns);
     for (const Core* const one : hang) silent_thread(one, diagnostics);
     return hang.empty();
 }
 
-void Session::State::silent_thread(const Core* hangs, Diagnostics& diagnostics) const {
+void SessionState::silent_thread(const Core* hangs, Diagnostics& diagnostics) const {
     for (const auto& [thread, one] : cores)
         if (one == hangs && one->hung()) hung_thread(*thread, *one, diagnostics);
         else if (one == hangs)
@@ -99,7 +99,7 @@ void Session::State::silent_thread(const Core* hangs, Diagnostics& diagnostics) 
                               "", "show thread and show fault say more");
 }
 
-void Session::State::withdraw(Diagnostics* diagnostics) {
+void SessionState::withdraw(Diagnostics* diagnostics) {
     edit->undo();
     bool in_step = true;
     if (touched) {
@@ -129,13 +129,13 @@ void Session::State::withdraw(Diagnostics* diagnostics) {
     else close_edit();
 }
 
-bool Session::State::synchronise(Diagnostics& diagnostics) {
+bool SessionState::synchronise(Diagnostics& diagnostics) {
     // A function must never be in two threads at once: first everything runs without the movers, then with them.
     if (const auto movers = moving(model); !movers.empty() && !swap(movers, diagnostics)) return false;
     return swap({}, diagnostics);
 }
 
-bool Session::State::swap(const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics) {
+bool SessionState::swap(const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics) {
     CompileInput input;
     input.epoch = ++epoch;
     input.without = &without;
@@ -173,7 +173,7 @@ bool Session::State::swap(const std::unordered_set<const LoadedFunction*>& witho
     return silent.empty();
 }
 
-void Session::State::keep_values() {
+void SessionState::keep_values() {
     const auto value = [](const hal_value* slot) { return hal_value{.raw = __atomic_load_n(&slot->raw, __ATOMIC_RELAXED)}; };
     for (const auto& [pin, unused] : edit->pin_values)
         if (pin->home) before.pins.try_emplace(pin, value(edit->present(*pin).slot));
@@ -182,7 +182,7 @@ void Session::State::keep_values() {
 }
 
 // Values that another thread owns: one coherent look into each such thread.
-void Session::State::observe_unknowns(Compiled& compiled) {
+void SessionState::observe_unknowns(Compiled& compiled) {
     std::map<Core*, std::vector<Compiled::Unknown*>> by_owner;
     for (auto& unknown : compiled.unknowns) {
         if (Core* const owner = core(unknown.owner)) by_owner[owner].push_back(&unknown);
@@ -213,7 +213,7 @@ void Session::State::observe_unknowns(Compiled& compiled) {
 
 // No thread uses the old instances of a reload, nor those that were unloaded: their pins stand alone, with the values they have,
 // before the images they point into go.
-void Session::State::retire() {
+void SessionState::retire() {
     const auto alone = [](const Pin& pin) {
         hal_pin& memory = *pin.memory;
         if (memory.slot == &memory.own) return;
@@ -232,7 +232,7 @@ void Session::State::retire() {
 
 // All threads that answered run the new plans; the old images are still there, and nobody writes them any more. A thread
 // that did not answer still runs its old plan, so what is known of its places stays.
-void Session::State::settle(Compiled& compiled, const std::vector<Core*>& silent) {
+void SessionState::settle(Compiled& compiled, const std::vector<Core*>& silent) {
     const auto hangs = [&](const Thread* thread) {
         return thread && std::find(silent.begin(), silent.end(), core(thread)) != silent.end();
     };

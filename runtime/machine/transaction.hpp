@@ -23,7 +23,7 @@ struct EditForm {
 };
 
 /// The open transaction of a session, made by Session::begin(). There is at most one at a time; whoever holds it holds
-/// Session::mutex. Destruction rolls back. [setup]
+/// the lock of the session. Destruction rolls back. [setup]
 class Transaction {
 public:
     Transaction(Transaction&& other) noexcept : session_(std::exchange(other.session_, nullptr)) {}

@@ -41,6 +41,13 @@ void Absences::assume(const std::string& name) {
     note(std::move(dashed), cause);
 }
 
+void Absences::note_program(const std::string& program, const std::vector<std::string>& names) {
+    const Cause cause = add("program " + quoted(program), "which is not started here", {}, Scope::names);
+    for (const std::string& name : names) note(name, cause);
+}
+
+void Absences::note_missing_text(const std::string& path) { add("file " + quoted(path), "which cannot be read", {}, Scope::file); }
+
 std::optional<Absences::Cause> Absences::assumed(const std::string& component) {
     const auto found = assumed_.find(component);
     if (found == assumed_.end()) return {};

@@ -42,6 +42,11 @@ public:
     /// The cause of a component that is assumed and that loadrt names: from then on its pins may have any name.
     std::optional<Cause> assumed(const std::string& component);
 
+    /// `hal check` does not start programs: the names that this one would register as components.
+    void note_program(const std::string& program, const std::vector<std::string>& names);
+    /// A netlist that cannot be read: names that it may define are not errors in the texts after it.
+    void note_missing_text(const std::string& path);
+
     /// True when functions or signals may be in use by something that is missing.
     bool open() const { return open_; }
     /// Reports the lines counted since the last time: with the error about their cause when it is among `diagnostics`, else by a

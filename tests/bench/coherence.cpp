@@ -40,10 +40,10 @@ struct Seen {
 Seen ours(const Options& options, double seconds) {
     Runtime runtime;
     runtime.apply(new_thread("fast", 50'000, options.cpu, "spin=0") + fmt::format("newthread slow 1000000 cpu={} priority={} spin=0\n", options.cpu, priority - 1) + netlist());
-    hal_stream& stream = *runtime.session.find_stream("sampler.0");
-    runtime.session.start_threads();
+    hal_stream& stream = *runtime.session.host().find_stream("sampler.0");
+    runtime.session.threads().start();
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-    runtime.session.stop_threads();
+    runtime.session.threads().stop();
     Seen seen;
     for (std::uint64_t at = 0, head = __atomic_load_n(&stream.head, __ATOMIC_ACQUIRE); at < head; ++at) {
         const hal_value* const record = stream.data + at % stream.depth * (stream.columns + 1);

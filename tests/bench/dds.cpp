@@ -23,15 +23,15 @@ namespace {
 double cycle_ns(const std::string& text, std::uint64_t cycles, const std::vector<std::string>& dropped = {}) {
     Runtime runtime(true);
     runtime.apply("newthread t 1000000\n" + text);
-    runtime.session.start_threads();
-    runtime.session.advance_cycles(100);
-    const auto lost = [&] { return dropped.empty() ? 0 : runtime.session.read(dropped).at(0).value().value.u64; };
+    runtime.session.threads().start();
+    runtime.session.threads().advance_cycles(100);
+    const auto lost = [&] { return dropped.empty() ? 0 : runtime.session.values().read(dropped).at(0).value().value.u64; };
     double best = 1e18;
     for (int run = 0, good = 0; good < 40 && run < 400; ++run) {
         usleep(20'000);  // the queue has 64 places, which the DDS thread empties meanwhile
         const auto before = lost();
         const CpuStopwatch watch;
-        runtime.session.advance_cycles(cycles);
+        runtime.session.threads().advance_cycles(cycles);
         const double ns = watch.ms() * 1e6 / static_cast<double>(cycles);
         if (lost() != before) continue;
         best = std::min(best, ns);

@@ -160,7 +160,7 @@ Slow measure_at_rate(const Options& options, const Case& c) {
     const auto rate = [&](const char* how) {
         Runtime runtime;
         runtime.apply(new_thread("t", 1'000'000, options.cpu, how) + netlist(c, c.count));
-        runtime.session.start_threads();
+        runtime.session.threads().start();
         const Thread& t = *runtime.session.model().threads.front();
         settle();
         std::vector<double> seen = watch(samples, [&] { return static_cast<double>(__atomic_load_n(&t.time.slot->s32, __ATOMIC_RELAXED)); });

@@ -27,14 +27,14 @@ struct Counts {
 };
 
 Counts counts(Runtime& runtime) {
-    const ThreadReport report = runtime.session.thread_reports().front();
+    const ThreadReport report = runtime.session.reports().threads().front();
     return {report.cycles, report.missed};
 }
 
 void live(const Options& options, Report& report) {
     Runtime runtime;
     runtime.apply(new_thread("t", 1'000'000, options.cpu) + gates(1000));
-    runtime.session.start_threads();
+    runtime.session.threads().start();
     std::vector<double> missed_idle, missed_edited, visible, cost;
     std::size_t done = 0;
     const Stopwatch all;
@@ -71,20 +71,20 @@ void churn(const Options& options, Report& report) {
     const long wanted = options.full ? 1'000'000 : options.quick ? 10'000 : 100'000;
     Runtime runtime;
     runtime.apply(new_thread("t", 100'000, options.cpu) + gates(50));
-    runtime.session.start_threads();
+    runtime.session.threads().start();
     const Counts idle = counts(runtime);
     std::this_thread::sleep_for(std::chrono::seconds(2));
     const Counts before = counts(runtime);
     const Stopwatch watch;
     long done = 0;
-    for (; done < wanted && runtime.session.fault_count() == 0; done += 2) {
+    for (; done < wanted && runtime.session.reports().fault_count() == 0; done += 2) {
         runtime.apply(fmt::format("delf and2.{} t\n", done / 2 % 50));
         runtime.apply(fmt::format("addf and2.{} t 25\n", done / 2 % 50));
     }
     const double seconds = watch.ms() / 1000;
     const Counts after = counts(runtime);
     report.row({.what = fmt::format("{} delf/addf on a running 100 us thread: faults", done), .unit = "",
-                .ours = static_cast<double>(runtime.session.fault_count()), .goal = limit(0)});
+                .ours = static_cast<double>(runtime.session.reports().fault_count()), .goal = limit(0)});
     const auto missed = [](const Counts& from, const Counts& to) { return 100.0 * static_cast<double>(to.missed - from.missed) / static_cast<double>(to.cycles - from.cycles); };
     report.row({.what = "the same: periods missed meanwhile", .unit = "%", .ours = missed(before, after), .peer = "no edits, 2 s:", .theirs = missed(idle, before)});
     report.note(fmt::format("{:.0f} edits per second over {:.0f} s. LinuxCNC 2.9 and 2.10 under the same edits, in an earlier measurement: the", static_cast<double>(done) / seconds, seconds));

@@ -28,12 +28,12 @@ std::string filter(const char* age) {
 double cycle_ns(const std::string& text, std::uint64_t cycles) {
     Runtime runtime(true);
     runtime.apply("newthread t 1000000\n" + text);
-    runtime.session.start_threads();
-    runtime.session.advance_cycles(1000);
+    runtime.session.threads().start();
+    runtime.session.threads().advance_cycles(1000);
     double best = 1e18;
     for (int run = 0; run < 7; ++run) {
         const std::int64_t begin = monotonic_ns();
-        runtime.session.advance_cycles(cycles);
+        runtime.session.threads().advance_cycles(cycles);
         best = std::min(best, static_cast<double>(monotonic_ns() - begin) / static_cast<double>(cycles));
     }
     return best;

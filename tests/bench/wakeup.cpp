@@ -26,7 +26,7 @@ Lateness ours(const Options& options, long period_ns, double seconds, const char
     Runtime runtime;
     runtime.apply(new_thread("t", period_ns, options.cpu, how));
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-    const ThreadReport report = runtime.session.thread_reports().front();
+    const ThreadReport report = runtime.session.reports().threads().front();
     return {report.wakeup_p50_ns / 1000, report.wakeup_p99_ns / 1000};
 }
 

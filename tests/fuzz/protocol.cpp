@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     hal::Shell shell(session);
     hal::TextOutput output;
     shell.run_text("start.hal", "newthread t 1000000\nnewsig level float\nnewsig flag bit\nalias param t.tmax longest\n", output);
-    session.lock = static_cast<unsigned>(hal::Lock::load);  // no components: their number would be the fuzzer's choice
+    session.locked = static_cast<unsigned>(hal::Lock::load);  // no components: their number would be the fuzzer's choice
     {
         hal::Connection connection(shell, 1);
         const std::string_view text(reinterpret_cast<const char*>(data), size);
@@ -65,7 +65,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         connection.handle(R"({"id":"last","list":"comp"})", reply);
         require(reply.find("\"id\":\"last\",\"ok\":true") != reply.npos, "the connection goes on", text);
     }
-    require(session.mutex.try_lock(), "nobody holds the machine", {});
-    session.mutex.unlock();
+    require(session.try_lock().owns_lock(), "nobody holds the machine", {});
     return 0;
 }

@@ -103,7 +103,7 @@ struct Component : testing::TestWithParam<std::string> {
             if (part > 0) fewest = std::min(fewest, page_faults() - before);
         }
         EXPECT_EQ(machine.get("t.threadbeat"), "1000");
-        for (const FaultRecord& fault : machine.session.faults()) EXPECT_NE(fault.code, "exception") << fault.sentence;
+        for (const FaultRecord& fault : machine.session.reports().faults()) EXPECT_NE(fault.code, "exception") << fault.sentence;
         // the kernel may take a page away at any moment, but not in each of nine rows of a hundred cycles
         if (guarded) {
             EXPECT_EQ(fewest, 0) << "it touches new memory all the time";

@@ -112,7 +112,7 @@ TEST(ServerThreads, clients_subscribe_edit_wait_and_disconnect_at_the_same_time)
     for (std::thread& thread : threads) thread.join();
     EXPECT_TRUE(eventually([&] { return server.counts().clients == 0; }));
     EXPECT_EQ(server.counts().rubbish, 0U);
-    const std::scoped_lock lock(machine.session.mutex);
+    const auto lock = machine.session.lock();
     EXPECT_FALSE(machine.session.in_transaction());
 }
 

@@ -58,20 +58,20 @@ public:
 
     /// A pin's or signal's value as getp prints it; "?" when there is none of that name.
     std::string get(const std::string& name) {
-        const auto reading = session.read({name})[0];
+        const auto reading = session.values().read({name})[0];
         return reading ? format_value(reading->type, reading->value) : "?";
     }
     std::int64_t number(const std::string& name) { return std::stoll(get(name)); }
     /// Several at once, of one cycle where they belong to one thread.
     std::vector<std::string> get_all(const std::vector<std::string>& names) {
         std::vector<std::string> values;
-        for (const auto& reading : session.read(names)) values.push_back(reading ? format_value(reading->type, reading->value) : "?");
+        for (const auto& reading : session.values().read(names)) values.push_back(reading ? format_value(reading->type, reading->value) : "?");
         return values;
     }
 
-    void start() { session.start_threads(); }
-    void stop() { session.stop_threads(); }
-    void cycles(std::uint64_t count) { session.advance_cycles(count); }
+    void start() { session.threads().start(); }
+    void stop() { session.threads().stop(); }
+    void cycles(std::uint64_t count) { session.threads().advance_cycles(count); }
 
     /// The whole model as text: everything a transaction may change and an undone one must not.
     std::string dump(bool values = true) {
@@ -92,7 +92,7 @@ public:
             if (!pin->alias.empty()) out << " alias " << pin->alias << (model.find_pin(pin->alias) == pin ? "" : " LOST");
             if (pin->signal) out << " on " << pin->signal->name << (pin->arrow_in ? " in" : "") << (pin->arrow_out ? " out" : "") << " at " << pin->linked_at.begin;
             if (pin->home) out << " home " << pin->home->name;
-            if (values && !changing(*pin)) out << " = " << format_exact(pin->type, session.read_pins({pin})[0]);
+            if (values && !changing(*pin)) out << " = " << format_exact(pin->type, session.values().read_pins({pin})[0]);
             out << "\n";
         }
         for (const Signal* signal : model.sorted_signals()) {
@@ -100,7 +100,7 @@ public:
                 << (signal->writer ? signal->writer->name : "-") << (model.signals[signal->index].get() == signal ? "" : " MISPLACED");
             for (const Pin* pin : signal->pins) out << " " << pin->name;
             if (signal->type == HAL_TYPE_PORT) out << " bytes " << (signal->port ? signal->port->capacity : 0);
-            else if (values && (!signal->writer || !changing(*signal->writer))) out << " = " << format_exact(signal->type, session.read_signals({signal})[0]);
+            else if (values && (!signal->writer || !changing(*signal->writer))) out << " = " << format_exact(signal->type, session.values().read_signals({signal})[0]);
             out << "\n";
         }
         for (const auto& thread : model.threads) {
@@ -134,7 +134,7 @@ private:
     // Threads and functions count and measure while the test looks.
     bool changing(const Pin& pin) const {
         if (pin.type == HAL_TYPE_PORT || pin.of_thread || !pin.instance) return true;
-        return !session.options().virtual_clock && session.running() && pin.dir != HAL_DIR_IN && pin.dir != HAL_DIR_PARAM;
+        return !session.options().virtual_clock && session.threads().running() && pin.dir != HAL_DIR_IN && pin.dir != HAL_DIR_PARAM;
     }
 };
 

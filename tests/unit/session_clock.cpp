@@ -87,11 +87,11 @@ TEST_F(DisciplinedThreads, Threads_that_come_later_join_the_moved_grid) {
 TEST_F(DisciplinedThreads, A_grid_that_goes_back_loses_no_cycle) {
     machine.must("setp fast.step -100000");
     machine.start();
-    machine.session.advance_ns(90'100'000);
+    machine.session.threads().advance_ns(90'100'000);
     EXPECT_EQ(machine.number("fast.due"), 90'100'000);
     EXPECT_EQ(machine.number("fast.shift"), -10'000'000);
-    EXPECT_EQ(machine.session.thread_reports()[0].cycles, 100u);
-    EXPECT_EQ(machine.session.thread_reports()[1].cycles, 25u);
+    EXPECT_EQ(machine.session.reports().threads()[0].cycles, 100u);
+    EXPECT_EQ(machine.session.reports().threads()[1].cycles, 25u);
 }
 
 TEST_F(DisciplinedThreads, A_second_leader_is_refused_and_told_who_leads) {
@@ -103,7 +103,7 @@ TEST_F(DisciplinedThreads, A_second_leader_is_refused_and_told_who_leads) {
         << machine.said;
     machine.must("unloadrt fast");
     machine.must("loadrt test-beat names=other");
-    EXPECT_EQ(machine.session.clock_report()->leader, "other");
+    EXPECT_EQ(machine.session.reports().clock()->leader, "other");
 }
 
 TEST_F(DisciplinedThreads, A_leader_may_be_exchanged_in_one_edit) {
@@ -113,24 +113,24 @@ TEST_F(DisciplinedThreads, A_leader_may_be_exchanged_in_one_edit) {
     machine.must("unloadrt fast\nloadrt test-beat names=other\naddf other f");
     machine.cycles(1);
     EXPECT_EQ(machine.number("other.due"), 11'050'000) << "the grid stays where it was brought to";
-    EXPECT_EQ(machine.session.clock_report()->leader, "other");
+    EXPECT_EQ(machine.session.reports().clock()->leader, "other");
     machine.must("unloadrt other");
-    EXPECT_FALSE(machine.session.clock_report());
+    EXPECT_FALSE(machine.session.reports().clock());
 }
 
 TEST_F(DisciplinedThreads, An_edit_that_is_undone_claims_nothing) {
     machine.must("unloadrt fast");
     EXPECT_FALSE(machine.edit("loadrt test-beat names=a\nloadrt test-beat names=b"));
-    EXPECT_FALSE(machine.session.clock_report());
+    EXPECT_FALSE(machine.session.reports().clock());
     machine.must("loadrt test-beat names=a");
-    EXPECT_TRUE(machine.session.clock_report());
+    EXPECT_TRUE(machine.session.reports().clock());
 }
 
 TEST_F(DisciplinedThreads, The_report_says_who_leads_where_and_how_fast) {
     machine.must("setp fast.step 200");
     machine.start();
     machine.cycles(2500);
-    const auto report = machine.session.clock_report();
+    const auto report = machine.session.reports().clock();
     ASSERT_TRUE(report);
     EXPECT_EQ(report->leader, "fast");
     EXPECT_EQ(report->shift_ns, 500'000);
@@ -145,9 +145,9 @@ TEST(DisciplinedRealThreads, Follow_steps_while_they_sleep_and_keep_their_phase)
     machine.must("addf fast f\naddf slow s\naddf slower ss");
     machine.must("setp fast.step -50000");
     machine.start();
-    EXPECT_TRUE(eventually([&] { return machine.session.thread_reports()[2].cycles >= 4; }));
+    EXPECT_TRUE(eventually([&] { return machine.session.reports().threads()[2].cycles >= 4; }));
     machine.must("setp fast.step 0");
-    machine.session.advance_ns(250'000'000);
+    machine.session.threads().advance_ns(250'000'000);
     // what was due last in each thread, brought back to the grid, is a multiple of the periods apart
     const std::int64_t fast = machine.number("fast.due"), slow = machine.number("slow.due"), slower = machine.number("slower.due");
     EXPECT_EQ((fast - slow) % 1'000'000, 0);

@@ -26,9 +26,9 @@ TEST_F(Faulty, A_function_that_throws_stops_its_thread_only) {
     EXPECT_EQ(machine.get("on"), "FALSE");
     EXPECT_EQ(machine.get("v"), "-5");
     EXPECT_EQ(machine.get("c-on"), "FALSE");
-    EXPECT_TRUE(machine.session.thread_reports()[0].faulted);
-    EXPECT_FALSE(machine.session.thread_reports()[1].faulted);
-    const auto faults = machine.session.faults();
+    EXPECT_TRUE(machine.session.reports().threads()[0].faulted);
+    EXPECT_FALSE(machine.session.reports().threads()[1].faulted);
+    const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
     EXPECT_EQ(faults[0].code, "exception");
     EXPECT_EQ(faults[0].thread, "t");
@@ -41,7 +41,7 @@ TEST_F(Faulty, A_function_that_throws_stops_its_thread_only) {
     machine.cycles(2);
     EXPECT_EQ(machine.get("c.count"), "6");
     EXPECT_EQ(machine.get("on"), "TRUE");
-    EXPECT_FALSE(machine.session.thread_reports()[0].faulted);
+    EXPECT_FALSE(machine.session.reports().threads()[0].faulted);
 }
 
 TEST_F(Faulty, A_function_that_throws_again_and_again_is_caught_again_and_again) {
@@ -49,11 +49,11 @@ TEST_F(Faulty, A_function_that_throws_again_and_again_is_caught_again_and_again)
     for (int i = 1; i <= 100; ++i) {
         machine.start();
         machine.cycles(2);
-        ASSERT_EQ(machine.session.fault_count(), static_cast<std::uint64_t>(i));
+        ASSERT_EQ(machine.session.reports().fault_count(), static_cast<std::uint64_t>(i));
     }
-    machine.session.clear_faults();
-    EXPECT_EQ(machine.session.fault_count(), 0u);
-    EXPECT_TRUE(machine.session.faults().empty());
+    machine.session.reports().clear_faults();
+    EXPECT_EQ(machine.session.reports().fault_count(), 0u);
+    EXPECT_TRUE(machine.session.reports().faults().empty());
 }
 
 TEST_F(Faulty, Not_a_number_on_a_finite_output_is_replaced_and_one_fault_per_row) {
@@ -62,15 +62,15 @@ TEST_F(Faulty, Not_a_number_on_a_finite_output_is_replaced_and_one_fault_per_row
     machine.must("setp f.bad-number 1");
     machine.cycles(5);
     EXPECT_EQ(machine.get("v"), "-5");
-    EXPECT_EQ(machine.session.fault_count(), 1u);
+    EXPECT_EQ(machine.session.reports().fault_count(), 1u);
     EXPECT_EQ(machine.get("c.count"), "7") << "the thread goes on";
     machine.must("setp f.bad-number 0");
     machine.cycles(1);
     EXPECT_EQ(machine.get("v"), "7");
     machine.must("setp f.bad-number 1");
     machine.cycles(3);
-    EXPECT_EQ(machine.session.fault_count(), 2u);
-    EXPECT_EQ(machine.session.faults()[0].sentence, "t: pin 'f.value' (test-faulty) became nan at cycle 2; it was set to -5; see: show pin f");
+    EXPECT_EQ(machine.session.reports().fault_count(), 2u);
+    EXPECT_EQ(machine.session.reports().faults()[0].sentence, "t: pin 'f.value' (test-faulty) became nan at cycle 2; it was set to -5; see: show pin f");
 }
 
 TEST_F(Faulty, A_component_raises_faults_of_its_own) {
@@ -78,7 +78,7 @@ TEST_F(Faulty, A_component_raises_faults_of_its_own) {
     machine.start();
     machine.cycles(1);
     machine.must("setp f.raises 0\nunloadrt f");  // the words are the plugin's, and it is gone
-    const auto faults = machine.session.faults();
+    const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
     EXPECT_EQ(faults[0].code, "component");
     EXPECT_NE(faults[0].sentence.find("a finger in the gear (3) at cycle 0"), std::string::npos) << faults[0].sentence;
@@ -88,10 +88,10 @@ TEST(FaultsOnTheRealClock, Have_an_age_that_grows) {
     Machine machine(Clock::real);
     machine.must("loadrt threads name1=t period1=1000000\nloadrt test-faulty names=f\naddf f.run t\nsetp f.raises 1");
     machine.start();
-    ASSERT_TRUE(eventually([&] { return !machine.session.faults().empty(); }));
-    const auto age = machine.session.faults()[0].age_ns;
+    ASSERT_TRUE(eventually([&] { return !machine.session.reports().faults().empty(); }));
+    const auto age = machine.session.reports().faults()[0].age_ns;
     EXPECT_GT(age, 0);
-    EXPECT_TRUE(eventually([&] { return machine.session.faults()[0].age_ns > age; }));
+    EXPECT_TRUE(eventually([&] { return machine.session.reports().faults()[0].age_ns > age; }));
 }
 
 TEST_F(Faulty, The_faults_of_a_deleted_thread_are_still_told) {
@@ -99,16 +99,16 @@ TEST_F(Faulty, The_faults_of_a_deleted_thread_are_still_told) {
     machine.start();
     machine.cycles(1);
     machine.must("delthread t");
-    ASSERT_EQ(machine.session.faults().size(), 1u);
-    EXPECT_EQ(machine.session.faults()[0].thread, "t");
+    ASSERT_EQ(machine.session.reports().faults().size(), 1u);
+    EXPECT_EQ(machine.session.reports().faults()[0].thread, "t");
 }
 
 TEST_F(Faulty, More_faults_than_are_kept_are_counted) {
     machine.must("setp f.raises 1");
     machine.start();
     machine.cycles(5000);
-    EXPECT_EQ(machine.session.fault_count(), 5000u);
-    EXPECT_LE(machine.session.faults().size(), 1000u);
+    EXPECT_EQ(machine.session.reports().fault_count(), 5000u);
+    EXPECT_LE(machine.session.reports().faults().size(), 1000u);
 }
 
 TEST_F(Faulty, A_storm_of_one_kind_is_one_record_with_a_count_and_buries_no_other) {
@@ -119,7 +119,7 @@ TEST_F(Faulty, A_storm_of_one_kind_is_one_record_with_a_count_and_buries_no_othe
     machine.cycles(5000);
     machine.must("setp f.raises 0");
     machine.cycles(1500);
-    const auto faults = machine.session.faults();
+    const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 6u) << "the first four of a storm stand for themselves";
     EXPECT_EQ(faults[0].code, "not-finite");
     EXPECT_EQ(faults[0].count, 1u);
@@ -128,7 +128,7 @@ TEST_F(Faulty, A_storm_of_one_kind_is_one_record_with_a_count_and_buries_no_othe
     EXPECT_EQ(faults[5].line(), faults[5].sentence + " (4996 times in 5.0 s)");
     machine.must("setp f.raises 1");
     machine.cycles(1);
-    EXPECT_EQ(machine.session.faults().size(), 7u) << "after a quiet second it is another one";
+    EXPECT_EQ(machine.session.reports().faults().size(), 7u) << "after a quiet second it is another one";
 }
 
 TEST(A_cycle_beyond_its_budget, is_a_fault_once_per_row) {
@@ -136,8 +136,8 @@ TEST(A_cycle_beyond_its_budget, is_a_fault_once_per_row) {
     machine.must("newthread t 20000000 budget=1ms\nloadrt test-faulty names=f\naddf f.run t");
     machine.start();
     machine.must("setp f.slow 3000");
-    ASSERT_TRUE(eventually([&] { return machine.session.thread_reports()[0].overruns >= 3; }));
-    const auto faults = machine.session.faults();
+    ASSERT_TRUE(eventually([&] { return machine.session.reports().threads()[0].overruns >= 3; }));
+    const auto faults = machine.session.reports().faults();
     ASSERT_FALSE(faults.empty());
     EXPECT_EQ(faults[0].code, "budget");
     EXPECT_NE(faults[0].sentence.find("(budget 1 ms)"), std::string::npos) << faults[0].sentence;
@@ -148,11 +148,11 @@ TEST(Missed_periods, are_counted_and_skipped_and_the_phase_stays) {
     machine.must("newthread t 2000000\nloadrt test-faulty names=f\naddf f.run t");
     machine.start();
     machine.must("setp f.slow 9000");
-    ASSERT_TRUE(eventually([&] { return machine.session.thread_reports()[0].missed >= 8; }));
+    ASSERT_TRUE(eventually([&] { return machine.session.reports().threads()[0].missed >= 8; }));
     machine.must("setp f.slow 0");
     const auto seen = machine.get_all({"t.missed", "t.threadbeat"});
     EXPECT_GE(std::stoll(seen[0]), 6) << "the pin is written when the overrun has ended, the report counts up to now";
-    EXPECT_EQ(machine.session.fault_count(), 0u) << "without a budget an overrun is no fault";
+    EXPECT_EQ(machine.session.reports().fault_count(), 0u) << "without a budget an overrun is no fault";
 }
 
 // --- a thread that hangs -----------------------------------------------------------------------------------------------
@@ -177,17 +177,17 @@ TEST(A_function_that_hangs, refuses_edits_by_name_and_leaves_the_other_threads_a
     EXPECT_NE(machine.said.find("[hung-thread]"), std::string::npos);
     EXPECT_FALSE(machine.edit("setp x.in 1"));
     EXPECT_NE(machine.said.find("[hung-thread]"), std::string::npos);
-    EXPECT_FALSE(machine.session.start_threads());
-    const ThreadReport report = machine.session.thread_reports()[1];
+    EXPECT_FALSE(machine.session.threads().start());
+    const ThreadReport report = machine.session.reports().threads()[1];
     EXPECT_TRUE(report.hung && report.faulted);
     EXPECT_EQ(report.function, "x");
     machine.must("setp c.step 2");  // values reach the threads that answer
     EXPECT_NE(machine.get_all({"x.level", "x.out"})[0], "?") << "it can still be looked at";
 
     watch.hang = false;
-    ASSERT_TRUE(eventually([&] { return !machine.session.thread_reports()[1].hung; }));
+    ASSERT_TRUE(eventually([&] { return !machine.session.reports().threads()[1].hung; }));
     EXPECT_EQ(machine.get("x.out"), "TRUE") << "its safe value, not that of the cycle that ended late";
-    EXPECT_TRUE(machine.session.start_threads());
+    EXPECT_TRUE(machine.session.threads().start());
     const auto runs = watch.runs.load();
     ASSERT_TRUE(eventually([&] { return watch.runs > runs + 2; }));
     machine.must("loadrt test-counter names=e\naddf e good\nnet s e.step");
@@ -204,24 +204,24 @@ TEST(A_function_that_hangs, leaves_safe_values_to_other_threads_and_is_one_fault
     ASSERT_TRUE(eventually([&] { return watch.runs > 2; }));
     const int emergencies = watch.emergencies;
     watch.hang = true;
-    ASSERT_TRUE(eventually([&] { return machine.session.fault_count() != 0; }));
+    ASSERT_TRUE(eventually([&] { return machine.session.reports().fault_count() != 0; }));
     EXPECT_EQ(machine.get("x.level"), "-1");
     EXPECT_TRUE(eventually([&] { return machine.get("d.step") == "-1"; })) << "the other thread reads the safe value";
     EXPECT_GT(watch.emergencies, emergencies);
-    const auto missed = machine.session.thread_reports()[0].missed;
-    EXPECT_TRUE(eventually([&] { return machine.session.thread_reports()[0].missed > missed + 100; })) << "by the clock";
-    EXPECT_EQ(machine.session.fault_count(), 1u);
-    const auto faults = machine.session.faults();
+    const auto missed = machine.session.reports().threads()[0].missed;
+    EXPECT_TRUE(eventually([&] { return machine.session.reports().threads()[0].missed > missed + 100; })) << "by the clock";
+    EXPECT_EQ(machine.session.reports().fault_count(), 1u);
+    const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
     EXPECT_EQ(faults[0].code, "hung-thread");
     EXPECT_NE(faults[0].sentence.find("bad: function 'x' (test-life) has not returned"), std::string::npos) << faults[0].sentence;
     watch.hang = false;
-    ASSERT_TRUE(eventually([&] { return !machine.session.thread_reports()[0].hung; }));
+    ASSERT_TRUE(eventually([&] { return !machine.session.reports().threads()[0].hung; }));
     EXPECT_EQ(machine.get("x.level"), "-1");
-    EXPECT_EQ(machine.session.fault_count(), 1u) << "the return of the function is no second fault";
+    EXPECT_EQ(machine.session.reports().fault_count(), 1u) << "the return of the function is no second fault";
     machine.start();
     EXPECT_TRUE(eventually([&] { return machine.get("x.level") == "7"; }));
-    EXPECT_EQ(machine.session.thread_reports()[0].hangs, 1u);
+    EXPECT_EQ(machine.session.reports().threads()[0].hangs, 1u);
 }
 
 TEST(A_thread_without_supervision, may_hang_and_goes_on) {
@@ -231,8 +231,8 @@ TEST(A_thread_without_supervision, may_hang_and_goes_on) {
     machine.start();
     ASSERT_TRUE(eventually([&] { return watch.runs > 2; }));
     watch.hang = true;
-    ASSERT_TRUE(eventually([&] { return machine.session.thread_reports()[0].missed > 300; }));
-    EXPECT_EQ(machine.session.thread_reports()[0].hangs, 0u);
+    ASSERT_TRUE(eventually([&] { return machine.session.reports().threads()[0].missed > 300; }));
+    EXPECT_EQ(machine.session.reports().threads()[0].hangs, 0u);
     watch.hang = false;
     const auto runs = watch.runs.load();
     EXPECT_TRUE(eventually([&] { return watch.runs > runs + 2; }));
@@ -246,14 +246,14 @@ TEST(A_cycle_of_many_periods, is_a_fault_that_names_the_function) {
     // The supervisor samples: on a busy host the first fault may name another function.
     std::string sentence;
     EXPECT_TRUE(eventually([&] {
-        for (const auto& fault : machine.session.faults())
+        for (const auto& fault : machine.session.reports().faults())
             if (sentence = fault.sentence; fault.code == "overrun" && sentence.find("periods), last seen in function 'f.run' (test-faulty)") != sentence.npos)
                 return true;
-        machine.session.clear_faults();
+        machine.session.reports().clear_faults();
         return false;
     })) << sentence;
     machine.must("setp f.slow 0");
-    EXPECT_FALSE(machine.session.thread_reports()[0].faulted) << "it goes on";
+    EXPECT_FALSE(machine.session.reports().threads()[0].faulted) << "it goes on";
 }
 
 TEST(A_session, ends_although_a_function_hangs) {

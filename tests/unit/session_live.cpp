@@ -138,10 +138,10 @@ TEST(A_period_of_more_than_a_thousand_seconds, is_refused) {
 TEST_F(Live, Priorities_fall_with_the_period_also_when_a_faster_thread_comes_later) {
     machine.must("newthread faster 500000");
     std::vector<std::string> policies;
-    for (const ThreadReport& report : machine.session.thread_reports()) policies.push_back(report.policy);
+    for (const ThreadReport& report : machine.session.reports().threads()) policies.push_back(report.policy);
     ASSERT_EQ(policies.size(), 3u);
     if (policies[0].starts_with("SCHED_FIFO")) EXPECT_EQ(policies, (std::vector<std::string>{"SCHED_FIFO 98", "SCHED_FIFO 97", "SCHED_FIFO 96"}));
-    else EXPECT_FALSE(machine.session.missing_privileges().empty());
+    else EXPECT_FALSE(machine.session.reports().missing_privileges().empty());
 }
 
 // Ten thousand edits that a seed chose: the machine counts on, the model stays whole, and nothing is torn.
@@ -189,7 +189,7 @@ TEST_F(Live, Random_edits_leave_a_running_machine_whole) {
     EXPECT_LT(taken, edits);
     EXPECT_EQ(machine.get("w.torn"), "0");
     until("w.looks", machine.number("w.looks") + 3);
-    EXPECT_EQ(machine.session.fault_count(), 0u);
+    EXPECT_EQ(machine.session.reports().fault_count(), 0u);
 }
 
 }  // namespace

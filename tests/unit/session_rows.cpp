@@ -46,7 +46,7 @@ TEST_F(Rows, A_fault_names_the_one_that_failed) {
     machine.cycles(2);
     machine.must("setp test-row.6.throws 1\nsetp test-row.0.in 300");
     machine.cycles(1);
-    const auto faults = machine.session.faults();
+    const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
     EXPECT_EQ(faults[0].sentence, "t: function 'test-row.6' (test-row) threw an exception at cycle 2; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start");
     EXPECT_EQ(machine.get("test-row.5.out"), "306");

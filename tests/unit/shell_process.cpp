@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "machine.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -12,10 +12,10 @@ namespace {
 
 bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-/// With the session's mutex: what is known of a program.
+/// With the session's lock: what is known of a program.
 bool running(ShellMachine& machine, const std::string& name) {
-    const std::scoped_lock lock(machine.session.mutex);
-    return machine.shell.processes().find(name) != nullptr;
+    const auto lock = machine.session.lock();
+    return machine.session.programs().find(name) != nullptr;
 }
 
 TEST(Process, waited_for_its_output_and_status_come_back) {
@@ -93,9 +93,9 @@ TEST(Process, W_waits_until_the_program_says_it_is_ready) {
     ShellMachine machine;
     std::thread announcer([&] {
         ASSERT_TRUE(eventually([&] { return running(machine, "panel"); }));
-        const std::scoped_lock lock(machine.session.mutex);
-        const auto pid = machine.shell.processes().find("panel")->pid;
-        EXPECT_EQ(machine.shell.processes().announce(pid, "panel"), "");
+        const auto lock = machine.session.lock();
+        const auto pid = machine.session.programs().find("panel")->pid;
+        EXPECT_EQ(machine.session.programs().announce(pid, "panel"), "");
     });
     EXPECT_EQ(machine.line("loadusr -Wn panel sleep 1000"), 0) << machine.err;
     announcer.join();
@@ -115,13 +115,13 @@ TEST(Process, a_reserved_name_is_not_for_a_program_from_before) {
     std::thread announcer([&] {
         ASSERT_TRUE(eventually([&] { return running(machine, "panel"); }));
         usleep(30'000);
-        const std::scoped_lock lock(machine.session.mutex);
-        Processes& processes = machine.shell.processes();
-        const auto older = processes.find("sleep")->pid, newer = processes.find("panel")->pid;
-        EXPECT_NE(processes.announce(older, "panel").find("is reserved for process " + std::to_string(newer)), std::string::npos);
-        EXPECT_EQ(processes.announce(newer, "second", 1), "") << "a component of another name does not give the first away";
-        EXPECT_NE(processes.find("panel"), nullptr);
-        EXPECT_EQ(processes.announce(newer, "panel", 2), "");
+        const auto lock = machine.session.lock();
+        Programs& programs = machine.session.programs();
+        const auto older = programs.find("sleep")->pid, newer = programs.find("panel")->pid;
+        EXPECT_NE(programs.announce(older, "panel").find("is reserved for process " + std::to_string(newer)), std::string::npos);
+        EXPECT_EQ(programs.announce(newer, "second", 1), "") << "a component of another name does not give the first away";
+        EXPECT_NE(programs.find("panel"), nullptr);
+        EXPECT_EQ(programs.announce(newer, "panel", 2), "");
     });
     usleep(50'000);
     EXPECT_EQ(machine.line("loadusr -Wn panel sleep 1000"), 0) << machine.err;
@@ -133,14 +133,14 @@ TEST(Process, a_program_may_choose_another_name_but_no_taken_one) {
     ShellMachine machine;
     machine.must("loadrt and2\nloadusr sleep 1000\n");
     {
-        const std::scoped_lock lock(machine.session.mutex);
-        Processes& processes = machine.shell.processes();
-        const auto pid = processes.find("sleep")->pid;
-        EXPECT_NE(processes.announce(pid, "and2"), "");
-        EXPECT_NE(processes.announce(pid, "bad name"), "");
-        EXPECT_EQ(processes.announce(pid, "panel"), "");
-        EXPECT_NE(processes.announce(pid, "second"), "");
-        EXPECT_NE(processes.announce(getpid(), "panel"), "");
+        const auto lock = machine.session.lock();
+        Programs& programs = machine.session.programs();
+        const auto pid = programs.find("sleep")->pid;
+        EXPECT_NE(programs.announce(pid, "and2"), "");
+        EXPECT_NE(programs.announce(pid, "bad name"), "");
+        EXPECT_EQ(programs.announce(pid, "panel"), "");
+        EXPECT_NE(programs.announce(pid, "second"), "");
+        EXPECT_NE(programs.announce(getpid(), "panel"), "");
     }
     EXPECT_EQ(machine.says("list comp"), "panel and2 \n");
 }
@@ -155,8 +155,8 @@ TEST(Process, a_waiting_command_can_be_cancelled_and_others_go_on_meanwhile) {
     });
     TextOutput output;
     EXPECT_TRUE(eventually([&] {
-        const std::scoped_lock lock(machine.session.mutex);
-        return !machine.shell.processes().idle();
+        const auto lock = machine.session.lock();
+        return !machine.session.programs().idle();
     }));
     EXPECT_EQ(other.execute("setp a.in0 1", output), 0) << output.err_text;
     machine.shell.cancel();
@@ -168,7 +168,7 @@ TEST(Process, those_still_running_are_ended_with_the_shells) {
     {
         ShellMachine machine;
         machine.must("loadusr sleep 1000\n");
-        pid = machine.shell.processes().find("sleep")->pid;
+        pid = machine.session.programs().find("sleep")->pid;
         EXPECT_EQ(kill(pid, 0), 0);
     }
     EXPECT_EQ(kill(pid, 0), -1);

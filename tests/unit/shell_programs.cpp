@@ -2,7 +2,7 @@
 // Programs as components, without a socket: pins, exchange, death and take-over, ports, streams.
 #include <nlohmann/json.hpp>
 
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "control/connection.hpp"
 #include "shell_machine.hpp"
 

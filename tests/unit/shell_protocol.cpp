@@ -211,7 +211,7 @@ TEST_F(Protocol, rubbish_gets_an_error_and_changes_nothing) {
         ASSERT_TRUE(reply.ends_with("\n") && reply.find('\n') == reply.size() - 1) << line;
         EXPECT_EQ(Json::parse(reply)["ok"], false) << line << "\n" << reply;
     }
-    EXPECT_FALSE(machine.session.running());
+    EXPECT_FALSE(machine.session.threads().running());
     const std::string nested = raw("{\"run\":" + std::string(10'000'000, '['));
     EXPECT_EQ(Json::parse(nested)["ok"], false);
     EXPECT_LT(nested.size(), 200U);

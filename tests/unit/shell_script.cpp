@@ -37,7 +37,7 @@ TEST(Script, nothing_is_executed_after_a_failed_transaction) {
 TEST(Script, a_syntax_error_belongs_to_the_transaction_of_its_line) {
     ShellMachine machine;
     EXPECT_EQ(machine.file("loadrt and2 names=a\nstart\nsetp a.in0 1\nsetp a.in1 \"1\nloadrt not\n"), 1);
-    EXPECT_TRUE(machine.session.running());
+    EXPECT_TRUE(machine.session.threads().running());
     EXPECT_TRUE(has(machine.err, "test.hal:4:")) << machine.err;
     EXPECT_EQ(machine.says("getp a.in0"), "FALSE\n");
 }
@@ -270,7 +270,7 @@ TEST(Script, a_check_looks_at_the_whole_file_and_does_nothing) {
     EXPECT_EQ(machine.file("loadrt and2 names=a\nstart\nloadusr -w touch /should-not-be-there\nshow pin\nsetp a.in0 x\nnewthread t 1000000\nsetp a.in1 y\n"), 1);
     EXPECT_EQ(machine.out, "");
     EXPECT_TRUE(machine.err.ends_with("\n2 errors\n")) << machine.err;
-    EXPECT_FALSE(machine.session.running());
+    EXPECT_FALSE(machine.session.threads().running());
 }
 
 TEST(Script, lines_that_make_nothing_leave_no_text_behind) {

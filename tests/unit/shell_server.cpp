@@ -181,7 +181,7 @@ TEST_F(ServerTest, clients_that_connect_and_disconnect_leak_nothing) {
     }
     EXPECT_TRUE(eventually([&] { return server->counts().accepted == 200 && server->counts().clients == 0; }));
     EXPECT_TRUE(alive());
-    const std::scoped_lock lock(machine->session.mutex);
+    const auto lock = machine->session.lock();
     EXPECT_FALSE(machine->session.in_transaction());
 }
 

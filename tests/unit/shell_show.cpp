@@ -168,7 +168,7 @@ TEST_F(Show, the_lock_status_is_linuxcncs) {
               "  HAL_LOCK_PARAMS  - setting params is locked\n"
               "  HAL_LOCK_RUN     - running/stopping HAL is locked\n");
     machine.line("unlock tune");
-    EXPECT_EQ(machine.session.lock, 252U);
+    EXPECT_EQ(machine.session.locked, 252U);
     machine.line("unlock");
     EXPECT_EQ(machine.says("status lock"), "HAL locking status:\n  current lock value 0 (00)\n  HAL_LOCK_NONE - nothing is locked\n");
     EXPECT_NE(machine.says("status").find("active signals:     5\n"), std::string::npos) << machine.out;

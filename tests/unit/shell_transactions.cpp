@@ -12,7 +12,7 @@
 
 #include <sys/wait.h>
 
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 #include "control/connection.hpp"
 
 namespace hal::test {

@@ -22,8 +22,8 @@ TEST(Transactions, a_living_program_is_terminated_only_by_what_takes_effect) {
     for (const char* line : {"unload prog", "unloadusr prog", "unload all", "unloadusr all"}) {
         EXPECT_EQ(world.machine.file(std::string("begin\n") + line + "\nsetp nothere 1\ncommit\n"), 1);
         EXPECT_EQ(world.machine.file(std::string(line) + "\nsetp nothere 1\n"), 1);
-        const std::scoped_lock lock(world.machine.session.mutex);
-        EXPECT_FALSE(world.machine.shell.processes().find("prog")->stopping) << line;
+        const auto lock = world.machine.session.lock();
+        EXPECT_FALSE(world.machine.session.programs().find("prog")->stopping) << line;
     }
     EXPECT_EQ(world.machine.file("begin\nnewsig new bit\nunload prog\ncommit\n"), 0) << world.machine.err;
     world.state();  // when it has ended
@@ -45,7 +45,7 @@ TEST(Transactions, what_cannot_be_part_of_one_is_rejected_and_leaves_it_open) {
     EXPECT_EQ(world.machine.line("start"), 1);
     EXPECT_TRUE(has(world.machine.err, "'start' and 'stop' cannot be in the same transaction")) << world.machine.err;
     EXPECT_EQ(world.machine.line("commit"), 0) << world.machine.err;
-    EXPECT_FALSE(world.machine.session.running());
+    EXPECT_FALSE(world.machine.session.threads().running());
     EXPECT_NE(world.machine.session.model().find_signal("new"), nullptr);
 }
 
@@ -53,11 +53,11 @@ TEST(Transactions, locks_count_from_their_line_and_take_effect_with_the_rest) {
     World world;
     EXPECT_EQ(world.machine.file("begin\nlock all\nnewsig late bit\ncommit\n"), 1);
     EXPECT_TRUE(has(world.machine.err, "[locked]")) << world.machine.err;
-    EXPECT_EQ(world.machine.session.lock, 0U);
+    EXPECT_EQ(world.machine.session.locked, 0U);
     EXPECT_EQ(world.machine.file("setp a.in0 0\nlock all\n"), 0) << world.machine.err;
-    EXPECT_EQ(world.machine.session.lock, 255U);
+    EXPECT_EQ(world.machine.session.locked, 255U);
     EXPECT_EQ(world.machine.file("unlock\nsetp a.in0 1\n"), 0) << world.machine.err;
-    EXPECT_EQ(world.machine.session.lock, 0U);
+    EXPECT_EQ(world.machine.session.locked, 0U);
 }
 
 TEST(Transactions, a_command_that_looks_sees_the_edits_made_so_far_and_does_not_end_them) {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "control/connection.hpp"
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 
 namespace hal::test {
 
@@ -25,8 +25,8 @@ struct World {
                      "addf a fast\naddf n fast\naddf s slow\nnet link a.out => n.in\nnewsig free float\nsets free 2\nalias pin b.in0 second\n"
                      "setp a.in0 1\nsetp s.gain0 2\nloadusr sleep 1000\nstart\nadvance 5 cycles\n");
         {
-            const std::scoped_lock lock(machine.session.mutex);
-            child = machine.shell.processes().find("sleep")->pid;
+            const auto lock = machine.session.lock();
+            child = machine.session.programs().find("sleep")->pid;
         }
         alive = std::make_unique<Connection>(machine.shell, child);
         EXPECT_TRUE(has(ask(*alive, R"({"component":"prog","pins":[{"name":"out","type":"bit","dir":"out"}]})"), "\"ok\":true"));
@@ -52,16 +52,16 @@ struct World {
     std::string state() {
         std::string text;
         {
-            std::unique_lock lock(machine.session.mutex);
-            Processes& processes = machine.shell.processes();
+            auto lock = machine.session.lock();
+            Programs& programs = machine.session.programs();
             const auto ending = [&] {
-                for (const std::string& name : processes.names())
-                    if (const auto* const entry = processes.find(name); entry->stopping && entry->child && !entry->ended) return true;
+                for (const std::string& name : programs.names())
+                    if (const auto* const entry = programs.find(name); entry->stopping && entry->child && !entry->ended) return true;
                 return false;
             };
-            while (ending()) processes.wait(lock, std::chrono::milliseconds(20));
-            for (const std::string& name : processes.names()) text += name + (processes.find(name)->dead() ? " dead\n" : " alive\n");
-            text += "locks " + std::to_string(machine.session.lock) + (machine.session.running() ? " running\n" : " stopped\n");
+            while (ending()) programs.wait(lock, std::chrono::milliseconds(20));
+            for (const std::string& name : programs.names()) text += name + (programs.find(name)->dead() ? " dead\n" : " alive\n");
+            text += "locks " + std::to_string(machine.session.locked) + (machine.session.threads().running() ? " running\n" : " stopped\n");
             EXPECT_FALSE(machine.session.in_transaction());
         }
         TextOutput output;

@@ -146,7 +146,7 @@ private:
         for (const auto& component : session.model().components)
             for (const auto& function : component->functions) text += "addf " + function->name + " hal-compile\n";
         if (shell.run_text("compile", text + "start\nadvance 3 cycles\n", output) != 0) return void(answer_["problem"] = first_error(output.err_text));
-        for (const FaultRecord& fault : session.faults()) {
+        for (const FaultRecord& fault : session.reports().faults()) {
             std::string what = fault.sentence.substr(fault.sentence.find(": ") + 2);
             what = what.substr(0, what.find(';'));
             answer_["problem"] = "with the initial values of its pins " + what;

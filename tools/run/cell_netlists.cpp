@@ -122,12 +122,12 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     for (const std::string& command : options.execute)
         if (status == 0 && !stop.requested()) status = execute(options, cell, command, output);
     if (loaded && !options.report && summary_wanted(options, output.printed) && cell.size() != 0) {
-        write_all(STDERR_FILENO, simulated_for(cell.session(0).now_ns(), wall) + "\n");
+        write_all(STDERR_FILENO, simulated_for(cell.session(0).threads().now_ns(), wall) + "\n");
         for (std::size_t i = 0; i < cell.size(); ++i)
             write_all(STDERR_FILENO, simulated_summary(cell.session(i), fmt::format("node {}", cell.nodes()[i].name)));
     }
     for (std::size_t i = 0; i < cell.size(); ++i) {
-        const auto reports = cell.session(i).thread_reports();
+        const auto reports = cell.session(i).reports().threads();
         if (std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted; })) status = 1;
         if (options.report) write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell.nodes()[i].name, timing_report(cell.session(i))));
     }
@@ -146,7 +146,7 @@ int load_node(HostedMachine& machine, const RunOptions& options, std::vector<Nod
         }
     }
     const std::size_t own = cell.find(options.part);
-    const auto available = machine.session.available_components();
+    const auto available = machine.session.host().available_components();
     if (std::find(available.begin(), available.end(), "dds_publish") == available.end() && cell.size() > 1) {
         Diagnostics found;
         found.error("no-dds", {}, "the nodes of this netlist exchange signals over DDS, and this Halcyon was built without it", "",
@@ -157,7 +157,7 @@ int load_node(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     if (const char* const usual = std::getenv("HALCYON_DDS"); participant.empty() && usual) participant = usual;
     if (!good_settings(options, participant)) return 1;
     const NodeLinks links = cell.size() > 1 ? node_links(cell, own, participant.empty() ? "" : " " + participant) : NodeLinks{};
-    machine.session.note_latencies(node_latencies(cell, own, false));
+    machine.shell.add_latencies(node_latencies(cell, own, false));
     const std::string name = fmt::format("<links of node {}>", options.part);
     const auto plain = [](const std::string& path) {  // a word that means itself
         return path.ends_with(".hal") && path.find_first_of(" \t'\"#$[]{}\\") == path.npos;

@@ -15,7 +15,7 @@ int run_check(const CheckOptions& options) {
     if (!nodes) return 1;
     if (!nodes->empty()) return check_cell(options, std::move(*nodes));
     Session session(offline());
-    for (const std::string& name : options.assume) session.assume(name);
+    for (const std::string& name : options.assume) session.absences().assume(name);
     ShellOptions how;
     how.check = how.keep_going = how.notes = true;
     how.color = colours(STDERR_FILENO);

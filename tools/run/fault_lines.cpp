@@ -40,12 +40,12 @@ void FaultLines::work() {
 }
 
 void FaultLines::look(std::int64_t now_ns) {
-    if (const std::uint64_t raised = session_.fault_count(); raised != raised_) raised_ = raised, raised_ns_ = now_ns;
+    if (const std::uint64_t raised = session_.reports().fault_count(); raised != raised_) raised_ = raised, raised_ns_ = now_ns;
     if (raised_ns_ != 0 && now_ns - raised_ns_ < storm_ns) {
         std::vector<FaultRecord> records;
         {
-            const std::lock_guard lock(session_.mutex);
-            records = session_.faults();
+            const auto lock = session_.lock();
+            records = session_.reports().faults();
         }
         seen_.erase(seen_.begin(), records.empty() ? seen_.end() : seen_.lower_bound(records.front().number));
         for (const FaultRecord& record : records) {

@@ -14,7 +14,7 @@
 namespace hal::tools {
 
 /// Prints "fault: SENTENCE [CODE]" for each fault of a machine with real-time threads, limited by a MessageLog. Its thread takes
-/// Session::mutex only after a fault was raised.
+/// the session's lock only after a fault was raised.
 class FaultLines {
 public:
     /// `sink` receives the lines instead of standard error.
@@ -22,7 +22,7 @@ public:
     ~FaultLines();  ///< prints pending lines
     FaultLines(const FaultLines&) = delete;
 
-    /// Prints the new faults. [any], but not under Session::mutex
+    /// Prints the new faults. [any], but not under the session's lock
     void look(std::int64_t now_ns);
 
 private:

@@ -138,8 +138,8 @@ int HostedMachine::load(Output* output) {
 
 void HostedMachine::start_threads() {
     forbid_builds();
-    const std::lock_guard lock(session.mutex);
-    if (!session.running() && !session.model().threads.empty()) session.start_threads();
+    const auto lock = session.lock();
+    if (!session.threads().running() && !session.model().threads.empty()) session.threads().start();
 }
 
 int HostedMachine::converse(const Prompt& prompt) {
@@ -151,27 +151,27 @@ void HostedMachine::advance(std::int64_t ns, std::uint64_t cycles) {
     constexpr std::int64_t slice_ns = 100'000'000;
     constexpr std::uint64_t slice_cycles = 1000;
     while (!stop.requested() && (ns > 0 || cycles > 0)) {
-        const std::lock_guard lock(session.mutex);
+        const auto lock = session.lock();
         if (ns > 0) {
             const std::int64_t slice = std::min(ns, slice_ns);
-            session.advance_ns(slice);
+            session.threads().advance_ns(slice);
             ns -= slice;
         } else {
             const std::uint64_t slice = std::min(cycles, slice_cycles);
-            session.advance_cycles(slice);
+            session.threads().advance_cycles(slice);
             cycles -= slice;
         }
     }
 }
 
 void HostedMachine::shut_down() {
-    const std::lock_guard lock(session.mutex);
+    const auto lock = session.lock();
     session.shut_down();
 }
 
 bool HostedMachine::faulted() {
-    const std::lock_guard lock(session.mutex);
-    const auto reports = session.thread_reports();
+    const auto lock = session.lock();
+    const auto reports = session.reports().threads();
     return std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted || r.hangs != 0; });
 }
 

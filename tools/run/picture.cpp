@@ -114,15 +114,15 @@ struct Picture::State {
     std::thread thread;
 
     std::optional<Scene> look() {
-        const std::lock_guard lock(session.mutex);
+        const auto lock = session.lock();
         Scene scene;
-        for (const auto& reading : session.read(motif.signals)) {
+        for (const auto& reading : session.values().read(motif.signals)) {
             if (!reading || reading->type != HAL_TYPE_FLOAT) return std::nullopt;  // the signal was deleted
             scene.values.push_back(reading->value.real);
         }
-        scene.seconds = static_cast<double>(session.now_ns() - start_ns) * 1e-9;
-        scene.faults = session.fault_count();
-        for (const ThreadReport& report : session.thread_reports()) {
+        scene.seconds = static_cast<double>(session.threads().now_ns() - start_ns) * 1e-9;
+        scene.faults = session.reports().fault_count();
+        for (const ThreadReport& report : session.reports().threads()) {
             scene.missed += report.missed;
             if (report.period_ns >= scene.thread.period_ns) scene.thread = report;
         }
@@ -148,8 +148,8 @@ struct Picture::State {
 
 Picture::Picture(Session& session, const Motif& motif) : state_(std::make_unique<State>(session, motif)) {
     {
-        const std::lock_guard lock(session.mutex);
-        state_->start_ns = session.now_ns();
+        const auto lock = session.lock();
+        state_->start_ns = session.threads().now_ns();
     }
     state_->thread = std::thread([this] { state_->loop(); });
 }
@@ -177,7 +177,7 @@ std::unique_ptr<Picture> Picture::start(Session& session) {
     if ((size.ws_col != 0 && size.ws_col < 80) || (size.ws_row != 0 && size.ws_row < 16)) return nullptr;
     const Motif* motif = nullptr;
     {
-        const std::lock_guard lock(session.mutex);
+        const auto lock = session.lock();
         motif = motif_for(session.model());
     }
     return motif ? std::unique_ptr<Picture>(new Picture(session, *motif)) : nullptr;

@@ -79,7 +79,7 @@ std::string busy_line(const std::vector<ThreadReport>& reports) {
 }  // namespace
 
 std::string loaded_summary(Session& session) {
-    const std::lock_guard lock(session.mutex);
+    const auto lock = session.lock();
     const Model& model = session.model();
     std::size_t instances = 0, width = 0;
     std::vector<const LoadedComponent*> shown;
@@ -106,15 +106,15 @@ std::string loaded_summary(Session& session) {
             fmt::format("  {:{}}  every {}: ", thread->name, width, format_duration(static_cast<double>(thread->options.period_ns))), names,
             24);
     }
-    for (const ThreadReport& report : session.thread_reports())
+    for (const ThreadReport& report : session.reports().threads())
         if (!report.supervised) text += fmt::format("thread {} is not supervised (supervise=off): a hang is not detected\n", report.name);
-    for (const std::string& line : session.missing_privileges()) text += line + "\n";
+    for (const std::string& line : session.reports().missing_privileges()) text += line + "\n";
     return text;
 }
 
 std::string timing_report(Session& session) {
-    const std::lock_guard lock(session.mutex);
-    const std::vector<ThreadReport> reports = session.thread_reports();
+    const auto lock = session.lock();
+    const std::vector<ThreadReport> reports = session.reports().threads();
     std::string text;
     if (reports.empty()) return text;
     std::size_t width = 6;
@@ -146,19 +146,19 @@ std::string timing_report(Session& session) {
         for (std::size_t i = 0; i < functions.size(); ++i) text += (i == 0 ? " " : ", ") + functions[i];
         text += "\n";
     }
-    const std::vector<FaultRecord> faults = session.faults();
-    if (!faults.empty()) text += fmt::format("{}:\n", counted(session.fault_count(), "fault", "faults"));
+    const std::vector<FaultRecord> faults = session.reports().faults();
+    if (!faults.empty()) text += fmt::format("{}:\n", counted(session.reports().fault_count(), "fault", "faults"));
     return text + sentences(faults) + busy_line(reports);
 }
 
 std::string simulated_summary(Session& session, std::string_view before) {
-    const std::lock_guard lock(session.mutex);
+    const auto lock = session.lock();
     std::string text(before);
-    for (const ThreadReport& report : session.thread_reports())
+    for (const ThreadReport& report : session.reports().threads())
         text += fmt::format("; {} {}{}", report.name, counted(report.cycles, "cycle", "cycles"), report.faulted ? ", stopped by a fault" : "");
-    const std::vector<FaultRecord> faults = session.faults();
+    const std::vector<FaultRecord> faults = session.reports().faults();
     if (faults.empty()) return text + "; no faults\n";
-    return text + fmt::format("; {}:\n", counted(session.fault_count(), "fault", "faults")) + sentences(faults);
+    return text + fmt::format("; {}:\n", counted(session.reports().fault_count(), "fault", "faults")) + sentences(faults);
 }
 
 }  // namespace hal::tools

@@ -38,10 +38,10 @@ std::string end_reason(int signal) {
 /// Opens the device of --watchdog. Returns false after printing the error.
 bool attach_watchdog(HostedMachine& machine, const RunOptions& options) {
     if (options.watchdog.empty()) return true;
-    const std::lock_guard lock(machine.session.mutex);
+    const auto lock = machine.session.lock();
     std::string problem;
     if (machine.session.model().threads.empty()) problem = "--watchdog needs a thread whose progress feeds the device; the netlist has none";
-    if (problem.empty() && machine.session.attach_watchdog(options.watchdog, problem)) return true;
+    if (problem.empty() && machine.session.threads().attach_watchdog(options.watchdog, problem)) return true;
     fail(options, problem);
     return false;
 }
@@ -70,7 +70,7 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     const std::string report = timing_report(machine.session);  // the threads take their figures with them
     machine.shut_down();
     print("\n" + end_reason(machine.stop.signal()) + report);
-    if (!machine.session.watchdog_disarmed())
+    if (!machine.session.threads().watchdog_disarmed())
         fail(options, options.watchdog + "was not disarmed, because a thread does not end; it resets this host after its timeout");
     return faulted ? 1 : status;
 }

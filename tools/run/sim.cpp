@@ -39,10 +39,10 @@ struct Shown {
 bool add_named(Session& session, const std::string& name, std::vector<Shown>& all) {
     const Model& model = session.model();
     const auto add_pin = [&](std::string_view own, const Pin* pin) {
-        all.push_back({std::string(own), format_value(pin->type, session.read_pins({pin})[0])});
+        all.push_back({std::string(own), format_value(pin->type, session.values().read_pins({pin})[0])});
     };
     const auto add_signal = [&](std::string_view own, const Signal* signal) {
-        all.push_back({std::string(own), format_value(signal->type, session.read_signals({signal})[0])});
+        all.push_back({std::string(own), format_value(signal->type, session.values().read_signals({signal})[0])});
     };
     const std::size_t before = all.size();
     if (const Pin* const pin = model.find_pin(name)) add_pin(name, pin);
@@ -59,7 +59,7 @@ bool add_named(Session& session, const std::string& name, std::vector<Shown>& al
 }  // namespace
 
 int show_values(const SimOptions& options, Session& session) {
-    const std::lock_guard lock(session.mutex);
+    const auto lock = session.lock();
     std::vector<Shown> all;
     for (const std::string& name : names_in(options.show)) {
         if (add_named(session, name, all)) continue;
@@ -109,7 +109,7 @@ int run_sim(const SimOptions& options) {
     if (machine.faulted() || machine.stop.requested()) status = 1;
     if (options.report) write_all(STDERR_FILENO, timing_report(machine.session));
     else if (loaded && summary_wanted(options, output.printed || !options.show.empty()))
-        write_all(STDERR_FILENO, simulated_summary(machine.session, simulated_for(machine.session.now_ns(), wall)));
+        write_all(STDERR_FILENO, simulated_summary(machine.session, simulated_for(machine.session.threads().now_ns(), wall)));
     return status;
 }
 

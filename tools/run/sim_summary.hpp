@@ -27,7 +27,7 @@ private:
     ProcessOutput process_;
 };
 
-/// Prints what --show names. Returns the exit status. Takes Session::mutex.
+/// Prints what --show names. Returns the exit status. Takes the session's lock.
 int show_values(const SimOptions& options, Session& session);
 
 /// "simulated 2 s in 12 ms, 163 times as fast as real time"

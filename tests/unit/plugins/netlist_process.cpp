@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
         std::cerr << hal::render(diagnostics, session.sources);
         return 3;
     }
-    session.start_threads();
-    session.advance_cycles(200);
+    session.threads().start();
+    session.threads().advance_cycles(200);
     return 0;
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Components that are programs of their own: in the model an instance without a plugin, whose pins no thread runs. So the
-// session owns them, and their values reach threads as those of signals that nothing writes.
+// Programs as components of the model: an instance without a plugin, whose pins belong to no thread. The session owns them, and their
+// values reach threads like those of signals without a writer.
 #include <deque>
 
 #include "machine/construct.hpp"
+#include "machine/programs.hpp"
 #include "machine/session.hpp"
 #include "machine/state.hpp"
 
@@ -18,33 +19,52 @@ Instance* instance_of(const LoadedComponent& component) {
 
 }  // namespace
 
-void Session::add_process(Transaction&, const std::string& name, std::int64_t pid, const Command& command) {
+void Programs::add_component(Transaction&, const std::string& name, std::int64_t pid, const Command& command) {
     Diagnostics none;
-    LoadedComponent& component = state_->editing(none).add_component(name, command.span);
+    LoadedComponent& component = state_.editing(none).add_component(name, command.span);
     component.process = pid;
     std::string text;
     for (const Token& token : command.args) text += (text.empty() ? "" : " ") + token.text;
     component.arguments.push_back(std::move(text));
 }
 
-void Session::set_process(Transaction&, std::string_view name, std::int64_t pid) {
+void Programs::add_to_model(const std::string& name, pid_t pid, const Command& command) {
+    Transaction transaction = session_.begin();
+    add_component(transaction, name, pid, command);
     Diagnostics none;
-    LoadedComponent* const component = state_->model.find_component(name);
-    if (component && component->process != 0) state_->editing(none).set_process(*component, pid);
+    transaction.commit(none);
 }
 
-void Session::remove_process(Transaction&, std::string_view name) {
+void Programs::replace_in_model(std::string_view name, pid_t pid) {
+    Transaction transaction = session_.begin();
     Diagnostics none;
-    LoadedComponent* const component = state_->model.find_component(name);
-    if (component && component->process != 0) state_->editing(none).remove_component(*component);
+    LoadedComponent* const component = state_.model.find_component(name);
+    if (component && component->process != 0) state_.editing(none).set_process(*component, pid);
+    transaction.commit(none);
 }
 
-void Session::disown_process(std::string_view name) {
-    if (LoadedComponent* const component = state_->model.find_component(name)) component->process = 0;
+void Programs::remove_component(Transaction&, std::string_view name) {
+    Diagnostics none;
+    LoadedComponent* const component = state_.model.find_component(name);
+    if (component && component->process != 0) state_.editing(none).remove_component(*component);
 }
 
-Pin* Session::add_outside_pin(Transaction&, std::string_view component_name, const OutsidePin& wanted, std::string& problem) {
-    State& s = *state_;
+void Programs::remove_from_model(std::string_view name) {
+    Transaction transaction = session_.begin();
+    remove_component(transaction, name);
+    Diagnostics refused;
+    if (transaction.commit(refused)) return;
+    // A thread that hangs may use its pins: the component stays in the model, but no process answers for it.
+    if (LoadedComponent* const component = state_.model.find_component(name)) component->process = 0;
+}
+
+bool Programs::has_pins(const Entry& entry) const {
+    const LoadedComponent* const component = entry.name.empty() ? nullptr : state_.model.find_component(entry.name);
+    return component && component->process != 0 && !component->instances.empty();
+}
+
+Pin* Programs::add_pin(Transaction&, std::string_view component_name, const ProgramPin& wanted, std::string& problem) {
+    SessionState& s = state_;
     LoadedComponent* const component = s.model.find_component(component_name);
     if (!component || component->process == 0) {
         problem = "there is no program '" + std::string(component_name) + "'";
@@ -90,34 +110,14 @@ Pin* Session::add_outside_pin(Transaction&, std::string_view component_name, con
     return nullptr;
 }
 
-void Session::remove_outside_pins(Transaction&, std::string_view component_name, const std::vector<Pin*>& pins) {
-    LoadedComponent* const component = state_->model.find_component(component_name);
+void Programs::remove_pins(Transaction&, std::string_view component_name, const std::vector<Pin*>& pins) {
+    LoadedComponent* const component = state_.model.find_component(component_name);
     Instance* const instance = component ? instance_of(*component) : nullptr;
     if (!instance || pins.empty()) return;
     Diagnostics none;
-    Edit& edit = state_->editing(none);
+    Edit& edit = state_.editing(none);
     for (Pin* const pin : pins) edit.unlink(*pin);
     edit.remove_pins(*instance, pins);
-}
-
-void Session::write_outside(const std::vector<std::pair<Pin*, hal_value>>& values) {
-    Notes<Signal, hal_value> row;
-    const auto flush = [&] {
-        Diagnostics ignored;  // a thread that hangs is found by every edit; it takes no values
-        if (!row.empty()) state_->write_values({}, row, ignored);
-        row.clear();
-    };
-    for (const auto& [pin, value] : values) {
-        Signal* const signal = pin->signal;
-        if (!signal) {
-            __atomic_store_n(&pin->memory->slot->raw, value.raw, __ATOMIC_RELAXED);
-            continue;
-        }
-        if (pin->type == HAL_TYPE_PORT || (pin->dir == HAL_DIR_IN && (signal->writer || signal->home))) continue;
-        row[signal] = value;
-        if (row.size() >= Core::most_writes / 2) flush();
-    }
-    flush();
 }
 
 }  // namespace hal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Programs outside the runtime: those started by loadusr, and those that registered themselves over the socket.
+// Components that are processes of their own: programs started by loadusr, and those that registered themselves over the socket.
 #pragma once
 
 #include <chrono>
@@ -8,6 +8,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -24,6 +25,7 @@ namespace hal {
 class Session;
 class Transaction;
 struct Pin;
+struct SessionState;
 
 enum class Restart { no, on_failure, always };
 
@@ -42,6 +44,17 @@ struct ProcessStart {
     bool keep_stdin = false;             ///< false: it reads /dev/null
 };
 
+/// A pin or parameter of a program's component.
+struct ProgramPin {
+    std::string name;                ///< full name
+    hal_type type = HAL_TYPE_BIT;
+    hal_dir dir = HAL_DIR_IN;
+    bool read_only = false;          ///< a parameter that only the program sets
+    hal_value initial{};
+    std::optional<hal_value> safe = {};  ///< its value once the program is dead; none: it keeps its value
+    std::string doc = {}, unit = {};
+};
+
 /// A stream between programs: one feeds it, one reads it.
 struct ProgramStream {
     std::string name, types;
@@ -49,8 +62,8 @@ struct ProgramStream {
     hal_stream stream{};
 };
 
-/// All members need Session::mutex held, and those that take a lock give it back while they wait.
-struct Processes {
+/// The programs of a session. All members need the session's lock; those that take a lock release it while they wait. [setup]
+struct Programs {
     struct Entry {
         std::uint64_t number = 0;  ///< of this entry, for as long as it lives
         std::string name = {};  ///< as component; empty: not registered as one
@@ -91,14 +104,21 @@ struct Processes {
         std::string state() const;
     };
 
-    explicit Processes(Session& session);
-    ~Processes();  ///< terminates all children: SIGTERM, then after two seconds SIGKILL
+    Programs(Session& session, SessionState& state);
+    ~Programs();  ///< terminates all children: SIGTERM, then after two seconds SIGKILL
 
     /// Starts a program. 0: `problem` says why not. `waited`: somebody will ask for its status and then collect() it.
     pid_t start(const ProcessStart& start, bool waited, std::string& problem);
     /// Makes a started program a component of the session. Its entry's number. The name is made unique if it is taken; when it is
     /// `reserved`, which must be free or a dead program's, it is this process's alone.
     std::uint64_t add(pid_t pid, const std::string& name, const Command& command, bool reserved = false);
+    /// Adds a component for the process `pid` to the model.
+    void add_component(Transaction& transaction, const std::string& name, std::int64_t pid, const Command& command);
+    /// Adds a pin to a program's component. It is linked like any other, and no thread runs it. Returns nullptr and sets `problem` to
+    /// the reason.
+    Pin* add_pin(Transaction& transaction, std::string_view component, const ProgramPin& pin, std::string& problem);
+    /// Unlinks and removes pins of a program's component.
+    void remove_pins(Transaction& transaction, std::string_view component, const std::vector<Pin*>& pins);
     /// A started program is started again when it ends, as the policy says.
     void keep_alive(pid_t pid, const ProcessStart& start, const RestartPolicy& policy);
     /// A program says that it is the component `name`, and ready unless told otherwise. A dead one's place is taken over,
@@ -162,7 +182,10 @@ private:
     void replace_in_model(std::string_view name, pid_t pid);
     void remove_from_model(std::string_view name);
 
+    void remove_component(Transaction& transaction, std::string_view name);
+
     Session& session_;
+    SessionState& state_;
     std::vector<Entry> entries_;
     std::condition_variable changed_;
     std::uint64_t owners_ = 0, numbers_ = 0;
@@ -179,5 +202,8 @@ private:
     };
     std::vector<Watched> watched_;
 };
+
+/// Returns the local time of day `ago_ns` ago: "12:34:56".
+std::string time_of_day(std::int64_t ago_ns = 0);
 
 }  // namespace hal

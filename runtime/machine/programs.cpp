@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "machine/processes.hpp"
+#include "machine/programs.hpp"
 
 #include <algorithm>
 #include <csignal>
@@ -15,11 +15,11 @@
 
 namespace hal {
 
-Processes::Processes(Session& session) : session_(session) {}
+Programs::Programs(Session& session, SessionState& state) : session_(session), state_(state) {}
 
-Processes::~Processes() {
+Programs::~Programs() {
     {
-        std::unique_lock lock(session_.mutex);
+        SessionLock lock = session_.lock();
         const auto living = [&] {
             return std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.child && !e.ended; });
         };
@@ -39,7 +39,7 @@ Processes::~Processes() {
     for (const auto& child : watched_) close(child.pidfd);
 }
 
-void Processes::work() {
+void Programs::work() {
     if (wake_ >= 0) {
         eventfd_write(wake_, 1);
         return;
@@ -52,13 +52,13 @@ void Processes::work() {
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
-pid_t Processes::start(const ProcessStart& start, bool waited, std::string& problem) {
+pid_t Programs::start(const ProcessStart& start, bool waited, std::string& problem) {
     const pid_t pid = spawn(start, problem);
     if (pid != 0) entries_.push_back({.number = ++numbers_, .pid = pid, .child = true, .waited = waited});
     return pid;
 }
 
-pid_t Processes::spawn(const ProcessStart& start, std::string& problem) {
+pid_t Programs::spawn(const ProcessStart& start, std::string& problem) {
     if (!spawner_) spawner_ = std::make_unique<Spawner>();
     const pid_t pid = spawner_->start(start, session_.options().name, problem);
     if (pid == 0) return 0;
@@ -75,7 +75,7 @@ pid_t Processes::spawn(const ProcessStart& start, std::string& problem) {
     return pid;
 }
 
-std::uint64_t Processes::add(pid_t pid, const std::string& name, const Command& command, bool reserved) {
+std::uint64_t Programs::add(pid_t pid, const std::string& name, const Command& command, bool reserved) {
     Entry* const started = find(pid);
     if (!started || started->ended) return 0;
     const std::uint64_t number = started->number;
@@ -98,59 +98,59 @@ std::uint64_t Processes::add(pid_t pid, const std::string& name, const Command& 
     return number;
 }
 
-Processes::Entry* Processes::find(std::string_view name) {
+Programs::Entry* Programs::find(std::string_view name) {
     const auto at = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return !e.name.empty() && e.name == name; });
     return at == entries_.end() ? nullptr : &*at;
 }
 
-Processes::Entry* Processes::find(pid_t pid) {
+Programs::Entry* Programs::find(pid_t pid) {
     const auto at = std::find_if(entries_.begin(), entries_.end(),
                                  [&](const Entry& e) { return e.pid == pid && (!e.dead() || (e.child && !e.ended)); });
     return at == entries_.end() ? nullptr : &*at;
 }
 
-Processes::Entry* Processes::find_number(std::uint64_t number) {
+Programs::Entry* Programs::find_number(std::uint64_t number) {
     const auto at = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.number == number; });
     return at == entries_.end() ? nullptr : &*at;
 }
 
-bool Processes::answers(std::uint64_t owner) const {
+bool Programs::answers(std::uint64_t owner) const {
     return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.owner == owner; });
 }
 
-std::string Processes::refusal_of(pid_t pid) const {
+std::string Programs::refusal_of(pid_t pid) const {
     const auto at = std::find_if(refusals_.begin(), refusals_.end(), [&](const auto& refusal) { return refusal.first == pid; });
     return at == refusals_.end() ? "" : at->second;
 }
 
-std::vector<std::string> Processes::registered_by(pid_t pid) const {
+std::vector<std::string> Programs::registered_by(pid_t pid) const {
     std::vector<std::string> all;
     for (const auto& entry : entries_)
         if (entry.pid == pid && !entry.dead() && (entry.ready || entry.owner != 0)) all.push_back(entry.name);
     return all;
 }
 
-std::vector<std::string> Processes::names() const {
+std::vector<std::string> Programs::names() const {
     std::vector<std::string> all;
     for (const auto& entry : entries_)
         if (!entry.name.empty()) all.push_back(entry.name);
     return all;
 }
 
-void Processes::collect(pid_t pid) {
+void Programs::collect(pid_t pid) {
     std::erase_if(entries_, [&](const Entry& e) { return e.pid == pid && !e.dead(); });
 }
 
-void Processes::abandon(pid_t pid) {
+void Programs::abandon(pid_t pid) {
     if (Entry* const entry = find(pid)) {
         entry->waited = false;
         if (entry->ended) collect(pid);
     }
 }
 
-void Processes::reap() {
+void Programs::reap() {
     std::vector<pollfd> waiting;
-    std::unique_lock lock(session_.mutex);
+    SessionLock lock = session_.lock();
     while (!ending_) {
         const auto before = std::chrono::steady_clock::now();
         waiting.assign(1, {wake_, POLLIN, 0});

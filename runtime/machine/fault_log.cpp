@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: MIT
+#include "machine/fault_log.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "machine/state.hpp"
+#include "text/fault_pages.hpp"
+
+namespace hal {
+
+const LoadedFunction* function_with_id(const Model& model, std::uint32_t id) {
+    for (const auto& component : model.components)
+        for (const auto& function : component->functions)
+            if (function->id == id) return function.get();
+    return nullptr;
+}
+
+std::string function_text(const LoadedFunction& function) { return "function '" + function.name + "' (" + function.component->name + ")"; }
+
+namespace {
+
+constexpr std::size_t kept_faults = 1000;
+constexpr std::int64_t same_row_ns = 2'000'000'000;  // of a storm, a thread queues one fault per kind and second
+
+/// A code as its standard writes it: 0x7305.
+std::string hexadecimal(double value) {
+    char text[32];
+    const bool fits = value >= 0 && value < 4294967296.0;
+    std::snprintf(text, sizeof text, "0x%04X", fits ? static_cast<unsigned>(value) : 0U);
+    return text;
+}
+
+const Pin* pin_with_id(const Model& model, std::uint32_t id) {
+    for (const auto& component : model.components)
+        for (const auto& instance : component->instances)
+            for (const auto& pin : instance->pins)
+                if (pin->id == id) return pin.get();
+    return nullptr;
+}
+
+const Instance* instance_at(const Model& model, const void* self) {
+    for (const auto& component : model.components)
+        for (const auto& instance : component->instances) {
+            const auto* const first = static_cast<const char*>(instance->memory);
+            if (self >= first && self < first + (component->plugin ? component->plugin->instance_size : 0)) return instance.get();
+        }
+    return nullptr;
+}
+
+std::string grouped(std::uint64_t number) {
+    std::string text = std::to_string(number);
+    for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, " ");
+    return text;
+}
+
+struct Worded {
+    FaultCode code;  // has a page of `hal explain`
+    std::string sentence;
+};
+
+/// ", in function 'f' (comp)", or nothing when it is not known.
+std::string in_function(const Model& model, std::uint32_t id) {
+    const LoadedFunction* const function = id != 0 ? function_with_id(model, id) : nullptr;
+    return function ? ", last seen in " + function_text(*function) : "";
+}
+
+std::string limit_of(const Thread& thread) {
+    return " (limit " + format_duration(static_cast<double>(thread.options.supervision_limit_ns())) + ")";
+}
+
+constexpr const char* stopped_and_safe = "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread ";
+
+/// `stopped_ns`: the whole process was not run for so long before the event.
+Worded worded(const Model& model, const Thread& thread, const FaultEvent& event, std::int64_t stopped_ns) {
+    const std::string at = " at cycle " + grouped(event.cycle);
+    switch (event.code) {
+    case HAL_FAULT_EXCEPTION: {
+        const LoadedFunction* const function = function_with_id(model, event.subject);
+        const std::string who = function ? "function '" + function->name + "' (" + function->component->name + ")" : "a function";
+        return {"exception",
+                thread.name + ": " + who + " threw an exception" + at +
+                    "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start"};
+    }
+    case HAL_FAULT_NOT_FINITE: {
+        const Pin* const pin = pin_with_id(model, event.subject);
+        const std::string who = pin ? "pin '" + pin->name + "' (" + pin->instance->component->name + ")" : "a pin";
+        const std::string to = pin ? format_value(HAL_TYPE_FLOAT, pin->safe) : "0";
+        return {"not-finite", thread.name + ": " + who + " became " + format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value}) + at +
+                                  "; it was set to " + to + (pin ? "; see: show pin " + pin->instance->name : "")};
+    }
+    case HAL_FAULT_BUDGET: {
+        const std::int64_t budget = thread.options.budget_ns, took = static_cast<std::int64_t>(event.value);
+        const bool over_budget = budget > 0 && took > budget;
+        const std::string why = over_budget ? "budget " + format_duration(static_cast<double>(budget))
+                                            : std::to_string(took / thread.options.period_ns) + " periods";
+        return {over_budget ? FaultCode("budget") : FaultCode("overrun"), thread.name + ": the cycle took " + format_duration(event.value) + " (" + why + ")" +
+                                                        in_function(model, event.subject) + at + "; see: show timing " + thread.name};
+    }
+    case HAL_FAULT_SILENT_THREAD:
+        return {"hung-thread", thread.name + ": " +
+                                   (event.subject != 0 ? "the cycle took " + format_duration(event.value) + in_function(model, event.subject)
+                                    : stopped_ns > 0   ? "the process got no CPU time for " + format_duration(static_cast<double>(stopped_ns)) +
+                                                           " (stopped by a signal or a debugger, or the host was busy)"
+                                                       : "no cycle for " + format_duration(event.value)) +
+                                   limit_of(thread) + at + stopped_and_safe + thread.name + ", start"};
+    case HAL_FAULT_COMPONENT: {
+        const Instance* const instance = instance_at(model, event.self);
+        // "what happened {}; what was done": the number where the braces are, in {x} hexadecimal, the cycle before the semicolon
+        std::string what = event.reason ? event.reason : "a fault", done;
+        const std::string number = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
+        if (const auto semicolon = what.find(';'); semicolon != std::string::npos) done = what.substr(semicolon), what.resize(semicolon);
+        if (const auto braces = what.find("{}"); braces != std::string::npos) what.replace(braces, 2, number);
+        else if (const auto code = what.find("{x}"); code != std::string::npos) what.replace(code, 3, hexadecimal(event.value));
+        else if (!std::isnan(event.value)) what += " (" + number + ")";
+        return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at + done +
+                                 (instance ? "; see: show pin " + instance->name : "")};
+    }
+    case HAL_FAULT_NONE: break;
+    }
+    return {"component", thread.name + ": a fault" + at};
+}
+
+/// What kept the thread from ending its cycle, beginning with its name.
+std::string worded(const SessionState& s, const Thread& thread, const Stall& stall) {
+    const auto name_of = [&](std::uint32_t id) -> std::string {
+        for (const auto& [one, core] : s.cores)
+            if (core->id() == id) return "'" + one->name + "'";
+        return "a thread that is gone";
+    };
+    const std::string silent = format_duration(static_cast<double>(stall.silent_ns));
+    const LoadedFunction* const function = stall.function != 0 ? function_with_id(s.model, stall.function) : nullptr;
+    std::string text = thread.name + ": ";
+    using enum Stall::Cause;
+    switch (stall.cause) {
+    case process:
+        text += "the process got no CPU time for " + silent + " (stopped by a signal or a debugger, or the host was busy)";
+        break;
+    case suspended: text += "the host was suspended for " + silent; break;
+    case busy:
+    case waiting:
+    case stopped:
+    case starved:
+        text += (function ? function_text(*function) + " has not returned, no cycle ended for " : "no cycle ended for ") + silent;
+        text += stall.cause == busy      ? ", it uses CPU time (a long computation or an endless loop)"
+                : stall.cause == waiting ? ", it waits in a system call"
+                : stall.cause == stopped ? stall.tracer != 0 ? ", stopped by the debugger with process ID " + std::to_string(stall.tracer)
+                                                             : std::string(", stopped by a signal")
+                                         : ", it gets no CPU time";
+        if (stall.occupant != 0) text += ": thread " + name_of(stall.occupant) + " uses CPU " + std::to_string(stall.cpu);
+        break;
+    }
+    text += limit_of(thread) + " at cycle " + grouped(stall.cycle);
+    text += "; the thread's functions are stopped and its outputs were set to their safe values";
+    if (stall.starved_count != 0) {
+        text += stall.starved_count == 1 ? "; thread " : "; threads ";
+        for (std::uint32_t i = 0; i < stall.starved_count; ++i) text += (i == 0 ? "" : ", ") + name_of(stall.starved[i]);
+        text += std::string(" got no CPU time beside it") +
+                (stall.demoted ? " until its real-time priority was taken away" : ", nor get any now: its priority could not be taken away");
+    } else if (stall.demoted) {
+        text += "; its real-time priority was taken away";
+    }
+    return text + "; see: show thread " + thread.name;
+}
+
+}  // namespace
+
+void FaultLog::add(Row row) {
+    row.record.number = ++number_;
+    rows_.push_back(std::move(row));
+    if (rows_.size() > kept_faults) rows_.pop_front();
+}
+
+void FaultLog::collect() {
+    for (const auto& thread : state_.model.threads) collect(*thread);
+}
+
+void FaultLog::collect(const Thread& thread) {
+    Core* const from = state_.core(&thread);
+    if (!from) return;
+    collect_stalls();
+    for (FaultEvent event; from->next_fault(event);) {
+        const auto again = std::find_if(rows_.rbegin(), rows_.rend(), [&](const Row& row) {
+            return event.repeats != 0 && row.event.code != HAL_FAULT_NONE && row.event.repeats != 0 && row.record.thread == thread.name &&
+                   row.event.same(event) && event.time_ns - row.event.last_ns < same_row_ns;
+        });
+        if (again != rows_.rend()) {
+            again->record.count += event.repeats;
+            again->record.span_ns = event.last_ns - again->record.age_ns;
+            again->event = event;
+            continue;
+        }
+        const bool silent = event.code == HAL_FAULT_SILENT_THREAD && event.subject == 0;
+        const std::int64_t gap_ns =
+            silent ? state_.executor->supervisor().process_gap_ns(event.time_ns, static_cast<std::int64_t>(event.value)) : 0;  // else it may be NaN
+        auto [code, sentence] = worded(state_.model, thread, event, gap_ns);
+        FaultRecord record;
+        record.cycle = event.cycle;
+        record.thread = thread.name;
+        record.code = code.name();
+        record.sentence = std::move(sentence);
+        record.age_ns = event.time_ns;
+        if (event.repeats != 0) record.count = event.repeats, record.span_ns = event.last_ns - event.time_ns;
+        add({std::move(record), event});
+    }
+}
+
+void FaultLog::collect_stalls() {
+    for (Stall stall; state_.executor->supervisor().next(stall);) {
+        const auto of = std::find_if(state_.cores.begin(), state_.cores.end(), [&](const auto& one) { return one.second->id() == stall.thread; });
+        if (of == state_.cores.end()) continue;  // the thread has ended since
+        FaultRecord record;
+        record.age_ns = stall.time_ns;
+        record.cycle = stall.cycle;
+        record.thread = of->first->name;
+        record.code = FaultCode("hung-thread").name();
+        record.sentence = worded(state_, *of->first, stall);
+        add({std::move(record), {}});
+    }
+}
+
+void FaultLog::close_rows() {
+    for (Row& row : rows_) row.event.code = HAL_FAULT_NONE;
+}
+
+std::vector<FaultRecord> FaultLog::records(std::int64_t now_ns) const {
+    std::vector<FaultRecord> records;
+    for (const Row& row : rows_) {
+        records.push_back(row.record);
+        records.back().age_ns = now_ns - row.record.age_ns;
+    }
+    return records;
+}
+
+std::string FaultRecord::line() const {
+    if (count == 1) return sentence;
+    char text[80];
+    std::snprintf(text, sizeof text, " (%llu times in %.1f s)", static_cast<unsigned long long>(count),
+                  std::max(static_cast<double>(span_ns) * 1e-9, 0.1));
+    return sentence + text;
+}
+
+}  // namespace hal

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// Turns the faults that threads and their supervisor queue into records with messages. Private to this folder.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "execute/core.hpp"
+#include "machine/reports.hpp"
+
+namespace hal {
+
+struct LoadedFunction;
+struct Model;
+struct Stall;
+
+class FaultLog {
+public:
+    explicit FaultLog(const SessionState& state) : state_(state) {}
+
+    /// Takes what is queued. Before an instance or thread leaves, because messages contain their names.
+    void collect();
+    void collect(const Thread& thread);
+    /// Instances are about to be destroyed: later faults, even from the same address, start records of their own.
+    void close_rows();
+    /// Returns the records with ages relative to `now_ns`, the oldest first.
+    std::vector<FaultRecord> records(std::int64_t now_ns) const;
+    bool empty() const { return rows_.empty(); }
+    const FaultRecord& newest() const { return rows_.back().record; }
+    void clear() { rows_.clear(); }
+
+private:
+    struct Row {
+        FaultRecord record;      // its age is the time of the first fault
+        FaultEvent event;        // the latest; compared with those that follow. HAL_FAULT_NONE: closed
+    };
+    void collect_stalls();
+    void add(Row row);
+
+    const SessionState& state_;
+    std::deque<Row> rows_;
+    std::uint64_t number_ = 0;   // of the newest
+};
+
+/// Returns the function with that number in the plan, or nullptr.
+const LoadedFunction* function_with_id(const Model& model, std::uint32_t id);
+/// Returns "function 'pid.0.do-pid-calcs' (pid)".
+std::string function_text(const LoadedFunction& function);
+
+}  // namespace hal

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// What a session reports: state and latency of its threads, faults, delays of signals, missing privileges.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hal {
+
+struct SessionState;
+struct Thread;
+
+/// State and timing of one thread since its start, for `show thread`, the report at the end and the protocol.
+struct ThreadReport {
+    std::string name;
+    std::int64_t period_ns = 0;
+    std::uint64_t cycles = 0, missed = 0, overruns = 0;
+    double wakeup_p50_ns = 0, wakeup_p99_ns = 0, wakeup_max_ns = 0;  ///< wake-up latency
+    double busy_p50_ns = 0, busy_p99_ns = 0, busy_max_ns = 0;        ///< execution time of the whole cycle
+    std::string policy;              ///< "SCHED_FIFO 98", "SCHED_OTHER (no privilege)", "virtual clock"
+    int cpu = -1;                    ///< -1: not bound to a CPU
+    std::uint64_t page_faults = 0;   ///< minor and major, in cycles after the first 100
+    bool faulted = false;            ///< stopped by a fault
+    bool hung = false;               ///< finishes no cycle; the supervisor has stopped its functions
+    std::uint64_t hangs = 0;         ///< number of hangs since the start
+    std::int64_t silent_ns = 0;      ///< hung: time since its last finished cycle
+    std::string function;            ///< hung: the function that does not return; empty: none
+    bool supervised = true;          ///< false with supervise=off
+};
+
+/// The external clock reference that disciplines the threads.
+struct ClockReport {
+    std::string leader;              ///< the instance that provides it
+    std::int64_t shift_ns = 0;       ///< offset of the threads' release times from CLOCK_MONOTONIC; positive: later
+    double rate = 0;                 ///< rate offset from CLOCK_MONOTONIC; 200e-6 is 200 ppm slower
+};
+
+/// One recorded fault with its message.
+struct FaultRecord {
+    std::uint64_t number = 0;        ///< counts from 1
+    std::int64_t age_ns = 0;
+    std::uint64_t cycle = 0;
+    std::string thread, code, sentence;  ///< sentence: what happened, in which cycle, what was done
+    std::uint64_t count = 1;             ///< faults of the same kind, less than 2 s apart, that this record stands for
+    std::int64_t span_ns = 0;            ///< from the first of them to the last
+
+    /// Returns the sentence and, when there is more than one, the count.
+    std::string line() const;
+};
+
+/// Part of a Session. [setup]
+class Reports {
+public:
+    explicit Reports(SessionState& state) : state_(state) {}
+
+    std::vector<ThreadReport> threads() const;
+    ThreadReport thread(const Thread& thread) const;
+    /// Returns nothing while the threads run by their own clock.
+    std::optional<ClockReport> clock() const;
+
+    /// Returns the newest 1000 faults, the oldest first.
+    std::vector<FaultRecord> faults() const;
+    /// Returns the number of faults that are not acknowledged. [any]
+    std::uint64_t fault_count() const;
+    /// Acknowledges all faults and forgets their records.
+    void clear_faults();
+
+    /// Returns one line per signal: writer => reader, delay in cycles and the reason; sorted.
+    std::vector<std::string> latencies() const;
+    /// Returns a line for each privilege for real time that the process lacks, and the command that grants it.
+    std::vector<std::string> missing_privileges() const;
+    /// Returns the state of the instance, its threads and faults as lines "KEY VALUE" (hal/status.h).
+    std::string status_text() const;
+
+private:
+    SessionState& state_;
+};
+
+}  // namespace hal

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "machine/thread_control.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <deque>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "machine/state.hpp"
+
+namespace hal {
+
+void SessionState::hung_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const {
+    const std::uint32_t id = core.hung_function();
+    const LoadedFunction* const function = id != 0 ? function_with_id(model, id) : nullptr;
+    const std::string silent = format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
+    diagnostics.error("hung-thread", thread.made,
+                      "thread '" + thread.name + "' has not finished a cycle for " + silent +
+                          (function ? ": " + function_text(*function) + " does not return" : ""),
+                      "its outputs are at their safe values", "show fault says more; a function that never returns ends only with the process");
+}
+
+bool ThreadControl::start(Diagnostics* diagnostics) {
+    SessionState& s = state_;
+    Diagnostics ignored;
+    if (report_hung(diagnostics ? *diagnostics : ignored)) return false;
+    bool all = true;
+    for (const auto& [thread, core] : s.cores)
+        if (!s.executor->reset(*core)) {
+            s.hung_thread(*thread, *core, diagnostics ? *diagnostics : ignored);
+            all = false;
+        }
+    if (all) s.executor->start();
+    return all;
+}
+
+bool ThreadControl::report_hung(Diagnostics& diagnostics) const {
+    bool any = false;
+    for (const auto& thread : state_.model.threads)
+        if (const Core* const core = state_.core(thread.get()); core && core->hung()) {
+            state_.hung_thread(*thread, *core, diagnostics);
+            any = true;
+        }
+    return any;
+}
+
+bool ThreadControl::stop(Diagnostics* diagnostics) {
+    SessionState& s = state_;
+    Diagnostics ignored;
+    if (!s.executor->running()) return !report_hung(diagnostics ? *diagnostics : ignored);
+    s.executor->stop();
+    // every thread makes its outputs safe at the end of its next cycle; see it done
+    std::deque<Observation> observations;
+    std::vector<std::pair<Core*, Observation*>> wishes;
+    for (const auto& [thread, core] : s.cores) wishes.emplace_back(core, &observations.emplace_back());
+    const bool answered = s.executor->observe(wishes, answer_timeout_ns);
+    if (report_hung(diagnostics ? *diagnostics : ignored)) return false;
+    if (answered) return true;
+    if (diagnostics)  // not supervised, or a long period of supervision
+        diagnostics->error("silent-thread", {}, "a thread did not stop within " + format_duration(static_cast<double>(answer_timeout_ns)),
+                           "", "show thread and show fault say more");
+    return false;
+}
+
+bool ThreadControl::running() const { return state_.executor->running(); }
+
+void ThreadControl::advance_ns(std::int64_t ns) { state_.executor->advance(ns); }
+
+void ThreadControl::advance_cycles(std::uint64_t cycles) {
+    SessionState& s = state_;
+    if (s.model.threads.empty()) return;
+    const Thread& fastest = *s.model.threads.front();
+    const Core* const core = s.core(&fastest);
+    const std::uint64_t wanted = core->cycles.load() + cycles;
+    if (s.executor->is_virtual()) return s.executor->advance_cycles(*core, cycles);
+    s.executor->advance(static_cast<std::int64_t>(cycles) * fastest.options.period_ns);
+    // under the real clock periods may have been missed: cycles are what was asked for
+    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted; ++turn) s.executor->advance(fastest.options.period_ns);
+}
+
+std::int64_t ThreadControl::now_ns() const { return state_.executor->now_ns(); }
+
+// --- the watchdog device: the kernel resets the host when nobody writes to it for its timeout; the supervisor writes ---------------
+
+bool ThreadControl::attach_watchdog(const std::string& path, std::string& problem) {
+    SessionState& s = state_;
+    if (watchdog_ >= 0) {
+        problem = "a watchdog is attached already";
+        return false;
+    }
+    const int device = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK);
+    if (device < 0) {
+        problem = "cannot open '" + path + "': " + std::strerror(errno);
+        return false;
+    }
+    watchdog_ = device;
+    s.executor->supervisor().feed(device);
+    return true;
+}
+
+void ThreadControl::disarm_watchdog() {
+    if (watchdog_ < 0) return;
+    state_.executor->supervisor().feed(-1);
+    state_.executor->supervisor().fence();
+    // The letter that tells the driver that this close is meant; otherwise it resets the host.
+    if (::write(watchdog_, "V", 1) != 1) return;
+    ::close(watchdog_);
+    watchdog_ = -1;
+}
+
+}  // namespace hal

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Starts, stops and advances the threads of a session, and feeds a watchdog device while they make progress.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace hal {
+
+class Diagnostics;
+struct SessionState;
+
+/// Part of a Session. [setup]
+class ThreadControl {
+public:
+    explicit ThreadControl(SessionState& state) : state_(state) {}
+
+    /// Starts all threads, also those that a fault stopped. Returns false after reporting when one hangs; then no thread that was
+    /// stopped is started.
+    bool start(Diagnostics* diagnostics = nullptr);
+    /// Stops the functions and sets the outputs to their safe values. Returns false after reporting when a thread does not answer;
+    /// the outputs of a thread that hangs are safe all the same.
+    bool stop(Diagnostics* diagnostics = nullptr);
+    /// Reports the threads that hang as errors. Returns false when there are none.
+    bool report_hung(Diagnostics& diagnostics) const;
+    bool running() const;
+
+    /// Virtual clock: runs the threads for `ns`. Real clock: waits for `ns`.
+    void advance_ns(std::int64_t ns);
+    /// The same for `cycles` cycles of the fastest thread.
+    void advance_cycles(std::uint64_t cycles);
+    /// The runtime's clock: CLOCK_MONOTONIC or the virtual clock.
+    std::int64_t now_ns() const;
+
+    /// Feeds a watchdog device (Linux watchdog API) while all supervised threads make progress. Returns false and sets `problem` to
+    /// the reason.
+    bool attach_watchdog(const std::string& path, std::string& problem);
+    /// Closes the watchdog device so that it does not reset the host.
+    void disarm_watchdog();
+    /// Returns true when there is no watchdog device or it accepted the disarming.
+    bool watchdog_disarmed() const { return watchdog_ < 0; }
+
+private:
+    SessionState& state_;
+    int watchdog_ = -1;  // the open device, until it is disarmed
+};
+
+}  // namespace hal
