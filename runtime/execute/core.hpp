@@ -31,7 +31,7 @@ struct Observation {
     std::atomic<bool> done{false};
 };
 
-/// Where the thread tells of itself; the model's pins.
+/// Pins of the model that show the state of the thread.
 struct ThreadPins {
     hal_pin *time, *tmax, *tmax_increased, *beat, *missed, *wakeup;
 };
@@ -90,14 +90,14 @@ public:
     /// Takes an unanswered plan back. False when the thread has it already.
     bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
-    /// Queues a row of writes, which all take effect in one cycle; false, and nothing done, when the queue has no room.
+    /// Queues a batch of writes, which all take effect in the same cycle. Returns false and queues none when the queue is full.
     bool write(const Write* row, std::size_t count) {
         if (!writes_.push(row, count)) return false;
         pushed_ += count;
         return true;
     }
     static constexpr std::size_t most_writes = 4096;              ///< longest row
-    /// Room for so many more; the thread only makes it larger.
+    /// Remaining capacity in writes; the thread only increases it.
     std::size_t room() const { return writes_.capacity() - writes_.size(); }
     /// When the cycle that is running began (CLOCK_MONOTONIC), or 0 between cycles and under the virtual clock.
     std::int64_t busy_since_ns() const { return busy_since_.load(std::memory_order_acquire); }
@@ -131,7 +131,7 @@ public:
     std::uint32_t interrupted_function() const noexcept;          ///< the same, seen from another thread
     std::uint64_t cycle_number() const noexcept { return info_.number; }
     bool in_function() const noexcept { return in_function_.load(std::memory_order_relaxed); }
-    std::jmp_buf recover;                                         ///< where an exception that left a function comes back to
+    std::jmp_buf recover;                                         ///< where the cycle continues after an exception left a function
 
 private:
     void take_over() noexcept;

@@ -75,7 +75,7 @@ bool wait_for(Ready ready, std::int64_t timeout_ns) {
 
 constexpr std::int64_t for_ever = std::numeric_limits<std::int64_t>::max() / 2;
 
-// Declared so by the supervisor, or not supervised: a cycle that began so long ago is not waited for again, it was waited for once.
+// Declared hung by the supervisor, or not supervised and in a cycle that an earlier call has already waited for.
 bool hangs(const Core& core, std::int64_t timeout_ns) {
     if (core.hung()) return true;
     const std::int64_t since = core.busy_since_ns();

@@ -37,7 +37,7 @@ public:
     bool running() const { return running_.load(std::memory_order_acquire); }
 
     /// Threads that hang, or are in the middle of a cycle and do not end it within the time-out. Asked before an edit, so that
-    /// a hanging thread refuses it before any other thread has taken its part.
+    /// a hung thread rejects it before any other thread has taken its part.
     std::vector<Core*> hanging(std::int64_t timeout_ns) const;
     /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the time-out;
     /// their plans have been withdrawn.
@@ -53,7 +53,7 @@ public:
     /// Virtual clock: runs until this thread has done so many cycles more, and what else is due until then. [setup]
     void advance_cycles(const Core& core, std::uint64_t cycles);
     /// Virtual clock: runs every cycle due within the next `ns`, fastest thread first at equal instants.
-    /// Real clock: waits so long.
+    /// Real clock: waits for that time.
     void advance(std::int64_t ns);
     std::int64_t now_ns() const;
     bool is_virtual() const { return virtual_; }
@@ -68,7 +68,7 @@ public:
     const Timeline& timeline() const { return timeline_; }
     hal_clock& clock() { return timeline_.shared; }
     const hal_background& background() const { return background_.shared(); }
-    /// Somebody will make steps: threads watch for them from now on, those that sleep long at once.
+    /// Enables external clock adjustment: from now on threads poll for adjustments while they sleep; those in a long sleep do so at once.
     void lead();
 
 private:

@@ -11,7 +11,7 @@
 
 namespace hal {
 
-/// One fault as the cycle records it: numbers only. The session words it.
+/// One fault as the cycle records it: numbers only. The session formats the message.
 struct FaultEvent {
     hal_fault_code code = HAL_FAULT_NONE;
     std::uint32_t subject = 0;      ///< the model's number of a function (exception, budget) or pin (not finite)

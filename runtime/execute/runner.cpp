@@ -147,7 +147,7 @@ void Runner::place(std::int64_t now_ns) noexcept {
 }
 
 // Until a sleeper has to look whether its deadline has moved: no step is longer than a tenth of the time between two of them, so
-// it cannot come before nine tenths of what is left. A spin window that is longer than that sees the steps anyway.
+// it cannot come before nine tenths of the remaining time. A spin window that is longer than that sees the steps anyway.
 std::int64_t Runner::safe_until(std::int64_t due) const noexcept {
     if (!timeline_.led()) return due;
     constexpr std::int64_t least_ns = 50'000;

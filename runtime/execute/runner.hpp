@@ -41,12 +41,12 @@ public:
            bool measure, std::int64_t epoch_ns);
     Runner(const Runner&) = delete;
 
-    /// Starts the thread and waits until it has what the system grants it. Throws std::runtime_error when there is no thread to be had.
+    /// Starts the thread and waits until it has what the system grants it. Throws std::runtime_error when the system cannot create a thread.
     void start();
     bool started() const { return thread != pthread_t{}; }
     /// Asks the thread to end, and wakes it.
     void ask_to_end();
-    /// What was asked is no longer wanted: the thread goes on should it come back to life.
+    /// Withdraws the request: the thread continues should its function return.
     void ask_to_go_on() { quit_.store(false, std::memory_order_release); }
     bool ended() const { return ended_.load(std::memory_order_acquire); }
     /// Waits for the end of a thread that has ended its last cycle. False: it is still there.

@@ -62,7 +62,7 @@ public:
     bool next(Stall& stall) { return stalls_.pop(stall); }
     /// Whether the process as a whole got no CPU time, or hardly any, in the time before `until_ns`: how long.
     std::int64_t process_gap_ns(std::int64_t until_ns, std::int64_t silent_ns) const;
-    /// A CPU is left to it beside those the threads are bound to. True while there is no thread.
+    /// Returns true when at least one CPU has no thread bound to it, and while there are no threads.
     bool has_own_cpu() const { return own_cpu_.load(); }
     std::int64_t interval_ns() const { return interval_ns_.load(); }
     /// Writes a byte there several times a second, as long as all supervised threads make progress.

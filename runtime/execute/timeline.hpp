@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The deadline grid of all threads, and how an outside beat moves it.
+// The deadline grid of all threads, and how an external clock reference disciplines it.
 //
 // A thread's deadlines are positions on a grid, epoch + k * period, which never changes; where a position lies on the clock is the
 // position plus the shift. A step changes the shift for all positions after that of the cycle that makes it: threads that are due at
@@ -33,19 +33,19 @@ public:
     void step(std::int64_t grid_ns, std::int64_t ns) noexcept;
 
     std::int64_t shift_ns() const noexcept { return __atomic_load_n(&shared.shift_ns, __ATOMIC_RELAXED); }  ///< [any]
-    /// How much longer a second of the grid has lately been than a second of the clock, as a ratio: +200e-6 follows a beat that is
+    /// Rate of the grid relative to the clock, of late, minus one: +200e-6 follows an external reference that is
     /// 200 ppm slow. 0 before the first second of steps. [any]
     double rate() const noexcept { return rate_.load(std::memory_order_relaxed); }
     /// The fastest thread has this period, 0: there is none. [setup]
     void bound(std::int64_t fastest_period_ns) noexcept { __atomic_store_n(&shared.limit_ns, fastest_period_ns / 10, __ATOMIC_RELAXED); }
-    /// Somebody may make steps from now on, so that threads must look for them while they sleep. [setup]
+    /// Enables adjustments: from now on threads must poll for them while they sleep. [setup]
     void lead() noexcept { led_.store(true, std::memory_order_release); }
     bool led() const noexcept { return led_.load(std::memory_order_acquire); }  ///< [any]
 
     hal_clock shared{};  ///< given out as extension "hal.clock/1"; written with atomic builtins. The session puts `claim` in
 
 private:
-    // Two steps: the newest, and room for the next one. No reader waits for a writer that was interrupted:
+    // Two steps: the newest, and a slot for the next one. No reader waits for a writer that was interrupted:
     //   1. reader sees newest = n        2. writer fills steps[(n + 1) & 1]      3. writer sets newest = n + 1     (release)
     //   4. writer fills steps[n & 1]     (release, so that who sees a part of it sees 3)
     //   5. reader, which has read a part of 4, finds newest changed and looks again. Before 3 nobody writes what it reads.

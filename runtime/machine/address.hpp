@@ -11,16 +11,16 @@ namespace hal {
 /// True for names an instance may have: 1 to 64 letters, digits, `-`, `_`, `.`, not beginning with a dot.
 bool good_instance_name(std::string_view name);
 
-/// The folder of the control sockets, without a final slash. Says nothing about whether it exists.
+/// The folder of the control sockets, without a final slash. It need not exist.
 std::string socket_folder();
 std::string socket_path(std::string_view name);
-/// The file beside the socket whose lock says that the instance lives; it holds the process id.
+/// The file beside the socket that a running instance keeps locked; it contains the process id.
 std::string lock_path(std::string_view name);
 
 /// Names of the instances that run now and belong to this user, sorted.
 std::vector<std::string> running_instances();
 
-/// Which instance a tool means that was told `wanted` (may be empty): that one; else $HALCYON_INSTANCE; else the only one
+/// The instance that a tool uses when its user asked for `wanted` (may be empty): that one; else $HALCYON_INSTANCE; else the only one
 /// that runs; else "default".
 std::string instance_wanted(std::string_view wanted);
 

@@ -18,7 +18,7 @@ std::string dashed(std::string text) {
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
     if (bytes > (std::size_t{1} << 32) || align == 0 || align > 4096) return nullptr;
     try {
-        // room to align by hand: arrays of char are aligned for any ordinary type only
+        // space to align by hand: arrays of char are aligned for any ordinary type only
         instance.allocations.push_back(std::make_unique<char[]>(bytes + align));
     } catch (const std::bad_alloc&) {
         return nullptr;
@@ -238,7 +238,7 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
                 if (total > 1) storage = block(total - 1);
                 in_block = 0;
             } else if (const auto list = c.list_length > total ? request.arguments.find(*c.lists.begin()) : request.arguments.end();
-                       list != request.arguments.end()) {  // a default may say more instances than are wanted
+                       list != request.arguments.end()) {  // a default may list more values than there are instances
                 diagnostics.error("bad-argument", list->second.at,
                                   "argument '" + list->first + "' lists " + std::to_string(c.list_length) + " values for " +
                                       std::to_string(total) + (total == 1 ? " instance" : " instances"));

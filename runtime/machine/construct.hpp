@@ -45,9 +45,9 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
 /// Memory that lives as long as the instance; nullptr: there is none, or the request is senseless.
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept;
 
-/// Starts one instance: it may acquire hardware. The reason of a refusal, or empty.
+/// Starts one instance: it may acquire hardware. Returns the reason of a failure, or an empty string.
 std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);
-/// The instance that makes the threads follow an outside beat, or nullptr.
+/// The instance that disciplines the threads (external clock reference), or nullptr.
 const Instance* clock_leader(const Model& model);
 /// [setup] Not while a thread runs its functions.
 void stop_instance(Instance& instance) noexcept;

@@ -28,7 +28,7 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Construction& c = construction_of(host);
     if (decl->size < HAL_PIN_DECL_SIZE_1_0 || !decl->name || !*decl->name || !memory || decl->type < HAL_TYPE_BIT ||
         decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN || decl->dir > HAL_DIR_PARAM)
-        return refuse(c, "it declares a pin that is none");
+        return refuse(c, "invalid pin declaration: name, memory, type or direction is missing or out of range");
     if (!good_name(decl->name)) return refuse(c, "it declares a pin with the invalid name '" + std::string(decl->name) + "': letters, digits and - _ . : are valid");
     auto pin = std::make_unique<Pin>();
     pin->name = whole_names(c.instance) ? decl->name : c.instance.name + "." + decl->name;
@@ -56,7 +56,7 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
 
 bool take_function(const hal_host* host, const hal_function_decl* decl) {
     Construction& c = construction_of(host);
-    if (decl->size < HAL_FUNCTION_DECL_SIZE_1_0 || !decl->name || !decl->step) return refuse(c, "it declares a function that is none");
+    if (decl->size < HAL_FUNCTION_DECL_SIZE_1_0 || !decl->name || !decl->step) return refuse(c, "invalid function declaration: name or step is null");
     if (decl->flags & HAL_FUNCTION_EMERGENCY) {
         c.instance.emergency.push_back({decl->step, decl->self});
         return true;

@@ -54,7 +54,7 @@ struct Construction {
     Sources* sources = nullptr;
     Diagnostics* diagnostics = nullptr;
     std::string text_name = {}, text = {};  // what it reads
-    std::uint32_t text_source = 0;          // 0: nothing was said of it yet
+    std::uint32_t text_source = 0;          // 0: no diagnostic refers to it yet
     bool said_why = false;                  // an error was
     std::size_t said = 0;                   // messages of this text; those beyond the limit are dropped
     std::deque<std::string> found = {};     // what find_text() gave

@@ -36,7 +36,7 @@ void begin_text(const hal_host* host, const char* name, const char* text, std::s
 void say_of_text(const hal_host* host, const hal_text_message* message) {
     Construction& c = construction_of(host);
     guarded(c, false, [&] {
-        if (message->size < sizeof *message) return refuse(c, "it says something in a form that is not known here");
+        if (message->size < sizeof *message) return refuse(c, "unsupported hal_text_message of " + std::to_string(message->size) + " bytes; rebuild the component");
         if (c.text_source == 0) c.text_source = c.sources->add(c.text_name, c.text);
         const auto size = static_cast<std::uint32_t>(c.text.size());
         const std::uint32_t begin = std::min(message->begin, size), end = std::clamp(message->end, begin, size);

@@ -13,7 +13,7 @@ namespace hal {
 struct CycleNames {
     std::string thread, function;
 };
-/// Of a cycle that runs and has done so for long: the model is read without a lock, since whoever changes it waits for the cycle.
+/// Returns the names for a cycle that does not end. The model is read without a lock: an edit waits for the end of the cycle.
 CycleNames names_of(const CycleNow& now);
 
 /// After watch_for_crashes(): the machine is going.

@@ -11,8 +11,8 @@
 
 namespace hal {
 
-/// Decides when a cycle has taken so long that it is reported, and when it ends the process. Reports are rare and limited over all cycles: a
-/// component that is slow in every cycle, under a sanitizer for example, is no endless loop.
+/// Decides when a long cycle is reported and when it ends the process. Reports are rate-limited over all cycles, because a component that is
+/// slow in every cycle, for example under a sanitizer, does not hang.
 class CyclePatience {
 public:
     static constexpr std::int64_t first_report_ns = 10'000'000'000, longest_pause_ns = 600'000'000'000;

@@ -10,7 +10,7 @@ namespace hal {
 
 namespace {
 
-/// What the constructor says while it runs.
+/// What the constructor declares.
 struct Gathering {
     Declared& page;
     std::map<const void*, std::string> names;  // of functions, by their identity
@@ -91,7 +91,7 @@ bool gather(const hal_component& component, Declared& page, std::string& problem
     const std::unique_ptr<void, decltype(release)> memory(::operator new(component.instance_size, align), release);
     std::fill_n(static_cast<char*>(memory.get()), component.instance_size, '\0');
     if (!component.create(&host, memory.get())) {
-        problem = gathering.failure.empty() ? "its constructor fails and does not say why" : gathering.failure;
+        problem = gathering.failure.empty() ? "its constructor failed without a reason" : gathering.failure;
         return false;
     }
     component.destroy(memory.get());

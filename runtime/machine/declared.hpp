@@ -39,7 +39,7 @@ struct Declared {
     std::string full_name(const Function& function) const;
 };
 
-/// Hosts the component's constructor. False: `problem` is a sentence that says why. [setup]
+/// Runs the component's constructor and gathers its declarations. Returns false and sets `problem` to the reason. [setup]
 bool gather(const hal_component& component, Declared& declared, std::string& problem);
 
 }  // namespace hal

@@ -55,7 +55,7 @@ bool names_itself(Elaboration& on, const Token& name) {
     return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
 }
 
-/// The arguments of loadrt that say which instances there shall be, and the others; false after saying what is wrong.
+/// Separates the arguments of loadrt that name or count instances from the others. Returns false after reporting.
 bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& request) {
     request.at = name.span;
     bool good = true;
@@ -107,7 +107,7 @@ bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& re
                      "names-and-count",
                      "names= and count= are both given",
                      {{request.count_at, "how many"}, {names_at, "and which"}},
-                     {"keep names=, it says how many there are"}};
+                     {"remove count=; names= also gives the number of instances"}};
         on.diagnostics.add(std::move(d));
         good = false;
     }

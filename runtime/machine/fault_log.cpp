@@ -60,7 +60,7 @@ struct Worded {
     std::string sentence;
 };
 
-/// ", in function 'f' (comp)", or nothing when it is not known.
+/// ", last seen in function 'f' (comp)", or nothing when the function is unknown.
 std::string in_function(const Model& model, std::uint32_t id) {
     const LoadedFunction* const function = id != 0 ? function_with_id(model, id) : nullptr;
     return function ? ", last seen in " + function_text(*function) : "";
@@ -72,7 +72,7 @@ std::string limit_of(const Thread& thread) {
 
 constexpr const char* stopped_and_safe = "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread ";
 
-/// `stopped_ns`: the whole process was not run for so long before the event.
+/// `stopped_ns`: how long the whole process got no CPU time before the event; 0 when it did.
 Worded worded(const Model& model, const Thread& thread, const FaultEvent& event, std::int64_t stopped_ns) {
     const std::string at = " at cycle " + grouped(event.cycle);
     switch (event.code) {

@@ -72,7 +72,7 @@ std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sour
         const bool answered = group.wish.done.load();
         for (std::size_t k = 0; k < group.at.size(); ++k) {
             if (answered) values[group.at[k]] = group.to[k];
-            else values[group.at[k]].raw = __atomic_load_n(&group.from[k]->raw, __ATOMIC_RELAXED);  // it hangs: its memory stands still
+            else values[group.at[k]].raw = __atomic_load_n(&group.from[k]->raw, __ATOMIC_RELAXED);  // it hangs: its memory does not change
         }
     }
     return values;

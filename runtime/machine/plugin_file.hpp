@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a plugin's file says of itself, read before the loader touches it.
+// Checks a plugin's file before the dynamic loader maps it.
 #pragma once
 
 #include <string>

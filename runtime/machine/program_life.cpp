@@ -3,7 +3,7 @@
 //
 //   initializing -> ready <-> not responding (within a declared rate): its outputs have their declared values
 //                     |
-//                     +--> gone: it leaves, or ends when it was told to
+//                     +--> gone: it leaves, or ends when it was asked to
 //                     v    its connection or process ends without having left
 //                   dead: pins keep their values, then take the declared ones; a program of the same name takes them over
 #include <algorithm>
@@ -58,7 +58,7 @@ std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t
     };
     if (entry && !entry->dead() && (entry->ready || entry->owner != 0)) return refuse(name_in_use(*entry));
     if (entry && entry->reserved && !entry->ended && entry->pid != pid) {
-        // a program from before must not come back in the place of the one that has just been started
+        // an earlier program must not take the name of the one that was just started
         const auto older = start_time(pid), newer = start_time(entry->pid);
         if (older != 0 && older < newer)
             return refuse("the name '" + name + "' is reserved for process " + std::to_string(entry->pid) + ", which loadusr has started");
@@ -175,7 +175,7 @@ void Programs::withdraw(std::uint64_t owner) {
         if (entry.owner != owner) continue;
         entry.owner = 0;
         entry.ready = false;
-        if (entry.stopping) leave(entry);  // it was told to end, and does
+        if (entry.stopping) leave(entry);  // it was asked to end
         else if (has_pins(entry)) die(entry, "its connection ended");
         else if (!entry.child) forget(entry);
     }

@@ -112,7 +112,7 @@ void Programs::act_in_time(std::int64_t overslept_ns) {
             entry.pid = pid;
             entry.ended = false;
             entry.child = entry.again = true;
-            if (entry.name.empty()) entry.dead_ns = 0;  // it had left in good order, and says its name anew
+            if (entry.name.empty()) entry.dead_ns = 0;  // it had left in good order and registers its name again
             else replace_in_model(entry.name, pid);
         }
     }

@@ -29,12 +29,12 @@ struct SessionState;
 
 enum class Restart { no, on_failure, always };
 
-/// Whether a program that has ended is started again, in the spirit of systemd's Restart=, RestartSec= and StartLimit….
+/// Whether a program that has ended is started again, modelled on systemd's Restart=, RestartSec= and StartLimit….
 struct RestartPolicy {
     Restart when = Restart::no;
     std::int64_t delay_ns = 1'000'000'000;
     static constexpr std::size_t most = 5;                       ///< restarts within …
-    static constexpr std::int64_t within_ns = 10'000'000'000;    ///< … so long; then it is given up
+    static constexpr std::int64_t within_ns = 10'000'000'000;    ///< … this time; after that it is not started again
 };
 
 struct ProcessStart {
@@ -69,7 +69,7 @@ struct Programs {
         std::string name = {};  ///< as component; empty: not registered as one
         pid_t pid = 0;
         bool child = false;     ///< started by loadusr, so that its end is seen here
-        bool ready = false;     ///< has said over the socket that it is a component
+        bool ready = false;     ///< registered as a component over the socket
         bool waited = false;    ///< a `loadusr -w` waits for its status: kept after its end, until collect()
         bool ended = false;
         int status = 0;         ///< exit status, or 128 + signal
@@ -82,7 +82,7 @@ struct Programs {
         std::int64_t dead_ns = 0;       ///< since when it is dead, on the steady clock; 0: it lives
         std::string obituary = {};      ///< "since 12:34:56 (exit status 1)"
         bool declared = false;          ///< dead, and its pins have taken their declared values
-        bool stopping = false;          ///< told to end: not started again
+        bool stopping = false;          ///< asked to end: not started again
         RestartPolicy restart = {};
         ProcessStart start = {};        ///< how to start it again
         std::vector<std::int64_t> restarts = {};  ///< when it was, lately
@@ -100,14 +100,14 @@ struct Programs {
         bool responds() const { return ready && silence.empty(); }
         /// When it is no longer waited for; meaningful while every_ns is not 0.
         std::int64_t due_ns() const { return heard_ns + every_ns + (timeout_ns >= 0 ? timeout_ns : usual_timeout_ns); }
-        /// As `show comp` says it.
+        /// As `show comp` prints it.
         std::string state() const;
     };
 
     Programs(Session& session, SessionState& state);
     ~Programs();  ///< terminates all children: SIGTERM, then after two seconds SIGKILL
 
-    /// Starts a program. 0: `problem` says why not. `waited`: somebody will ask for its status and then collect() it.
+    /// Starts a program. Returns its process ID, or 0 with the reason in `problem`. `waited`: the caller reads its status, then calls collect().
     pid_t start(const ProcessStart& start, bool waited, std::string& problem);
     /// Makes a started program a component of the session. Its entry's number. The name is made unique if it is taken; when it is
     /// `reserved`, which must be free or a dead program's, it is this process's alone.
@@ -119,10 +119,10 @@ struct Programs {
     Pin* add_pin(Transaction& transaction, std::string_view component, const ProgramPin& pin, std::string& problem);
     /// Unlinks and removes pins of a program's component.
     void remove_pins(Transaction& transaction, std::string_view component, const std::vector<Pin*>& pins);
-    /// A started program is started again when it ends, as the policy says.
+    /// Applies a restart policy to a started program.
     void keep_alive(pid_t pid, const ProcessStart& start, const RestartPolicy& policy);
-    /// A program says that it is the component `name`, and ready unless told otherwise. A dead one's place is taken over,
-    /// pins and all. Empty, or why not. `owner` is the connection that says so.
+    /// Registers a program as the component `name`; it takes over the pins of a dead one of that name. Returns an empty string, or the
+    /// reason of a rejection. `owner` is the connection that registers it; `ready` false: it adds pins first.
     std::string announce(pid_t pid, const std::string& name, std::uint64_t owner = 0, bool ready = true);
     /// The component of that name if this connection answers for it, or nullptr.
     Entry* owned(std::string_view name, std::uint64_t owner);
@@ -163,7 +163,7 @@ struct Programs {
     /// Ends a program whose start has failed: its name is free at once, and SIGKILL follows SIGTERM after 5 s.
     void give_up(Entry& entry);
 
-    /// Sleeps until something about a process changes, at most so long.
+    /// Releases the lock until something about a process changes, for `most` at most.
     void wait(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds most) { changed_.wait_for(lock, most); }
 
 private:

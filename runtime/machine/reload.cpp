@@ -13,7 +13,7 @@
 namespace hal {
 namespace {
 
-// Plugins of an interface before 1.1 do not say.
+// Plugins of an interface before 1.1 do not declare it.
 bool acquires(const LoadedComponent& component) {
     return component.plugin->abi_minor < 1 || (component.plugin->flags & HAL_COMPONENT_STARTS);
 }

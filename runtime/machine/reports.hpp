@@ -69,7 +69,7 @@ public:
 
     /// Returns one line per signal: writer => reader, delay in cycles and the reason; sorted.
     std::vector<std::string> latencies() const;
-    /// Returns a line for each privilege for real time that the process lacks, and the command that grants it.
+    /// Returns a line for each missing real-time privilege, with the command that grants it.
     std::vector<std::string> missing_privileges() const;
     /// Returns the state of the instance, its threads and faults as lines "KEY VALUE" (hal/status.h).
     std::string status_text() const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What the machine is doing in a component outside of the cycle: its constructor, start, stop or destructor. It holds the session's lock
-// meanwhile, so when the call does not return, this is all that can be told.
+// meanwhile, so when the call does not return, nothing else can be reported.
 #pragma once
 
 #include <atomic>

@@ -55,11 +55,11 @@ bool claim_clock(const hal_clock*, const hal_host* host) {
     Starting& starting = *static_cast<Starting*>(host->data);
     if (const Instance* const other = clock_leader(starting.model); other && other != &starting.instance) {
         try {
-            return starting.fail(("the threads follow the beat of '" + other->name + "' (" + other->component->name +
-                                  "), and they can follow only one: let this one not follow, or unload '" + other->name + "' first")
+            return starting.fail(("the threads already follow the clock of '" + other->name + "' (" + other->component->name +
+                                  "); disable clock following here or unload '" + other->name + "' first")
                                      .c_str());
         } catch (const std::bad_alloc&) {
-            return starting.fail("the threads follow the beat of another instance, and they can follow only one");
+            return starting.fail("the threads already follow the clock of another instance");
         }
     }
     starting.instance.leads_clock = true;

@@ -41,7 +41,7 @@ struct SessionState {
     Absences absences;                       ///< of `hal check`: of all texts so far
     std::vector<AutoOrder> auto_orders;
     std::size_t commands = 0;                ///< in the open transaction
-    std::set<std::string> reported;          ///< warnings and notes said before
+    std::set<std::string> reported;          ///< warnings and notes that were printed before
 
     /// What the open transaction put in place of, should it be withdrawn after a thread has taken it.
     struct {

@@ -96,7 +96,7 @@ void SessionState::silent_thread(const Core* hangs, Diagnostics& diagnostics) co
                               "thread '" + thread->name + "' did not answer within " +
                                   format_duration(static_cast<double>(answer_timeout_ns)) +
                                   ": one of its functions hangs, or it gets no CPU time",
-                              "", "show thread and show fault say more");
+                              "", "see: show thread, show fault");
 }
 
 void SessionState::withdraw(Diagnostics* diagnostics) {

@@ -19,7 +19,7 @@ void SessionState::hung_thread(const Thread& thread, const Core& core, Diagnosti
     diagnostics.error("hung-thread", thread.made,
                       "thread '" + thread.name + "' has not finished a cycle for " + silent +
                           (function ? ": " + function_text(*function) + " does not return" : ""),
-                      "its outputs are at their safe values", "show fault says more; a function that never returns ends only with the process");
+                      "its outputs are at their safe values", "see: show fault; a function that never returns ends only with the process");
 }
 
 bool ThreadControl::start(Diagnostics* diagnostics) {
@@ -60,7 +60,7 @@ bool ThreadControl::stop(Diagnostics* diagnostics) {
     if (answered) return true;
     if (diagnostics)  // not supervised, or a long period of supervision
         diagnostics->error("silent-thread", {}, "a thread did not stop within " + format_duration(static_cast<double>(answer_timeout_ns)),
-                           "", "show thread and show fault say more");
+                           "", "see: show thread, show fault");
     return false;
 }
 
@@ -87,7 +87,7 @@ std::int64_t ThreadControl::now_ns() const { return state_.executor->now_ns(); }
 bool ThreadControl::attach_watchdog(const std::string& path, std::string& problem) {
     SessionState& s = state_;
     if (watchdog_ >= 0) {
-        problem = "a watchdog is attached already";
+        problem = "a watchdog is already attached";
         return false;
     }
     const int device = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK);
@@ -104,7 +104,7 @@ void ThreadControl::disarm_watchdog() {
     if (watchdog_ < 0) return;
     state_.executor->supervisor().feed(-1);
     state_.executor->supervisor().fence();
-    // The letter that tells the driver that this close is meant; otherwise it resets the host.
+    // The magic character: without it the driver resets the host after the close.
     if (::write(watchdog_, "V", 1) != 1) return;
     ::close(watchdog_);
     watchdog_ = -1;

@@ -28,7 +28,7 @@ bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& 
     return false;
 }
 
-// cpu=, policy=, priority=, spin=, budget=, supervise=, profile=, fp=; `known` false when it is none of them
+// cpu=, policy=, priority=, spin=, budget=, supervise=, profile=, fp=; `known` is false for any other key
 bool set_option(NewThread& thread, std::string_view key, std::string_view value, Span at, Diagnostics& diagnostics, bool& known) {
     ThreadOptions& o = thread.options;
     const auto bad = [&](const char* help) {

@@ -71,7 +71,7 @@ void Transaction::roll_back() {
 
 namespace {
 
-// What a single shell line may not yet have right (net comes before addf) is said for whole files only.
+// What may still be incomplete after a single shell line (net before addf) is checked for whole files only.
 void check_all(const Model& model, bool whole, bool complete, bool open, Diagnostics& diagnostics) {
     check_periods(model, diagnostics);
     check_spread_pins(model, diagnostics);
@@ -99,7 +99,7 @@ bool Transaction::commit(Diagnostics& diagnostics) {
     } catch (const std::bad_alloc&) {
         s.out_of_memory(diagnostics);
     }
-    // Nothing runs under `hal check`: what could be made stays, so that the texts after this one are judged with it.
+    // Nothing runs under `hal check`: what could be made stays, so that the texts after this one are checked against it.
     if (!good && s.edit && s.options.check_only) s.close_edit();
     else if (!good && s.edit) s.withdraw(&diagnostics);
     s.open = false;
@@ -119,7 +119,7 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     Diagnostics found;
     check_all(model, commands > 1, options.check_only, edit->absences().open(), found);
     for (const Diagnostic& one : found.all()) {
-        // an old warning is not said again with every later edit
+        // a warning is printed once, not with every later edit
         if (reported.insert(one.message).second || (one.severity == Severity::error && !options.check_only)) diagnostics.add(one);
     }
     if (diagnostics.failed()) return false;
@@ -169,7 +169,7 @@ bool SessionState::write_values(const Notes<Pin, hal_value>& pins, const Notes<S
     if (diagnostics.failed()) return false;
     if (!executor->write(rows, answer_timeout_ns)) {
         diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "",
-                          "show thread and show fault say more");
+                          "see: show thread, show fault");
         return false;
     }
     for (const auto& [signal, value] : signals) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The only way to change the model of a Session: one edit, which takes effect whole or not at all.
+// The only way to change the model of a Session: one atomic edit.
 #pragma once
 
 #include <functional>
@@ -22,8 +22,8 @@ struct EditForm {
     bool arrows = false;  ///< arrows may stand among its arguments and are not counted
 };
 
-/// The open transaction of a session, made by Session::begin(). There is at most one at a time; whoever holds it holds
-/// the lock of the session. Destruction rolls back. [setup]
+/// The open transaction of a session, made by Session::begin(). There is at most one at a time, and its owner holds
+/// the session's lock. Destruction rolls back. [setup]
 class Transaction {
 public:
     Transaction(Transaction&& other) noexcept : session_(std::exchange(other.session_, nullptr)) {}

@@ -96,9 +96,8 @@ TEST_F(DisciplinedThreads, A_grid_that_goes_back_loses_no_cycle) {
 
 TEST_F(DisciplinedThreads, A_second_leader_is_refused_and_told_who_leads) {
     machine.refused("loadrt test-beat names=other", "start-failed");
-    EXPECT_NE(machine.said.find("'other' (test-beat) cannot start: the threads follow the beat of 'fast' (test-beat), and they can "
-                                "follow only one: "
-                                "let this one not follow, or unload 'fast' first"),
+    EXPECT_NE(machine.said.find("'other' (test-beat) cannot start: the threads already follow the clock of 'fast' (test-beat); "
+                                "disable clock following here or unload 'fast' first"),
               std::string::npos)
         << machine.said;
     machine.must("unloadrt fast");
