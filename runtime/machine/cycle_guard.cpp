@@ -13,7 +13,7 @@
 
 namespace hal {
 
-CyclePatience::Verdict CyclePatience::look(const CycleNow& now, std::int64_t now_ns) noexcept {
+CycleTimeLimit::Action CycleTimeLimit::check(const CycleNow& now, std::int64_t now_ns) noexcept {
     if (now.core != seen_.core || now.cycle != seen_.cycle) {
         cycle_since_ns_ = function_since_ns_ = now_ns;
         slow_ = false;
@@ -21,17 +21,17 @@ CyclePatience::Verdict CyclePatience::look(const CycleNow& now, std::int64_t now
         function_since_ns_ = now_ns;
     }
     seen_ = now;
-    if (!now.core) return Verdict::none;
+    if (!now.core) return Action::none;
     const std::int64_t took = cycle_ns(now_ns);
-    if (limit_ns > 0 && took >= limit_ns) return Verdict::end;
-    if (took < first_report_ns) return Verdict::none;
+    if (limit_ns > 0 && took >= limit_ns) return Action::end;
+    if (took < first_report_ns) return Action::none;
     if (!slow_) slow_ = true, ++slow_cycles_;
     if (reported_ns_ != 0) {
-        if (now_ns - reported_ns_ < pause_ns_) return Verdict::none;
+        if (now_ns - reported_ns_ < pause_ns_) return Action::none;
         pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
     }
     reported_ns_ = now_ns;
-    return Verdict::report;
+    return Action::report;
 }
 
 CycleGuard::~CycleGuard() {
@@ -45,14 +45,14 @@ CycleGuard::~CycleGuard() {
 }
 
 void CycleGuard::begin(std::int64_t limit_ns) {
-    patience_.limit_ns = limit_ns;
+    time_limit_.limit_ns = limit_ns;
     thread_ = std::thread([this] { work(); });
 }
 
 void CycleGuard::end_soon() {
     const std::lock_guard lock(mutex_);
-    const std::int64_t limit = ending_limit_ns + (patience_.in_cycle() ? patience_.cycle_ns(monotonic_ns()) : 0);
-    if (patience_.limit_ns == 0 || patience_.limit_ns > limit) patience_.limit_ns = limit;
+    const std::int64_t limit = ending_limit_ns + (time_limit_.in_cycle() ? time_limit_.cycle_ns(monotonic_ns()) : 0);
+    if (time_limit_.limit_ns == 0 || time_limit_.limit_ns > limit) time_limit_.limit_ns = limit;
 }
 
 namespace {
@@ -64,28 +64,28 @@ std::string wall_time(std::int64_t ns) { return format_duration(static_cast<doub
 void CycleGuard::work() {
     std::unique_lock lock(mutex_);
     while (!over_) {
-        const std::int64_t interval = patience_.limit_ns > 0 ? std::clamp<std::int64_t>(patience_.limit_ns / 8, 1'000'000, 100'000'000) : 100'000'000;
+        const std::int64_t interval = time_limit_.limit_ns > 0 ? std::clamp<std::int64_t>(time_limit_.limit_ns / 8, 1'000'000, 100'000'000) : 100'000'000;
         if (wake_.wait_for(lock, std::chrono::nanoseconds(interval), [this] { return over_; })) return;
         const CycleNow now = cycle_now();
         const std::int64_t now_ns = monotonic_ns();
-        const CyclePatience::Verdict verdict = patience_.look(now, now_ns);
-        if (verdict == CyclePatience::Verdict::none) continue;
+        const CycleTimeLimit::Action action = time_limit_.check(now, now_ns);
+        if (action == CycleTimeLimit::Action::none) continue;
         const CycleNames names = names_of(now);
-        const bool end = verdict == CyclePatience::Verdict::end;
-        const std::int64_t took = patience_.cycle_ns(now_ns);
+        const bool end = action == CycleTimeLimit::Action::end;
+        const std::int64_t took = time_limit_.cycle_ns(now_ns);
         std::string text = "hal: " + names.thread + ": ";
-        if (!names.function.empty() && patience_.one_function()) text += names.function + " has not returned for ";
+        if (!names.function.empty() && time_limit_.one_function()) text += names.function + " has not returned for ";
         else text += "the cycle has not ended for ";
         text += took < 1'000'000'000 ? format_duration(static_cast<double>(took)) : wall_time(took);
         text += " of wall time";
-        if (!names.function.empty() && !patience_.one_function()) text += ", now in " + names.function;
+        if (!names.function.empty() && !time_limit_.one_function()) text += ", now in " + names.function;
         text += " (cycle " + std::to_string(now.cycle) + ")";
         if (end) {
             make_all_safe();
             text += "; outputs were set to their safe values; the process ends [hung-thread]\n";
         } else {
-            if (patience_.slow_cycles() > 1)
-                text += "; " + std::to_string(patience_.slow_cycles()) + " cycles took longer than " + wall_time(CyclePatience::first_report_ns);
+            if (time_limit_.slow_cycles() > 1)
+                text += "; " + std::to_string(time_limit_.slow_cycles()) + " cycles took longer than " + wall_time(CycleTimeLimit::first_report_ns);
             text += "; it goes on (--cycle-limit TIME ends it)\n";
         }
         [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());

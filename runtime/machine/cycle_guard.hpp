@@ -13,13 +13,13 @@ namespace hal {
 
 /// Decides when a long cycle is reported and when it ends the process. Reports are rate-limited over all cycles, because a component that is
 /// slow in every cycle, for example under a sanitizer, does not hang.
-class CyclePatience {
+class CycleTimeLimit {
 public:
     static constexpr std::int64_t first_report_ns = 10'000'000'000, longest_pause_ns = 600'000'000'000;
-    enum class Verdict : std::uint8_t { none, report, end };
+    enum class Action : std::uint8_t { none, report, end };
 
     /// What the cycle does that runs now, if any, in real time. [any]
-    Verdict look(const CycleNow& now, std::int64_t now_ns) noexcept;
+    Action check(const CycleNow& now, std::int64_t now_ns) noexcept;
     /// A cycle of so much wall time ends the process; 0: none does.
     std::int64_t limit_ns = 0;
 
@@ -57,7 +57,7 @@ private:
     void work();
     std::mutex mutex_;
     std::condition_variable wake_;
-    CyclePatience patience_;
+    CycleTimeLimit time_limit_;
     bool over_ = false;
     std::thread thread_;
 };

@@ -8,14 +8,14 @@ namespace {
 struct DisciplinedThreads : testing::Test {
     DisciplinedThreads() {
         machine.must("newthread f 1000000\nnewthread s 4000000");
-        machine.must("loadrt test-beat names=fast");
-        machine.must("loadrt test-beat names=slow lead=0");
+        machine.must("loadrt test-clock names=fast");
+        machine.must("loadrt test-clock names=slow lead=0");
         machine.must("addf fast f\naddf slow s");
     }
     Machine machine;
 };
 
-TEST_F(DisciplinedThreads, A_step_moves_what_is_due_after_its_cycle_and_no_more) {
+TEST_F(DisciplinedThreads, An_adjustment_moves_only_later_cycles) {
     machine.start();
     machine.cycles(2);
     EXPECT_EQ(machine.number("fast.due"), 2'000'000);
@@ -38,8 +38,8 @@ TEST_F(DisciplinedThreads, All_threads_keep_their_phase_to_one_another) {
 }
 
 TEST_F(DisciplinedThreads, A_slow_thread_may_lead_a_fast_one) {
-    machine.must("unloadrt fast\nunloadrt slow\nloadrt test-beat names=fast lead=0");
-    machine.must("loadrt test-beat names=slow\naddf fast f\naddf slow s\nsetp slow.step 50000");
+    machine.must("unloadrt fast\nunloadrt slow\nloadrt test-clock names=fast lead=0");
+    machine.must("loadrt test-clock names=slow\naddf fast f\naddf slow s\nsetp slow.step 50000");
     machine.start();
     machine.cycles(4);
     EXPECT_EQ(machine.number("fast.due"), 4'000'000);
@@ -74,7 +74,7 @@ TEST_F(DisciplinedThreads, Threads_that_come_later_join_the_moved_grid) {
     machine.start();
     machine.cycles(6);
     machine.must("setp fast.step 0");
-    machine.must("newthread n 2000000\nloadrt test-beat names=new lead=0\naddf new n");
+    machine.must("newthread n 2000000\nloadrt test-clock names=new lead=0\naddf new n");
     machine.cycles(6);
     EXPECT_EQ(machine.number("fast.due"), 12'006'000);
     EXPECT_EQ(machine.number("new.due"), 12'006'000);
@@ -94,14 +94,14 @@ TEST_F(DisciplinedThreads, A_grid_that_goes_back_loses_no_cycle) {
     EXPECT_EQ(machine.session.reports().threads()[1].cycles, 25u);
 }
 
-TEST_F(DisciplinedThreads, A_second_leader_is_refused_and_told_who_leads) {
-    machine.refused("loadrt test-beat names=other", "start-failed");
-    EXPECT_NE(machine.said.find("'other' (test-beat) cannot start: the threads already follow the clock of 'fast' (test-beat); "
+TEST_F(DisciplinedThreads, A_second_leader_is_rejected_with_the_name_of_the_first) {
+    machine.refused("loadrt test-clock names=other", "start-failed");
+    EXPECT_NE(machine.said.find("'other' (test-clock) cannot start: the threads already follow the clock of 'fast' (test-clock); "
                                 "disable clock following here or unload 'fast' first"),
               std::string::npos)
         << machine.said;
     machine.must("unloadrt fast");
-    machine.must("loadrt test-beat names=other");
+    machine.must("loadrt test-clock names=other");
     EXPECT_EQ(machine.session.reports().clock()->leader, "other");
 }
 
@@ -109,7 +109,7 @@ TEST_F(DisciplinedThreads, A_leader_may_be_exchanged_in_one_edit) {
     machine.must("setp fast.step 5000");
     machine.start();
     machine.cycles(10);
-    machine.must("unloadrt fast\nloadrt test-beat names=other\naddf other f");
+    machine.must("unloadrt fast\nloadrt test-clock names=other\naddf other f");
     machine.cycles(1);
     EXPECT_EQ(machine.number("other.due"), 11'050'000) << "the grid stays where it was brought to";
     EXPECT_EQ(machine.session.reports().clock()->leader, "other");
@@ -117,15 +117,15 @@ TEST_F(DisciplinedThreads, A_leader_may_be_exchanged_in_one_edit) {
     EXPECT_FALSE(machine.session.reports().clock());
 }
 
-TEST_F(DisciplinedThreads, An_edit_that_is_undone_claims_nothing) {
+TEST_F(DisciplinedThreads, An_edit_that_is_rolled_back_claims_no_lead) {
     machine.must("unloadrt fast");
-    EXPECT_FALSE(machine.edit("loadrt test-beat names=a\nloadrt test-beat names=b"));
+    EXPECT_FALSE(machine.edit("loadrt test-clock names=a\nloadrt test-clock names=b"));
     EXPECT_FALSE(machine.session.reports().clock());
-    machine.must("loadrt test-beat names=a");
+    machine.must("loadrt test-clock names=a");
     EXPECT_TRUE(machine.session.reports().clock());
 }
 
-TEST_F(DisciplinedThreads, The_report_says_who_leads_where_and_how_fast) {
+TEST_F(DisciplinedThreads, The_report_names_the_leader_the_offset_and_the_rate) {
     machine.must("setp fast.step 200");
     machine.start();
     machine.cycles(2500);
@@ -136,11 +136,11 @@ TEST_F(DisciplinedThreads, The_report_says_who_leads_where_and_how_fast) {
     EXPECT_NEAR(report->rate, 200e-6, 1e-9);
 }
 
-TEST(DisciplinedRealThreads, Follow_steps_while_they_sleep_and_keep_their_phase) {
+TEST(DisciplinedRealThreads, Follow_adjustments_while_they_sleep_and_keep_their_phase) {
     Machine machine(Clock::real);
-    machine.must("newthread f 1000000\nnewthread s 20000000\nnewthread ss 100000000\nloadrt test-beat names=fast");
-    machine.must("loadrt test-beat names=slow lead=0");
-    machine.must("loadrt test-beat names=slower lead=0");
+    machine.must("newthread f 1000000\nnewthread s 20000000\nnewthread ss 100000000\nloadrt test-clock names=fast");
+    machine.must("loadrt test-clock names=slow lead=0");
+    machine.must("loadrt test-clock names=slower lead=0");
     machine.must("addf fast f\naddf slow s\naddf slower ss");
     machine.must("setp fast.step -50000");
     machine.start();

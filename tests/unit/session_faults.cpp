@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What goes wrong inside components: faults in the cycle, plugins that are none, threads that hang.
+// What goes wrong inside components: faults in the cycle, invalid plugins, threads that hang.
 #include <filesystem>
 #include <fstream>
 
@@ -94,7 +94,7 @@ TEST(FaultsOnTheRealClock, Have_an_age_that_grows) {
     EXPECT_TRUE(eventually([&] { return machine.session.reports().faults()[0].age_ns > age; }));
 }
 
-TEST_F(Faulty, The_faults_of_a_deleted_thread_are_still_told) {
+TEST_F(Faulty, The_faults_of_a_deleted_thread_are_still_reported) {
     machine.must("setp f.throws 1");
     machine.start();
     machine.cycles(1);
@@ -152,12 +152,12 @@ TEST(Missed_periods, are_counted_and_skipped_and_the_phase_stays) {
     machine.must("setp f.slow 0");
     const auto seen = machine.get_all({"t.missed", "t.threadbeat"});
     EXPECT_GE(std::stoll(seen[0]), 6) << "the pin is written when the overrun has ended, the report counts up to now";
-    EXPECT_EQ(machine.session.reports().fault_count(), 0u) << "without a budget an overrun is no fault";
+    EXPECT_EQ(machine.session.reports().fault_count(), 0u) << "an overrun raises no fault without a budget";
 }
 
 // --- a thread that hangs -----------------------------------------------------------------------------------------------
 
-TEST(A_function_that_hangs, refuses_edits_by_name_and_leaves_the_other_threads_alone) {
+TEST(A_function_that_hangs, rejects_edits_with_its_name_and_leaves_the_other_threads_running) {
     Watch watch;
     Machine machine(Clock::real);
     machine.must("newthread good 1000000\nnewthread bad 2000000\nloadrt test-life names=x " + watch.argument() + "\nloadrt test-counter names=c,d\naddf x bad\naddf c good\nnet s c.sum");
@@ -218,7 +218,7 @@ TEST(A_function_that_hangs, leaves_safe_values_to_other_threads_and_is_one_fault
     watch.hang = false;
     ASSERT_TRUE(eventually([&] { return !machine.session.reports().threads()[0].hung; }));
     EXPECT_EQ(machine.get("x.level"), "-1");
-    EXPECT_EQ(machine.session.reports().fault_count(), 1u) << "the return of the function is no second fault";
+    EXPECT_EQ(machine.session.reports().fault_count(), 1u) << "the return of the function raises no second fault";
     machine.start();
     EXPECT_TRUE(eventually([&] { return machine.get("x.level") == "7"; }));
     EXPECT_EQ(machine.session.reports().threads()[0].hangs, 1u);
@@ -256,7 +256,7 @@ TEST(A_cycle_of_many_periods, is_a_fault_that_names_the_function) {
     EXPECT_FALSE(machine.session.reports().threads()[0].faulted) << "it goes on";
 }
 
-TEST(A_session, ends_although_a_function_hangs) {
+TEST(A_session, ends_while_a_function_hangs) {
     static Watch watch;  // the thread may go on using it
     {
         Machine machine(Clock::real);
@@ -271,7 +271,7 @@ TEST(A_session, ends_although_a_function_hangs) {
     ASSERT_TRUE(eventually([&] { return watch.runs > runs || !watch.hanging; }));
 }
 
-// --- plugins that are none ---------------------------------------------------------------------------------------------
+// --- invalid plugins ---------------------------------------------------------------------------------------------------
 
 struct Bad {
     const char *component, *code, *words;
@@ -296,7 +296,7 @@ struct BadFile : testing::Test {
         good.assign(std::istreambuf_iterator<char>(from), {});
     }
     ~BadFile() override { fs::remove_all(folder); }
-    // what loading a file of these bytes says
+    // returns what loading a file of these bytes reports
     std::string load(const std::string& bytes) {
         std::ofstream(folder / "broken.so", std::ios::binary) << bytes;
         SessionOptions options;
@@ -315,7 +315,7 @@ struct BadFile : testing::Test {
 
 TEST_F(BadFile, That_is_empty_is_a_diagnostic) { EXPECT_NE(load("").find("[bad-plugin]"), std::string::npos); }
 TEST_F(BadFile, That_is_text_is_a_diagnostic) { EXPECT_NE(load("int main() { return 0; }\n").find("it is not a shared library [bad-plugin]"), std::string::npos); }
-TEST_F(BadFile, That_is_whole_loads) { EXPECT_EQ(load(good), ""); }
+TEST_F(BadFile, That_is_complete_loads) { EXPECT_EQ(load(good), ""); }
 TEST_F(BadFile, Cut_anywhere_is_a_diagnostic) {
     ASSERT_GT(good.size(), 5000u);
     for (std::size_t part = 0; part < 64; ++part) {

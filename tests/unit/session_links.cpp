@@ -185,11 +185,11 @@ TEST_F(Links, Linked_and_unlinked_in_one_transaction_keeps_what_was_inherited) {
 
 // --- setp and sets -----------------------------------------------------------------------------------------------------
 
-TEST_F(Links, Setp_refuses_outputs) { machine.refused("setp x.bit-out 1", "output-set"); }
-TEST_F(Links, Sets_refuses_signals_with_a_writer) { machine.refused("net a x.bit-out\nsets a 1", "writer-set"); }
+TEST_F(Links, Setp_rejects_outputs) { machine.refused("setp x.bit-out 1", "output-set"); }
+TEST_F(Links, Sets_rejects_signals_with_a_writer) { machine.refused("net a x.bit-out\nsets a 1", "writer-set"); }
 TEST_F(Links, Setp_of_nothing_is_an_error) { machine.refused("setp x.bit-inn 1", "no-such-pin"); }
 TEST_F(Links, Sets_of_nothing_is_an_error) { machine.refused("sets nowhere 1", "no-such-signal"); }
-TEST_F(Links, Setp_refuses_linked_pins) {
+TEST_F(Links, Setp_rejects_linked_pins) {
     machine.must("net a x.bit-in");
     machine.refused("setp x.bit-in 1", "linked-set");
 }
@@ -321,7 +321,7 @@ TEST_F(Ports, A_stream_crosses_threads) {
     EXPECT_EQ(machine.get("q.wrong"), "0");
 }
 
-TEST_F(Ports, One_reader_one_writer_one_size) {
+TEST_F(Ports, Accept_one_reader_one_writer_and_one_size) {
     machine.refused("net s p.to q.from r.from", "two-readers");
     machine.refused("net s p.to q.to", "two-writers");
     machine.must("net s p.to q.from\nsets s 8");

@@ -130,7 +130,7 @@ TEST(A_slow_thread, takes_edits_and_answers_between_its_cycles) {
     machine.must("delthread rare");
 }
 
-TEST(A_period_of_more_than_a_thousand_seconds, is_refused) {
+TEST(A_period_of_more_than_a_thousand_seconds, is_rejected) {
     Machine machine;
     machine.refused("newthread t 1000000000001", "bad-period");
 }
@@ -145,7 +145,7 @@ TEST_F(Live, Priorities_fall_with_the_period_also_when_a_faster_thread_comes_lat
 }
 
 // Ten thousand edits that a seed chose: the machine counts on, the model stays whole, and nothing is torn.
-TEST_F(Live, Random_edits_leave_a_running_machine_whole) {
+TEST_F(Live, Random_edits_keep_a_running_machine_consistent) {
     machine.must("loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet wa w.a => w.a-in w.a-again\nnet wb w.b => w.b-in w.b-again\n"
                  "loadrt test-types names=x,y,z\nloadrt test-port names=p,q\nloadrt test-counter names=still\naddf still fast");
     machine.start();
@@ -185,7 +185,7 @@ TEST_F(Live, Random_edits_leave_a_running_machine_whole) {
             for (const Pin* pin : signal->pins) ASSERT_EQ(pin->signal, signal.get());
         }
     }
-    EXPECT_GT(taken, edits / 10) << "most random edits are refused, but not nearly all";
+    EXPECT_GT(taken, edits / 10) << "most random edits are rejected, but not nearly all";
     EXPECT_LT(taken, edits);
     EXPECT_EQ(machine.get("w.torn"), "0");
     until("w.looks", machine.number("w.looks") + 3);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The end of memory at every single allocation of an edit: it works or it is refused, and then nothing has changed.
+// The end of memory at every single allocation of an edit: the edit succeeds, or it fails and nothing has changed.
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
@@ -13,7 +13,7 @@
 
 namespace {
 
-// Counts allocations of this thread while it is armed; refuses one, or all from one on until so many bytes were given back.
+// Counts allocations of this thread while it is armed; fails one, or all from one on until a number of bytes was freed.
 struct Shortage {
     bool armed = false;
     long refuse = -1, made = 0;
@@ -83,7 +83,7 @@ const char* const machine_text =
 
 struct Memory : testing::TestWithParam<std::tuple<const char*, bool>> {};
 
-// One edit with the n-th allocation refused, for n = 0, 1, 2 …, until an edit needs fewer than n.
+// One edit with the n-th allocation failing, for n = 0, 1, 2 …, until an edit needs fewer than n.
 TEST_P(Memory, running_out_at_any_allocation_changes_nothing_or_all) {
 #if defined(__SANITIZE_THREAD__)
     GTEST_SKIP() << "one thread only, and the address sanitizer looks closer";
@@ -93,7 +93,7 @@ TEST_P(Memory, running_out_at_any_allocation_changes_nothing_or_all) {
     machine.must(machine_text);
     machine.start();
     machine.cycles(3);
-    // a thread that was ended and comes back has made its outputs safe, so their values are not compared
+    // a thread that was ended and made again has made its outputs safe, so their values are not compared
     const bool values = !std::string_view(edit).starts_with("delthread") && !std::string_view(edit).starts_with("unloadrt all");
     std::string before = machine.dump(values);
     const auto source = machine.session.sources.add("edit", edit);
@@ -111,7 +111,7 @@ TEST_P(Memory, running_out_at_any_allocation_changes_nothing_or_all) {
         const bool reached = shortage.made > n;
         shortage = {};
         if (good && !reached) break;  // it has worked with every allocation granted
-        ASSERT_FALSE(good) << "allocation " << n << " was refused, but the edit took effect";
+        ASSERT_FALSE(good) << "allocation " << n << " failed, but the edit took effect";
         ++refused;
         const std::string said = render(diagnostics, machine.session.sources);
         // what a constructor itself could not get is its own reason
@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(
                      testing::Bool()),
     [](const auto& edit) { return std::to_string(edit.index); });
 
-TEST(A_thread_the_system_refuses, undoes_the_edit) {
+TEST(A_thread_that_the_system_cannot_create, rolls_back_the_edit) {
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__) || defined(HALCYON_RT_GUARD)
     GTEST_SKIP() << "the sanitizer stands before pthread_create itself";
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Functions of one kind in a row are run by one loop of their plugin: nobody must be able to tell.
+// Functions of one kind in a row are run by one loop of their plugin, without an observable difference.
 #include <string>
 
 #include "machine.hpp"

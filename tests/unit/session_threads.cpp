@@ -29,7 +29,7 @@ TEST_F(Threads, Addf_places_functions_by_position) {
     EXPECT_EQ(row(machine, "t"), "d b a c");
 }
 
-TEST_F(Threads, Addf_refuses_positions_that_are_none) {
+TEST_F(Threads, Addf_rejects_invalid_positions) {
     machine.must("addf a t\naddf b t");
     for (const char* position : {"0", "4", "-4", "x", "1.5", "99999999999999999999"}) machine.refused(std::string("addf c t ") + position, "bad-position");
 }
@@ -44,7 +44,7 @@ TEST_F(Threads, A_function_is_in_one_thread_once) {
     machine.refused("delf b t", "not-in-thread");
 }
 
-TEST_F(Threads, Unknown_names_are_refused) {
+TEST_F(Threads, Unknown_names_are_rejected) {
     machine.refused("addf nothing t", "no-such-function");
     machine.refused("addf a nothing", "no-such-thread");
     machine.refused("delf nothing t", "no-such-function");
@@ -88,7 +88,7 @@ TEST_F(Threads, Functions_get_the_nominal_period) {
     EXPECT_EQ(machine.get("b.count"), "2");
 }
 
-TEST_F(Threads, A_period_is_rounded_to_a_multiple_of_the_fastest_and_that_is_said) {
+TEST_F(Threads, A_period_is_rounded_to_a_multiple_of_the_fastest_with_a_warning) {
     machine.must("newthread slow 2600000");
     EXPECT_EQ(machine.session.model().find_thread("slow")->options.period_ns, 3000000);
     EXPECT_NE(machine.said.find("[period-multiple]"), std::string::npos);
@@ -101,7 +101,7 @@ TEST_F(Threads, A_new_fastest_thread_must_divide_all_others) {
     EXPECT_EQ(machine.session.model().threads.front()->name, "fast");
 }
 
-TEST_F(Threads, Periods_that_are_none_are_refused) {
+TEST_F(Threads, Invalid_periods_are_rejected) {
     for (const char* period : {"0", "999", "-1000000", "x", "1e99"}) machine.refused(std::string("newthread u ") + period, "bad-period");
     machine.refused("newthread t 1000000", "name-taken");
     machine.refused("newthread u 1000000 cpu=x", "bad-argument");
@@ -230,7 +230,7 @@ TEST(Instances, are_numbered_named_and_added_at_any_time) {
     machine.refused("loadrt test-counter coutn=1", "unknown-argument");
     machine.refused("loadrt test-counter word", "bad-argument");
     machine.must("loadrt test-counter");
-    EXPECT_NE(machine.session.model().find_instance("test-counter.4"), nullptr) << "a refused load takes no number";
+    EXPECT_NE(machine.session.model().find_instance("test-counter.4"), nullptr) << "a rejected load takes no number";
 }
 
 TEST(Instances, of_a_singleton_are_one) {
@@ -335,7 +335,7 @@ TEST(Unload_all, takes_everything_back) {
     EXPECT_EQ(watch.destroyed, 3);
 }
 
-TEST(A_session, stops_and_destroys_what_is_left_when_it_ends) {
+TEST(A_session, stops_and_destroys_the_remaining_instances_when_it_ends) {
     Watch watch;
     {
         Machine machine;
@@ -367,7 +367,7 @@ TEST(Check_only, constructs_and_starts_nothing) {
     EXPECT_EQ(watch.destroyed, 1);
 }
 
-TEST(Auto_order, puts_writers_before_readers_and_says_where_it_cut_a_loop) {
+TEST(Auto_order, puts_writers_before_readers_and_reports_where_it_cut_a_loop) {
     Machine machine;
     machine.must("loadrt threads name1=t period1=1000000\nloadrt test-counter names=a,b,c\nnet x c.sum => b.step\nnet y b.sum => a.step");
     machine.must("addf --auto t");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// All or nothing: whatever an edit did is undone exactly when something in the same transaction fails.
+// Transactions are atomic: an edit is rolled back exactly when another one of the same transaction fails.
 #include "machine.hpp"
 #include "plugins/watch.hpp"
 
@@ -20,19 +20,19 @@ struct Transaction : testing::TestWithParam<const char*> {
     Machine machine;
 };
 
-TEST_P(Transaction, is_undone_exactly_when_its_last_command_fails) {
+TEST_P(Transaction, is_rolled_back_exactly_when_its_last_command_fails) {
     machine.refused(std::string(GetParam()) + "\nsetp nowhere 1", "no-such-pin");
     machine.cycles(2);  // and the machine runs on
     EXPECT_EQ(machine.get("a.count"), "12");
     machine.must(GetParam());  // nothing was left that would be in the way
 }
 
-TEST_P(Transaction, is_undone_exactly_when_an_instance_cannot_start) {
+TEST_P(Transaction, is_rolled_back_exactly_when_an_instance_cannot_start) {
     machine.refused(std::string(GetParam()) + "\nloadrt test-life names=bad refuse=start", "start-failed");
     machine.must(GetParam());
 }
 
-TEST_P(Transaction, is_undone_exactly_when_a_rule_over_the_whole_model_fails) {
+TEST_P(Transaction, is_rolled_back_exactly_when_a_rule_over_the_whole_model_fails) {
     machine.refused(std::string(GetParam()) + "\nloadrt threads name1=m period1=8000000 name2=n period2=16000000\nloadrt test-two names=tied common=1\naddf tied.fast m\naddf tied.first n",
                     "spread-pins");
     machine.must(GetParam());
@@ -86,7 +86,7 @@ TEST(A_transaction, is_the_only_one_and_ends_once) {
     EXPECT_TRUE(machine.session.begin().commit(diagnostics));
 }
 
-TEST(A_transaction, carries_out_its_actions_only_when_it_has_taken_effect) {
+TEST(A_transaction, runs_its_actions_only_after_the_commit) {
     Machine machine;
     int done = 0;
     const auto act = [&](const std::string& text, bool commit) {
@@ -142,7 +142,7 @@ TEST(Values_of_one_transaction, reach_a_thread_in_one_cycle_even_when_they_are_m
     for (const char* name : {"test-counter.0.sum", "test-counter.1500.sum", "test-counter.2999.sum"}) EXPECT_EQ(machine.get(name), "6");
 }
 
-TEST(An_instance_that_cannot_start, undoes_the_load_and_stops_those_started_before) {
+TEST(An_instance_that_cannot_start, rolls_back_the_load_and_stops_those_started_before) {
     Watch watch;
     Machine machine;
     machine.must("loadrt threads");
@@ -154,7 +154,7 @@ TEST(An_instance_that_cannot_start, undoes_the_load_and_stops_those_started_befo
     EXPECT_EQ(watch.emergencies, 2) << "outputs of hardware that was touched are made safe";
 }
 
-TEST(A_constructor_that_throws, undoes_the_load) {
+TEST(A_constructor_that_throws, rolls_back_the_load) {
     Watch watch;
     Machine machine;
     machine.refused("loadrt test-life names=x " + watch.argument() + "\nloadrt test-life names=z refuse=construct", "construct-failed");
