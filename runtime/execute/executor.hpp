@@ -23,34 +23,34 @@ public:
     ~Executor();
     Executor(const Executor&) = delete;
 
-    /// A new thread, which serves its inbox at once. Returns its core; it lives until remove().
+    /// Creates a thread, which serves its inbox at once. Returns its core, which lives until remove().
     Core& add(const CoreOptions& options, ThreadPins pins);
-    /// Ends a thread after making its outputs safe. False when it did not end within `timeout_ns`, or hangs (it is then left alone).
+    /// Sets a thread's outputs to their safe values and ends it. Returns false when it hangs or does not end within `timeout_ns`.
     bool remove(Core& core, std::int64_t timeout_ns);
-    /// Makes the outputs of a thread safe that does not end, and stops its functions.
+    /// Sets the outputs of a thread that does not end to their safe values and stops its functions.
     void abandon(Core& core);
-    /// Lets functions run again that a fault stopped. False: the thread hangs.
+    /// Lets functions that a fault stopped run again. Returns false when the thread hangs.
     bool reset(Core& core);
 
     void start() { running_.store(true, std::memory_order_release); }
     void stop() { running_.store(false, std::memory_order_release); }
     bool running() const { return running_.load(std::memory_order_acquire); }
 
-    /// Threads that hang, or are in the middle of a cycle and do not end it within the time-out. Asked before an edit, so that
+    /// Returns the threads that hang, or do not end their current cycle within the timeout. Called before an edit, so that
     /// a hung thread rejects it before any other thread has taken its part.
     std::vector<Core*> hanging(std::int64_t timeout_ns) const;
-    /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the time-out;
-    /// their plans have been withdrawn.
+    /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the timeout;
+    /// their plans are withdrawn.
     std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns);
-    /// Waits for all observations. False when a thread did not answer; its observation is withdrawn.
+    /// Waits for all observations. Returns false when a thread did not answer; its observation is withdrawn.
     bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns);
-    /// Queues a row of at most Core::most_writes writes per thread; each row takes effect in one cycle. Waits while there is no
-    /// room. False, and nothing done, when a thread does not make room.
+    /// Queues a batch of at most Core::most_writes writes per thread; each batch takes effect in one cycle. Waits while a queue is
+    /// full. Returns false and queues nothing when it stays full for the timeout.
     bool write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows, std::int64_t timeout_ns);
-    /// Gives a running SCHED_FIFO thread another priority: a faster one has come, or one has gone.
+    /// Changes the priority of a running SCHED_FIFO thread: threads with a shorter period were added or removed.
     void set_priority(Core& core, int priority);
 
-    /// Virtual clock: runs until this thread has done so many cycles more, and what else is due until then. [setup]
+    /// Virtual clock: runs until this thread has done `cycles` more cycles, with all that is due until then.
     void advance_cycles(const Core& core, std::uint64_t cycles);
     /// Virtual clock: runs every cycle due within the next `ns`, fastest thread first at equal instants.
     /// Real clock: waits for that time.

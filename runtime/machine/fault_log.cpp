@@ -55,7 +55,7 @@ std::string grouped(std::uint64_t number) {
     return text;
 }
 
-struct Worded {
+struct FaultMessage {
     FaultCode code;  // has a page of `hal explain`
     std::string sentence;
 };
@@ -73,7 +73,7 @@ std::string limit_of(const Thread& thread) {
 constexpr const char* stopped_and_safe = "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread ";
 
 /// `stopped_ns`: how long the whole process got no CPU time before the event; 0 when it did.
-Worded worded(const Model& model, const Thread& thread, const FaultEvent& event, std::int64_t stopped_ns) {
+FaultMessage message_of(const Model& model, const Thread& thread, const FaultEvent& event, std::int64_t stopped_ns) {
     const std::string at = " at cycle " + grouped(event.cycle);
     switch (event.code) {
     case HAL_FAULT_EXCEPTION: {
@@ -123,7 +123,7 @@ Worded worded(const Model& model, const Thread& thread, const FaultEvent& event,
 }
 
 /// What kept the thread from ending its cycle, beginning with its name.
-std::string worded(const SessionState& s, const Thread& thread, const Stall& stall) {
+std::string message_of(const SessionState& s, const Thread& thread, const Stall& stall) {
     const auto name_of = [&](std::uint32_t id) -> std::string {
         for (const auto& [one, core] : s.cores)
             if (core->id() == id) return "'" + one->name + "'";
@@ -194,7 +194,7 @@ void FaultLog::collect(const Thread& thread) {
         const bool silent = event.code == HAL_FAULT_SILENT_THREAD && event.subject == 0;
         const std::int64_t gap_ns =
             silent ? state_.executor->supervisor().process_gap_ns(event.time_ns, static_cast<std::int64_t>(event.value)) : 0;  // else it may be NaN
-        auto [code, sentence] = worded(state_.model, thread, event, gap_ns);
+        auto [code, sentence] = message_of(state_.model, thread, event, gap_ns);
         FaultRecord record;
         record.cycle = event.cycle;
         record.thread = thread.name;
@@ -215,7 +215,7 @@ void FaultLog::collect_stalls() {
         record.cycle = stall.cycle;
         record.thread = of->first->name;
         record.code = FaultCode("hung-thread").name();
-        record.sentence = worded(state_, *of->first, stall);
+        record.sentence = message_of(state_, *of->first, stall);
         add({std::move(record), {}});
     }
 }

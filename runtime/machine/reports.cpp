@@ -21,7 +21,7 @@ std::string policy_text(const Granted& granted, bool virtual_clock) {
     return granted.refused ? "SCHED_OTHER (no privilege)" : "SCHED_OTHER";
 }
 
-std::string worded(const Way& way) {
+std::string delay_text(const Way& way) {
     const std::string& pin = way.pin->name;
     std::string line = way.pin->signal->name + ": " + (way.pin->dir == HAL_DIR_OUT ? way.far + " => " + pin : pin + " => " + way.far);
     line += "  " + std::to_string(way.cycles) + (way.cycles == 1 ? " cycle" : " cycles") + " on the wire, " +
@@ -138,7 +138,7 @@ std::vector<std::string> Reports::latencies() const {
     for (const auto& component : state_.model.components)
         for (const auto& instance : component->instances)
             for (const Way& way : instance->ways)
-                if (way.pin->signal) lines.push_back(worded(way));
+                if (way.pin->signal) lines.push_back(delay_text(way));
     std::sort(lines.begin(), lines.end());
     return lines;
 }

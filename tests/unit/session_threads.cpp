@@ -163,10 +163,10 @@ TEST_F(Threads, Initf_runs_once_in_a_cycle_of_its_own) {
 }
 
 TEST_F(Threads, Time_pins_of_threads_and_functions_link_and_set_like_others) {
-    machine.must("addf a t\nnet beat t.threadbeat\nnewsig n s32\nlinkps a.time n\nsetp a.tmax 5\nsetp t.tmax 7");
+    machine.must("addf a t\nnet ticks t.threadbeat\nnewsig n s32\nlinkps a.time n\nsetp a.tmax 5\nsetp t.tmax 7");
     machine.start();
     machine.cycles(3);
-    EXPECT_EQ(machine.get("beat"), "3");
+    EXPECT_EQ(machine.get("ticks"), "3");
     EXPECT_EQ(machine.get("a.tmax"), "5");  // the virtual clock measures nothing
     EXPECT_EQ(machine.get("t.tmax"), "7");
     machine.refused("setp t.threadbeat 0", "output-set");
@@ -356,7 +356,7 @@ TEST(Check_only, constructs_and_starts_nothing) {
     {
         Session session(options);
         Diagnostics diagnostics;
-        const auto source = session.sources.add("x", "loadrt threads\nloadrt test-life refuse=start " + watch.argument() + "\naddf test-life.0 thread1\n");
+        const auto source = session.sources.add("x", "loadrt threads\nloadrt test-life fail=start " + watch.argument() + "\naddf test-life.0 thread1\n");
         Transaction transaction = session.begin();
         for (const Command& command : parse(session.sources, source, {}, diagnostics)) apply_edit(transaction, command, diagnostics);
         EXPECT_TRUE(transaction.commit(diagnostics)) << render(diagnostics, session.sources);

@@ -28,7 +28,7 @@ TEST_P(Transaction, is_rolled_back_exactly_when_its_last_command_fails) {
 }
 
 TEST_P(Transaction, is_rolled_back_exactly_when_an_instance_cannot_start) {
-    machine.refused(std::string(GetParam()) + "\nloadrt test-life names=bad refuse=start", "start-failed");
+    machine.refused(std::string(GetParam()) + "\nloadrt test-life names=bad fail=start", "start-failed");
     machine.must(GetParam());
 }
 
@@ -48,7 +48,7 @@ INSTANTIATE_TEST_SUITE_P(
                     "unloadrt a", "unloadrt test-counter", "unloadrt test-shared", "unloadrt test-shared.0", "unloadrt x\nunloadrt y", "unloadrt all", "unloadrt p\nloadrt test-port names=p",
                     "loadrt test-counter names=n\naddf n t\nunloadrt n", "alias pin y.u32-in other", "unalias pin speed", "unalias pin speed\nalias pin y.u32-in speed", "unloadrt x\nalias pin y.u32-in speed",
                     "net fresh x.float-in y.float-in\nunlinkp y.float-in", "linkpp x.u64-out y.u64-in", "delsig fresh\nnet fresh2 a.sum => x.float-in", "addf --auto u", "addf --auto t z",
-                    "setp a.tmax 4\nsetp t.tmax 5", "net beat t.threadbeat", "net beat t.threadbeat\ndelthread t", "net time a.time\nunloadrt a"),
+                    "setp a.tmax 4\nsetp t.tmax 5", "net ticks t.threadbeat", "net ticks t.threadbeat\ndelthread t", "net time a.time\nunloadrt a"),
     [](const auto& edit) { return std::to_string(edit.index); });
 
 TEST(A_transaction, reports_all_its_errors_at_once) {
@@ -146,8 +146,8 @@ TEST(An_instance_that_cannot_start, rolls_back_the_load_and_stops_those_started_
     Watch watch;
     Machine machine;
     machine.must("loadrt threads");
-    machine.refused("loadrt test-life names=x,y " + watch.argument() + "\nloadrt test-life names=z refuse=start\naddf x thread1", "start-failed");
-    EXPECT_NE(machine.said.find("it does not want to start"), std::string::npos);
+    machine.refused("loadrt test-life names=x,y " + watch.argument() + "\nloadrt test-life names=z fail=start\naddf x thread1", "start-failed");
+    EXPECT_NE(machine.said.find("the test rejects the start"), std::string::npos);
     EXPECT_EQ(watch.started, 2);
     EXPECT_EQ(watch.stopped, 2);
     EXPECT_EQ(watch.destroyed, 2);
@@ -157,8 +157,8 @@ TEST(An_instance_that_cannot_start, rolls_back_the_load_and_stops_those_started_
 TEST(A_constructor_that_throws, rolls_back_the_load) {
     Watch watch;
     Machine machine;
-    machine.refused("loadrt test-life names=x " + watch.argument() + "\nloadrt test-life names=z refuse=construct", "construct-failed");
-    EXPECT_NE(machine.said.find("it does not want to exist"), std::string::npos);
+    machine.refused("loadrt test-life names=x " + watch.argument() + "\nloadrt test-life names=z fail=construct", "construct-failed");
+    EXPECT_NE(machine.said.find("the test rejects the construction"), std::string::npos);
     EXPECT_EQ(watch.constructed, 1);
     EXPECT_EQ(watch.started, 0);
     EXPECT_EQ(watch.destroyed, 1);

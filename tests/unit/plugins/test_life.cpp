@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tells of every step of its life; refuses one of them when asked to.
+// Records every step of its life; fails one of them on request.
 #include <chrono>
 #include <thread>
 
@@ -11,7 +11,7 @@ namespace {
 struct Life : hal::Component {
     using Component::Component;
     hal::Argument address{*this, "watch", 0, "what it reports to"};
-    hal::TextArgument refuse{*this, "refuse", "nothing", "construct or start"};
+    hal::TextArgument failing{*this, "fail", "nothing", "step that fails: construct or start"};
     hal::In<bool> in{*this, "in", "copied to out"};
     hal::Out<bool> out{*this, "out", "in", {.safe = true}};
     hal::Out<double> level{*this, "level", "7", {.safe = -1.0}};
@@ -21,13 +21,13 @@ struct Life : hal::Component {
 
     ~Life() { ++watch.destroyed; }
     hal::test::Watch& constructed() {
-        if (refuse.get() == "construct") throw std::runtime_error("it does not want to exist");
+        if (failing.get() == "construct") throw std::runtime_error("the test rejects the construction");
         auto& found = hal::test::Watch::at(address);
         ++found.constructed;
         return found;
     }
     void start() {
-        if (refuse.get() == "start") throw std::runtime_error("it does not want to start");
+        if (failing.get() == "start") throw std::runtime_error("the test rejects the start");
         ++watch.started;
     }
     void stop() noexcept { ++watch.stopped; }
