@@ -245,7 +245,7 @@ private:
 
     void read_file() {
         const std::string text = texts_.read("file", file_.get());
-        texts_.begin(file_.get(), text);  // also for what refuse() reports later
+        texts_.begin(file_.get(), text);  // for later messages about its matrices
         MatrixText reader;
         reader.read_file(text);
         texts_.reject(file_.get(), text, "matrix-text", reader.problems);

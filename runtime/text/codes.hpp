@@ -10,7 +10,7 @@
 
 namespace hal {
 
-/// A code from the table; naming one that is not there does not compile.
+/// A code from the table; naming an unknown one does not compile.
 class Code {
 public:
     consteval Code(const char* name) : index_(find(name)) {}

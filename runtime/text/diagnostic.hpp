@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What went wrong, where, and what to type (docs/design.md, Errors). Made anywhere, worded here, rendered in one place.
+// What went wrong, where, and what to type (docs/design.md, Errors). Formatted where it arises, rendered in one place.
 #pragma once
 
 #include <string>

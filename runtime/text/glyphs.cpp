@@ -25,7 +25,7 @@ bool in(const Range (&ranges)[n], char32_t code) {
     return std::any_of(std::begin(ranges), std::end(ranges), [code](Range r) { return r.first <= code && code <= r.last; });
 }
 
-/// The code point at `at` and its length, or length 0 when the bytes are no UTF-8.
+/// The code point at `at` and its length, or length 0 when the bytes are not valid UTF-8.
 std::size_t decode(std::string_view text, std::size_t at, char32_t& code) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const unsigned char first = byte(at);
