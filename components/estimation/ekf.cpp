@@ -166,14 +166,9 @@ private:
     }
     Nonlinear read() const {
         const std::string text = file_.get().empty() ? example : texts_.read("model", file_.get());
-        texts_.begin(file_.get(), text);
         Model model;
         model.read(text);
-        for (const auto& p : model.problems) texts_.say(HAL_SEVERITY_ERROR, "model-text", p.begin, p.end, p.sentence, "", p.help);
-        if (!model.problems.empty()) {
-            if (texts_.offered()) hal::Texts::refuse();
-            throw std::invalid_argument(file_.get() + ": " + model.problems[0].sentence);
-        }
+        texts_.reject(file_.get(), text, "model-text", model.problems);
         return Nonlinear(std::move(model));
     }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Formulas of a user's, compiled when they are read and evaluated in the cycle together with their derivatives.
+// Formulas, compiled when they are read and evaluated in the cycle together with their derivatives.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,8 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "text/config_text.hpp"
 
 namespace hal::estimation {
 
@@ -30,24 +32,21 @@ class Expression {
 public:
     static constexpr std::size_t deepest = 24;
 
-    struct Problem {
-        std::uint32_t begin, end;
-        std::string   sentence, help;
-    };
-    /// The number of a variable, or none.
+    using Problem = text::Problem;
+    /// Returns the number of a variable, or nothing.
     using Lookup = std::function<std::optional<std::uint16_t>(std::string_view)>;
 
-    /// Precedence from weak to strong: + -, * /, sign, ^ (to the right). `at` is where `text` stands in its file. [setup]
+    /// Precedence from weak to strong: + -, * /, sign, ^ (to the right). `at` is the offset of `text` in its file. [setup]
     static std::optional<Problem> compile(std::string_view text, std::uint32_t at, const Lookup& lookup, Expression& to) {
         Parser parser{text, at, lookup, to, 0, {}, 0};
         to.steps_.clear();
         parser.sum();
         parser.skip();
         if (!parser.problem && parser.place < text.size())
-            parser.fail(parser.place, parser.place + 1, "'" + std::string(1, text[parser.place]) + "' does not go on a formula",
-                        "between two values stands one of + - * / ^");
+            parser.fail(parser.place, parser.place + 1, "'" + std::string(1, text[parser.place]) + "' is not an operator",
+                        "write one of + - * / ^ between two values");
         if (!parser.problem && parser.deep > deepest)
-            parser.fail(0, text.size(), "the formula nests too deep", "split it by constants, or write it with fewer brackets");
+            parser.fail(0, text.size(), "the formula is nested too deeply", "split it with constants, or use fewer brackets");
         return parser.problem;
     }
 
@@ -170,7 +169,7 @@ private:
             }
         }
         void sign() {
-            if (++nested > 200) return fail(place, place + 1, "the formula nests too deep", "write it with fewer brackets");
+            if (++nested > 200) return fail(place, place + 1, "the formula is nested too deeply", "use fewer brackets");
             if (take('-')) sign(), push({Kind::one, 0, 0.0});
             else if (take('+')) sign();
             else power();
@@ -184,24 +183,24 @@ private:
             skip();
             if (problem) return;
             if (place >= text.size())
-                return fail(text.empty() ? 0 : text.size() - 1, text.size(), "the formula ends where a value should stand", a_value);
+                return fail(text.empty() ? 0 : text.size() - 1, text.size(), "missing value at the end of the formula", a_value);
             const std::size_t begin = place;
             if (take('(')) {
                 sum();
-                if (!problem && !take(')')) fail(begin, begin + 1, "this bracket is not closed", "write a ) where it ends");
+                if (!problem && !take(')')) fail(begin, begin + 1, "unclosed bracket", "write the closing )");
                 return;
             }
             const unsigned char c = static_cast<unsigned char>(text[place]);
             if (std::isdigit(c) || c == '.') return number();
             if (std::isalpha(c) || c == '_') return word();
-            fail(begin, begin + 1, "'" + std::string(1, text[begin]) + "' is no value",
+            fail(begin, begin + 1, "'" + std::string(1, text[begin]) + "' is not a value",
                  a_value);
         }
         void number() {
             const std::string rest(text.substr(place));
             char*             end = nullptr;
             const double      v = std::strtod(rest.c_str(), &end);
-            if (end == rest.c_str()) return fail(place, place + 1, "'.' is no number", "numbers are written as in 9.81 or 2e-3");
+            if (end == rest.c_str()) return fail(place, place + 1, "'.' is not a number", "write numbers as in 9.81 or 2e-3");
             place += static_cast<std::size_t>(end - rest.c_str());
             push({Kind::number, 0, v});
         }
@@ -218,7 +217,7 @@ private:
                 if (const int i = find(ones, 1); i >= 0) {
                     sum();
                     if (!problem && !take(')'))
-                        fail(begin, begin + name.size(), name + " takes one value in brackets", "as in " + name + "(x)");
+                        fail(begin, begin + name.size(), name + " takes one value in brackets", "write " + name + "(x)");
                     return push({Kind::one, static_cast<std::uint16_t>(i), 0.0});
                 }
                 if (const int i = find(twos, 5); i >= 0) {
@@ -226,16 +225,16 @@ private:
                     const bool comma = take(',');
                     if (comma) sum();
                     if (!problem && !(comma && take(')')))
-                        fail(begin, begin + name.size(), name + " takes two values with a comma between them", "as in " + name + "(y, x)");
+                        fail(begin, begin + name.size(), name + " takes two values", "write " + name + "(y, x)");
                     return push({Kind::two, static_cast<std::uint16_t>(i), 0.0});
                 }
                 return fail(begin, begin + name.size(), "unknown function '" + name + "'",
-                            "functions are sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max");
+                            "the functions are sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max");
             }
             if (name == "pi") return push({Kind::number, 0, std::numbers::pi});
             if (const auto i = lookup(name)) return push({Kind::variable, *i, 0.0});
-            fail(begin, begin + name.size(), "there is no '" + name + "'",
-                 "states, inputs and constants are named in lines above this one");
+            fail(begin, begin + name.size(), "unknown name '" + name + "'",
+                 "define states, inputs and constants above this line");
         }
     };
 

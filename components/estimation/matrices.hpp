@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Matrices as a user gives them: as load arguments (`a=0,1;-2,-3`) or in a file (`file=rig.matrices`).
+// Matrices given by the user: as load arguments (`a=0,1;-2,-3`) or in a file (`file=rig.matrices`).
 #pragma once
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <cctype>
-#include <cstdlib>
+#include <cmath>
 #include <map>
 #include <string>
 #include <string_view>
@@ -13,42 +13,38 @@
 
 #include "estimation/matrix.hpp"
 #include "hal/texts.hpp"
+#include "text/characters.hpp"
+#include "text/config_text.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::estimation {
 
-/// A matrix and where it stands.
+/// A matrix and its span.
 struct Given {
     std::string     name;
     Eigen::MatrixXd value;
     bool            in_file = false;
     std::uint32_t   begin = 0, end = 0;  ///< its name in the file
-    std::string     argument;            ///< NAME=TEXT, shortened, when a load argument gave it
-};
-
-struct TextProblem {
-    std::uint32_t begin, end;
-    std::string   sentence, help;
+    std::string     argument;            ///< NAME=TEXT, shortened, if a load argument gave it
 };
 
 /// NAME = rows, a line or a `;` between rows, spaces or commas between numbers, `diag` before the numbers of a diagonal, `#` before a
-/// comment. Names are told apart without regard to case. [setup]
+/// comment. Names are not case sensitive. [setup]
 class MatrixText {
 public:
-    std::vector<Given>       found;
-    std::vector<TextProblem> problems;
+    std::vector<Given>         found;
+    std::vector<text::Problem> problems;
 
-    /// A whole file. [setup]
+    /// Reads a whole file. [setup]
     void read_file(std::string_view text) {
         text_ = text;
-        for (std::size_t line = 0; line < text.size();) {
-            const std::size_t end = std::min(text.find('\n', line), text.size());
-            read_line(line, std::min(text.find('#', line), end));
-            line = end + 1;
-        }
+        text::Lines lines(text, "#");  // a `;` separates rows
+        while (const auto line = lines.next()) read_line(line->at.offset, line->at.offset + line->at.length);
         finish();
         in_files();
     }
-    /// The rows of one matrix, as a load argument has them. [setup]
+    /// Reads the rows of one matrix from a load argument. [setup]
     void read_rows(std::string name, std::string_view text) {
         text_ = text;
         open(std::move(name), 0, 0);
@@ -57,8 +53,6 @@ public:
     }
 
 private:
-    static constexpr std::size_t most_problems = 100;  // one more is kept, so that the host knows of it
-
     static bool space(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
 
     void in_files() {
@@ -75,8 +69,7 @@ private:
             for (const char c : name) word = word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
             if (!word)
                 say(begin, std::max(stop, begin + 1), "'" + name + "' is not a name of a matrix", "write NAME = numbers, as in: A = 0 1");
-            std::string key = name;
-            for (char& c : key) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+            const std::string key = lower(name);
             if (++defined_[key] == 2) say(begin, stop, "duplicate matrix '" + name + "'", "delete all but one of them");
             open(name, begin, stop);
             at += equals + 1;
@@ -104,7 +97,7 @@ private:
     void word(std::size_t at, std::size_t stop) {
         const std::string token(text_.substr(at, stop - at));
         if (!open_) {
-            if (!lost_) say(at, stop, "'" + token + "' belongs to no matrix", "write NAME = before the numbers, as in: A = 0 1");
+            if (!lost_) say(at, stop, "'" + token + "' outside a matrix", "write NAME = before the numbers, as in: A = 0 1");
             lost_ = true;
             return;
         }
@@ -112,10 +105,9 @@ private:
             diagonal_ = true;
             return;
         }
-        char*        rest = nullptr;
-        const double number = std::strtod(token.c_str(), &rest);
-        if (*rest != '\0' || !(std::fabs(number) < 1e300))
-            say(at, stop, "'" + token + "' is not a number", "numbers are written as in -1.5 or 2e-3");
+        const auto   real = parse_real(token);
+        const double number = real.value_or(0.0);
+        if (!real || !(std::fabs(number) < 1e300)) say(at, stop, "'" + token + "' is not a number", "write numbers as in -1.5 or 2e-3");
         if (numbers_.empty()) row_begin_ = at;
         row_end_ = stop;
         numbers_.push_back(number);
@@ -124,9 +116,9 @@ private:
         if (numbers_.empty()) return;
         if (!rows_.empty() && rows_[0].size() != numbers_.size())
             say(row_begin_, row_end_,
-                "row " + std::to_string(rows_.size() + 1) + " of " + current_.name + " has " + std::to_string(numbers_.size()) +
-                    (numbers_.size() == 1 ? " number" : " numbers") + ", its first has " + std::to_string(rows_[0].size()),
-                "all rows of a matrix are of one length");
+                "row " + std::to_string(rows_.size() + 1) + " of " + current_.name + " has " + counted(numbers_.size(), "number") +
+                    ", its first has " + std::to_string(rows_[0].size()),
+                "all rows of a matrix must have the same length");
         rows_.push_back(std::move(numbers_));
         numbers_.clear();
     }
@@ -142,9 +134,9 @@ private:
         const std::size_t high = rows_.size(), wide = rows_.empty() ? 0 : rows_[0].size();
         if (high == 0)
             say(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
-                "write them behind the =, or in the lines below it");
+                "write them after the =, or in the lines below it");
         if (diagonal_ && high > 1)
-            say(current_.begin, current_.end, "'" + current_.name + "' has rows behind diag", "diag is followed by one row: diag 1 2 3");
+            say(current_.begin, current_.end, "'" + current_.name + "' has several rows after diag", "write one row after diag: diag 1 2 3");
         const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
         if (problems.empty()) {
             current_.value = Eigen::MatrixXd::Zero(index(diagonal_ ? wide : high), index(wide));
@@ -159,17 +151,9 @@ private:
         found.push_back(std::move(current_));
     }
     void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-        if (problems.size() > most_problems) return;
-        problems.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+        text::add(problems, begin, end, std::move(sentence), std::move(help));
     }
 
-public:
-    static bool same(std::string_view a, std::string_view b) {
-        return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                          [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-    }
-
-private:
     std::string_view                 text_;
     Given                            current_;
     std::map<std::string, unsigned>  defined_;  // by name in lower case: how often
@@ -179,10 +163,10 @@ private:
     std::size_t                      row_begin_ = 0, row_end_ = 0;
 };
 
-/// What a component asks for.
+/// A matrix that a component needs.
 struct Wanted {
     const char* name;     ///< in a file; the load argument is the same in lower case
-    const char* example;  ///< taken when a bare `loadrt` gives nothing at all; "" for none
+    const char* example;  ///< default for a `loadrt` without any matrix; "" for none
     const char* doc;
 };
 
@@ -190,7 +174,7 @@ struct Wanted {
 class Matrices {
 public:
     Matrices(hal::Component& component, std::initializer_list<Wanted> wanted)
-        : texts_(component), file_(component, "file", "", "file with the matrices, beside the netlist; an argument goes before it") {
+        : texts_(component), file_(component, "file", "", "file with the matrices, beside the netlist; an argument takes precedence") {
         std::vector<std::pair<const Wanted*, std::string>> arguments;
         bool                                               any = !file_.get().empty();
         for (const Wanted& w : wanted) {
@@ -212,7 +196,7 @@ public:
         }
     }
     bool has(const char* name) const { return given_.contains(lower(name)); }
-    /// Throws when it is not there. [setup]
+    /// Returns a matrix; throws if it is missing. [setup]
     const Given& at(const char* name) const {
         const auto found = given_.find(lower(name));
         if (found == given_.end())
@@ -220,14 +204,14 @@ public:
                                         name + " = 1 0");
         return found->second;
     }
-    /// The matrix, which must have this size. [setup]
+    /// Returns a matrix that must have this size. [setup]
     const Eigen::MatrixXd& at(const char* name, Eigen::Index rows, Eigen::Index columns, const std::string& why) const {
         const Given& given = at(name);
         if (given.value.rows() != rows || given.value.cols() != columns)
             refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not " + size(rows, columns), why);
         return given.value;
     }
-    /// A square one; its size is the number of states. [setup]
+    /// Returns a square matrix; its size is the number of states. [setup]
     const Eigen::MatrixXd& square(const char* name) const {
         const Given& given = at(name);
         if (given.value.rows() != given.value.cols())
@@ -235,7 +219,7 @@ public:
                    "it has a row and a column per state");
         return given.value;
     }
-    /// As a vector of `count`, whether written as a row or as a column. [setup]
+    /// Returns a vector of `count` values, written as a row or as a column. [setup]
     Eigen::VectorXd vector(const char* name, Eigen::Index count, const std::string& why) const {
         const Given& given = at(name);
         if (given.value.size() != count || (given.value.rows() != 1 && given.value.cols() != 1))
@@ -243,7 +227,7 @@ public:
                    why);
         return given.value.reshaped();
     }
-    /// Ends the constructor: what is wrong with a matrix that was read. [setup]
+    /// Reports an error of a matrix that was read and ends the constructor. [setup]
     [[noreturn]] void refuse(const Given& given, const std::string& sentence, const std::string& help) const {
         if (given.in_file && texts_.offered()) {
             texts_.say(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
@@ -257,22 +241,14 @@ public:
     }
 
 private:
-    static std::string lower(std::string text) {
-        for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-        return text;
-    }
     static std::string size(Eigen::Index rows, Eigen::Index columns) { return std::to_string(rows) + " x " + std::to_string(columns); }
 
     void read_file() {
         const std::string text = texts_.read("file", file_.get());
-        texts_.begin(file_.get(), text);
+        texts_.begin(file_.get(), text);  // for later messages about its matrices
         MatrixText reader;
         reader.read_file(text);
-        for (const TextProblem& p : reader.problems) texts_.say(HAL_SEVERITY_ERROR, "matrix-text", p.begin, p.end, p.sentence, "", p.help);
-        if (!reader.problems.empty()) {
-            if (texts_.offered()) hal::Texts::refuse();
-            throw std::invalid_argument(file_.get() + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
-        }
+        texts_.reject(file_.get(), text, "matrix-text", reader.problems);
         for (Given& given : reader.found) given_[lower(given.name)] = std::move(given);
     }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A nonlinear plant as a user writes it: states with their derivatives, inputs, constants and what is measured.
+// A nonlinear plant in formulas: states with their derivatives, inputs, constants and measurements.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,6 @@ namespace hal::estimation {
 class Model {
 public:
     static constexpr std::size_t most_inputs = 8, most_measures = 12, most_constants = 32;
-    static constexpr std::size_t most_problems = 100;  ///< one more is kept, so that the host knows of it
 
     struct State {
         std::string   name;
@@ -29,7 +28,7 @@ public:
     };
     struct Measure {
         std::string name;
-        double      sigma, wrap;  // wrap: it begins anew after that much; 0: never
+        double      sigma, wrap;  // wrap: period of a value that wraps around; 0: none
         Expression  value;
     };
 
@@ -41,20 +40,16 @@ public:
 
     void read(std::string_view text) {
         text_ = text;
-        for (std::size_t line = 0; line < text.size();) {
-            const std::size_t stop = std::min(text.find('\n', line), text.size());
-            const std::size_t end = std::min(text.find('#', line), stop);
-            read_line(line, end);
-            line = stop + 1;
-        }
+        text::Lines lines(text);
+        while (const auto line = lines.next()) read_line(line->at.offset, line->at.offset + line->at.length);
         for (const State& s : states)
             if (!s.moves)
                 say(s.begin, s.end, "state '" + s.name + "' has no derivative",
-                    "write " + s.name + "' = and a formula; 0 for a state that only wanders");
+                    "write " + s.name + "' = FORMULA; 0 for a random walk");
         if (states.empty()) say(0, 1, "the model has no states", "write state NAME = START sigma S noise N for each");
-        if (measures.empty() && problems.empty()) say(0, 1, "nothing is measured", "write measure NAME = FORMULA sigma S");
+        if (measures.empty() && problems.empty()) say(0, 1, "the model has no measurement", "write measure NAME = FORMULA sigma S");
     }
-    /// Values in the order that formulas know them: states, inputs, constants. [realtime]
+    /// Returns the number of variables: states, inputs, constants, in this order. [realtime]
     std::size_t variables() const noexcept { return most_slopes + most_inputs + constants.size(); }
 
 private:
@@ -78,11 +73,10 @@ private:
     }
     /// At least a letter wide, if there is one.
     void add(Expression::Problem problem) {
-        if (problems.size() > most_problems) return;
         const auto size = static_cast<std::uint32_t>(text_.size());
         problem.begin = std::min(problem.begin, std::max(size, 1u) - 1);
         problem.end = std::min(std::max(problem.end, problem.begin + 1), size);
-        problems.push_back(std::move(problem));
+        text::add(problems, std::move(problem));
     }
     void read_line(std::size_t begin, std::size_t end) {
         const Words line = trim(begin, end);
@@ -92,22 +86,22 @@ private:
         if (what == "input") return input(first.end, line.end);
         const std::size_t equals = text_.substr(line.begin, line.end - line.begin).find('=');
         if (equals == std::string_view::npos)
-            return say(line.begin, line.end, "this line means nothing", "lines begin with constant, input, state, measure or NAME'");
+            return say(line.begin, line.end, "invalid line", "write constant, input, state, measure or NAME' = FORMULA");
         const std::size_t sign = line.begin + equals;
         if (what == "constant") return constant(first.end, sign, line.end);
         if (what == "state") return state(first.end, sign, line.end);
         if (what == "measure") return measure(first.end, sign, line.end);
         if (first.end < line.end && text_[first.end] == '\'') return rate(first, sign, line.end);
-        say(first.begin, first.end, "a line cannot begin with '" + std::string(what) + "'",
-            "lines begin with constant, input, state, measure or NAME'");
+        say(first.begin, first.end, "unknown keyword '" + std::string(what) + "'",
+            "the keywords are constant, input, state, measure, NAME'");
     }
     bool fresh(Words name, std::size_t limit, std::size_t count, const char* what) {
         const std::string text(piece(name));
-        if (text.empty()) return say(name.begin, name.end, "a name is missing", "names are letters, digits and _"), false;
+        if (text.empty()) return say(name.begin, name.end, "missing name", "names consist of letters, digits and _"), false;
         if (count >= limit)
-            return say(name.begin, name.end, "there are more than " + std::to_string(limit) + " " + what, "leave out what matters least"),
+            return say(name.begin, name.end, "more than " + std::to_string(limit) + " " + what, "reduce the model"),
                    false;
-        if (index_.contains(text) || text == "pi") return say(name.begin, name.end, "'" + text + "' is there twice", "another name"), false;
+        if (index_.contains(text) || text == "pi") return say(name.begin, name.end, "duplicate name '" + text + "'", "choose another name"), false;
         return true;
     }
     void input(std::size_t begin, std::size_t end) {
@@ -131,8 +125,8 @@ private:
         for (std::size_t i = 0; i < constants.size(); ++i) values[most_slopes + most_inputs + i].value = constants[i];
         const double v = e(values.data(), 0).value;
         if (!std::isfinite(v))
-            say(formula.begin, formula.end, "this is no finite number",
-                "is something divided by 0, or the root of a negative number taken?");
+            say(formula.begin, formula.end, "the value is not finite",
+                "check for a division by 0 or the root of a negative number");
         return v;
     }
     void constant(std::size_t begin, std::size_t sign, std::size_t end) {
@@ -156,11 +150,11 @@ private:
         if (!fresh(name, most_slopes, states.size(), "states")) return;
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), noise = keyword(sign + 1, end, "noise");
         if (sigma == end || noise == end || noise < sigma)
-            return say(name.begin, end, "a state has a start, a sigma and a noise",
+            return say(name.begin, end, "a state needs a start value, sigma and noise",
                        "write state " + std::string(piece(name)) + " = 0 sigma 1 noise 0.1");
         const double start = fixed(trim(sign + 1, sigma)), wide = fixed(trim(sigma + 5, noise)), wanders = fixed(trim(noise + 5, end));
         if (wide < 0.0 || wanders < 0.0)
-            say(sigma, end, "a sigma or a noise is negative", "0 is what is known exactly, and what does not wander");
+            say(sigma, end, "sigma or noise is negative", "write 0 for an exact start value, and for a state without noise");
         index_[std::string(piece(name))] = static_cast<std::uint16_t>(states.size());
         states.push_back({std::string(piece(name)),
                           start,
@@ -187,24 +181,24 @@ private:
             s.moves = true;
             return formula(trim(sign + 1, end), s.rate);
         }
-        say(name.begin, name.end, "there is no state '" + std::string(piece(name)) + "'",
-            "write its line state NAME = START sigma S noise N above this one");
+        say(name.begin, name.end, "unknown state '" + std::string(piece(name)) + "'",
+            "write state NAME = START sigma S noise N above this one");
     }
     void measure(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
-        if (piece(name).empty()) return say(begin, sign, "a name is missing", "names are letters, digits and _");
+        if (piece(name).empty()) return say(begin, sign, "missing name", "names consist of letters, digits and _");
         if (measures.size() >= most_measures)
-            return say(name.begin, name.end, "there are more than 12 measurements", "leave out what matters least");
+            return say(name.begin, name.end, "more than 12 measurements", "reduce the model");
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), wrap = keyword(sign + 1, end, "wrap");
         if (sigma == end)
-            return say(name.begin, end, "a measurement has a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
+            return say(name.begin, end, "a measurement needs a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
         Measure m{std::string(piece(name)), fixed(trim(sigma + 5, wrap)), 0.0, {}};
-        if (!(m.sigma > 0.0)) say(sigma, end, "sigma is not above 0", "each measurement has some noise: write how much, as in sigma 0.01");
+        if (!(m.sigma > 0.0)) say(sigma, end, "sigma must be positive", "write the noise of the measurement, as in sigma 0.01");
         if (wrap != end) {
             const Words period = trim(wrap + 4, end);
             m.wrap = period.begin == period.end ? 2.0 * std::numbers::pi : fixed(period);
             if (!(m.wrap > 0.0))
-                say(wrap, end, "what it wraps after is above 0", "write wrap for an angle, wrap 65536 for a counter of 16 bits");
+                say(wrap, end, "the wrap period must be positive", "write wrap for an angle, wrap 65536 for a 16-bit counter");
         }
         formula(trim(sign + 1, sigma), m.value);
         measures.push_back(std::move(m));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files of a user's that cameras' components read: what is wrong in them is said as the netlist's own errors are.
+// Files that components with a camera read; their errors are reported like those of the netlist.
 #pragma once
 
 #include <string>
@@ -10,21 +10,11 @@
 
 namespace hal::vision {
 
-/// Says all problems at their places and ends the constructor, if there are any. [setup]
-template <class Problems>
-void refuse(const hal::Texts& texts, const std::string& file, const std::string& text, const char* code, const Problems& problems) {
-    if (problems.empty()) return;
-    texts.begin(file, text);
-    for (const auto& p : problems) texts.say(HAL_SEVERITY_ERROR, code, p.begin, p.end, p.sentence, "", p.help);
-    if (texts.offered()) hal::Texts::refuse();
-    throw std::invalid_argument(file + ": " + problems.front().sentence + "; " + problems.front().help);
-}
-
-/// The camera that `file` is about. In a component's constructor. [setup]
+/// Reads the calibration `file`, in the constructor of a component. [setup]
 inline Camera camera_from(const hal::Texts& texts, const std::string& file) {
     const std::string text = texts.read("camera", file);
     CameraText        read = read_camera(text);
-    refuse(texts, file, text, "camera-text", read.problems);
+    texts.reject(file, text, "camera-text", read.problems);
     read.camera.file = file;
     return read.camera;
 }

@@ -30,7 +30,7 @@ public:
         const std::string text = texts.read("ground", file_.get());
         GroundText        read = read_ground(text);
         measured_.emplace(read, std::nullopt);
-        refuse(texts, file_.get(), text, "camera-text", read.problems);
+        texts.reject(file_.get(), text, "camera-text", read.problems);
     }
     /// [helper thread]
     const Ground& in(const Frame& frame) {

@@ -38,7 +38,7 @@ private:
         Ground            ground(read, camera);
         if (!read.problems.empty() && file.empty())
             throw hal::ArgumentError("points", "points=" + points + ": " + read.problems.front().sentence + "; " + read.problems.front().help);
-        refuse(texts, file, text, "camera-text", read.problems);
+        texts.reject(file, text, "camera-text", read.problems);
         return ground;
     }
 

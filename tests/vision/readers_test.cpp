@@ -182,30 +182,30 @@ TEST(Camera, is_read_from_what_ros_writes) {
 TEST(Camera, that_cannot_be_read_says_where_and_why) {
     const std::string own = "size 640\nfocal x\nzoom 3\n";
     EXPECT_EQ(said(read_camera(own), own),
-              "size 640|size has 1 number, it takes 2\nx|'x' is not a number\nzoom|'zoom' is no word of a calibration\n");
+              "size 640|size has 1 number, expected 2\nx|'x' is not a number\nzoom|unknown key 'zoom'\n");
     const std::string millimetres = "size 640 480\nfocal 4.5\n";
-    EXPECT_EQ(said(read_camera(millimetres), millimetres), "focal 4.5|these focal lengths fit no picture 640 px wide\n");
+    EXPECT_EQ(said(read_camera(millimetres), millimetres), "focal 4.5|implausible focal lengths for an image 640 px wide\n");
     const std::string empty;
-    EXPECT_EQ(said(read_camera(empty), empty), "|there is no size\n|there is no focal\n");
+    EXPECT_EQ(said(read_camera(empty), empty), "|missing size\n|missing focal\n");
     const auto own_refusal = [](const std::string& lines) { return read_camera("size 640 480\n" + lines).problems.at(0).sentence; };
-    EXPECT_EQ(own_refusal("focal 0\n"), "a focal length is not positive");
-    EXPECT_EQ(own_refusal("focal 600\ncentre 5000 200\n"), "the centre is far outside of the picture");
+    EXPECT_EQ(own_refusal("focal 0\n"), "focal length is not positive");
+    EXPECT_EQ(own_refusal("focal 600\ncentre 5000 200\n"), "the centre is far outside the image");
     const auto bent = [&](const std::string& distortion) {
         const auto read = read_camera("size 640 480\nfocal 600\ndistortion " + distortion + "\n");
         return read.problems.empty() ? "" : read.problems[0].sentence.substr(0, read.problems[0].sentence.find(" it folds"));
     };
     EXPECT_EQ(own_refusal("focal 600\ndistortion 4000\n"),
-              "invalid distortion: beyond 14 px from the centre it folds the picture over itself or stretches it more than four times");
+              "invalid distortion: beyond 14 px from the centre it folds the image over itself or scales it up more than four times");
     EXPECT_EQ(bent("30 -900"), "invalid distortion: beyond 114 px from the centre");
     EXPECT_EQ(bent("-0.9"), "invalid distortion: beyond 243 px from the centre");
     EXPECT_EQ(bent("0 0 0.4"), "invalid distortion: beyond 250 px from the centre");
     for (const char* real : {"-0.35 0.15 0.001 -0.002", "0.12 -0.25 0 0 0.1", "-0.4 0.2", "0.3"}) EXPECT_EQ(bent(real), "") << real;
-    EXPECT_EQ(own_refusal("focal 600\nfocal 600\n"), "'focal' is there twice");
+    EXPECT_EQ(own_refusal("focal 600\nfocal 600\n"), "duplicate key 'focal'");
     const auto opencv_refusal = [](const std::string& matrix, const std::string& distortion = "") {
         return read_camera("%YAML:1.0\nimage_width: 640\nimage_height: 480\n" + matrix + distortion).problems.at(0).sentence;
     };
     const std::string good = "camera_matrix: !!opencv-matrix\n   data: [ 600, 0, 320, 0, 600, 240, 0, 0, 1 ]\n";
-    EXPECT_EQ(opencv_refusal(""), "there is no camera_matrix");
+    EXPECT_EQ(opencv_refusal(""), "missing camera_matrix");
     EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   rows: 3\n"), "camera_matrix has no data");
     EXPECT_EQ(opencv_refusal("camera_matrix: !!opencv-matrix\n   data: [ 600, 0, x, 0, 600, 240, 0, 0, 1 ]\n"), "'x' is not a number");
     EXPECT_TRUE(opencv_refusal("camera_matrix: [ 1, 2\n").starts_with("invalid YAML: "));
@@ -213,10 +213,10 @@ TEST(Camera, that_cannot_be_read_says_where_and_why) {
               "invalid camera_matrix");
     EXPECT_EQ(opencv_refusal(good, "distortion_coefficients: !!opencv-matrix\n   data: [ 0, 0, 0, 0, 0, 0.1, 0.1, 0.1 ]\n"),
               "the distortion has 8 coefficients");
-    EXPECT_EQ(read_camera("%YAML:1.0\n" + good).problems.at(0).sentence, "there is no image_width and image_height");
+    EXPECT_EQ(read_camera("%YAML:1.0\n" + good).problems.at(0).sentence, "missing image_width and image_height");
     const std::string yaml = "image_width: 640\nimage_height: -1\ncamera_matrix: !!opencv-matrix\n data: [ 1, 2 ]\n";
     EXPECT_EQ(said(read_camera(yaml), yaml),
-              "-1|'-1' is no width or height of a picture\ncamera_matrix|camera_matrix has 2 numbers, not 9\n");
+              "-1|'-1' is not a valid image width or height\ncamera_matrix|camera_matrix has 2 numbers, not 9\n");
 }
 
 Ground ground(const std::string& text, const std::optional<Camera>& camera = {}) {
@@ -278,13 +278,13 @@ TEST(Ground, that_four_points_do_not_give_says_why) {
         Ground made(read, std::nullopt);
         return read.problems.empty() ? "" : read.problems[0].sentence;
     };
-    EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 2 0 2 0; 0 1 0 1"), "the pixels of these points lie in a line, or two at one place");
-    EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 1 1 1 0; 0 1 0 1"), "these points lie in a line, or two at one place");
-    EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 1 1 1 1"), "there are 3 points, and a plane takes four");
+    EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 2 0 2 0; 0 1 0 1"), "the pixels of these points are collinear or coincide");
+    EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 1 1 1 0; 0 1 0 1"), "these points are collinear or coincide");
+    EXPECT_EQ(refusal("0 0 0 0; 1 0 1 0; 1 1 1 1"), "3 points, but a plane needs four");
     EXPECT_EQ(refusal("0 0 0"), "this point has 3 numbers, not 4");
     EXPECT_EQ(refusal("0 0 0 0 0"), "this point has more than 4 numbers");
     EXPECT_EQ(refusal("0 0 0 nan"), "'nan' is not a number");
-    EXPECT_EQ(refusal("0 0 0 0; 100 0 1 0; 100 100 0 1; 0 100 1 1"), "some of these points would be above the horizon");
+    EXPECT_EQ(refusal("0 0 0 0; 100 0 1 0; 100 100 0 1; 0 100 1 1"), "some of these points are above the horizon");
 }
 
 }  // namespace

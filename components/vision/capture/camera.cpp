@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "vision/capture/camera.hpp"
 
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #ifdef HALCYON_YAML
 #include <yaml-cpp/yaml.h>
@@ -16,7 +18,7 @@ struct Word {
     std::size_t begin = 0, end = 0;
 };
 
-/// What both kinds of file share: where things stand, what is wrong, and what came of it.
+/// Shared by both formats: spans, problems and the result.
 class Text {
 public:
     explicit Text(std::string_view text) : text_(text) {}
@@ -27,51 +29,49 @@ public:
 
 protected:
     void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-        if (found_.problems.size() < 20)
-            found_.problems.push_back(
-                {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+        text::add(found_.problems, begin, end, std::move(sentence), std::move(help));
     }
     std::string of(Word w) const { return std::string(text_.substr(w.begin, std::min<std::size_t>(w.end - w.begin, 60))); }
 
     bool number(Word w, double& to) {
         const std::string token = of(w);
-        char*             end = nullptr;
-        to = std::strtod(token.c_str(), &end);
-        if (*end == '\0' && std::fabs(to) < 1e12) return true;
-        say(w.begin, w.end, "'" + token + "' is not a number", "numbers are written as in 600.5 or -2e-3");
+        const auto        real = parse_real(token);
+        to = real.value_or(0.0);
+        if (real && std::fabs(to) < 1e12) return true;
+        say(w.begin, w.end, "'" + token + "' is not a number", "write numbers as in 600.5 or -2e-3");
         return false;
     }
     bool whole(Word w, int& to) {
         double value = 0;
         if (!number(w, value)) return false;
         if (value != std::floor(value) || value < 1 || value > 8192) {
-            say(w.begin, w.end, "'" + of(w) + "' is no width or height of a picture", "it is a whole number from 1 to 8192");
+            say(w.begin, w.end, "'" + of(w) + "' is not a valid image width or height", "write an integer of 1..8192");
             return false;
         }
         to = static_cast<int>(value);
         return true;
     }
     void missing(const char* name, const std::string& example) {
-        say(0, std::min<std::size_t>(text_.size(), 1), std::string("there is no ") + name, "write a line: " + example);
+        say(0, std::min<std::size_t>(text_.size(), 1), std::string("missing ") + name, "write a line: " + example);
     }
-    /// What no camera has: the usual reason is a file of another kind, or numbers in the wrong order.
+    /// Rejects implausible cameras: a file of another kind, or numbers in the wrong order.
     void check() {
         const Camera& c = found_.camera;
         const auto    wrong = [&](Word at, const std::string& sentence, const std::string& help) {
             say(at.begin, std::max(at.end, at.begin + 1), sentence, help);
         };
         if (!(c.fx > 0 && c.fy > 0))
-            return wrong(focal_, "a focal length is not positive", "focal lengths in px, often about the width of the picture");
+            return wrong(focal_, "focal length is not positive", "write it in px, often about the image width");
         if (c.fx > 100.0 * c.width || c.fx < 0.05 * c.width || c.fy > 2 * c.fx || c.fx > 2 * c.fy)
-            wrong(focal_, "these focal lengths fit no picture " + std::to_string(c.width) + " px wide",
-                  "in px, and the two alike; often about the width");
+            wrong(focal_, "implausible focal lengths for an image " + std::to_string(c.width) + " px wide",
+                  "write them in px and nearly equal; often about the width");
         if (c.cx < -c.width || c.cx > 2 * c.width || c.cy < -c.height || c.cy > 2 * c.height)
-            wrong(centre_, "the centre is far outside of the picture", "in px, and near to half of the width and of the height");
+            wrong(centre_, "the centre is far outside the image", "write it in px, near half the width and half the height");
         if (const double radius = usable_px(c); radius >= 0.0)
             wrong(
                 distortion_,
                 "invalid distortion: beyond " + std::to_string(std::lround(radius)) +
-                    " px from the centre it folds the picture over itself or stretches it more than four times",
+                    " px from the centre it folds the image over itself or scales it up more than four times",
                 "k1 k2 p1 p2 k3 for coordinates divided by the focal length, of the order of 0.1; calibrate with views that reach into the "
                 "corners of the picture");
     }
@@ -103,11 +103,8 @@ class OwnText : public Text {
 public:
     using Text::Text;
     CameraText read() {
-        for (std::size_t line = 0; line < text_.size();) {
-            const std::size_t end = std::min(text_.find('\n', line), text_.size());
-            one(line, std::min(text_.find('#', line), end));
-            line = end + 1;
-        }
+        text::Lines lines(text_);
+        while (const auto line = lines.next()) one(*line);
         Camera& c = found_.camera;
         if (found_.problems.empty()) {
             if (c.width == 0) missing("size", "size 640 480");
@@ -118,15 +115,9 @@ public:
     }
 
 private:
-    void one(std::size_t at, std::size_t end) {
-        const auto        blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == '='; };
+    void one(const text::Word& line) {
         std::vector<Word> words;
-        while (at < end) {
-            while (at < end && blank(text_[at])) ++at;
-            const std::size_t begin = at;
-            while (at < end && !blank(text_[at])) ++at;
-            if (at > begin && words.size() < 16) words.push_back({begin, at});
-        }
+        for (const text::Word& word : text::words_of(line, ",=")) words.push_back({word.at.offset, word.at.offset + word.at.length});
         if (words.empty()) return;
         Camera&           c = found_.camera;
         const std::string name = of(words[0]);
@@ -151,7 +142,7 @@ private:
             distortion_ = all;
             for (std::size_t i = 1; i < words.size(); ++i) number(words[i], c.distortion[i - 1]);
         } else {
-            say(words[0].begin, words[0].end, "'" + name + "' is no word of a calibration", "there are size, focal, centre, distortion");
+            say(words[0].begin, words[0].end, "unknown key '" + name + "'", "the keys are size, focal, centre, distortion");
         }
     }
     bool counted(const std::vector<Word>& words, const std::string& name, std::size_t least, std::size_t most, const char* example) {
@@ -159,18 +150,18 @@ private:
         if (count >= least && count <= most) return true;
         const std::string wants = least == most ? std::to_string(most) : std::to_string(least) + " to " + std::to_string(most);
         say(words[0].begin, words.back().end,
-            name + " has " + std::to_string(count) + (count == 1 ? " number" : " numbers") + ", it takes " + wants,
-            std::string("as in: ") + example);
+            name + " has " + counted(count, "number") + ", expected " + wants,
+            std::string("write ") + example);
         return false;
     }
     bool once(bool twice, Word name) {
-        if (twice) say(name.begin, name.end, "'" + of(name) + "' is there twice", "delete one of them");
+        if (twice) say(name.begin, name.end, "duplicate key '" + of(name) + "'", "delete one of them");
         return !twice;
     }
 };
 
 #ifdef HALCYON_YAML
-/// What OpenCV's and ROS's calibration write as YAML.
+/// The YAML that the calibration tools of OpenCV and ROS write.
 class YamlText : public Text {
 public:
     using Text::Text;

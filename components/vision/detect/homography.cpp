@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "vision/detect/homography.hpp"
 
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
 namespace hal::vision {
 namespace {
 constexpr std::size_t least_points = 4, most_points = 1000;
-
-std::string plural(std::size_t n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
 
 /// Four of these span a plane: no matter which line through two of them is taken, two others are off it.
 bool spread(const std::vector<cv::Point2d>& p) {
@@ -30,47 +30,31 @@ bool spread(const std::vector<cv::Point2d>& p) {
 
 GroundText read_ground(std::string_view text) {
     GroundText result;
-    const auto say = [&](std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-        if (result.problems.size() < 20)
-            result.problems.push_back(
-                {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
-    };
-    const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == ':'; };
-    for (std::size_t at = 0; at < text.size();) {
-        const std::size_t   line = std::min(text.find('\n', at), text.size());
-        const std::size_t   end = std::min({line, text.find(';', at), text.find('#', at)});
+    const char* const form = "write u v x y: pixel from the left and from the top, then the position on the ground";
+    const auto        point = [&](const text::Word& row) {
         std::vector<double> numbers;
-        std::size_t         first = end, last = end;
-        bool                good = true;
-        for (std::size_t i = at; i < end && good;) {
-            while (i < end && blank(text[i])) ++i;
-            const std::size_t begin = i;
-            while (i < end && !blank(text[i])) ++i;
-            if (i == begin) break;
-            first = std::min(first, begin), last = i;
-            const std::string token(text.substr(begin, std::min<std::size_t>(i - begin, 60)));
-            char*             rest = nullptr;
-            const double      value = std::strtod(token.c_str(), &rest);
-            good = *rest == '\0' && std::fabs(value) < 1e9;
-            if (!good)
-                say(begin, i, "'" + token + "' is not a number", "a row is u v x y: pixel from the left and from the top, then the place");
-            numbers.push_back(value);
+        const auto          words = text::words_of(row, ",:");
+        if (words.empty()) return;
+        for (const text::Word& word : words) {
+            const auto value = parse_real(word.text);
+            if (!value || std::fabs(*value) >= 1e9)
+                return text::add(result.problems, word.at.offset, word.at.offset + word.at.length, "'" + word.text.substr(0, 60) + "' is not a number",
+                                 form);
+            numbers.push_back(*value);
             if (numbers.size() > 4) break;
         }
-        if (good && !numbers.empty()) {
-            if (numbers.size() != 4)
-                say(first, last,
-                    "this point has " + (numbers.size() > 4 ? "more than 4 numbers" : plural(numbers.size(), "number") + ", not 4"),
-                    "a row is u v x y: pixel from the left and from the top, then the place");
-            else if (result.points.size() < most_points)
-                result.points.push_back(
-                    {numbers[0], numbers[1], numbers[2], numbers[3], static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last)});
-        }
-        at = end < line && text[end] == ';' ? end + 1 : line + 1;
-    }
+        const std::uint32_t first = words[0].at.offset, last = words[numbers.size() - 1].at.offset + words[numbers.size() - 1].at.length;
+        if (numbers.size() != 4)
+            text::add(result.problems, first, last,
+                      "this point has " + (numbers.size() > 4 ? "more than 4 numbers" : counted(numbers.size(), "number") + ", not 4"), form);
+        else if (result.points.size() < most_points) result.points.push_back({numbers[0], numbers[1], numbers[2], numbers[3], first, last});
+    };
+    text::Lines lines(text, "#");  // a `;` separates points
+    while (const auto line = lines.next())
+        for (const text::Word& row : text::list_of(*line, ';')) point(row);
     if (result.problems.empty() && result.points.size() < least_points)
-        say(0, std::min<std::size_t>(text.size(), 1), "there are " + plural(result.points.size(), "point") + ", and a plane takes four",
-            "give four points that lie far apart, in rows of u v x y");
+        text::add(result.problems, 0, std::min<std::size_t>(text.size(), 1), counted(result.points.size(), "point") + ", but a plane needs four",
+                  "write four points that are far apart, one per row: u v x y");
     return result;
 }
 
@@ -92,13 +76,13 @@ void Ground::fit(GroundText& text, const std::optional<Camera>& camera) {
     }
     const GroundPoint& any = text.points.front();
     const auto refuse = [&](const char* sentence, const char* help) { text.problems.push_back({any.begin, any.end, sentence, help}); };
-    const char* const apart = "take the corners of a large square: of any three points none lies between the others";
+    const char* const apart = "use the corners of a large square: no three points on a line";
     // all pairs of a hundred are enough to see it
     const auto few = [](std::vector<cv::Point2d> all) { return all.resize(std::min<std::size_t>(all.size(), 100)), all; };
-    if (!spread(few(seen))) return refuse("the pixels of these points lie in a line, or two at one place", apart);
-    if (!spread(few(there))) return refuse("these points lie in a line, or two at one place", apart);
+    if (!spread(few(seen))) return refuse("the pixels of these points are collinear or coincide", apart);
+    if (!spread(few(there))) return refuse("these points are collinear or coincide", apart);
     const cv::Mat h = cv::findHomography(seen, there, 0);
-    if (h.empty() || !cv::checkRange(h)) return refuse("no plane fits these points", "look whether two of them are exchanged");
+    if (h.empty() || !cv::checkRange(h)) return refuse("no plane fits these points", "check whether two of them are exchanged");
     std::copy(h.begin<double>(), h.end<double>(), h_.begin());
     double least = 1e300, most = -1e300, sum = 0;
     for (const auto& p : seen) {
@@ -109,7 +93,7 @@ void Ground::fit(GroundText& text, const std::optional<Camera>& camera) {
         for (double& value : h_) value = -value;
         std::swap(least, most), least = -least, most = -most;
     }
-    if (least <= 0) return refuse("some of these points would be above the horizon", "look whether two of them are exchanged");
+    if (least <= 0) return refuse("some of these points are above the horizon", "check whether two of them are exchanged");
     least_w_ = 1e-3 * least;
     for (std::size_t i = 0; i < seen.size(); ++i) {
         double x = 0, y = 0;
