@@ -85,7 +85,9 @@ struct NodeLink {
         std::vector<std::string> words{"loadrt", "node", TopicLink::word(argument::cell, cell), TopicLink::word(argument::node, node)};
         std::string              names;
         for (const std::string& other : others) names += (names.empty() ? "" : ",") + other;
-        for (const auto& [name, value] : {std::pair(argument::others, &names), {argument::offers, &offers}, {argument::wants, &wants}})
+        const std::pair<const char*, const std::string*> lists[] = {
+            {argument::others, &names}, {argument::offers, &offers}, {argument::wants, &wants}};
+        for (const auto& [name, value] : lists)
             if (!value->empty()) words.push_back(TopicLink::word(name, *value));
         return words;
     }

@@ -187,8 +187,8 @@ TEST(Station_with_a_list_of_masters, ignores_syncs_of_others_and_names_them) {
     }
     bed.run(100 * ms);
     EXPECT_EQ(mac(5), s.status().master);
-    EXPECT_EQ(1, s.events[Event::stranger_sync]);
-    EXPECT_EQ(mac(1), s.last_who[Event::stranger_sync]);
+    EXPECT_EQ(1, s.events[Event::unknown_master]);
+    EXPECT_EQ(mac(1), s.last_who[Event::unknown_master]);
     EXPECT_EQ(0, s.events[Event::master_changed]);
 }
 

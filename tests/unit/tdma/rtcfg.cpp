@@ -57,7 +57,7 @@ struct Cell : Bed {
 
     static StationSetup unknown() {
         StationSetup s;
-        s.room_for_slots = most_slots;
+        s.slot_capacity = most_slots;
         s.configured = false;
         return s;
     }
@@ -101,10 +101,10 @@ TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
     Said said;
     cell.run(4000 * ms);
     EXPECT_EQ(
-        "tdma.2: configured by 02:00:00:00:00:01: it is station x with 1 slot, the cycle is 1000 us\n"
-        "tdma.3: configured by 02:00:00:00:00:01: it is station y with 2 slots, the cycle is 1000 us\n"
-        "tdma.2: the file from 02:00:00:00:00:01, 3000 bytes, is in '" +
-            cell.path + "'\n",
+        "tdma.2: configured by 02:00:00:00:00:01 as station x: 1 slot, cycle 1000 us\n"
+        "tdma.3: configured by 02:00:00:00:00:01 as station y: 2 slots, cycle 1000 us\n"
+        "tdma.2: received '" +
+            cell.path + "' from 02:00:00:00:00:01 (3000 bytes)\n",
         said.text());
     EXPECT_TRUE(cell.x.station.ready() && cell.y.station.ready());
     EXPECT_EQ(300'000, cell.x.station.setup().slots.at(0).offset);
@@ -243,8 +243,8 @@ TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
     for (int i = 0; i < 5; ++i) cell.inject(m, 9, 10 * ms + i * 5 * ms);
     cell.run(100 * ms);
     EXPECT_EQ(
-        "tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:3:1: error: unknown key 'slott'; "
-        "did you mean 'slot'?; this station waits for another\n",
+        "tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:3:1: error: unknown key 'slott'; "
+        "did you mean 'slot'?; waiting for another\n",
         said.text());
     EXPECT_EQ(State::unconfigured, cell.x.status().state);
     EXPECT_EQ(5U, cell.at_x.applicant.foreign());
@@ -270,8 +270,8 @@ TEST(Rtcfg_client, is_not_made_to_talk_for_ever) {
     cell.run(400 * ms);
     const std::string words = said.text();
     EXPECT_EQ(3, std::count(words.begin(), words.end(), '\n')) << words;
-    EXPECT_TRUE(words.ends_with("; this station waits for another, and says no more of such\n")) << words;
-    EXPECT_TRUE(words.starts_with("tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:1:1: error: there is "
+    EXPECT_TRUE(words.ends_with("; waiting for another (further rejections are not reported)\n")) << words;
+    EXPECT_TRUE(words.starts_with("tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:1:1: error: there is "
                                  "no key 'cy?[2Jcle'; "))
         << words;
     EXPECT_EQ(50U, cell.at_x.applicant.foreign());

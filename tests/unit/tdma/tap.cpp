@@ -125,9 +125,9 @@ TEST_F(Taps, carry_a_frame_from_one_to_the_other) {
 TEST_F(Taps, follow_another_schedule_and_go_with_their_station) {
     auto opened = open_tap(*at_s, {"hal5", mac(2)}, "tdma.1");
     ASSERT_NE(nullptr, opened.tap) << opened.problem;
-    EXPECT_EQ("the interface hal5 is another process's; give this one another name, as in hal%d",
+    EXPECT_EQ("interface hal5 is in use by another process; use another name, for example hal%d",
               open_tap(*at_m, {"hal5", mac(1)}, "x").problem);
-    EXPECT_EQ("lo is another interface's name, and that is no TAP; give this one another name, as in hal%d",
+    EXPECT_EQ("interface lo exists, but is not a TAP interface; use another name, for example hal%d",
               open_tap(*at_m, {"lo", mac(1)}, "x").problem);
     StationSetup changed = slave(300'000);
     changed.slots.push_back({.id = tunnel_slot, .offset = 700'000, .size = 500});

@@ -73,7 +73,7 @@ TEST(Tunnel, carries_packets_both_ways_in_order) {
     EXPECT_EQ(40u, p.at_m.sent());
     EXPECT_EQ(40u, p.at_m.received());
     EXPECT_EQ(40u, p.at_s.received());
-    EXPECT_EQ(0u, p.at_m.dropped() + p.at_s.dropped() + p.at_m.refused() + p.at_s.refused());
+    EXPECT_EQ(0u, p.at_m.dropped() + p.at_s.dropped() + p.at_m.rejected() + p.at_s.rejected());
 }
 
 TEST(Tunnel, leaves_its_slot_to_nobody_and_others_theirs) {
@@ -155,7 +155,7 @@ TEST(Tunnel, has_the_mtu_of_slot_1) {
     EXPECT_FALSE(none.give(packet(mac(2), mac(1), 40)));
     // Another schedule comes while it runs.
     StationSetup room = with_tunnel(master(), 400'000);
-    room.room_for_slots = 2;
+    room.slot_capacity = 2;
     Machine& later = bed.add(3, room);
     Tunnel tunnel{later.station};
     EXPECT_EQ(mtu, tunnel.mtu());
@@ -201,9 +201,9 @@ TEST_P(Hostile_frame, is_counted_and_goes_nowhere) {
     ASSERT_TRUE(is_packet(decode(frame), mac(2)));
     GetParam().spoil(frame);
     EXPECT_FALSE(is_packet(decode(frame), mac(2)));
-    const auto before = p.at_s.refused() + p.s.status().count.foreign;
+    const auto before = p.at_s.rejected() + p.s.status().count.foreign;
     for (int i = 0; i < 5; ++i) p.at_s.arrived(frame, p.now);  // as one would by which a driver's filter was passed by
-    EXPECT_EQ(before + 5, p.at_s.refused());
+    EXPECT_EQ(before + 5, p.at_s.rejected());
     EXPECT_TRUE(Pair::next(p.at_s).empty());
     EXPECT_EQ(0u, p.at_s.received());
     EXPECT_TRUE(p.s.station.ready());
@@ -246,9 +246,9 @@ TEST(Tunnel, gives_on_only_packets_whatever_comes) {
         EXPECT_EQ(f.size() - rtmac_bytes, length);
     }
     EXPECT_EQ(taken, p.at_s.received());
-    EXPECT_EQ(20'000 - taken, p.at_s.refused());
+    EXPECT_EQ(20'000 - taken, p.at_s.rejected());
     EXPECT_GT(taken, 1000u);
-    EXPECT_GT(p.at_s.refused(), 1000u);
+    EXPECT_GT(p.at_s.rejected(), 1000u);
 }
 
 TEST(Tap, names_are_those_of_interfaces) {
@@ -256,7 +256,7 @@ TEST(Tap, names_are_those_of_interfaces) {
     for (const char* bad : {"", ".", "..", "a/b", "a b", "a:b", "hal%s", "hal%", "%d%d", "sixteen-letters-"}) {
         const std::string expected =
             "'" + std::string(bad) +
-            "' is no name of an interface: at most 15 letters and digits, as in hal0, or hal%d for the first that is free";
+            "' is not a valid interface name; use at most 15 letters and digits, for example hal0, or hal%d for the first free number";
         EXPECT_EQ(expected, wrong_name(bad));
     }
 }
