@@ -207,7 +207,7 @@ private:
     bool                          good_ = false, swapped_ = false;
 };
 
-/// Joints come in any order, and more or fewer than ours; what is not there keeps its value.
+/// Matches joints by name, in any order; a missing one keeps its value.
 void walk_joints(const Schema& schema, Walk& walk, hal_value* to) noexcept {
     const auto ours = schema.names.size();
     const auto count = walk.get<std::uint32_t>();
