@@ -271,8 +271,8 @@ TEST(Rtcfg_client, reports_at_most_three_invalid_configurations) {
     const std::string words = said.text();
     EXPECT_EQ(3, std::count(words.begin(), words.end(), '\n')) << words;
     EXPECT_TRUE(words.ends_with("; waiting for another (further rejections are not reported)\n")) << words;
-    EXPECT_TRUE(words.starts_with("tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:1:1: error: there is "
-                                 "no key 'cy?[2Jcle'; "))
+    EXPECT_TRUE(words.starts_with("tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:1:1: error: unknown key "
+                                  "'cy?[2Jcle'; "))
         << words;
     EXPECT_EQ(50U, cell.at_x.applicant.foreign());
 }
