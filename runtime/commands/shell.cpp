@@ -69,7 +69,7 @@ void Shell::look_up(std::function<std::optional<std::string>(const std::string&)
 void Shell::look_in(std::optional<Ini> ini) { state_->ini = std::move(ini); }
 
 int Shell::execute(const std::vector<std::string>& words, Output& output, std::string_view name) {
-    return words.empty() ? 0 : execute(std::vector{words}, output, name);
+    return words.empty() ? 0 : execute(std::vector<std::vector<std::string>>{words}, output, name);
 }
 
 int Shell::execute(const std::vector<std::vector<std::string>>& all, Output& output, std::string_view name) {

@@ -324,8 +324,8 @@ private:
     hal::DisciplinedClock                   clock_;
     hal::Discipline                         discipline_;
     const hal_faults*                       faults_ = nullptr;
-    bool                                    leads_ = false, period_reported_ = false, was_reset_ = false, was_synchronised_ = false, withdrawn_ = false;
-    bool                                    had_carrier_ = true;
+    bool                                    leads_ = false, period_reported_ = false, was_reset_ = false;
+    bool                                    was_synchronised_ = false, withdrawn_ = false, had_carrier_ = true;
 };
 
 }  // namespace
