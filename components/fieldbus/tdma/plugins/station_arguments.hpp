@@ -95,7 +95,7 @@ struct StationArguments {
         }
         setup.configured = false;
         setup.asks_master = true;
-        setup.room_for_slots = most_slots;
+        setup.slot_capacity = most_slots;
         return true;
     }
 
