@@ -7,31 +7,31 @@
 #include <vector>
 
 #include "engine.hpp"
+#include "links/links.hpp"
 #include "hal/component.hpp"
 #include "hal/message_log.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
 #include "schema.hpp"
-#include "words.hpp"
+#include "status_text.hpp"
 
 namespace hal::dds {
 
-/// Of the participant: who may meet. A member before the pins.
+/// The load arguments of a participant: domain, network, security. Declared before the pins.
 class ParticipantArguments {
 public:
     explicit ParticipantArguments(hal::Component& c)
         : texts_(c),
           domain_(c, "domain", 0, "DDS domain", {.min = 0, .max = 232}),
-          interfaces_(c, "interfaces", "", "addresses or names of interfaces, or all; without it nothing leaves this machine"),
-          peers_(c, "peers", "", "addresses where others are looked for, besides multicast"),
-          server_(c, "server", "", "discovery servers ADDRESS:PORT instead of multicast"),
-          shared_memory_(c, "shared_memory", 0, "1: between processes of this machine too", {.min = 0, .max = 1}),
+          interfaces_(c, "interfaces", "", "network interfaces by address or name, or all; default: loopback only"),
+          peers_(c, "peers", "", "addresses to search for other participants, in addition to multicast"),
+          server_(c, "server", "", "discovery servers ADDRESS:PORT; replaces multicast"),
+          shared_memory_(c, "shared_memory", 0, "1: also use shared memory between processes of this machine", {.min = 0, .max = 1}),
           profile_(c, "profile", "",
-                   "participant profile of Fast DDS: FILE.xml:NAME; those of writers and readers named like the topic count where no "
-                   "argument says"),
-          security_(c, "security", "", "folder of certificates and permissions, as ROS 2's enclaves have it") {}
+                   "Fast DDS participant profile, FILE.xml:NAME; writer and reader profiles named like the topic supply defaults"),
+          security_(c, "security", "", "folder of certificates and permissions (a ROS 2 enclave)") {}
 
-    /// In the component's constructor: files are looked for beside the netlist. [setup]
+    /// Returns the settings, with files resolved relative to the netlist. For the component's constructor. [setup]
     Settings settings() const {
         Settings s;
         s.domain = static_cast<int>(domain_);
@@ -47,7 +47,7 @@ public:
         if (!security_.get().empty()) s.security = texts_.find(security_.get());
         return s;
     }
-    /// False: the declarations are looked at, nobody loads this. [setup]
+    /// Returns false when the component is constructed for its declarations only (`hal doc`). [setup]
     bool loading() const { return texts_.offered(); }
 
 private:
@@ -58,42 +58,42 @@ private:
     hal::TextArgument profile_, security_;
 };
 
-/// A member before the pins.
+/// The load arguments that dds_publish and dds_subscribe share. Declared before the pins.
 class Arguments {
 public:
     explicit Arguments(hal::Component& c)
         : name(name_of(c)),
-
-          topic_(c, "topic", "", "name of the topic; ROS 2's /arm/state is topic=/arm/state with ros=", {.per_instance = true}),
-          fields_(c, "fields", "", "the group: NAME:TYPE, separated by commas, NAME:TYPE*N for a row; types bit float s32 u32 s64 u64"),
-          type_(c, "type", "", "name of the type on the wire; without it one is made of the fields"),
+          topic_(c, argument::topic, "", "topic name; with ros= the ROS 2 topic of this name", {.per_instance = true}),
+          fields_(c, argument::fields, "", "fields NAME:TYPE, comma-separated, NAME:TYPE*N for N of them; types bit float s32 u32 s64 u64"),
+          type_(c, argument::type, "", "type name on the wire; default: derived from the fields"),
           ros_(c, "ros", "",
-               "instead of fields: a type of ROS 2, std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist "
+               "ROS 2 message type instead of fields: std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist "
                "WrenchStamped, sensor_msgs/JointState Image"),
-          joints_(c, "joints", "", "names of a JointState's joints"),
-          frame_(c, "frame", "", "frame_id of a ROS header"),
-          encoding_(c, "encoding", "bgr8", "of an Image"),
-          reliable_(c, "reliable", 1, "1: what is lost is sent again; 0: best effort", {.min = 0, .max = 1}),
-          depth_(c, "depth", 16, "samples kept for those who have not got them yet", {.min = 1, .max = 100'000}),
-          deadline_(c, "deadline_ms", 0, "a sample at least so often: promised by publishers, asked for by subscribers; 0: none",
+          joints_(c, "joints", "", "joint names of a JointState"),
+          frame_(c, "frame", "", "frame_id of the ROS header"),
+          encoding_(c, "encoding", "bgr8", "pixel encoding of an Image"),
+          reliable_(c, argument::reliable, 1, "1: lost samples are retransmitted; 0: best effort", {.min = 0, .max = 1}),
+          depth_(c, "depth", 16, "samples kept until they are delivered", {.min = 1, .max = 100'000}),
+          deadline_(c, "deadline_ms", 0,
+                    "DDS deadline, maximum sample interval (ms): offered by publishers, requested by subscribers; 0: none",
                     {.min = 0, .max = longest_ms}),
-          budget_(c, "latency_ms", 0, "latency budget: a hint for the engine", {.min = 0, .max = longest_ms}),
-          lease_(c, "lease_ms", 0, "liveliness: a publisher not heard of for so long counts as dead; 0: as its participant, 5000",
+          budget_(c, "latency_ms", 0, "DDS latency budget (ms), a hint to the library", {.min = 0, .max = longest_ms}),
+          lease_(c, "lease_ms", 0, "liveliness lease of the publisher (ms); 0: that of its participant, 5000",
                  {.min = 0, .max = longest_ms}),
           participant(c) {}
 
-    /// Throws hal::ArgumentError. [setup]
+    /// Returns the type of the topic. Throws hal::ArgumentError or std::invalid_argument. [setup]
     Schema schema() const {
         if (!participant.loading() && fields_.get().empty() && ros_.get().empty()) return Schema::of_fields("value:float");
-        if (topic_.get().empty()) throw std::invalid_argument("which topic? write topic=NAME");
+        if (topic_.get().empty()) throw std::invalid_argument("missing topic name; write topic=NAME");
         for (const auto& [argument, text] : {std::pair{"topic", &topic_.get()}, std::pair{"type", &type_.get()}})
             if (text->size() > longest_name)
-                throw hal::ArgumentError(argument, std::string(argument) + "= has more than " + std::to_string(longest_name) +
-                                            " letters; make it shorter");
+                throw hal::ArgumentError(argument, std::string(argument) + "= has " + std::to_string(text->size()) + " characters (limit " +
+                                            std::to_string(longest_name) + ")");
         if (!ros_.get().empty() && (!fields_.get().empty() || !type_.get().empty()))
-            throw hal::ArgumentError("ros", "ros= gives the fields and the type; leave fields= and type= out");
+            throw hal::ArgumentError("ros", "ros= cannot be combined with fields= or type=; remove them");
         if (ros_.get().empty() && fields_.get().empty())
-            throw std::invalid_argument("which pins? write fields=angle:float,ready:bit or ros=std_msgs/Float64");
+            throw std::invalid_argument("missing fields; write fields=angle:float,ready:bit or ros=std_msgs/Float64");
         return ros_.get().empty() ? Schema::of_fields(fields_.get(), type_.get())
                                   : Schema::of_ros(ros_.get(), list_of(joints_.get()), frame_.get(), encoding_.get());
     }
@@ -114,10 +114,9 @@ public:
     }
     std::int64_t       deadline_ms() const noexcept { return deadline_; }
     std::int64_t       depth() const noexcept { return depth_; }
-    const std::string& said_topic() const noexcept { return topic_.get(); }
-    /// A line on standard error, never in a cycle.
-    void say(const std::string& sentence) const { log_.print(sentence); }
-    /// Prints what say() only counted; several times a second. Never in a cycle.
+    /// Prints a line on standard error. Never in a cycle.
+    void log(const std::string& sentence) const { log_.print(sentence); }
+    /// Prints the repetitions that log() only counted; called several times a second. Never in a cycle.
     void flush_log() const { log_.flush(); }
 
     const std::string name;  ///< of the instance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The pins of a group, a row per type: a cycle walks six loops without a branch per pin.
+// The pins of a topic, one array per type, so that a cycle runs six loops without a branch per pin.
 #pragma once
 
 #include <new>
@@ -14,7 +14,7 @@ namespace hal::dds {
 template <template <class> class P>
 class FieldPins {
 public:
-    /// Declares them in the order of the fields. [setup]
+    /// Declares the pins in the order of the fields. [setup]
     FieldPins(hal::Component& component, const hal::Function& function, const Schema& schema, const char* doc) {
         each([&](auto& row) { row.reserve(schema); });
         for (std::size_t i = 0; i < schema.fields.size(); ++i) each([&](auto& row) { row.declare(component, function, schema, i, doc); });
@@ -28,13 +28,13 @@ public:
             }
         });
     }
-    /// Takes all values from a row of them, in the order of the fields. [realtime]
+    /// Sets all pins from an array of values, in the order of the fields. [realtime]
     void load(const hal_value* from) noexcept {
         each([from](auto& row) {
             for (std::size_t i = 0; i < row.size; ++i) row.pins[i] = row.value(from[row.at[i].field]);
         });
     }
-    /// Fields with a safe value get it. [realtime]
+    /// Sets the fields that have a safe value to it. [realtime]
     void make_safe() noexcept {
         each([](auto& row) {
             for (std::size_t i = 0; i < row.size; ++i)

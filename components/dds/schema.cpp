@@ -14,7 +14,7 @@
 namespace hal::dds {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "values are stored as they stand in memory");
+static_assert(std::endian::native == std::endian::little, "values are stored in native byte order");
 
 constexpr std::size_t header = 4, most_fields = 1024, most_bytes = 60'000;
 
@@ -56,7 +56,7 @@ private:
     std::vector<std::uint8_t>& to_;
 };
 
-[[noreturn]] void refuse(const std::string& argument, const std::string& why) { throw ArgumentError(argument, why); }
+[[noreturn]] void reject(const std::string& argument, const std::string& why) { throw ArgumentError(argument, why); }
 
 hal_value value_of(std::string_view text, hal_type type, const std::string& whole) {
     hal_value value{};
@@ -76,7 +76,7 @@ hal_value value_of(std::string_view text, hal_type type, const std::string& whol
     default: got = std::from_chars(first, last, value.u64); break;
     }
     if (got.ec != std::errc{} || got.ptr != last || text.empty())
-        refuse("fields", "fields: '" + whole + "': '" + std::string(text) + "' is not a " + std::string(row(type).name));
+        reject("fields", "fields: '" + whole + "': '" + std::string(text) + "' is not a " + std::string(row(type).name));
     return value;
 }
 
@@ -85,13 +85,13 @@ void name_ok(std::string_view name, const std::string& whole, const std::string&
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
     };
     if (name.empty() || !std::all_of(name.begin(), name.end(), good))
-        refuse(argument, argument + ": '" + whole + "': '" + std::string(name) + "' cannot be a pin's name; letters, digits, - _ and . can");
+        reject(argument, argument + ": '" + whole + "': '" + std::string(name) + "' is not a valid pin name; use letters, digits, - _ and .");
 }
 
 /// "NAME:TYPE[*N][=SAFE]" to one or N fields.
 void parse(const std::string& whole, std::vector<Field>& to) {
     const auto colon = whole.find(':');
-    if (colon == std::string::npos) refuse("fields", "fields: '" + whole + "' has no type; write NAME:TYPE, as in angle:float,ready:bit");
+    if (colon == std::string::npos) reject("fields", "fields: '" + whole + "' has no type; write NAME:TYPE, as in angle:float,ready:bit");
     std::string_view name = std::string_view(whole).substr(0, colon), rest = std::string_view(whole).substr(colon + 1), safe;
     bool             has_safe = false;
     if (const auto at = rest.find('='); at != std::string_view::npos) {
@@ -105,24 +105,24 @@ void parse(const std::string& whole, std::vector<Field>& to) {
         const std::string_view digits = rest.substr(at + 1);
         const auto             got = std::from_chars(digits.data(), digits.data() + digits.size(), count);
         if (got.ec != std::errc{} || got.ptr != digits.data() + digits.size() || count == 0 || count > most_fields)
-            refuse("fields", "fields: '" + whole + "': after * stands how many, 1 to " + std::to_string(most_fields));
+            reject("fields", "fields: '" + whole + "': invalid count after *; write 1.." + std::to_string(most_fields));
         rest = rest.substr(0, at);
         is_row = true;
     }
     const auto type = std::find_if(types.begin(), types.end(), [rest](const TypeName& t) { return t.name == rest; });
     if (type == types.end())
-        refuse("fields", "fields: '" + whole + "': unknown type '" + std::string(rest) + "'; there are bit, float, s32, u32, s64, u64");
+        reject("fields", "fields: '" + whole + "': unknown type '" + std::string(rest) + "'; types are bit, float, s32, u32, s64, u64");
     for (std::size_t i = 0; i < count; ++i) {
         std::string own(name);
         if (is_row) own += "-" + std::to_string(i);
         name_ok(own, whole);
         if (std::any_of(to.begin(), to.end(), [&own](const Field& f) { return f.name == own; }))
-            refuse("fields", "fields: there are two fields '" + own + "'");
+            reject("fields", "fields: duplicate field '" + own + "'");
         Field field{std::move(own), type->type, {}};
         if (has_safe) field.safe = value_of(safe, type->type, whole);
         to.push_back(std::move(field));
     }
-    if (to.size() > most_fields) refuse("fields", "fields: more than " + std::to_string(most_fields) + " fields; make two topics of them");
+    if (to.size() > most_fields) reject("fields", "fields: more than " + std::to_string(most_fields) + " fields; split them into two topics");
 }
 
 void place(Schema& schema, Writer& writer, std::string name, hal_type type) {
@@ -140,12 +140,12 @@ void ros_header(Schema& schema, Writer& writer, std::string_view frame) {
 }
 
 void joint_state(Schema& schema, Writer& writer, const std::vector<std::string>& names) {
-    if (names.empty()) refuse("ros", "ros=sensor_msgs/JointState needs the names of its joints: joints=shoulder,elbow");
-    if (names.size() > 256) refuse("joints", "joints: more than 256 joints; make two topics of them");
+    if (names.empty()) reject("ros", "ros=sensor_msgs/JointState: missing joint names; write joints=shoulder,elbow");
+    if (names.size() > 256) reject("joints", "joints: more than 256 joints; split them into two topics");
     writer.number(static_cast<std::uint32_t>(names.size()));
     for (const std::string& n : names) {
         name_ok(n, n, "joints");
-        if (std::count(names.begin(), names.end(), n) > 1) refuse("joints", "joints: there are two joints '" + n + "'");
+        if (std::count(names.begin(), names.end(), n) > 1) reject("joints", "joints: duplicate joint '" + n + "'");
         writer.text(n);
     }
     for (const char* what : {"-position", "-velocity", "-effort"}) {
@@ -207,7 +207,7 @@ private:
     bool                          good_ = false, swapped_ = false;
 };
 
-/// Joints come in any order, and more or fewer than ours; what is not there keeps its value.
+/// Matches joints by name, in any order; a missing one keeps its value.
 void walk_joints(const Schema& schema, Walk& walk, hal_value* to) noexcept {
     const auto ours = schema.names.size();
     const auto count = walk.get<std::uint32_t>();
@@ -332,12 +332,12 @@ Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& name
         writer.number(0);  // data
         schema.layout += 'q';
     } else {
-        refuse("ros", "ros=" + std::string(ros) +
-               ": there are std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist WrenchStamped, " +
-               "sensor_msgs/JointState Image; other types: fields= and type=, when they consist of plain numbers");
+        reject("ros", "ros=" + std::string(ros) +
+               ": unsupported message type; supported are std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist " +
+               "WrenchStamped, sensor_msgs/JointState Image; other types that consist of plain numbers: fields= and type=");
     }
     if (schema.sample.size() > most_bytes)
-        refuse("ros", "ros=" + std::string(ros) + ": the message has more than " + std::to_string(most_bytes) +
+        reject("ros", "ros=" + std::string(ros) + ": the message exceeds " + std::to_string(most_bytes) +
                " bytes; shorten joints=, frame= or encoding=");
     const auto slash = ros.find('/');
     schema.type = std::string(ros.substr(0, slash)) + "::msg::dds_::" + std::string(ros.substr(slash + 1)) + "_";

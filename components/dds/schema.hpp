@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A group of pins as one type: which fields, where they stand in the bytes, what the type is called. Known when the netlist is loaded, so
-// that a cycle only stores values at known places.
+// A group of pins as one type: its fields, their offsets, its name. Known when the netlist is loaded, so that a cycle only stores values at
+// known offsets.
 //
 // XCDR1, little-endian, final, no key (DDS-XTypes 1.3, 7.4.1; DDSI-RTPS 2.3, 10.2): after the header of four bytes a primitive is aligned
-// to its size, counted from behind the header; a string is a 32-bit length with its 0, then the bytes; a sequence is a 32-bit count, then
-// the elements.
+// to its size, counted from the end of the header; a string is a 32-bit length that includes its 0, then the bytes; a sequence is a 32-bit
+// count, then the elements.
 #pragma once
 
 #include <cstdint>
@@ -18,44 +18,44 @@
 
 namespace hal::dds {
 
-/// A pin of the group. Ports have no place in a topic.
+/// A field of the topic and its pin. Ports cannot be fields.
 struct Field {
     std::string              name;                ///< of the pin
     hal_type                 type = HAL_TYPE_FLOAT;
-    std::optional<hal_value> safe;   ///< subscribers: shown while the topic is not valid
+    std::optional<hal_value> safe;   ///< subscribers: value of the pin while the topic is not valid
 };
 
-/// A value within the bytes.
+/// A value within a sample.
 struct Place {
-    std::uint32_t offset = 0;  ///< in all bytes, header included
+    std::uint32_t offset = 0;  ///< bytes from the beginning, header included
     hal_type      type = HAL_TYPE_FLOAT;
 };
 
 /// The type of one topic.
 struct Schema {
     std::string               type;                  ///< name on the wire
-    std::string               prefix;  ///< of the topic's name on the wire: "rt/" for ROS 2 types, else ""
+    std::string               prefix;  ///< of the topic name on the wire: "rt/" for ROS 2 types, else ""
     std::vector<std::string>  names;   ///< joints of a JointState
     std::vector<Field>        fields;         ///< in the order of the pins
-    std::vector<std::uint8_t> sample;  ///< one whole sample with all values 0, header included
-    std::vector<Place>        places;         ///< of each field in `sample`
-    std::uint32_t             stamp = 0;  ///< offset of a ROS header's stamp (int32 sec, uint32 nanosec) in `sample`; 0: it has none
-    std::string               ros;  ///< "std_msgs/Float64", or "" for a type made of the fields
-    std::string               layout;  ///< how decode() walks a sample whose strings and sequences are of any length
+    std::vector<std::uint8_t> sample;  ///< a complete sample with all values 0, header included
+    std::vector<Place>        places;         ///< offset of each field in `sample`
+    std::uint32_t             stamp = 0;  ///< offset of a ROS header's stamp (int32 sec, uint32 nanosec) in `sample`; 0: no stamp
+    std::string               ros;  ///< "std_msgs/Float64", or "" for a type derived from the fields
+    std::string               layout;  ///< format for decode(), for strings and sequences of any length
 
-    /// "angle:float,ready:bit,joint:float*6,effort:float=0": NAME:TYPE, with *N a row (joint-0, joint-1 ...), with =VALUE what subscribers
-    /// show while nothing valid is there. Types: bit, float, s32, u32, s64, u64. `type` "" derives the name from the fields, so that
-    /// different groups never match. Throws std::invalid_argument.
+    /// Parses "angle:float,ready:bit,joint:float*6,effort:float=0": NAME:TYPE, *N for N fields (joint-0, joint-1 ...), =VALUE for the
+    /// value of a subscriber's pin while the topic is not valid. Types: bit, float, s32, u32, s64, u64. An empty `type` derives the name
+    /// from the fields, so that different groups never match. Throws std::invalid_argument. [setup]
     static Schema of_fields(std::string_view fields, std::string type = "");
-    /// A type of ROS 2: std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState Image
-    /// (its header and format, without pixels). `names` are the joints of a JointState, `frame` the header's frame_id, `encoding` of an
-    /// Image. Throws std::invalid_argument.
+    /// Builds a ROS 2 type: std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState
+    /// Image (its header and format, without pixels). `names` are the joints of a JointState, `frame` the header's frame_id, `encoding` that of
+    /// an Image. Throws std::invalid_argument. [setup]
     static Schema of_ros(std::string_view ros, const std::vector<std::string>& names = {}, std::string_view frame = "",
                          std::string_view encoding = "bgr8");
 };
 
-/// Values of the fields, in their order, out of one sample that came from anywhere; what a JointState does not have keeps its value. False,
-/// and `values` untouched, when the bytes are not of this type. Takes no memory. [any]
+/// Decodes the values of the fields, in their order, from an untrusted sample; joints that a JointState does not contain keep their value.
+/// Returns false and leaves `values` unchanged when the bytes are not of this type. Allocates nothing. [any]
 bool decode(const Schema&, std::span<const std::uint8_t> bytes, std::span<hal_value> values) noexcept;
 
 }  // namespace hal::dds

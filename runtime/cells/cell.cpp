@@ -26,10 +26,10 @@ ShellOptions of_node(ShellOptions options, const std::string& node) {
 
 }  // namespace
 
-/// What the nodes have in common is read once for each of them: what is said of it is printed once.
-class Cell::Once final : public Output {
+/// Common lines are read once per node: prints each of their diagnostics once.
+class Cell::UniqueOutput final : public Output {
 public:
-    explicit Once(Output& to) : to_(to) {}
+    explicit UniqueOutput(Output& to) : to_(to) {}
     void out(std::string_view text) override { to_.out(text); }
     void err(std::string_view text) override {
         // diagnostics are paragraphs
@@ -41,7 +41,7 @@ public:
             const std::size_t line = paragraph.find('\n');
             const bool whole = line != paragraph.npos;
             const bool count = !whole && !paragraph.empty() && paragraph[0] >= '0' && paragraph[0] <= '9';  // "2 errors" of one node
-            if (paragraph.empty() || count || (whole && !said_.insert(std::string(paragraph)).second)) continue;
+            if (paragraph.empty() || count || (whole && !printed_.insert(std::string(paragraph)).second)) continue;
             to_.err((whole && any_ ? "\n" : "") + std::string(paragraph) + "\n");
             any_ = any_ || whole;
         }
@@ -50,7 +50,7 @@ public:
 
 private:
     Output& to_;
-    std::set<std::string> said_;
+    std::set<std::string> printed_;
     bool any_ = false;
 };
 
@@ -77,7 +77,7 @@ std::size_t Cell::find(std::string_view node) const {
 }
 
 bool Cell::load(const std::vector<std::string>& files, const std::string& ini, Output& output) {
-    Once once(output);
+    UniqueOutput once(output);
     bool good = true;
     for (std::size_t i = 0; i < size(); ++i) {
         Machine& machine = machines_[i];
@@ -89,10 +89,10 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
                 if (other.name == nodes_[i].name) continue;
                 std::string problem;
                 ProgramPin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
-                ProgramPin refused{"node." + other.name + ".refused", HAL_TYPE_BIT, HAL_DIR_OUT};
+                ProgramPin incompatible{"node." + other.name + ".incompatible", HAL_TYPE_BIT, HAL_DIR_OUT};
                 ProgramPin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
                 machine.pins[other.name + ".online"] = machine.session->programs().add_pin(transaction, watch, online, problem);
-                machine.pins[other.name + ".refused"] = machine.session->programs().add_pin(transaction, watch, refused, problem);
+                machine.pins[other.name + ".incompatible"] = machine.session->programs().add_pin(transaction, watch, incompatible, problem);
                 machine.pins[other.name + ".age-ms"] = machine.session->programs().add_pin(transaction, watch, age, problem);
             }
             Diagnostics none;
@@ -131,7 +131,7 @@ bool Cell::connect(Output& output) {
 
 bool Cell::start(Output& output) {
     bool good = true;
-    std::vector<std::string> links(size());
+    std::vector<std::vector<std::vector<std::string>>> links(size());
     for (const NodeTopic& topic : topics_)
         for (const NodeField& field : topic.fields)
             for (const NodeReader& reader : field.readers) {
@@ -145,10 +145,10 @@ bool Cell::start(Output& output) {
                 machine.pins[from + "." + field.signal] = machine.session->programs().add_pin(transaction, watch, pin, problem);
                 Diagnostics none;
                 transaction.commit(none);
-                links[reader.node] += "net " + field.signal + " node." + from + "." + field.signal + "\n";
+                links[reader.node].push_back({"net", field.signal, pin.name});
             }
     for (std::size_t i = 0; i < size(); ++i) {
-        if (!links[i].empty()) good = machines_[i].shell->run_text("<links of node " + nodes_[i].name + ">", links[i], output) == 0 && good;
+        if (!links[i].empty()) good = machines_[i].shell->execute(links[i], output, "<links of node " + nodes_[i].name + ">") == 0 && good;
         machines_[i].shell->add_latencies(node_latencies(*this, i, true));
         const auto lock = machines_[i].session->lock();
         if (!machines_[i].session->threads().running() && !machines_[i].session->model().threads.empty()) machines_[i].session->threads().start();
@@ -162,21 +162,21 @@ void Cell::advance(std::int64_t ns) {
     for (const std::int64_t until = now_ns_ + ns; now_ns_ < until;) {
         const std::int64_t step = std::min(step_ns_, until - now_ns_);
         for (std::size_t i = 0; i < size(); ++i) {
-            if (alone_ != SIZE_MAX && i != alone_) continue;
+            if (isolated_ != SIZE_MAX && i != isolated_) continue;
             const auto lock = machines_[i].session->lock();
             machines_[i].session->threads().advance_ns(step);
         }
         const bool first = now_ns_ == 0;
         now_ns_ += step;
-        if (alone_ != SIZE_MAX) continue;
+        if (isolated_ != SIZE_MAX) continue;
         for (const NodeTopic& topic : topics_)
             if (now_ns_ % topic.rate_ns < step) deliver(topic);
-        if (first) greet();
+        if (first) set_online();
     }
 }
 
-// Since the first step all are there.
-void Cell::greet() {
+// After the first step all nodes are online.
+void Cell::set_online() {
     for (Machine& machine : machines_) {
         std::vector<std::pair<Pin*, hal_value>> online;
         for (const auto& [name, pin] : machine.pins)

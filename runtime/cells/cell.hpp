@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The nodes of a netlist as machines in this process, one session each: for `hal check`, for `hal sim`, which passes the signals between
-// them itself, and for what `hal run --node` has to know of the others. [setup], one thread.
+// them itself, and for `hal run --node`, which needs to know the signals of the other nodes. [setup], one thread.
 #pragma once
 
 #include <deque>
@@ -19,12 +19,12 @@ namespace hal {
 
 class Cell {
 public:
-    /// `name` is what the topics between the nodes are called after.
+    /// `name` is part of the names of the topics between the nodes.
     Cell(std::string name, std::vector<NodeLine> nodes, const SessionOptions& session, const ShellOptions& shell);
     ~Cell();
 
-    /// Loads the files into every node and finds what passes between them. What several nodes would say is said once. False: something
-    /// is wrong.
+    /// Loads the files into every node and determines the topics between them. A diagnostic that several nodes share is printed once.
+    /// Returns false after any error.
     bool load(const std::vector<std::string>& files, const std::string& ini, Output& output);
 
     const std::string& name() const { return name_; }
@@ -34,28 +34,28 @@ public:
     Session& session(std::size_t node) { return *machines_[node].session; }
     const Session& session(std::size_t node) const { return *machines_[node].session; }
     Shell& shell(std::size_t node) { return *machines_[node].shell; }
-    /// Its number, or size().
+    /// Returns the index of a node, or size() when it is unknown.
     std::size_t find(std::string_view node) const;
 
     // --- on the virtual clock ---------------------------------------------------------------------------------------------
-    /// Links the signals of other nodes; each node starts its threads unless its netlist did.
+    /// Links the signals of other nodes and starts the threads of each node whose netlist did not. Returns false after any error.
     bool start(Output& output);
-    /// Only this node goes on; the others are silent to it.
-    void leave_alone(std::size_t node) { alone_ = node; }
-    /// All nodes pass `ns` together; what they have written passes to its readers at each topic's rate.
+    /// Runs only this node; the others are offline to it.
+    void isolate(std::size_t node) { isolated_ = node; }
+    /// Advances all nodes by `ns`; signals pass to their readers at the rate of their topic.
     void advance(std::int64_t ns);
 
 private:
     struct Machine {
         std::unique_ptr<Session> session;
         std::unique_ptr<Shell> shell;
-        std::map<std::string, Pin*> pins;  ///< "robot.online", "robot.age-ms", "robot.SIGNAL": the outside ones
+        std::map<std::string, Pin*> pins;  ///< by "robot.online", "robot.age-ms", "robot.SIGNAL"
     };
-    class Once;
+    class UniqueOutput;
     bool connect(Output& output);
     Span place(std::size_t node, Span span);
     void report(Diagnostics& found, Output& output) const;
-    void greet();
+    void set_online();
     void deliver(const NodeTopic& topic);
 
     std::string name_;
@@ -63,32 +63,33 @@ private:
     ShellOptions options_;
     std::vector<Machine> machines_;
     std::vector<NodeTopic> topics_;
-    Sources texts_;  ///< of all nodes' texts that diagnostics between them show
+    Sources texts_;  ///< texts of all nodes that diagnostics between them show
     std::map<std::pair<std::string, std::uint32_t>, std::uint32_t> known_texts_;
     std::int64_t step_ns_ = 0, now_ns_ = 0;
-    std::size_t alone_ = SIZE_MAX;
+    std::size_t isolated_ = SIZE_MAX;
 };
 
-/// The nodes that the `node` lines of netlists (or of those that .ini files name) speak of, in order of first mention; none: they are of
-/// one machine. What is wrong with the lines is said when they are run.
+/// Returns the nodes in the `node` lines of netlists, or of the netlists that .ini files name, in order of first mention; none: a netlist for
+/// one machine. Errors in these lines are reported when the netlist is run.
 std::vector<NodeLine> nodes_of(const std::vector<std::string>& files, const std::string& ini);
 
-/// The pins that say of every other node whether it is there: `node.NAME.online`, `node.NAME.age-ms`.
+/// The component whose pins show the state of every other node: `node.NAME.online`, `node.NAME.age-ms`.
 struct NodePins {
     static constexpr const char* component = "node";
 };
 
-/// "cell" of "machines/cell.hal": what the topics are called after.
+/// Returns "cell" for "machines/cell.hal": the name of the cell in its topics.
 std::string cell_name(const std::vector<std::string>& files);
 
-/// Lines of `show latency`: the signals that `node` writes for others or reads from them.
+/// Returns lines of `show latency`: the signals that `node` writes for others or reads from them.
 std::vector<std::string> node_latencies(const Cell& cell, std::size_t node, bool simulated);
 
-/// What `hal run --node` adds to the part of a node: before it the watch over the other nodes, behind it the topics.
+/// The commands that `hal run --node` adds to the part of a node, as words: before it the component that monitors the other nodes, after it
+/// the topics.
 struct NodeLinks {
-    std::string before, behind;
+    std::vector<std::vector<std::string>> before, after;
 };
-/// `participant`: arguments of the DDS participant as they stand in a netlist, or empty.
-NodeLinks node_links(const Cell& cell, std::size_t node, const std::string& participant);
+/// Returns the commands for `node`; `participant` are further arguments NAME=VALUE of each DDS component. [setup]
+NodeLinks node_links(const Cell& cell, std::size_t node, const std::vector<std::string>& participant);
 
 }  // namespace hal

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What a node's own machine needs for the signals of others: components of components/dds, as commands.
+// What a node's own machine needs for the signals of the other nodes: components of components/dds, their links and functions.
 #include <cstdlib>
 
 #include "base/types.hpp"
 #include "cells/cell.hpp"
 #include "commands/files.hpp"
+#include "dds/links/links.hpp"
 
 namespace hal {
 namespace {
 
-/// FNV-1a: equal texts, equal numbers, on any machine.
+/// Returns FNV-1a (RFC 9923), the same on any machine.
 std::uint64_t hash(std::string_view text) {
     std::uint64_t number = 0xcbf29ce484222325u;
     for (const char c : text) number = (number ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
@@ -22,21 +23,18 @@ std::string hex(std::uint64_t number) {
     return text;
 }
 
-std::string ms(std::int64_t ns) { return std::to_string((ns + 999'999) / 1'000'000); }
-std::string hz(std::int64_t ns) { return format_exact(HAL_TYPE_FLOAT, hal_value{.real = 1e9 / static_cast<double>(ns)}); }
-
 const std::string& from(const Cell& cell, const NodeTopic& topic) { return cell.nodes()[topic.from].name; }
 
 std::string topic_name(const Cell& cell, const NodeTopic& topic) {
     return "halcyon/" + cell.name() + "/" + from(cell, topic) + "/" + topic.thread;
 }
 
-/// The name on the wire changes with the signals: nodes with other versions of the netlist never take each other's bytes.
+/// The type name contains a hash of the signals: nodes with different versions of the netlist never exchange data.
 std::string type_name(const Cell& cell, const NodeTopic& topic) {
     return "halcyon::nodes::" + from(cell, topic) + "_" + hex(hash(topic.layout()));
 }
 
-/// The layout without blanks: an argument.
+/// The layout without blanks, for an argument.
 std::string compact(const NodeTopic& topic) {
     std::string text;
     for (const char c : topic.layout())
@@ -48,7 +46,7 @@ std::string compact(const NodeTopic& topic) {
 std::string every(const NodeTopic& topic) { return format_duration(static_cast<double>(topic.rate_ns)); }
 std::string deadline(const NodeTopic& topic) { return format_duration(static_cast<double>(topic.deadline_ns)); }
 
-/// How many topics `node` has from the node that writes this one, or sends itself: one needs no further name.
+/// The number of topics that `reader` receives from this one's writer, or that the writer sends: the name of a single one needs no thread.
 std::size_t alike(const Cell& cell, const NodeTopic& topic, std::size_t reader) {
     std::size_t number = 0;
     for (const NodeTopic& other : cell.topics()) number += other.from == topic.from && (reader == topic.from || other.read_by(reader));
@@ -68,30 +66,38 @@ const NodeReader* reader_of(const NodeField& field, std::size_t node) {
     return nullptr;
 }
 
-std::string send(const Cell& cell, const NodeTopic& topic, const std::string& participant) {
-    const std::string instance = out_name(cell, topic);
-    std::string text = "loadrt dds_publish names=" + instance + " topic=" + topic_name(cell, topic) + " type=" + type_name(cell, topic) +
-                       " fields=\"" + compact(topic) + "\" rate=" + hz(topic.rate_ns) + " reliable=0" + participant + "\n";
-    for (const NodeField& field : topic.fields) text += "net " + field.signal + " => " + instance + "." + field.signal + "\n";
-    return text + "addf " + instance + " " + topic.thread + "\n";
+using Words = std::vector<std::string>;
+
+Words with(Words words, const Words& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
 }
 
-std::string take(const Cell& cell, const NodeTopic& topic, std::size_t node, const std::string& participant) {
-    const std::string instance = in_name(cell, topic, node);
-    std::string fields, nets;
+void publish(const Cell& cell, const NodeTopic& topic, const Words& participant, std::vector<Words>& commands) {
+    dds::PublishLink link{{out_name(cell, topic), topic_name(cell, topic), type_name(cell, topic)},
+                          1e9 / static_cast<double>(topic.rate_ns)};
+    for (const NodeField& field : topic.fields) link.fields.push_back({field.signal, std::string(name(field.type))});
+    commands.push_back(with(link.arguments(), participant));
+    for (const NodeField& field : topic.fields) commands.push_back({"net", field.signal, "=>", link.instance + "." + field.signal});
+    commands.push_back({"addf", link.instance, topic.thread});
+}
+
+void subscribe(const Cell& cell, const NodeTopic& topic, std::size_t node, const Words& participant, std::vector<Words>& commands) {
+    dds::SubscribeLink link{{in_name(cell, topic, node), topic_name(cell, topic), type_name(cell, topic)},
+                            (topic.deadline_ns + 999'999) / 1'000'000};
+    std::vector<Words> nets;
     std::vector<const Pin*> pins;
     for (const NodeField& field : topic.fields) {
+        link.fields.push_back({field.signal, std::string(name(field.type))});
         const NodeReader* const reader = reader_of(field, node);
-        fields += (fields.empty() ? "" : ",") + field.signal + ":" + name(field.type);
-        if (!reader) continue;  // it comes along for another node
-        fields += "=" + format_exact(field.type, reader->safe);
-        nets += "net " + field.signal + " <= " + instance + "." + field.signal + "\n";
+        if (!reader) continue;  // another node reads it
+        link.fields.back().safe = format_exact(field.type, reader->safe);
+        nets.push_back({"net", field.signal, "<=", link.instance + "." + field.signal});
         pins.insert(pins.end(), reader->pins.begin(), reader->pins.end());
     }
-    const Thread* const thread = thread_for(cell.session(node).model(), pins);
-    return "loadrt dds_subscribe names=" + instance + " topic=" + topic_name(cell, topic) + " type=" + type_name(cell, topic) +
-           " fields=\"" + fields + "\" timeout_ms=" + ms(topic.deadline_ns) + " reliable=0" + participant + "\n" + nets + "addf " +
-           instance + " " + thread->name + " 1\n";
+    commands.push_back(with(link.arguments(), participant));
+    commands.insert(commands.end(), nets.begin(), nets.end());
+    commands.push_back({"addf", link.instance, thread_for(cell.session(node).model(), pins)->name, "1"});
 }
 
 }  // namespace
@@ -126,7 +132,7 @@ std::vector<std::string> node_latencies(const Cell& cell, std::size_t node, bool
 
 namespace {
 
-/// A line of the text begins with the word: worth parsing.
+/// Returns true when a line of the text begins with `node`, so that it is worth parsing.
 bool has_node_line(std::string_view text) {
     for (std::size_t at = text.find("node"); at != text.npos; at = text.find("node", at + 1)) {
         const std::size_t before = text.substr(0, at).find_last_not_of(" \t");
@@ -140,59 +146,60 @@ bool has_node_line(std::string_view text) {
 
 std::vector<NodeLine> nodes_of(const std::vector<std::string>& files, const std::string& ini_file) {
     std::vector<NodeLine> nodes;
-    Diagnostics said_when_run;
+    Diagnostics reported_when_run;
     Sources texts;
     Ini ini;
-    if (!ini_file.empty()) ini = Ini::read(texts, ini_file, said_when_run);
+    if (!ini_file.empty()) ini = Ini::read(texts, ini_file, reported_when_run);
     const auto anything = [](const std::string& name) -> std::optional<std::string> {
         const char* const value = std::getenv(name.c_str());
         return value ? value : name;
     };
-    const auto look = [&](const std::string& file) {
+    const auto collect = [&](const std::string& file) {
         std::string text, problem;
         if (file.ends_with(".tcl") || !read_text_file(resolve_path(file, ""), text, problem) || !has_node_line(text)) return;
         const std::uint32_t source = texts.add(file, std::move(text));
-        collect_nodes(parse(texts, source, {&ini, anything}, said_when_run), nodes, said_when_run);
+        collect_nodes(parse(texts, source, {&ini, anything}, reported_when_run), nodes, reported_when_run);
     };
     for (const std::string& file : files) {
         if (!file.ends_with(".ini")) {
-            look(file);
+            collect(file);
             continue;
         }
-        ini = Ini::read(texts, resolve_path(file, ""), said_when_run);
+        ini = Ini::read(texts, resolve_path(file, ""), reported_when_run);
         for (const std::string& entry : ini.all("HAL", "HALFILE"))
-            look(resolve_path(entry.substr(0, entry.find(' ')), folder_of(canonical_path(resolve_path(file, "")))));
+            collect(resolve_path(entry.substr(0, entry.find(' ')), folder_of(canonical_path(resolve_path(file, "")))));
     }
     return nodes;
 }
 
-NodeLinks node_links(const Cell& cell, std::size_t node, const std::string& participant) {
-    NodeLinks links;
-    std::string peers, offers, wants, after;
+NodeLinks node_links(const Cell& cell, std::size_t node, const std::vector<std::string>& participant) {
+    dds::NodeLink own{cell.name(), cell.nodes()[node].name, {}, {}, {}};
     for (const NodeLine& other : cell.nodes())
-        if (other.name != cell.nodes()[node].name) peers += (peers.empty() ? "" : ",") + other.name;
+        if (other.name != own.node) own.others.push_back(other.name);
+    NodeLinks links;
+    std::vector<Words> sent, monitored;
     const Thread* const thread = thread_for(cell.session(node).model(), {});
+    if (thread) links.after.push_back({"addf", "node.watch", thread->name, "1"});
+    // Subscribers run before everything that reads their pins, and before node.watch: each addf puts its function first.
     std::set<std::size_t> heard;
-    std::string takes;
     for (const NodeTopic& topic : cell.topics()) {
         const std::string described = from(cell, topic) + "/" + topic.thread + "=" + compact(topic) + ";";
         if (topic.from == node) {
-            links.behind += send(cell, topic, participant);
-            offers += described;
+            publish(cell, topic, participant, sent);
+            own.offers += described;
         } else if (topic.read_by(node)) {
-            takes += take(cell, topic, node, participant);
-            wants += described;
-            if (!heard.insert(topic.from).second) continue;  // the first topic speaks for the node
+            subscribe(cell, topic, node, participant, links.after);
+            own.wants += described;
+            if (!heard.insert(topic.from).second) continue;  // the node is online while its first topic is valid
             const std::string instance = in_name(cell, topic, node), name = from(cell, topic);
-            after += "net node:" + name + ":heard " + instance + ".valid => node." + name + ".heard\n";
-            after += "net node:" + name + ":age " + instance + ".age-ms => node." + name + ".heard-age-ms\n";
+            monitored.push_back({"net", "node:" + name + ":heard", instance + "." + dds::pin::valid, "=>",
+                                 dds::NodeLink::pin(name, dds::pin::heard)});
+            monitored.push_back({"net", "node:" + name + ":age", instance + "." + dds::pin::age_ms, "=>",
+                                 dds::NodeLink::pin(name, dds::pin::heard_age_ms)});
         }
     }
-    links.before = "loadrt node cell=" + cell.name() + " node=" + cell.nodes()[node].name + (peers.empty() ? "" : " others=" + peers) +
-                   (offers.empty() ? "" : " offers=\"" + offers + "\"") + (wants.empty() ? "" : " wants=\"" + wants + "\"") + participant +
-                   "\n";
-    // what comes from others is taken before anything reads it; the watch sees it just taken
-    links.behind = (thread ? "addf node.watch " + thread->name + " 1\n" : "") + takes + after + links.behind;
+    links.before.push_back(with(own.arguments(), participant));
+    for (auto* const more : {&monitored, &sent}) links.after.insert(links.after.end(), more->begin(), more->end());
     return links;
 }
 

@@ -100,9 +100,9 @@ int Script::run(std::uint32_t source) {
     return failed_ ? 1 : 0;
 }
 
-int Script::run(const Command& command) {
+int Script::run(const std::vector<Command>& commands) {
     files_.push_back({"", {}});
-    run_line(command);
+    run_row(commands, 0, commands.size());
     files_.pop_back();
     finish();
     return failed_ ? 1 : 0;

@@ -29,8 +29,8 @@ public:
 
     /// Runs a text that is in the session's sources, then ends the last transaction. Returns 0, or 1 when anything failed.
     int run(std::uint32_t source);
-    /// Runs one command whose text is in the session's sources.
-    int run(const Command& command);
+    /// Runs commands whose text is in the session's sources, then ends the last transaction. Returns like run(source).
+    int run(const std::vector<Command>& commands);
     /// Several texts with the loads of all of them merged and done first (`[HAL]TWOPASS`).
     int run_two_pass(const std::vector<std::uint32_t>& texts);
 

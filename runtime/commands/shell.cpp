@@ -80,13 +80,21 @@ std::vector<std::string> Shell::latencies() const {
 void Shell::look_in(std::optional<Ini> ini) { state_->ini = std::move(ini); }
 
 int Shell::execute(const std::vector<std::string>& words, Output& output, std::string_view name) {
-    if (words.empty()) return 0;
+    return words.empty() ? 0 : execute(std::vector<std::vector<std::string>>{words}, output, name);
+}
+
+int Shell::execute(const std::vector<std::vector<std::string>>& all, Output& output, std::string_view name) {
     Script script(*this, *state_, output);
     Sources& sources = state_->session.sources;
+    std::vector<Command> commands;
     std::string text;
-    command_of(words, 0, text);
-    const std::uint32_t source = sources.add(std::string(name), text);
-    const int status = script.run(command_of(words, source, text = {}));
+    for (const auto& words : all) commands.push_back(command_of(words, 0, text));
+    const std::uint32_t source = sources.add(std::string(name), std::move(text));
+    for (Command& command : commands) {
+        command.span.source = command.name.span.source = source;
+        for (Token& word : command.args) word.span.source = source;
+    }
+    const int status = script.run(commands);
     if (script.quit_seen()) state_->quit = true;
     if (script.text_can_go()) sources.drop(source);
     return status;

@@ -82,6 +82,8 @@ public:
     int execute(std::string_view line, Output& output, std::string_view name = "<shell>", std::uint32_t number = 1);
     /// Runs one command whose words are given as they are: no quotes, no comments, nothing to substitute.
     int execute(const std::vector<std::string>& words, Output& output, std::string_view name = "<commandline>");
+    /// Runs several commands of words like a text: consecutive edits are one transaction.
+    int execute(const std::vector<std::vector<std::string>>& commands, Output& output, std::string_view name);
     /// Runs a text as a file: consecutive edits are one transaction, ended by commands that act and by the end.
     int run_text(std::string name, std::string text, Output& output);
     /// Runs a .hal file, or an .ini file with its [HAL] section: HALFILE=, HALCMD=, TWOPASS=. An .ini file also becomes

@@ -77,7 +77,7 @@ std::vector<Command> parse(const Sources& sources, std::uint32_t source, const E
 std::vector<Command> expand(const Command& command, Diagnostics& diagnostics);
 
 /// A command of words that were separated before: one-shot commands of a command line. Nothing in them is substituted and no quote is
-/// special. `text` becomes the words on one line, quoted where that shows their boundaries; the spans point into it, as source `source`.
+/// special. Appends the words to `text` as one line, quoted where that shows their boundaries; the spans point into it, as source `source`.
 Command command_of(const std::vector<std::string>& words, std::uint32_t source, std::string& text);
 
 /// The word as it has to be written in a netlist to arrive as one word: `config=a b` is `config="a b"`.

@@ -40,7 +40,7 @@ std::string_view without_quotes(std::string_view word) {
 Command command_of(const std::vector<std::string>& words, std::uint32_t source, std::string& text) {
     Command command;
     for (const std::string& word : words) {
-        if (!text.empty()) text += ' ';
+        if (!text.empty()) text += &word == words.data() ? '\n' : ' ';
         std::string shown = written(word);
         std::replace_if(shown.begin(), shown.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
         const auto begin = static_cast<std::uint32_t>(text.size());
@@ -49,7 +49,7 @@ Command command_of(const std::vector<std::string>& words, std::uint32_t source, 
         if (&word == words.data()) command.name = std::move(token);
         else command.args.push_back(std::move(token));
     }
-    command.span = {source, 0, static_cast<std::uint32_t>(text.size())};
+    command.span = {source, command.name.span.begin, static_cast<std::uint32_t>(text.size())};
     return command;
 }
 

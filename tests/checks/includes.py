@@ -19,7 +19,7 @@ ROWS = {
     "runtime/machine": ["runtime/execute", "runtime/model", "runtime/netlist"],
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
-    "runtime/cells": ["runtime/control"],
+    "runtime/cells": ["runtime/control", "components/dds/links"],
     "tools": ["tools/inspect", "tools/comp", "tools/bus"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/cli", "runtime/cells"],
@@ -44,7 +44,8 @@ ROWS = {
     "components/sim": ["components"],
     "components/estimation": ["components"],
     "components/vision": ["components"],
-    "components/dds": ["components"],
+    "components/dds": ["components", "components/dds/links"],
+    "components/dds/links": [],  # what cells gives the components, as data
     "components": ["runtime/sdk", "runtime/text"],
     "components/cia402": ["runtime/sdk"],
     "components/canopen/protocol": ["runtime/sdk", "runtime/text", "drivers/link", "components/cia402"],  # cia402: the error codes

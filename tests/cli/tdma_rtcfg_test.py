@@ -50,13 +50,13 @@ class Rtcfg(Segment):
         self.assertEqual("FALSE", self.pin("x", "configured"))
         self.station("m", NETLIST.format("config=cell.tdma station=m"))
         self.wait_for_words("x", RUNS)
-        written = f"tdma.0: the file from {self.mac('m')}, {len(self.file)} bytes, is in 'received'\n"
+        written = f"tdma.0: received 'received' from {self.mac('m')} ({len(self.file)} bytes)\n"
         self.wait_for_words("x", written)
         self.assertEqual(self.file, (self.folder / "received").read_text())
         self.wait_for("m", "stations", "1")
         self.wait_for("x", "stage2-bytes", str(len(self.file)))
         said = self.said("x")
-        configured = f"tdma.0: configured by {self.mac('m')}: it is station x with 1 slot, the cycle is 5000 us\n"
+        configured = f"tdma.0: configured by {self.mac('m')} as station x: 1 slot, cycle 5000 us\n"
         self.assertEqual([1, 1, 1], [said.count(words) for words in (waits, configured, written)], said)
 
         # Switched off and on again.
@@ -79,7 +79,7 @@ class Rtcfg(Segment):
         self.wait_for_words("node", "hal node: waits for the master of eth:wire0 to send it its schedule (RTcfg); the master's file must have a "
                                     f"block with 'mac {self.mac('x')}'\n")
         master = self.station("m", NETLIST.format("config=cell.tdma station=m").replace("5000000", "2000000"))
-        self.wait_for_words("node", f"hal node: configured by {self.mac('m')}: it is station x with 1 slot, the cycle is 2000 us\n")
+        self.wait_for_words("node", f"hal node: configured by {self.mac('m')} as station x: 1 slot, cycle 2000 us\n")
         self.wait_for_words("m", f"tdma.0: station x ({self.mac('x')}) is configured\n")
         self.wait_for("m", "stations", "1")
         self.wait_for_words("node", "hal node: runs: its slots may be used\n")
@@ -88,7 +88,7 @@ class Rtcfg(Segment):
         self.wait_for_words("node", f"hal node: lost the sync of {self.mac('m')}; this station stops sending until the next sync\n")
         self.write("cell.tdma", CELL.format(self.mac("x")))  # here its slot is far behind the beginning of its cycle
         self.station("m", NETLIST.format("config=cell.tdma station=m"))
-        self.wait_for_words("node", f"hal node: configured by {self.mac('m')}: it is station x with 1 slot, the cycle is 5000 us\n")
+        self.wait_for_words("node", f"hal node: configured by {self.mac('m')} as station x: 1 slot, cycle 5000 us\n")
         self.wait_for_words("node", "hal node: runs: its slots may be used\n", 2)
         self.wait_for("m", "stations", "1")
         self.stop(node)

@@ -123,7 +123,7 @@ class Tdma(Case):
         self.assertEqual("hal tdma ping: instance 'default' has no station of a segment (loadrt tdma)\n", self.bad("tdma", "ping", "x"))
 
     def test_a_recording_reports_missing_samples(self):
-        for words, problem in (("", "into which file? write file=seen.pcapng"),
+        for words, problem in (("", "missing file=; write file=seen.pcapng"),
                                ("file=none/seen.pcapng", "none/seen.pcapng cannot be written: No such file or directory"),
                                ("file=seen.pcapng link=sim:", "sim:: the name of the segment is missing; write sim:net0")):
             self.write("record.hal", f"loadrt segment_record {words}\nstart\n")
@@ -134,7 +134,7 @@ class Tdma(Case):
                    "addf tdma.0.transmit servo\naddf segment-record.0.update servo\nstart\nadvance 2s\ngetp segment-record.0.failed\n")
         done = self.run_program("sim", "full.hal")
         self.assertEqual("TRUE\n", done.stdout)
-        self.assertEqual(1, done.stderr.count("segment-record.0: /dev/full cannot be written any more; is the disk full?\n"), done.stderr)
+        self.assertEqual(1, done.stderr.count("segment-record.0: cannot write /dev/full; check that the disk is not full\n"), done.stderr)
 
     def test_bad_plan(self):
         self.write("cell.tdma", CELL.replace("slot 0 200", "slot 0 110"))

@@ -57,7 +57,7 @@ print(hashlib.sha256(got[::-1]).hexdigest())
 """
 
 GRANT = ("needs the capability CAP_NET_ADMIN; grant it with: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw,cap_net_admin=ep "
-         f"{HAL.resolve()}; or make it once: ")
+         f"{HAL.resolve()}; or create it once: ")
 WITHOUT_ADMIN = ("setpriv", "--bounding-set=-net_admin", "--inh-caps=-net_admin")
 
 
@@ -105,18 +105,18 @@ class Tunnel(Segment):
                                                                  "frames-sent", "syncs-lost", "frames-intruding")}, file=sys.stderr)
             self.assertEqual(["TRUE", "TRUE", "FALSE"], [self.pin(name, pin) for pin in ("synchronous", "running", "fault")],
                              self.said(name))
-            self.assertEqual([0] * 3, [self.number(name, pin) for pin in ("losses", "tunnel-refused", "frames-foreign")], self.said(name))
+            self.assertEqual([0] * 3, [self.number(name, pin) for pin in ("losses", "tunnel-rejected", "frames-foreign")], self.said(name))
             self.assertGreater(self.number(name, "tunnel-sent"), 90)  # 120 kB are 83 packets each way; five pings
             self.assertNotIn("babbling", self.said(name))
 
     def test_its_mtu_is_its_slots_size(self):
         self.both(size=200)
         self.assertIn("mtu 196", self.at("x", "ip", "link", "show", "hal0").stdout)
-        self.assertIn("tdma.0: ordinary packets pass by hal0, MTU 196, IP 10.9.0.2\n", self.said("x"))
+        self.assertIn("tdma.0: tunnel open for ordinary packets: hal0, MTU 196, IP 10.9.0.2\n", self.said("x"))
         self.ping("x", "10.9.0.1", "-s", "400")
         # The interface is removed and created with its station.
         ip("-n", "m", "link", "delete", "hal0")
-        self.wait_for_words("m", "tdma.0: the interface hal0 was deleted; ordinary packets pass again after unloadrt and loadrt\n")
+        self.wait_for_words("m", "tdma.0: interface hal0 was deleted; ordinary packets pass again after unloadrt and loadrt\n")
         self.assertEqual("TRUE", self.pin("m", "running"))
 
     def test_a_station_without_a_file_gets_its_ip_with_its_schedule(self):
@@ -125,7 +125,7 @@ class Tunnel(Segment):
         self.station("x", self.netlist("x").replace("config=cell.tdma station=x", "station=auto"))
         self.assertNotIn("ordinary packets", self.said("x"))
         self.station("m", self.netlist("m"))
-        self.wait_for_words("x", "tdma.0: ordinary packets pass by hal0, MTU 196, IP 10.9.0.2\n")
+        self.wait_for_words("x", "tdma.0: tunnel open for ordinary packets: hal0, MTU 196, IP 10.9.0.2\n")
         for name in self.names:
             self.wait_for_carrier(name)
         self.ping("m", "10.9.0.2")
@@ -141,27 +141,27 @@ class Tunnel(Segment):
 
     def test_what_is_in_the_way_is_named(self):
         starts = "'tdma.0' (tdma) cannot start: tunnel: "
-        self.assertEqual(starts + "wire0 is another interface's name, and that is no TAP; give this one another name, as in hal%d "
+        self.assertEqual(starts + "interface wire0 exists, but is not a TAP interface; use another name, for example hal%d "
                          "[start-failed]", self.refused("tunnel=wire0"))
         by_hand = ("sudo ip tuntap add dev hal0 mode tap user $USER; sudo ip link set hal0 address " + self.mac("m") +
                    " mtu 1496 up; sudo ip addr add 10.9.0.1/16 dev hal0")
-        self.assertEqual(starts + "the interface hal0 " + GRANT + by_hand + " [start-failed]",
+        self.assertEqual(starts + "interface hal0 " + GRANT + by_hand + " [start-failed]",
                          self.refused("tunnel=hal0 netmask=255.255.0.0", *WITHOUT_ADMIN))
-        self.assertEqual(starts + "this machine has no /dev/net/tun (No such file or directory); sudo modprobe tun, or for a container: "
+        self.assertEqual(starts + "missing /dev/net/tun (No such file or directory); type: sudo modprobe tun, or for a container add: "
                          "--device /dev/net/tun [start-failed]",
                          self.refused("tunnel=hal0", "unshare", "--mount", "sh", "-c", 'mount -t tmpfs tmpfs /dev/net && exec "$@"', "sh"))
         self.station("m", self.netlist("m"))
         wait_until(lambda: "running until" in self.said("m"), "the master runs")
-        self.assertEqual(starts + "the interface hal0 is another process's; give this one another name, as in hal%d [start-failed]",
+        self.assertEqual(starts + "interface hal0 is in use by another process; use another name, for example hal%d [start-failed]",
                          self.refused("tunnel=hal0"))
 
     def test_what_cannot_be_is_named_before_anything_starts(self):
-        self.assertEqual("component 'tdma': tunnel=hal0: ordinary packets leave in slot 1, and x has none; write slot 1 OFFSET into its "
-                         "block of cell.tdma; `hal tdma plan` shows what is free [bad-argument]",
+        self.assertEqual("component 'tdma': tunnel=hal0: ordinary packets use slot 1, and x has none; add slot 1 OFFSET to its "
+                         "block in cell.tdma: `hal tdma plan` shows the free time [bad-argument]",
                          self.refused("tunnel=hal0", station="x", cell=CELL.replace("slot 1 3500 1/1 {size}", "")))
-        self.assertEqual("component 'tdma': tunnel='a/b' is no name of an interface: at most 15 letters and digits, as in hal0, or "
-                         "hal%d for the first that is free [bad-argument]", self.refused("tunnel=a/b"))
-        self.assertEqual("component 'tdma': netmask=255.0.255.0 is none; write 24 or 255.255.255.0 [bad-argument]",
+        self.assertEqual("component 'tdma': tunnel='a/b' is not a valid interface name; use at most 15 letters and digits, for example hal0, or "
+                         "hal%d for the first free number [bad-argument]", self.refused("tunnel=a/b"))
+        self.assertEqual("component 'tdma': invalid netmask=255.0.255.0; write 24 or 255.255.255.0 [bad-argument]",
                          self.refused("tunnel=hal0 netmask=255.0.255.0"))
         self.assertEqual("slot 1 is that of ordinary packets, and 71 bytes are too few: IP needs 68 and the RTmac header 4 [tdma-schedule]",
                          self.refused("tunnel=hal0", cell=CELL.replace("1/1 1500", "1/1 71")))
@@ -172,8 +172,8 @@ class Tunnel(Segment):
         node = ["ip", "netns", "exec", "x", HAL, "node", "axis-io", "--id", "2", "--link", "cane:wire0?to=master",
                 "--tdma", "cell.tdma", "--station", "x"]
         ended = subprocess.run([*node, "--tunnel", "wire0"], cwd=self.folder, env=self.environment, stderr=subprocess.PIPE, text=True)
-        self.assertEqual((1, "hal node axis-io: --tunnel: wire0 is another interface's name, and that is no TAP; give this one another "
-                          "name, as in hal%d\n"), (ended.returncode, ended.stderr))
+        self.assertEqual((1, "hal node axis-io: --tunnel: interface wire0 exists, but is not a TAP interface; use another name, "
+                          "for example hal%d\n"), (ended.returncode, ended.stderr))
         process = subprocess.Popen([*node, "--tunnel", "hal%d"], cwd=self.folder, env=self.environment, stdout=subprocess.DEVNULL)
         self.addCleanup(self.stop, process)
         self.wait_for("m", "running", "TRUE")
@@ -191,7 +191,7 @@ class Tunnel(Segment):
                                    cwd=self.folder, env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self.addCleanup(process.stderr.close)
         self.addCleanup(self.stop, process)
-        self.assertEqual("tdma.0: ordinary packets pass by hal7, MTU 1496, IP 10.9.0.1\n", process.stderr.readline())
+        self.assertEqual("tdma.0: tunnel open for ordinary packets: hal7, MTU 1496, IP 10.9.0.1\n", process.stderr.readline())
         self.station("x", self.netlist("x"))
         self.wait_for("x", "tunnel-open", "TRUE")
         self.ping("x", "10.9.0.1")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""What the network does: a partition and its healing, what leaves the machine, a discovery server; in a network namespace of its own. Skipped
-where that cannot be made."""
+"""What the network does: a partition and its end, which packets leave the machine, a discovery server; in a network namespace of its own. Skipped
+where none can be created."""
 import json
 import shutil
 import signal
@@ -12,7 +12,7 @@ import unittest
 from rig import DdsCase, own_network, wait_until
 
 if not own_network():
-    print("no network namespace of one's own here (unshare --net)")
+    print("cannot create a network namespace (unshare --net)")
     sys.exit(77)
 
 
@@ -26,7 +26,7 @@ def sent_packets(interface):
 
 
 class Network(DdsCase):
-    def test_a_partition_is_noticed_and_heals(self):
+    def test_a_partition_makes_the_pins_invalid_until_it_ends(self):
         self.publisher(1.5)
         self.subscriber(more="timeout_ms=300")
         self.becomes("sub.valid", "TRUE")
@@ -34,33 +34,33 @@ class Network(DdsCase):
         self.addCleanup(ip, "link", "set", "lo", "up")
         self.becomes("sub.valid", "FALSE")
         self.assertEqual("-1", self.value("sub.angle", "subscriber"))
-        self.becomes("sub.matched", "0")  # both have forgotten each other
+        self.becomes("sub.matched", "0")  # both have dropped each other
         self.becomes("pub.matched", "0", "publisher")
         ip("link", "set", "lo", "up")
         self.becomes("sub.valid", "TRUE")
         self.shows("1.5")
-        self.says("sub: topic 'arm/state' is valid again\n")
+        self.prints("sub: topic 'arm/state' is valid again\n")
 
-    def test_a_process_that_stood_still_is_found_again(self):
-        """It begins anew, and does not count on being remembered: what Fast DDS 2.9 keeps of another that it has forgotten may not fit any more."""
+    def test_a_suspended_process_announces_itself_again(self):
+        """It uses a new identity: the state that Fast DDS 2.9 keeps of a dropped participant may be stale."""
         self.subscriber(more="timeout_ms=300")
         publisher = self.publisher(1.5)
         self.becomes("sub.valid", "TRUE")
         publisher.send_signal(signal.SIGSTOP)
         self.addCleanup(publisher.send_signal, signal.SIGCONT)
-        self.becomes("sub.matched", "0")  # forgotten, after 5 s
-        wait_until(lambda: float(self.value("sub.age-ms", "subscriber")) > 7000, "it stands still for longer than it is remembered")
+        self.becomes("sub.matched", "0")  # dropped after 5 s
+        wait_until(lambda: float(self.value("sub.age-ms", "subscriber")) > 7000, "it is suspended for longer than its lease")
         self.assertEqual("FALSE", self.value("sub.valid", "subscriber"))
         publisher.send_signal(signal.SIGCONT)
         # a process without CPU time for longer than its threads' limit runs its functions again after `start`
-        wait_until(lambda: "got no CPU time" in self.shell("show", "fault", instance="publisher").stdout, "the fault of the thread is known")
+        wait_until(lambda: "got no CPU time" in self.shell("show", "fault", instance="publisher").stdout, "the thread has reported its fault")
         self.good("shell", "--name", "publisher", "start")
         self.becomes("sub.valid", "TRUE")
         self.shows("1.5")
         self.becomes("pub.matched", "1", "publisher")
-        self.assertRegex(self.words("publisher"), r"dds: this process stood still for \d+\.\d s, so others may have forgotten it; it makes itself known anew\n")
+        self.assertRegex(self.words("publisher"), r"dds: this process was suspended for \d+\.\d s and may have been dropped by others; announcing it again\n")
 
-    def test_nothing_leaves_the_machine_unless_asked(self):
+    def test_nothing_leaves_the_machine_without_interfaces(self):
         ip("link", "add", "out0", "type", "veth", "peer", "name", "out1")
         self.addCleanup(ip, "link", "del", "out0")
         for command in (["link", "set", "out0", "address", "02:00:00:00:00:01"], ["addr", "add", "10.77.0.1/24", "dev", "out0"],
@@ -75,9 +75,9 @@ class Network(DdsCase):
         self.assertEqual(before, sent_packets("out0"))
         self.end_quietly(publisher)
         self.publisher(more="interfaces=out0")
-        wait_until(lambda: sent_packets("out0") > before, "it announces itself where it was told to")
+        wait_until(lambda: sent_packets("out0") > before, "it announces itself on the given interface")
 
-    def test_a_discovery_server_brings_them_together(self):
+    def test_a_discovery_server_connects_them(self):
         if not shutil.which("fast-discovery-server"):
             self.skipTest("fast-discovery-server is not installed (fastdds-tools)")
         server = subprocess.Popen(["fast-discovery-server", "-i", "0", "-l", "127.0.0.1", "-p", "11811"], stdin=subprocess.DEVNULL,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the tests of DDS share: machines on a domain of their own, strangers, certificates."""
+"""Shared by the DDS tests: machines on a domain of their own, and rogue, a program that misbehaves on a topic."""
 import os
 import subprocess
 import sys
@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "cli"))
 from harness import HAL, Case, wait_until  # noqa: E402, F401
 from own_network import dds_domain, own_network  # noqa: E402, F401
 
-STRANGER = Path(os.environ.get("DDS_STRANGER") or HAL.parent / "dds_stranger")
+ROGUE = Path(os.environ.get("DDS_ROGUE") or HAL.parent / "dds_rogue")
 DOMAIN = dds_domain()  # in a network of its own
 
 PUBLISH = """loadrt threads name1=servo period1=1000000
@@ -29,15 +29,14 @@ FIELDS = "angle:float=-1,ready:bit=0,count:s32*2"
 class DdsCase(Case):
     def setUp(self):
         super().setUp()
-        # Fast DDS 2.9 never frees the keys of a handshake that is refused or ends half-way.
+        # Fast DDS 2.9 never frees the keys of a handshake that is rejected or aborted.
         self.environment["LSAN_OPTIONS"] = "print_suppressions=0:suppressions=" + self.write("known-leaks", "leak:libcrypto\n")
         self.environment["ASAN_OPTIONS"] = ":".join(filter(None, [os.environ.get("ASAN_OPTIONS"), "new_delete_type_mismatch=0"]))
         if os.environ.get("HALCYON_PLUGIN_PATH"):
             self.environment["HALCYON_PLUGIN_PATH"] = os.environ["HALCYON_PLUGIN_PATH"]
-        self.said = {}
 
     def machine(self, instance, netlist):
-        """A machine that runs; what it says on standard error is in said(instance)."""
+        """Starts a machine; words(instance) returns its standard error."""
         self.write(instance + ".hal", netlist)
         log = open(self.folder / (instance + ".log"), "a")
         self.addCleanup(log.close)
@@ -69,29 +68,29 @@ class DdsCase(Case):
         wait_until(lambda: self.value(pin, instance) == value, f"{instance}: {pin} is {value}")
 
     def shows(self, *values):
-        """The subscriber's pins become valid with these values: on a busy machine samples may be late, and what was valid is not for a while."""
+        """Waits for the subscriber's pins to have these values: on a busy machine samples may be late and the pins invalid for a moment."""
         for pin, value in zip(("angle", "ready", "count-0", "count-1"), values):
             self.becomes("sub." + pin, value)
 
-    def says(self, text, instance="subscriber"):
-        wait_until(lambda: text in self.words(instance), f"{instance} says '{text}'")
+    def prints(self, text, instance="subscriber"):
+        wait_until(lambda: text in self.words(instance), f"{instance} prints '{text}'")
 
-    def stranger(self, *words, fields="angle:float,ready:bit,count:s32*2", topic="arm/state", domain=DOMAIN):
-        """A program on the topic until its input ends."""
-        process = subprocess.Popen([str(STRANGER), topic, fields, f"domain={domain}", *words], cwd=self.folder, env=self.environment,
+    def rogue(self, *words, fields="angle:float,ready:bit,count:s32*2", topic="arm/state", domain=DOMAIN):
+        """Starts a program on the topic that runs until its input ends."""
+        process = subprocess.Popen([str(ROGUE), topic, fields, f"domain={domain}", *words], cwd=self.folder, env=self.environment,
                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(self.end_stranger, process)
+        self.addCleanup(self.end_rogue, process)
         return process
 
-    def reads_a_sample(self, stranger):
-        """The line of the first sample that one reads who listens."""
-        while (line := stranger.stdout.readline()) and not line.startswith("sample"):
+    def reads_a_sample(self, rogue):
+        """Returns the line of the first sample that a listening rogue receives."""
+        while (line := rogue.stdout.readline()) and not line.startswith("sample"):
             pass
         self.assertTrue(line, "it ended without a sample")
         return line
 
-    def end_stranger(self, process):
-        """Its whole output."""
+    def end_rogue(self, process):
+        """Ends it and returns its whole output."""
         if process.stdin.closed:
             return "", ""
         out = process.communicate(timeout=120)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Types made of pins, byte by byte (XCDR1: DDSI-RTPS 2.3, 10.2), and what comes back out of bytes that anybody may have sent.
+// Types made of pins, byte by byte (XCDR1: DDSI-RTPS 2.3, 10.2), and decoding of untrusted bytes.
 #include "dds/schema.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ std::string names(const Schema& s) {
     for (const Field& f : s.fields) all += f.name + " ";
     return all;
 }
-std::string refusal(std::string_view fields) {
+std::string rejection(std::string_view fields) {
     try {
         Schema::of_fields(fields);
     } catch (const std::invalid_argument& e) { return e.what(); }
@@ -34,7 +34,7 @@ std::vector<hal_value> decoded(const Schema& s, const Bytes& bytes) {
     return values;
 }
 
-TEST(Schema, fields_stand_aligned_behind_the_header) {
+TEST(Schema, of_fields_aligns_each_field_after_the_header) {
     const Schema s = Schema::of_fields("ready:bit,angle:float,count:s32,mode:bit,time:u64");
     ASSERT_EQ(5u, s.places.size());
     EXPECT_EQ(4u, s.places[0].offset);
@@ -46,7 +46,7 @@ TEST(Schema, fields_stand_aligned_behind_the_header) {
     EXPECT_EQ((Bytes{0, 1, 0, 0}), Bytes(s.sample.begin(), s.sample.begin() + 4));
 }
 
-TEST(Schema, values_come_out_as_they_went_in) {
+TEST(Schema, decode_returns_the_encoded_values_of_every_type) {
     Schema s = Schema::of_fields("b:bit,f:float,i:s32,u:u32,l:s64,k:u64");
     put(s, 0, true);
     put(s, 1, -2.5);
@@ -63,7 +63,7 @@ TEST(Schema, values_come_out_as_they_went_in) {
     EXPECT_EQ(~std::uint64_t{1}, v[5].u64);
 }
 
-TEST(Schema, other_byte_orders_and_the_second_representation_are_read) {
+TEST(Schema, decode_accepts_big_endian_and_XCDR2) {
     const Schema s = Schema::of_fields("n:s32,f:float");
     const Bytes big{0, 0, 0, 0, 0, 0, 0, 5, 0, 0, 0, 0, 0x40, 0x04, 0, 0, 0, 0, 0, 0};  // 5, 2.5
     auto v = decoded(s, big);
@@ -75,7 +75,7 @@ TEST(Schema, other_byte_orders_and_the_second_representation_are_read) {
     EXPECT_EQ(2.5, v[1].real);
 }
 
-TEST(Schema, rows_and_safe_values_are_read) {
+TEST(Schema, of_fields_expands_counts_and_parses_safe_values) {
     const Schema s = Schema::of_fields("j:float*3=-1.5,ready:bit=1");
     EXPECT_EQ("j-0 j-1 j-2 ready ", names(s));
     EXPECT_EQ(-1.5, s.fields[2].safe->real);
@@ -83,7 +83,7 @@ TEST(Schema, rows_and_safe_values_are_read) {
     EXPECT_FALSE(Schema::of_fields("a:float").fields[0].safe.has_value());
 }
 
-TEST(Schema, groups_that_differ_have_types_that_differ) {
+TEST(Schema, of_fields_derives_different_type_names_from_different_fields) {
     const auto type = [](const char* fields) { return Schema::of_fields(fields).type; };
     EXPECT_EQ(type("a:float,b:bit"), type("a:float=3,b:bit=1"));
     EXPECT_NE(type("a:float,b:bit"), type("b:bit,a:float"));
@@ -92,19 +92,19 @@ TEST(Schema, groups_that_differ_have_types_that_differ) {
     EXPECT_EQ("mine::State", Schema::of_fields("a:float", "mine::State").type);
 }
 
-TEST(Schema, says_what_is_wrong_with_fields) {
-    EXPECT_EQ("fields: 'angle' has no type; write NAME:TYPE, as in angle:float,ready:bit", refusal("angle"));
-    EXPECT_EQ("fields: 'angle:real': unknown type 'real'; there are bit, float, s32, u32, s64, u64", refusal("angle:real"));
-    EXPECT_EQ("fields: 'a:float*0': after * stands how many, 1 to 1024", refusal("a:float*0"));
-    EXPECT_EQ("fields: 'a:float*5000': after * stands how many, 1 to 1024", refusal("a:float*5000"));
-    EXPECT_EQ("fields: 'a:s32=1.5': '1.5' is not a s32", refusal("a:s32=1.5"));
-    EXPECT_EQ("fields: there are two fields 'a'", refusal("a:float,b:bit,a:bit"));
-    EXPECT_EQ("fields: 'a b:float': 'a b' cannot be a pin's name; letters, digits, - _ and . can", refusal("a b:float"));
-    EXPECT_EQ("fields: '' has no type; write NAME:TYPE, as in angle:float,ready:bit", refusal("a:float,"));
-    EXPECT_EQ("fields: more than 1024 fields; make two topics of them", refusal("a:bit*600,b:bit*600"));
+TEST(Schema, of_fields_rejects_invalid_fields_with_the_reason) {
+    EXPECT_EQ("fields: 'angle' has no type; write NAME:TYPE, as in angle:float,ready:bit", rejection("angle"));
+    EXPECT_EQ("fields: 'angle:real': unknown type 'real'; types are bit, float, s32, u32, s64, u64", rejection("angle:real"));
+    EXPECT_EQ("fields: 'a:float*0': invalid count after *; write 1..1024", rejection("a:float*0"));
+    EXPECT_EQ("fields: 'a:float*5000': invalid count after *; write 1..1024", rejection("a:float*5000"));
+    EXPECT_EQ("fields: 'a:s32=1.5': '1.5' is not a s32", rejection("a:s32=1.5"));
+    EXPECT_EQ("fields: duplicate field 'a'", rejection("a:float,b:bit,a:bit"));
+    EXPECT_EQ("fields: 'a b:float': 'a b' is not a valid pin name; use letters, digits, - _ and .", rejection("a b:float"));
+    EXPECT_EQ("fields: '' has no type; write NAME:TYPE, as in angle:float,ready:bit", rejection("a:float,"));
+    EXPECT_EQ("fields: more than 1024 fields; split them into two topics", rejection("a:bit*600,b:bit*600"));
 }
 
-TEST(Schema, ros_messages_have_the_names_and_pins_of_ros) {
+TEST(Schema, of_ros_uses_the_names_and_fields_of_the_message) {
     EXPECT_EQ("std_msgs::msg::dds_::Float64_", Schema::of_ros("std_msgs/Float64").type);
     EXPECT_EQ("rt/", Schema::of_ros("std_msgs/Bool").prefix);
     EXPECT_EQ("data ", names(Schema::of_ros("std_msgs/Int32")));
@@ -115,33 +115,33 @@ TEST(Schema, ros_messages_have_the_names_and_pins_of_ros) {
     EXPECT_EQ("height width step ", names(Schema::of_ros("sensor_msgs/Image")));
 }
 
-TEST(Schema, says_what_is_wrong_with_a_message_of_ros) {
-    const auto refused = [](const char* type, const std::vector<std::string>& joints) -> std::string {
+TEST(Schema, of_ros_rejects_invalid_messages_with_the_reason) {
+    const auto rejection = [](const char* type, const std::vector<std::string>& joints) -> std::string {
         try {
             Schema::of_ros(type, joints);
         } catch (const std::invalid_argument& e) { return e.what(); }
         return "accepted";
     };
-    EXPECT_EQ("ros=sensor_msgs/JointState needs the names of its joints: joints=shoulder,elbow", refused("sensor_msgs/JointState", {}));
-    EXPECT_EQ("joints: there are two joints 'a'", refused("sensor_msgs/JointState", {"a", "b", "a"}));
-    EXPECT_EQ("joints: 'a b': 'a b' cannot be a pin's name; letters, digits, - _ and . can", refused("sensor_msgs/JointState", {"a b"}));
-    EXPECT_EQ("joints: more than 256 joints; make two topics of them",
-              refused("sensor_msgs/JointState", std::vector<std::string>(257, "a")));
-    EXPECT_EQ("ros=sensor_msgs/Imu: there are std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist WrenchStamped, "
-              "sensor_msgs/JointState Image; other types: fields= and type=, when they consist of plain numbers",
-              refused("sensor_msgs/Imu", {}));
+    EXPECT_EQ("ros=sensor_msgs/JointState: missing joint names; write joints=shoulder,elbow", rejection("sensor_msgs/JointState", {}));
+    EXPECT_EQ("joints: duplicate joint 'a'", rejection("sensor_msgs/JointState", {"a", "b", "a"}));
+    EXPECT_EQ("joints: 'a b': 'a b' is not a valid pin name; use letters, digits, - _ and .", rejection("sensor_msgs/JointState", {"a b"}));
+    EXPECT_EQ("joints: more than 256 joints; split them into two topics",
+              rejection("sensor_msgs/JointState", std::vector<std::string>(257, "a")));
+    EXPECT_EQ("ros=sensor_msgs/Imu: unsupported message type; supported are std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, "
+              "geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState Image; other types that consist of plain numbers: fields= and type=",
+              rejection("sensor_msgs/Imu", {}));
     std::vector<std::string> long_names;
     for (int i = 0; i < 256; ++i) long_names.push_back(std::to_string(i) + std::string(250, 'j'));
-    EXPECT_EQ("ros=sensor_msgs/JointState: the message has more than 60000 bytes; shorten joints=, frame= or encoding=",
-              refused("sensor_msgs/JointState", long_names));
+    EXPECT_EQ("ros=sensor_msgs/JointState: the message exceeds 60000 bytes; shorten joints=, frame= or encoding=",
+              rejection("sensor_msgs/JointState", long_names));
 }
 
-TEST(Schema, joints_are_found_by_name) {
+TEST(Schema, decode_matches_joints_by_name) {
     Schema theirs = Schema::of_ros("sensor_msgs/JointState", {"elbow", "wrist", "shoulder"}, "base");
     for (std::size_t i = 0; i < 9; ++i) put(theirs, i, static_cast<double>(i + 1));
     const Schema ours = Schema::of_ros("sensor_msgs/JointState", {"shoulder", "elbow", "tool"});
     std::vector<hal_value> v(9);
-    v[2].real = 77;  // the tool, which is not there
+    v[2].real = 77;  // the tool, a joint that the sample does not contain
     ASSERT_TRUE(decode(ours, theirs.sample, v));
     EXPECT_EQ(3, v[0].real);
     EXPECT_EQ(1, v[1].real);
@@ -150,7 +150,7 @@ TEST(Schema, joints_are_found_by_name) {
     EXPECT_EQ(9, v[6].real);
 }
 
-TEST(Schema, what_is_not_of_the_type_changes_nothing) {
+TEST(Schema, decode_leaves_the_values_unchanged_for_a_sample_of_another_type) {
     for (const Schema& s : {Schema::of_fields("a:float,b:bit"), Schema::of_ros("sensor_msgs/JointState", {"a", "b"}, "base"),
                             Schema::of_ros("sensor_msgs/Image", {}, "camera")}) {
         std::vector<hal_value> v(s.fields.size());
@@ -163,7 +163,7 @@ TEST(Schema, what_is_not_of_the_type_changes_nothing) {
         }
         bytes = s.sample;
         bytes.resize(bytes.size() + 8);
-        EXPECT_FALSE(decode(s, bytes, v)) << "more than the type has";
+        EXPECT_FALSE(decode(s, bytes, v)) << "trailing bytes";
         bytes = s.sample;
         bytes[1] = 3;  // a parameter list
         EXPECT_FALSE(decode(s, bytes, v));
@@ -171,7 +171,7 @@ TEST(Schema, what_is_not_of_the_type_changes_nothing) {
     }
 }
 
-TEST(Outbox, hands_over_in_order_and_is_full_at_last) {
+TEST(Outbox, keeps_the_order_and_rejects_samples_when_full) {
     const Schema s = Schema::of_fields("n:s32");
     Outbox box(s.sample, 4);
     std::int64_t time = 0;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""DDS Security: two machines with certificates of one authority exchange a topic; one without, one with certificates of another authority, and one
-that is not permitted the topic do not. The certificates are made here, by openssl."""
+"""DDS Security: two machines with certificates of one authority exchange a topic; one without certificates, one with those of another authority, and
+one without permission for the topic do not. The certificates are made here, by openssl."""
 import shutil
 import subprocess
 import sys
@@ -51,7 +51,7 @@ class Security(DdsCase):
         self.openssl("smime", "-sign", "-in", "plain.xml", "-text", "-out", to, "-signer", f"{authority}.pem", "-inkey", f"{authority}.key")
 
     def enclave(self, name, authority="authority", topic="arm/state"):
-        """A folder of one machine, as ROS 2's enclaves have it."""
+        """Creates the folder of one machine, in the layout of a ROS 2 enclave."""
         (self.folder / name).mkdir()
         self.openssl("ecparam", "-name", "prime256v1", "-genkey", "-noout", "-out", f"{name}/key.pem")
         self.openssl("req", "-new", "-key", f"{name}/key.pem", "-subj", f"/O=Halcyon/CN={name}", "-out", f"{name}/request")
@@ -63,7 +63,7 @@ class Security(DdsCase):
         self.sign(authority, PERMISSIONS.format(name=name, topic=topic), f"{name}/permissions.p7s")
         return f"security={self.folder / name}"
 
-    def test_those_of_one_authority_exchange_a_topic_and_others_do_not(self):
+    def test_only_participants_of_the_same_authority_exchange_a_topic(self):
         self.authority("authority")
         self.authority("other")
         self.publisher(4.5, more=self.enclave("arm"))
@@ -71,17 +71,17 @@ class Security(DdsCase):
         self.becomes("sub.valid", "TRUE")
         self.shows("4.5")
         self.becomes("pub.matched", "1", "publisher")
-        self.says("sub: hal top does not show this instance: Fast DDS made no writer of 'halcyon/status'")
+        self.prints("sub: not visible in hal top: Fast DDS created no writer for 'halcyon/status'")
 
-        # Those who may not are there first, so that they are not just slow when one who may has read a sample.
-        without = self.stranger("listen")
-        thief = self.stranger("listen", self.enclave("thief", "other"))
-        tool = self.stranger("listen", self.enclave("tool"))
+        # The participants without permission start first, so that they had time for a sample when the permitted one has read its.
+        without = self.rogue("listen")
+        thief = self.rogue("listen", self.enclave("thief", "other"))
+        tool = self.rogue("listen", self.enclave("tool"))
         self.reads_a_sample(tool)
-        self.assertEqual("ready\n", self.end_stranger(without)[0])
-        self.assertEqual("ready\n", self.end_stranger(thief)[0])
+        self.assertEqual("ready\n", self.end_rogue(without)[0])
+        self.assertEqual("ready\n", self.end_rogue(thief)[0])
 
-    def test_hal_top_with_a_certificate_sees_who_has_one(self):
+    def test_hal_top_with_a_certificate_shows_secured_instances(self):
         self.authority("authority")
         self.publisher(more=self.enclave("arm", topic="*"))
         domain, tool = f"domain={DOMAIN}", self.enclave("tool", topic="*")
@@ -89,22 +89,22 @@ class Security(DdsCase):
         wait_until(lambda: '"publisher"' in self.good("top", "--json", "--dds", f"{domain} {tool}", environment=elsewhere), "hal top sees it")
         self.assertEqual("[]\n", self.good("top", "--json", "--dds", domain, environment=elsewhere))
 
-    def test_who_is_not_permitted_the_topic_is_refused_by_name(self):
+    def test_a_topic_without_permission_is_denied_by_name(self):
         self.authority("authority")
         self.write("bad.hal", "loadrt threads name1=servo period1=1000000\nloadrt dds_publish names=pub topic=arm/state fields=a:float "
                               f"domain={DOMAIN} {self.enclave('guest', topic='other/topic')}\n")
         done = self.run_program("run", "--for", "10ms", "bad.hal")
         self.assertNotEqual(0, done.returncode)
         self.assertIn("arm/state", done.stderr)
-        self.assertIn("Fast DDS made no ", done.stderr)
+        self.assertIn("Fast DDS created no ", done.stderr)
 
-    def test_a_folder_that_lacks_a_file_is_refused_by_name(self):
+    def test_a_folder_with_a_missing_file_is_rejected_by_name(self):
         self.authority("authority")
         words = self.enclave("arm")
         (self.folder / "arm" / "key.pem").unlink()
         self.write("bad.hal", "loadrt threads name1=servo period1=1000000\nloadrt dds_publish names=pub topic=arm/state fields=a:float "
                               f"domain={DOMAIN} {words}\n")
-        self.assertIn("arm/key.pem is not there; the folder needs identity_ca.cert.pem, cert.pem, key.pem, ", self.run_program("run", "--for", "10ms", "bad.hal").stderr)
+        self.assertIn("arm/key.pem; the folder needs identity_ca.cert.pem, cert.pem, key.pem, ", self.run_program("run", "--for", "10ms", "bad.hal").stderr)
 
 
 if __name__ == "__main__":

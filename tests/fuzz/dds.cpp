@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "components/dds/schema.hpp"
-#include "components/dds/words.hpp"
+#include "components/dds/status_text.hpp"
 #include "tools/inspect/seen_instance.hpp"
 #include "tests/fuzz/driver/require.hpp"
 

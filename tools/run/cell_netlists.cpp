@@ -37,8 +37,9 @@ ShellOptions for_check() {
     return how;
 }
 
-/// Reads words KEY=VALUE for the DDS components. Returns false after printing an invalid one.
-bool good_settings(const Options& options, const std::string& settings) {
+/// Splits settings into words KEY=VALUE for the DDS components. Returns nothing after printing an invalid one.
+std::optional<std::vector<std::string>> dds_settings(const Options& options, const std::string& settings) {
+    std::vector<std::string> words;
     static constexpr std::array<std::string_view, 7> keys{"domain",        "interfaces", "peers",   "server",
                                                           "shared_memory", "profile",    "security"};
     for (std::size_t at = settings.find_first_not_of(' '); at < settings.size(); at = settings.find_first_not_of(' ', at)) {
@@ -47,12 +48,14 @@ bool good_settings(const Options& options, const std::string& settings) {
         const std::string key = word.substr(0, word.find('='));
         at = end;
         if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() &&
-            word.find_first_of("\"'#$[]{}\\\n") == word.npos)
+            word.find_first_of("\"'[]{}") == word.npos) {  // loadrt removes quotes and expands ranges
+            words.push_back(word);
             continue;
+        }
         fail(options, fmt::format("--dds: invalid setting '{}'; use KEY=VALUE with one of the keys: {}", word, fmt::join(keys, " ")));
-        return false;
+        return std::nullopt;
     }
-    return true;
+    return words;
 }
 
 /// "NODE: COMMAND" of --execute.
@@ -114,7 +117,7 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     stop.listen();
     int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
     constexpr std::int64_t slice_ns = 100'000'000;
-    if (!options.part.empty()) cell.leave_alone(cell.find(options.part));
+    if (!options.part.empty()) cell.isolate(cell.find(options.part));
     for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested(); left -= slice_ns)
         cell.advance(std::min(left, slice_ns));
     const bool loaded = status == 0;
@@ -153,25 +156,24 @@ int load_node(HostedMachine& machine, const RunOptions& options, std::vector<Nod
                     "sudo apt install libfastrtps-dev, and build again; hal sim runs all nodes in one process without it");
         return print_diagnostics(options, found);
     }
-    std::string participant = options.dds;
-    if (const char* const usual = std::getenv("HALCYON_DDS"); participant.empty() && usual) participant = usual;
-    if (!good_settings(options, participant)) return 1;
-    const NodeLinks links = cell.size() > 1 ? node_links(cell, own, participant.empty() ? "" : " " + participant) : NodeLinks{};
+    const char* const usual = std::getenv("HALCYON_DDS");
+    const auto participant = dds_settings(options, options.dds.empty() && usual ? usual : options.dds);
+    if (!participant) return 1;
+    const NodeLinks links = cell.size() > 1 ? node_links(cell, own, *participant) : NodeLinks{};
     machine.shell.add_latencies(node_latencies(cell, own, false));
     const std::string name = fmt::format("<links of node {}>", options.part);
-    const auto plain = [](const std::string& path) {  // a word that means itself
-        return path.ends_with(".hal") && path.find_first_of(" \t'\"#$[]{}\\") == path.npos;
-    };
-    if (options.ini.empty() && std::all_of(options.words.begin(), options.words.end(), plain)) {  // all of it takes effect together
-        std::string text = links.before;
-        for (const std::string& path : options.words) text += "source " + path + "\n";
-        return machine.shell.run_text(name, text + links.behind, output);
+    const auto netlist = [](const std::string& path) { return path.ends_with(".hal"); };
+    if (options.ini.empty() && std::all_of(options.words.begin(), options.words.end(), netlist)) {  // the whole machine is one transaction
+        auto commands = links.before;
+        for (const std::string& path : options.words) commands.push_back({"source", path});
+        commands.insert(commands.end(), links.after.begin(), links.after.end());
+        return machine.shell.execute(commands, output, name);
     }
-    int status = machine.shell.run_text(name, links.before, output);
+    int status = machine.shell.execute(links.before, output, name);
     if (status != 0) return status;
     status = machine.load();
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
-    return std::max(status, machine.shell.run_text(name, links.behind, output));
+    return std::max(status, machine.shell.execute(links.after, output, name));
 }
 
 }  // namespace hal::tools

@@ -48,7 +48,7 @@ void remove_leftovers() {
     }
     if (count == 0) return;
     char line[160];
-    std::snprintf(line, sizeof line, "dds: removed from /dev/shm what killed processes have left: %d segment%s of shared memory, %.1f MB\n",
+    std::snprintf(line, sizeof line, "dds: removed %d shared memory segment%s of killed processes from /dev/shm (%.1f MB)\n",
                   count, count == 1 ? "" : "s", static_cast<double>(bytes) * 1e-6);
     std::fputs(line, stderr);
 }

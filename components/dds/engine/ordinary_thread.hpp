@@ -12,7 +12,8 @@
 
 namespace hal::dds {
 
-/// What the library's threads get: an ordinary policy, and stacks that may be resident (mlockall makes them so).
+/// Runs work in a thread with an ordinary policy and a small stack (mlockall makes stacks resident); threads that the library starts
+/// there inherit both.
 class OrdinaryThread {
 public:
     template <class F>
@@ -35,7 +36,7 @@ public:
         pthread_t thread{};
         const int failed = pthread_create(&thread, &attributes, [](void* p) -> void* {
             auto& c = *static_cast<Call*>(p);
-            setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // inherited by the library's threads; where it is allowed
+            setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // inherited by the library's threads; if permitted
             try {
                 c.work();
             } catch (...) { c.error = std::current_exception(); }
@@ -45,7 +46,7 @@ public:
         pthread_setattr_default_np(&before);
         pthread_attr_destroy(&before);
         pthread_attr_destroy(&attributes);
-        if (failed != 0) throw std::runtime_error("no thread for DDS could be started");
+        if (failed != 0) throw std::runtime_error("cannot start a thread for DDS");
         if (call.error) std::rethrow_exception(call.error);
     }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The one thread of the process that writes to DDS: an ordinary one, whoever started it.
+// The thread of the process that writes to DDS; never a real-time one.
 #include <pthread.h>
 #include <sched.h>
 #include <sys/prctl.h>
@@ -44,7 +44,7 @@ public:
     }
 
 private:
-    /// Goes on while the machine sleeps.
+    /// Returns a clock that continues while the machine sleeps.
     static std::int64_t awake_ns() noexcept {
         timespec t{};
         clock_gettime(CLOCK_BOOTTIME, &t);
@@ -59,7 +59,7 @@ private:
     void begin() {
         pthread_attr_t attributes;
         pthread_attr_init(&attributes);
-        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);  // the caller may be a real-time thread's
+        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);  // the caller may be a real-time thread
         pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
         const sched_param none{};
         pthread_attr_setschedparam(&attributes, &none);
@@ -71,18 +71,18 @@ private:
         pthread_attr_destroy(&attributes);
         if (error != 0) {
             entries_.clear();
-            throw std::runtime_error("no thread for DDS could be started");
+            throw std::runtime_error("cannot start the DDS thread");
         }
         running_ = true;
         pthread_setname_np(thread_, "hal-dds");
     }
 
     void run() {
-        setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // as urgent as an ordinary thread may be, where that is allowed
-        prctl(PR_SET_TIMERSLACK, 1UL);  // it is woken beside a cycle, which is not to wait 50 us for it
+        setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // the highest priority of an ordinary thread, if permitted
+        prctl(PR_SET_TIMERSLACK, 1UL);  // the default of 50 us would delay samples
         std::unique_lock lock(mutex_);
         for (last_ns_ = awake_ns(); running_;) {
-            look_for_standstill();
+            check_for_suspension();
             engine_log().flush();
             const auto   now = Clock::now().time_since_epoch();
             std::int64_t next = now.count() + 1'000'000'000;
@@ -94,13 +94,13 @@ private:
         }
     }
 
-    /// The thread wakes every second at least; when it has not, others may have forgotten this process.
-    void look_for_standstill() {
+    /// The thread wakes at least every second. After a longer gap, others may have dropped this process.
+    void check_for_suspension() {
         const std::int64_t now = awake_ns(), gone = now - std::exchange(last_ns_, now);
         if (gone > participant_lease_ns) {
             char text[128];
             std::snprintf(text, sizeof text,
-                          "this process stood still for %.1f s, so others may have forgotten it; it makes itself known anew",
+                          "this process was suspended for %.1f s and may have been dropped by others; announcing it again",
                           static_cast<double>(gone) * 1e-9);
             engine_log().print(text);
             anew_at_ns_ = now;

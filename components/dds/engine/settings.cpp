@@ -28,7 +28,7 @@ using fastdds::dds::DomainParticipantQos;
 using fastrtps::rtps::IPLocator;
 using fastrtps::rtps::Locator_t;
 
-[[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
+[[noreturn]] void reject(const std::string& why) { throw std::runtime_error(why); }
 
 bool is_address(const std::string& text) {
     in_addr to{};
@@ -38,7 +38,7 @@ bool is_address(const std::string& text) {
 /// Addresses of this machine's interfaces by name; all names and addresses go to `known`.
 std::vector<std::string> addresses_of(const std::string& interface, std::string& known) {
     ifaddrs* list = nullptr;
-    if (getifaddrs(&list) != 0) refuse("the interfaces of this machine cannot be listed");
+    if (getifaddrs(&list) != 0) reject("cannot list the network interfaces of this machine");
     std::vector<std::string> found;
     for (const ifaddrs* i = list; i != nullptr; i = i->ifa_next) {
         if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
@@ -58,7 +58,7 @@ Locator_t address_and_port(const std::string& text, const char* what) {
     const std::string address = text.substr(0, colon);
     if (colon != text.npos) std::from_chars(text.data() + colon + 1, text.data() + text.size(), port);
     if (!is_address(address) || port == 0)
-        refuse(std::string(what) + "=" + text + " is not an address and a port, as in 192.168.1.7:11811");
+        reject(std::string(what) + "=" + text + ": expected ADDRESS:PORT, for example 192.168.1.7:11811");
     Locator_t to;
     IPLocator::setIPv4(to, address);
     to.port = port;
@@ -74,7 +74,7 @@ void transports(DomainParticipantQos& qos, const Settings& s) {
         if (all) break;
         std::string known;
         const auto  found = addresses_of(i, known);
-        if (found.empty()) refuse("interfaces: this machine has no interface or address '" + i + "'; it has " + known);
+        if (found.empty()) reject("interfaces: unknown interface or address '" + i + "'; this machine has " + known);
         udp->interfaceWhiteList.insert(udp->interfaceWhiteList.end(), found.begin(), found.end());
     }
     qos.transport().use_builtin_transports = false;
@@ -87,7 +87,7 @@ void transports(DomainParticipantQos& qos, const Settings& s) {
 void discovery(DomainParticipantQos& qos, const Settings& s) {
     auto& builtin = qos.wire_protocol().builtin;
     auto& config = builtin.discovery_config;
-    // a process that was killed is forgotten then; validity does not wait for it
+    // after this a killed process is removed; the validity of topics does not depend on it
     config.leaseDuration = {static_cast<std::int32_t>(participant_lease_ns / 1'000'000'000), 0};
     config.leaseDuration_announcementperiod = {1, 0};
     config.initial_announcements.count = 10;
@@ -114,7 +114,7 @@ void discovery(DomainParticipantQos& qos, const Settings& s) {
     builtin.initialPeersList.push_back(group);
     builtin.initialPeersList.push_back(own);
     for (const std::string& p : s.peers) {
-        if (!is_address(p)) refuse("peers: '" + p + "' is not an address, as in 192.168.1.7");
+        if (!is_address(p)) reject("peers: invalid address '" + p + "'; write one like 192.168.1.7");
         Locator_t to;
         IPLocator::setIPv4(to, p);
         to.port = 0;
@@ -125,13 +125,12 @@ void discovery(DomainParticipantQos& qos, const Settings& s) {
 void security(DomainParticipantQos& qos, const Settings& s) {
     namespace fs = std::filesystem;
     const fs::path folder = fs::absolute(s.security);
-    if (!fs::is_directory(folder)) refuse("security: there is no folder " + folder.string());
+    if (!fs::is_directory(folder)) reject("security: no such folder: " + folder.string());
     const auto file = [&](const char* name) {
         const fs::path path = folder / name;
         if (!fs::is_regular_file(path))
-            refuse("security: " + path.string() +
-                   " is not there; the folder needs identity_ca.cert.pem, cert.pem, key.pem, "
-                   "permissions_ca.cert.pem, governance.p7s and permissions.p7s, as in ROS 2");
+            reject("security: missing file " + path.string() + "; the folder needs identity_ca.cert.pem, cert.pem, key.pem, "
+                   "permissions_ca.cert.pem, governance.p7s and permissions.p7s (a ROS 2 enclave)");
         return "file://" + path.string();
     };
     auto& to = qos.properties().properties();
@@ -146,8 +145,8 @@ void security(DomainParticipantQos& qos, const Settings& s) {
     to.emplace_back("dds.sec.access.builtin.Access-Permissions.permissions", file("permissions.p7s"));
 }
 
-/// What Fast DDS logs, a line each.
-class Said : public fastdds::dds::LogConsumer {
+/// Prints what Fast DDS logs.
+class LogForwarder : public fastdds::dds::LogConsumer {
 public:
     void Consume(const fastdds::dds::Log::Entry& entry) override {
         std::string line = entry.message;
@@ -165,7 +164,7 @@ void prepare_library() {
         unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
         fastdds::dds::Log::ClearConsumers();
         fastdds::dds::Log::SetVerbosity(fastdds::dds::Log::Kind::Error);
-        fastdds::dds::Log::RegisterConsumer(std::make_unique<Said>());
+        fastdds::dds::Log::RegisterConsumer(std::make_unique<LogForwarder>());
     });
 }
 
@@ -175,7 +174,7 @@ hal::MessageLog& engine_log() {
 }
 
 DomainParticipantQos participant_qos(const Settings& s) {
-    if (s.domain < 0 || s.domain > 232) refuse("domain=" + std::to_string(s.domain) + " is outside 0..232");
+    if (s.domain < 0 || s.domain > 232) reject("domain=" + std::to_string(s.domain) + " is outside 0..232");
     DomainParticipantQos qos = fastdds::dds::PARTICIPANT_QOS_DEFAULT;
     if (s.profile.empty()) {
         transports(qos, s);
@@ -184,11 +183,11 @@ DomainParticipantQos participant_qos(const Settings& s) {
         const auto        colon = s.profile.rfind(':');
         const std::string file = s.profile.substr(0, colon), name = colon == s.profile.npos ? "halcyon" : s.profile.substr(colon + 1);
         auto*             factory = fastdds::dds::DomainParticipantFactory::get_instance();
-        if (!std::filesystem::is_regular_file(file)) refuse("profile: there is no file " + file);
+        if (!std::filesystem::is_regular_file(file)) reject("profile: no such file: " + file);
         if (!(factory->load_XML_profiles_file(file) == fastrtps::types::ReturnCode_t::RETCODE_OK))
-            refuse("profile: Fast DDS cannot read " + file + "; its own message says where");
+            reject("profile: Fast DDS cannot read " + file + "; see its own message");
         if (!(factory->get_participant_qos_from_profile(name, qos) == fastrtps::types::ReturnCode_t::RETCODE_OK))
-            refuse("profile: " + file + " has no participant profile '" + name + "'; write profile=" + file + ":NAME");
+            reject("profile: " + file + " has no participant profile '" + name + "'; write profile=" + file + ":NAME");
     }
     if (!s.security.empty()) security(qos, s);
     if (!s.name.empty()) qos.name(s.name);

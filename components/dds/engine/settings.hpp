@@ -8,10 +8,11 @@
 
 namespace hal::dds {
 
-/// Throws std::runtime_error: an interface that is not there, a bad address, a missing file of the security folder.
+/// Returns the QoS of a participant. Throws std::runtime_error for an unknown interface, an invalid address, a missing file.
 eprosima::fastdds::dds::DomainParticipantQos participant_qos(const Settings&);
 
-/// Once per process, before anything of Fast DDS: no files read that nobody named, what it logs said on standard error, by us.
+/// Prepares Fast DDS, once per process and before its first use: it reads no configuration file that was not named, and logs through
+/// engine_log().
 void prepare_library();
 
 }  // namespace hal::dds

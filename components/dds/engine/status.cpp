@@ -40,7 +40,7 @@ private:
             next_ = now + status_period_ns;
             const std::size_t length = host_ != nullptr ? host_->text(host_, buffer_.data(), buffer_.size()) : 0;
             if (length != 0) last_.assign(buffer_.data(), length);
-            if (host_ != nullptr && last_.empty()) {  // being loaded: nobody is to hear of it without its name
+            if (host_ != nullptr && last_.empty()) {  // still loading: the status needs the instance's name
                 next_ = 0;
                 return now + 10'000'000;
             }
@@ -71,10 +71,10 @@ Beacons& beacons() {
     return one;
 }
 
-/// hal top's ear.
-class Ear final : public Listener {
+/// Receives the status of all instances, for hal top.
+class StatusReader final : public Listener {
 public:
-    Ear(const Settings& settings, void (*heard)(void*, const char*, std::size_t), void* user)
+    StatusReader(const Settings& settings, void (*heard)(void*, const char*, std::size_t), void* user)
         : heard_(heard), user_(user), participant_(open(settings)) {
         Quality quality = status_quality();
         quality.depth = 64;
@@ -101,7 +101,7 @@ Settings settings_of(const char* words) {
         if (key == "domain") {
             const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), settings.domain);
             if (error != std::errc{} || end != value.data() + value.size())
-                throw std::invalid_argument("'" + word + "': write domain=NUMBER, 0 to 232");
+                throw std::invalid_argument("'" + word + "': write domain=NUMBER, 0..232");
         } else if (key == "shared_memory" && (value == "0" || value == "1")) settings.shared_memory = value == "1";
         else if (key == "interfaces") settings.interfaces = list_of(value);
         else if (key == "peers") settings.peers = list_of(value);
@@ -109,8 +109,8 @@ Settings settings_of(const char* words) {
         else if (key == "profile") settings.profile = value;
         else if (key == "security") settings.security = value;
         else
-            throw std::invalid_argument("'" + word +
-                                        "' is no setting; the settings are domain= interfaces= peers= server= shared_memory=0 or 1, "
+            throw std::invalid_argument("invalid setting '" + word +
+                                        "'; the settings are domain= interfaces= peers= server= shared_memory=0 or 1, "
                                         "profile= security=");
     }
     return settings;
@@ -130,11 +130,11 @@ std::shared_ptr<Beacon> beacon(const std::shared_ptr<Participant>& participant, 
 
 void* halcyon_status_open(const char* settings, void (*heard)(void*, const char*, std::size_t), void* user, char* problem) {
     try {
-        return new hal::dds::Ear(hal::dds::settings_of(settings), heard, user);
+        return new hal::dds::StatusReader(hal::dds::settings_of(settings), heard, user);
     } catch (const std::exception& why) {
         std::strncpy(problem, why.what(), 255);
         problem[255] = 0;
         return nullptr;
     }
 }
-void halcyon_status_close(void* ear) { delete static_cast<hal::dds::Ear*>(ear); }
+void halcyon_status_close(void* reader) { delete static_cast<hal::dds::StatusReader*>(reader); }

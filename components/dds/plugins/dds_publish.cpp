@@ -8,7 +8,7 @@
 #include <mutex>
 #include <optional>
 
-#include "dds/attendance.hpp"
+#include "dds/topic_connection.hpp"
 #include "dds/field_pins.hpp"
 #include "dds/outbox.hpp"
 
@@ -19,15 +19,15 @@ using namespace hal::dds;
 class DdsPublish : public hal::Component, private Listener, private Served {
 public:
     explicit DdsPublish(const hal_host* host) : Component(host) {
-        if (!(rate_ >= 0)) throw hal::ArgumentError("rate", "rate= is below 0; write samples per second, or 0 for every cycle");
+        if (!(rate_ >= 0)) throw hal::ArgumentError("rate", "rate= is negative; write samples per second, or 0 for every cycle");
     }
 
     void start() {
-        attendance_.begin(arguments_, settings_, *this, [this](Participant& p) { return p.writer(topic_, quality_, this); });
+        connection_.open(arguments_, settings_, *this, [this](Participant& p) { return p.writer(topic_, quality_, this); });
     }
-    void stop() noexcept { attendance_.end(*this); }
+    void stop() noexcept { connection_.close(*this); }
 
-    /// Stores the pins into the next place of the outbox, every n-th cycle. [realtime]
+    /// Stores the pins into the next slot of the outbox, every n-th cycle. [realtime]
     void publish(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() != period_) {
             period_ = cycle.period_ns();
@@ -45,11 +45,12 @@ public:
                 dropped = dropped + 1;
             }
         }
-        due_.store(cycle.start_ns() + every_ * period_, std::memory_order_release);  // after the sample: who sees this sees it
+        // After the sample, so that a reader of this sees the sample too.
+        due_.store(cycle.start_ns() + every_ * period_, std::memory_order_release);
         sent = sent_.load(std::memory_order_relaxed);
-        refused = refused_.load(std::memory_order_relaxed);
-        matched = attendance_.matched();
-        wrong_type = attendance_.wrong_type();
+        rejected = rejected_.load(std::memory_order_relaxed);
+        matched = connection_.matched();
+        wrong_type = connection_.wrong_type();
     }
 
 private:
@@ -59,8 +60,8 @@ private:
         return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
     }
 
-    /// Writes what waits, and says when the next is to be expected: shortly before the cycle that makes it, so that a short look into the
-    /// outbox every now and then replaces being woken by the cycle, which would cost it a system call.
+    /// Writes the queued samples. Returns the time of the next call, shortly before the cycle that makes the next sample: polling the
+    /// outbox for a moment replaces a wake-up by the cycle, which would cost the cycle a system call.
     std::int64_t serve(std::int64_t now) noexcept override {
         const std::int64_t due = due_.load(std::memory_order_acquire);
         bool               found = false;
@@ -71,15 +72,15 @@ private:
             write(bytes, made);
         }
         if (found) {
-            // Waiting for a sample costs time of a processor, coming after it delays it: it is aimed at looking for 15 us.
+            // Polling for a sample costs CPU time, polling after it adds latency: the target is 15 us of polling.
             const std::int64_t looked = expected_ == made ? now - since_ : 0;
             if (looked <= 0) lead_ -= 4'000;
             else lead_ += (looked - 15'000) / 8;
             lead_ = std::clamp<std::int64_t>(lead_, -150'000, 150'000);
             expected_ = 0;
-            return now;  // once more, as `due` may be of before the sample
+            return now;  // once more, because `due` may be older than the sample
         }
-        const bool ours = std::abs(due - now) < 2'000'000'000;  // else it is not this machine's clock, but a virtual one
+        const bool ours = std::abs(due - now) < 2'000'000'000;  // otherwise the cycle runs on a virtual clock
         if (!ours) return now + 1'000'000;
         if (due + lead_ > now) {
             expected_ = 0;
@@ -89,7 +90,7 @@ private:
             expected_ = due;
             since_ = now;
         }
-        if (now - since_ < 60'000) return now;  // at once again
+        if (now - since_ < 60'000) return now;  // poll again
         return now + (now - due < 5'000'000 ? 100'000 : 5'000'000);
     }
 
@@ -102,16 +103,16 @@ private:
             std::memcpy(bytes.data() + schema_.stamp, &sec, sizeof sec);
             std::memcpy(bytes.data() + schema_.stamp + 4, &nanosec, sizeof nanosec);
         }
-        (attendance_.endpoint().write(bytes, source) ? sent_ : refused_).fetch_add(1, std::memory_order_relaxed);
+        (connection_.endpoint().write(bytes, source) ? sent_ : rejected_).fetch_add(1, std::memory_order_relaxed);
     }
 
-    void on_event(Event e, int count, const std::string& words) noexcept override {
-        attendance_.met(arguments_, e, count, words, "a subscriber of topic '" + topic_.name + "' asks for more than is offered: ");
+    void on_event(Event e, int count, const std::string& text) noexcept override {
+        connection_.handle(arguments_, e, count, text, "topic '" + topic_.name + "': a subscriber requests a QoS that is not offered: ");
     }
 
     Arguments         arguments_{*this};
-    hal::RealArgument rate_{*this, "rate", 100, "samples per second, rounded to cycles; 0: every cycle"};
-    hal::Function     publish_{*this, "", &DdsPublish::publish, "takes the pins' values, every n-th cycle"};
+    hal::RealArgument rate_{*this, argument::rate, 100, "samples per second, rounded to cycles; 0: every cycle"};
+    hal::Function     publish_{*this, "", &DdsPublish::publish, "samples the pins, every n-th cycle"};
 
     const Schema    schema_ = arguments_.schema();
     const TopicType topic_ = arguments_.topic(schema_);
@@ -119,46 +120,46 @@ private:
     const Settings  settings_ = arguments_.participant.settings();
 
     FieldPins<hal::In> fields_{*this, publish_, schema_, "field of the topic"};
-    hal::In<bool>      enable{*this, publish_, "enable", "FALSE: nothing is published", {.initial = true}};
+    hal::In<bool>      enable{*this, publish_, "enable", "TRUE: samples are published", {.initial = true}};
 
-    hal::Out<std::uint32_t> matched{*this, publish_, "matched", "subscribers"};
+    hal::Out<std::uint32_t> matched{*this, publish_, "matched", "matched subscribers"};
     hal::Out<std::uint64_t> sent{*this, publish_, "sent", "samples written"};
-    hal::Out<std::uint64_t> dropped{*this, publish_, "dropped", "samples the DDS thread was too slow to take"};
-    hal::Out<std::uint64_t> refused{*this, publish_, "refused",
-                                    "samples that a reliable subscriber, which does not keep up, has left no room for"};
-    hal::Out<bool>          wrong_type{*this, publish_, "wrong-type", "somebody subscribes to this topic with another type"};
+    hal::Out<std::uint64_t> dropped{*this, publish_, "dropped", "samples lost because the queue to the DDS thread was full"};
+    hal::Out<std::uint64_t> rejected{*this, publish_, "rejected",
+                                     "samples lost because the history was full: a reliable subscriber does not keep up"};
+    hal::Out<bool>          wrong_type{*this, publish_, "wrong-type", "a subscriber uses this topic with another type"};
 
     // The cycle's
     std::int64_t period_ = 0, every_ = 1, left_ = 0;
     // Between the cycle and the DDS thread
     Outbox                     outbox_{schema_.sample, 64};
     std::atomic<std::int64_t>  due_{0};  // when the next sample is made
-    std::atomic<std::uint64_t> sent_{0}, refused_{0};
+    std::atomic<std::uint64_t> sent_{0}, rejected_{0};
     // The DDS thread's
-    std::int64_t lead_ = 0;  // when it looks first, from the beginning of the cycle
+    std::int64_t lead_ = 0;  // start of polling, relative to the beginning of the cycle
     std::int64_t flush_at_ = 0;
-    std::int64_t expected_ = 0, since_ = 0;  // the cycle it is looking for, and since when
+    std::int64_t expected_ = 0, since_ = 0;  // the cycle whose sample it polls for, and since when
 
-    Attendance<Writer> attendance_;
+    TopicConnection<Writer> connection_;
 };
 
 }  // namespace
 
 HAL_COMPONENT(DdsPublish, "dds_publish", "Publishes a group of pins as a DDS topic", R"(
-The values of all fields, taken in one cycle, are one sample of a typed topic: final, without a key, XCDR1. The cycle only stores them into a
-queue; a thread of the process, not a real-time one, writes them. `hal doc dds_subscribe` is the other side.
+The values of all fields, sampled in the same cycle, are one sample of a typed topic: final, without a key, XCDR1. The cycle only stores them
+into a queue; a thread of the process, not a real-time one, writes them. `hal doc dds_subscribe` describes the subscriber.
 
     loadrt dds_publish topic=arm/state names=state fields=angle:float,ready:bit,joint:float*6 rate=0 deadline_ms=20
     addf state servo-thread
     net angle  => state.angle
     net j0     => state.joint-0
 
-`rate` is in samples per second; 0 is every cycle. Nothing leaves the machine unless `interfaces=` says so.
+`rate` is in samples per second; 0 is every cycle. Nothing leaves the machine without `interfaces=`.
 
-Two groups meet when topic, type and domain are equal. Without `type=` the type's name is made of names and types of the fields, so that
-groups that differ never exchange anything; both sides then say which types they have (`wrong-type`).
+A publisher and a subscriber match when topic, type and domain are equal. Without `type=` the type name is derived from names and types of
+the fields, so that different groups never exchange data; both sides then report both types (`wrong-type`).
 
-ROS 2 sees `ros=std_msgs/Float64 topic=/arm/angle` as its topic /arm/angle. The fields are then the message's: `data`; `linear-x` to
+ROS 2 sees `ros=std_msgs/Float64 topic=/arm/angle` as its topic /arm/angle. The fields are then those of the message: `data`; `linear-x` to
 `angular-z`; `force-x` to `torque-z`; of a JointState NAME-position, NAME-velocity, NAME-effort for each of `joints=`; `height`, `width`,
-`step` of an Image, which is sent without pixels. The stamp of a header is the time of the cycle.
+`step` of an Image, which is sent without pixels. The stamp of the header is the time of the cycle.
 )")

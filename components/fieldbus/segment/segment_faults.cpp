@@ -32,14 +32,14 @@ const Kind*             kind_of(std::string_view name) {
     return nullptr;
 }
 
-[[noreturn]] void refuse(const std::string& part, const std::string& help) {
-    throw std::invalid_argument("'" + part + "' is no fault of a segment; " + help);
+[[noreturn]] void reject(const std::string& part, const std::string& help) {
+    throw std::invalid_argument("invalid fault '" + part + "': " + help);
 }
 
 double number(const std::string& part, std::string_view text, const char*& unit) {
     double value = 0;
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || !(value >= 0.0 && value < 1e9)) refuse(part, "'" + std::string(text) + "' is no number");
+    if (wrong != std::errc{} || !(value >= 0.0 && value < 1e9)) reject(part, "'" + std::string(text) + "' is not a number");
     unit = end;
     return value;
 }
@@ -47,7 +47,7 @@ double number(const std::string& part, std::string_view text, const char*& unit)
 double number(const std::string& part, std::string_view text) {
     const char*  end = nullptr;
     const double value = number(part, text, end);
-    if (end != text.data() + text.size()) refuse(part, "'" + std::string(text) + "' is no number");
+    if (end != text.data() + text.size()) reject(part, "'" + std::string(text) + "' is not a number");
     return value;
 }
 
@@ -57,14 +57,14 @@ std::int64_t duration(const std::string& part, std::string_view text) {
     const double           value = number(part, text, end);
     const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
     const double           scale = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : unit == "ns" ? 1.0 : 0.0;
-    if (scale == 0.0) refuse(part, "'" + std::string(text) + "' is no time; write 20ms");
+    if (scale == 0.0) reject(part, "'" + std::string(text) + "' is not a time; write one with a unit, for example 20ms");
     return std::llround(value * scale);
 }
 
 /// "loss:every=50:from=1s:until=2s".
 Disturbance parse(const std::string& part) {
     const char* help =
-        "write loss, duplicate, delay, cut or garble, and behind it "
+        "write loss, duplicate, delay, cut or garble, with options "
         ":every=50:probability=0.02:count=3:from=1s:until=2s:type=0x9023:frame=reply:time=2ms:length=30";
     std::string_view rest(part);
     const auto       word = rest.substr(0, rest.find(':'));
@@ -73,7 +73,7 @@ Disturbance parse(const std::string& part) {
     bool        known = false;
     for (const auto& row : rows)
         if (word == row.name) d.fault = row.fault, known = true;
-    if (!known) refuse(part, help);
+    if (!known) reject(part, help);
     d.every = 1, d.delay_ns = 1'000'000, d.length = 30;
     while (!rest.empty()) {
         const auto item = rest.substr(0, rest.find(':'));
@@ -91,10 +91,10 @@ Disturbance parse(const std::string& part) {
         else if (key == "type" && value == "0x9022") d.type = 0x9022;
         else if (key == "type" && value == "0x9023") d.type = 0x9023;
         else if (const auto* kind = kind_of(key == "frame" ? value : ""); kind != nullptr) d.type = 0x9021, d.at = kind_at, d.is = kind->id;
-        else refuse(part, help);
+        else reject(part, help);
     }
-    if (d.every == 0 && d.probability == 0.0) refuse(part, "every counts from 1, and a probability is above 0");
-    if (d.probability > 1.0) refuse(part, "a probability is 1 at most");
+    if (d.every == 0 && d.probability == 0.0) reject(part, "every must be at least 1, or probability above 0");
+    if (d.probability > 1.0) reject(part, "probability exceeds 1");
     return d;
 }
 
@@ -105,7 +105,7 @@ std::vector<Disturbance> parse_all(std::string_view text) {
         text.remove_prefix(std::min(part.size() + 1, text.size()));
         all.push_back(parse(std::string(part)));
     }
-    if (all.size() > 32) throw std::invalid_argument("more than 32 faults");
+    if (all.size() > 32) throw std::invalid_argument(std::to_string(all.size()) + " faults (limit 32)");
     return all;
 }
 
@@ -113,22 +113,22 @@ struct SegmentFaults final : hal::Component {
     using Component::Component;
 
     hal::TextArgument link{*this, "link", "sim:net0/tester",
-                           "the segment; a station of its own on it, or one whose cable is to be cut, as in sim:cnc/x"};
-    hal::TextArgument faults{*this, "faults", "", "what goes wrong, by commas: loss:every=50:from=1s:until=2s,duplicate:every=7"};
+                           "segment, with a station of its own, or the station whose cable is cut, for example sim:cnc/x"};
+    hal::TextArgument faults{*this, "faults", "", "faults, comma-separated: loss:every=50:from=1s:until=2s,duplicate:every=7"};
     const std::vector<Disturbance> list = parse_all(faults.get());
-    hal::Argument                  seed{*this, "seed", 1, "of what is drawn", {.min = 0, .max = 1'000'000'000}};
+    hal::Argument                  seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
 
-    hal::Function run{*this, "update", &SegmentFaults::update, "cuts and joins the cable, babbles, shows how often faults struck"};
+    hal::Function run{*this, "update", &SegmentFaults::update, "cuts and reconnects the cable, babbles, counts faults"};
 
-    hal::In<bool> cut{*this, "cut", "true: the cable of the station `link` names is cut"};
-    hal::In<bool> babble{*this, "babble", "true: the station `link` names sends without asking anybody, broadcasts of Ethertype 0x9023"};
-    hal::Param<std::uint32_t> babble_period{*this, "babble-period", "between two frames that are babbled", {.initial = 100, .unit = "us"}};
-    hal::Outs<std::uint64_t>  hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames that fault # of the list has struck"};
+    hal::In<bool> cut{*this, "cut", "TRUE: the cable of the station in `link` is cut"};
+    hal::In<bool> babble{*this, "babble", "TRUE: the station in `link` babbles: it broadcasts frames of Ethertype 0x9023 at any time"};
+    hal::Param<std::uint32_t> babble_period{*this, "babble-period", "interval between babbled frames", {.initial = 100, .unit = "us"}};
+    hal::Outs<std::uint64_t>  hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames affected by this fault of the list"};
 
     void start() {
-        auto opened = hal::ethernet::open(link.get(), {.types = {0x88b5}});  // of none that anybody uses here: it receives nothing
+        auto opened = hal::ethernet::open(link.get(), {.types = {0x88b5}});  // an unused Ethertype: receives nothing
         if (!opened) throw std::runtime_error(opened.problem);
-        if (opened.port->segment() == nullptr) throw std::runtime_error(link.get() + " is no segment in memory; write sim:NAME/STATION");
+        if (opened.port->segment() == nullptr) throw std::runtime_error(link.get() + " is not a segment in memory; write sim:NAME/STATION");
         port_ = std::move(opened.port);
         auto& segment = *port_->segment();
         segment.seed(static_cast<std::uint64_t>(seed));
@@ -137,7 +137,7 @@ struct SegmentFaults final : hal::Component {
         std::fill_n(babbled_.begin(), 6, std::uint8_t{0xff});
         std::copy_n(port_->address().begin(), 6, babbled_.begin() + 6);
         babbled_[12] = 0x90, babbled_[13] = 0x23;
-        segment.babble(segment.port(), babbled_, 0);  // takes its memory
+        segment.babble(segment.port(), babbled_, 0);  // allocates its memory
     }
     void stop() noexcept {
         if (port_) port_->segment()->calm();
@@ -166,16 +166,15 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SegmentFaults, "segment_faults", "What goes wrong on an Ethernet segment in memory", R"(
-Frames of a `sim:` segment are lost, come twice, late, cut short or with a byte changed, or a cable is cut: on purpose, on the clock of the
-threads, the same in every run.
+HAL_COMPONENT(SegmentFaults, "segment_faults", "Fault injection on an Ethernet segment in memory", R"(
+Loses, duplicates, delays, truncates or corrupts frames of a `sim:` segment, or cuts a cable: on the clock of the threads, reproducibly.
 
-`faults` is a list by commas of loss, duplicate, delay, cut and garble, each with what it strikes: `every=50` (every 50th frame; without it
-all), `probability=0.02` (each frame, drawn; the same ones for the same `seed`), `count=3` (then it is over), `from=1s`, `until=2s`,
-`type=0x9023` (of that Ethertype only), `frame=reply` (of TDMA's sync, request or reply only), `time=2ms` (delay), `length=30` (cut: bytes that
-are left). `garble` is what a hostile station does: the check sequence of Ethernet is right.
+`faults` is a comma-separated list of loss, duplicate, delay, cut (truncates) and garble (corrupts), each with options: `every=50` (every 50th
+frame; default every frame), `probability=0.02` (random frames, the same ones for the same `seed`), `count=3` (ends after 3 frames), `from=1s`,
+`until=2s`, `type=0x9023` (this Ethertype only), `frame=reply` (TDMA sync, request or reply only), `time=2ms` (delay), `length=30` (cut: remaining
+bytes). A garbled frame has a valid Ethernet checksum, like one from a hostile station.
 
-The station `link` names can also babble: while `babble` is true it sends a frame every `babble-period`, without asking anybody.
+The station in `link` can also babble: while `babble` is TRUE it sends a frame every `babble-period`, outside any slot.
 
     loadrt segment_faults link=sim:net0/tester faults=loss:every=50:from=1s:until=2s,garble:every=7:type=0x9023
     addf segment-faults.0.update servo

@@ -21,18 +21,18 @@ using namespace hal::ethernet;
 struct SegmentRecord final : hal::Component {
     using Component::Component;
 
-    hal::TextArgument link{*this, "link", "sim:net0/recorder", "the segment: one in memory, by a station of its own, or eth:enp3s0"};
-    hal::TextArgument file{*this, "file", "", "where the frames are written, as in seen.pcapng"};
+    hal::TextArgument link{*this, "link", "sim:net0/recorder", "segment: in memory with a station of its own, or eth:enp3s0"};
+    hal::TextArgument file{*this, "file", "", "capture file, for example seen.pcapng"};
 
-    hal::Function run{*this, "update", &SegmentRecord::update, "takes what was on the segment since the cycle before"};
+    hal::Function run{*this, "update", &SegmentRecord::update, "captures the frames since the last cycle"};
 
-    hal::In<bool>           pause{*this, "pause", "true: frames are passed over"};
-    hal::Out<std::uint64_t> frames{*this, "frames", "that are in the file, or on their way there"};
-    hal::Out<std::uint64_t> dropped{*this, "dropped", "frames for which there was no room: they came faster than the file is written"};
-    hal::Out<bool>          failed{*this, "failed", "the file could not be written to its end, as of a disk that is full"};
+    hal::In<bool>           pause{*this, "pause", "TRUE: frames are not captured"};
+    hal::Out<std::uint64_t> frames{*this, "frames", "frames captured"};
+    hal::Out<std::uint64_t> dropped{*this, "dropped", "frames lost because the file is written too slowly"};
+    hal::Out<bool>          failed{*this, "failed", "the file could not be written, for example because the disk is full"};
 
     void start() {
-        if (file.get().empty()) throw std::runtime_error("into which file? write file=seen.pcapng");
+        if (file.get().empty()) throw std::runtime_error("missing file=; write file=seen.pcapng");
         auto opened = open(link.get(), {.promiscuous = true, .receive_capacity = 1024});
         if (!opened) throw std::runtime_error(opened.problem);
         std::string problem;
@@ -51,7 +51,7 @@ struct SegmentRecord final : hal::Component {
     }
 
     void update(hal::Cycle cycle) noexcept {
-        constexpr int most = 256;  // of one cycle: a babbling station must not hold the thread
+        constexpr int most = 256;  // per cycle: a babbling station must not block the thread
         for (int n = 0; n < most; ++n) {
             const auto arrival = port_->receive(cycle.start_ns());
             if (!arrival) break;
@@ -82,7 +82,7 @@ private:
             good = recorder_ && recorder_->write(written_.time_ns + since_1970_, std::span(written_.bytes).first(written_.length)) && good;
         if (any) good = recorder_ && recorder_->flush() && good;
         if (good || broken_.exchange(true)) return;
-        hal::MessageLog(name_).print(file.get() + " cannot be written any more; is the disk full?");
+        hal::MessageLog(name_).print("cannot write " + file.get() + "; check that the disk is not full");
     }
 
     const std::string         name_ = hal::own_name("segment-record.0");
@@ -90,23 +90,23 @@ private:
     std::unique_ptr<Recorder> recorder_;
     std::int64_t              since_1970_ = 0;
     hal::Queue<Taken>         waiting_{512};
-    Taken                     taken_, written_;      // the cycle's; the writer's
-    std::atomic<bool>         broken_{false};        // by the writer
+    Taken                     taken_, written_;      // of the cycle; of the writer
+    std::atomic<bool>         broken_{false};        // set by the writer
     hal::Background           writer_{[this](std::int64_t, bool may_wait) {
         write();
         if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }};  // the last: it uses the others
+    }};  // the last member: it uses the others
 };
 
 }  // namespace
 
-HAL_COMPONENT(SegmentRecord, "segment_record", "Writes what is on an Ethernet segment into a file for Wireshark", R"(
-Every frame on a segment in memory, whoever it is for, with the time when it was there, as pcapng: for Wireshark and tshark, which know TDMA
-and RTcfg, and for `link=replay:seen.pcapng`. Times are those of the run: on the virtual clock they begin with 0, which is 1970 to Wireshark.
+HAL_COMPONENT(SegmentRecord, "segment_record", "Captures an Ethernet segment into a pcapng file", R"(
+Captures every frame on a segment in memory, for any station, with its time, as pcapng: for Wireshark and tshark, which decode TDMA and RTcfg,
+and for `link=replay:seen.pcapng`. Times are those of the run: on the virtual clock they begin at 0, which Wireshark shows as 1970.
 
     loadrt segment_record link=sim:net0/recorder file=seen.pcapng
     addf segment-record.0.update servo
 
-`update` may stand anywhere in a thread. Of a real interface, `link=eth:enp3s0`, it writes what comes from others; the frames that this
-machine sends are in `tcpdump -i enp3s0 -w seen.pcap`.
+The position of `update` in the thread does not matter. On a real interface, `link=eth:enp3s0`, it captures received frames only; capture sent
+frames with `tcpdump -i enp3s0 -w seen.pcap`.
 )")

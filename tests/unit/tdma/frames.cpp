@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames byte by byte: the golden ones are written from the layouts of the RTmac, TDMA and RTcfg documents.
+// Frames byte by byte: the golden ones follow the layouts of the RTmac, TDMA and RTcfg documents.
 #include <gtest/gtest.h>
 
 #include "components/fieldbus/tdma/wire/rtcfg_frames.hpp"
@@ -22,7 +22,7 @@ std::string hex(std::span<const std::uint8_t> bytes) {
 }
 std::string padded(std::string text) { return text + std::string(120 - std::min<std::size_t>(text.size(), 120), '0'); }
 
-TEST(Frame_of_sync, has_these_bytes) {
+TEST(Frame_of_sync, matches_the_specification) {
     const Frame f = encode(one, Sync{0x01020304, 0x1112131415161718, 0x2122232425262728});
     EXPECT_EQ(padded("ffffffffffff"
                      "020000000001"
@@ -45,7 +45,7 @@ TEST(Frame_of_sync, has_these_bytes) {
     EXPECT_EQ(0x11, f[sync_stamp_at]);
 }
 
-TEST(Frame_of_request, has_these_bytes) {
+TEST(Frame_of_request, matches_the_specification) {
     const Frame f = encode(one, two, Request{0x1112131415161718, 0x01020304, 0x2122232425262728});
     EXPECT_EQ(padded("020000000001"
                      "020000000002"
@@ -67,7 +67,7 @@ TEST(Frame_of_request, has_these_bytes) {
     EXPECT_EQ(0x11, f[request_stamp_at]);
 }
 
-TEST(Frame_of_reply, has_these_bytes) {
+TEST(Frame_of_reply, matches_the_specification) {
     const Frame f = encode(two, one, Reply{0x1112131415161718, 0x2122232425262728, 0x3132333435363738});
     EXPECT_EQ(padded("020000000002"
                      "020000000001"
@@ -89,7 +89,7 @@ TEST(Frame_of_reply, has_these_bytes) {
     EXPECT_EQ(0x31, f[reply_stamp_at]);
 }
 
-TEST(Frame_that_is_cut_or_foreign, is_nothing) {
+TEST(Frame_decoder, rejects_truncated_and_foreign_frames) {
     const Frame whole = encode(one, Sync{1, 2, 3});
     for (std::size_t length = 0; length < 42; ++length) {
         const Decoded d = decode(std::span(whole).first(length));
@@ -109,7 +109,7 @@ TEST(Frame_that_is_cut_or_foreign, is_nothing) {
     EXPECT_EQ(Defect::frame_id, changed(21, 0x12));
 }
 
-TEST(Frame_of_another_protocol, comes_back_out_of_the_tunnel) {
+TEST(Frame_of_another_protocol, survives_the_tunnel) {
     std::vector<std::uint8_t> packet(98, 7);
     packet[12] = 0x08, packet[13] = 0x00;
     std::array<std::uint8_t, 200> inside{}, back{};
@@ -123,7 +123,7 @@ TEST(Frame_of_another_protocol, comes_back_out_of_the_tunnel) {
         hex(std::span(inside).subspan(12, 6)));
     ASSERT_EQ(98U, untunnel(std::span(inside).first(length), back));
     EXPECT_TRUE(std::equal(packet.begin(), packet.end(), back.begin()));
-    EXPECT_EQ(0U, tunnel(packet, std::span(inside).first(101))) << "no room";
+    EXPECT_EQ(0U, tunnel(packet, std::span(inside).first(101))) << "no space";
     EXPECT_EQ(0U, untunnel(encode(one, Sync{}), back));
 }
 
@@ -134,7 +134,7 @@ std::string encoded(const rtcfg::Message& m) {
     return hex(std::span(out).first(rtcfg::encode(m, out)));
 }
 
-TEST(Frame_of_rtcfg, has_these_bytes) {
+TEST(Frame_of_rtcfg, matches_the_specification) {
     const std::uint8_t data[] = {0xaa, 0xbb, 0xcc};
     rtcfg::Message m;
     m.to = two, m.from = one;
@@ -200,7 +200,7 @@ TEST(Frame_of_rtcfg, has_these_bytes) {
               encoded(m));
 }
 
-TEST(Frame_of_rtcfg, is_read_as_it_was_written_and_not_when_it_is_cut) {
+TEST(Frame_of_rtcfg, survives_the_round_trip_and_is_rejected_when_truncated) {
     const std::uint8_t data[] = {1, 2, 3, 4, 5};
     for (unsigned id = 0; id < rtcfg::ids; ++id)
         for (const bool by_ip : {false, true}) {

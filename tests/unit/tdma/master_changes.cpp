@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Time when masters change: what a station that begins to lead keeps of the clock it estimated, and for how long.
+// Global time when masters change: holdover of the estimated clock by the new master.
 #include <gtest/gtest.h>
 
 #include "wire.hpp"
@@ -36,7 +36,7 @@ struct Trio : Bed {
 };
 
 class Twenty_changes_of_master : public testing::TestWithParam<int> {};
-TEST_P(Twenty_changes_of_master, leave_the_time_at_the_crystals_rate) {
+TEST_P(Twenty_changes_of_master, keep_the_rate_of_the_crystals) {
     Trio t(GetParam());
     ASSERT_TRUE(t.first.station.ready() && t.second.station.ready() && t.station.station.ready());
     double worst = 0.0;
@@ -65,7 +65,7 @@ TEST_P(Twenty_changes_of_master, leave_the_time_at_the_crystals_rate) {
 }
 INSTANTIATE_TEST_SUITE_P(noise, Twenty_changes_of_master, testing::Values(0, 300, 2'000, 20'000));
 
-TEST(Backup_that_leads, goes_on_at_the_masters_rate_and_comes_to_its_own) {
+TEST(Backup_as_master, starts_at_the_masters_rate_and_approaches_its_own) {
     Trio t(2'000, 40 * ppm);
     ASSERT_TRUE(t.second.station.ready());
     EXPECT_NEAR(-40, t.second.status().drift / ppm, 3);
@@ -114,7 +114,7 @@ TEST(Clock_estimate, leads_at_its_own_crystal_when_the_slope_is_not_known_yet) {
     EXPECT_EQ(0.0, clock.drift());
 }
 
-/// Syncs of a stranger in its own schedule, one every cycle.
+/// Syncs of an unknown master in its own schedule, one every cycle.
 void strange_syncs(Bed& bed, int from, int count) {
     for (int n = 0; n < count; ++n) {
         const Time at = bed.now + n * ms + 333'000;
@@ -123,7 +123,7 @@ void strange_syncs(Bed& bed, int from, int count) {
     }
 }
 
-TEST(Master_with_followers, does_not_give_way_to_a_smaller_address) {
+TEST(Master_with_followers, does_not_yield_to_a_smaller_address) {
     Bed bed;
     Machine& m = bed.add(5, master());
     Machine& s = bed.add(6, slave(300'000));
@@ -142,7 +142,7 @@ TEST(Master_with_followers, does_not_give_way_to_a_smaller_address) {
     EXPECT_EQ(1, m.events[Event::other_master_gone]);
 }
 
-TEST(Master_that_stepped_down, comes_back_by_itself_when_the_other_is_gone) {
+TEST(Master_that_stepped_down, takes_over_when_the_other_is_lost) {
     Bed bed;
     Machine& m = bed.add(5, master());
     bed.run(100 * ms);
@@ -157,7 +157,7 @@ TEST(Master_that_stepped_down, comes_back_by_itself_when_the_other_is_gone) {
     EXPECT_EQ(2, m.events[Event::leading]);
 }
 
-TEST(Master_that_found_another, leads_when_that_one_is_gone) {
+TEST(Master_that_found_another, takes_over_when_that_one_is_lost) {
     Bed bed;
     Machine& a = bed.add(1, master());
     bed.run(50 * ms);
@@ -170,7 +170,7 @@ TEST(Master_that_found_another, leads_when_that_one_is_gone) {
     EXPECT_TRUE(b.status().leading);
 }
 
-TEST(Station_with_a_list_of_masters, ignores_syncs_of_others_and_names_them) {
+TEST(Station_with_a_list_of_masters, ignores_and_reports_syncs_of_others) {
     Bed bed;
     StationSetup lead = master(), follow = slave(300'000);
     lead.masters = follow.masters = {mac(5)};
@@ -187,8 +187,8 @@ TEST(Station_with_a_list_of_masters, ignores_syncs_of_others_and_names_them) {
     }
     bed.run(100 * ms);
     EXPECT_EQ(mac(5), s.status().master);
-    EXPECT_EQ(1, s.events[Event::stranger_sync]);
-    EXPECT_EQ(mac(1), s.last_who[Event::stranger_sync]);
+    EXPECT_EQ(1, s.events[Event::unknown_master]);
+    EXPECT_EQ(mac(1), s.last_who[Event::unknown_master]);
     EXPECT_EQ(0, s.events[Event::master_changed]);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A station asks another one; question and answer are in their senders' slots.
+// Pings between stations; request and answer use their senders' slots.
 #include <gtest/gtest.h>
 
 #include "wire.hpp"
@@ -29,7 +29,7 @@ struct Pair {
     }
 };
 
-TEST(Ping, is_answered_in_the_next_slot_and_tells_the_way) {
+TEST(Ping, is_answered_in_the_next_slot_and_gives_the_path_delay) {
     for (const double skew : {-200e-6, 0.0, 200e-6}) {
         Pair p({skew, 77'000'000'000});
         ASSERT_TRUE(p.m.station.ready() && p.s.station.ready());
@@ -74,7 +74,7 @@ TEST(Ping, goes_from_a_slave_too_and_gives_the_drift_of_the_other_clock) {
     EXPECT_NEAR(200e-6, p.m.station.roster()[0].drift, 3e-6);
 }
 
-TEST(Ping, that_nobody_answers_is_given_up_after_a_second) {
+TEST(Ping, without_an_answer_times_out_after_a_second) {
     Pair p;
     p.bed.wire.fault = [](Wire::Frame& f) { return decode(f.bytes).kind != Kind::echo; };
     p.m.station.ping(0, 3);
@@ -89,7 +89,7 @@ TEST(Ping, that_nobody_answers_is_given_up_after_a_second) {
     EXPECT_EQ(Outcome::answered, p.m.station.pings()[0].outcome);
 }
 
-TEST(Ping, leaves_only_in_room_that_frames_leave) {
+TEST(Ping, uses_only_time_that_frames_leave) {
     Pair p;
     bool full = true;
     p.m.in_cycle = [&](Machine& m) {
@@ -119,7 +119,7 @@ TEST(Ping, of_a_station_without_a_known_address_is_not_sent) {
     EXPECT_EQ(Outcome::no_address, m.station.pings()[0].outcome);
 }
 
-TEST(Ping, answers_that_are_invented_count_nothing) {
+TEST(Ping, ignores_forged_answers) {
     Pair p;
     p.bed.wire.fault = [](Wire::Frame& f) { return decode(f.bytes).kind != Kind::echo; };
     p.m.station.ping(0, 9);
@@ -141,7 +141,7 @@ TEST(Ping, answers_that_are_invented_count_nothing) {
     EXPECT_EQ(foreign + 6, static_cast<Time>(p.m.status().count.foreign));
 }
 
-TEST(Ping, is_answered_once_to_each_asker_however_many_it_sends) {
+TEST(Ping, is_answered_once_per_sender) {
     Pair p;
     p.bed.wire.watching = true;
     for (int n = 0; n < 500; ++n) {

@@ -31,7 +31,7 @@ slot 0 600 1/1 100
 slot 2 700
 )";
 
-/// A station that knows only its address, with what its component does for it; its helper has its turn behind each cycle.
+/// A station that knows only its address, with the applicant of its component; the helper runs after each cycle.
 struct Newcomer {
     Newcomer(Machine& m, rtcfg::Logical own, std::string file)
         : machine(m), applicant("tdma." + std::to_string(m.port.address()[5]), m.station, own, std::move(file), m) {
@@ -57,7 +57,7 @@ struct Cell : Bed {
 
     static StationSetup unknown() {
         StationSetup s;
-        s.room_for_slots = most_slots;
+        s.slot_capacity = most_slots;
         s.configured = false;
         return s;
     }
@@ -90,7 +90,7 @@ struct Cell : Bed {
     }
 };
 
-/// What is said on standard error while it lives.
+/// Captures standard error.
 struct Said {
     Said() { testing::internal::CaptureStderr(); }
     std::string text() { return testing::internal::GetCapturedStderr(); }
@@ -101,10 +101,10 @@ TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
     Said said;
     cell.run(4000 * ms);
     EXPECT_EQ(
-        "tdma.2: configured by 02:00:00:00:00:01: it is station x with 1 slot, the cycle is 1000 us\n"
-        "tdma.3: configured by 02:00:00:00:00:01: it is station y with 2 slots, the cycle is 1000 us\n"
-        "tdma.2: the file from 02:00:00:00:00:01, 3000 bytes, is in '" +
-            cell.path + "'\n",
+        "tdma.2: configured by 02:00:00:00:00:01 as station x: 1 slot, cycle 1000 us\n"
+        "tdma.3: configured by 02:00:00:00:00:01 as station y: 2 slots, cycle 1000 us\n"
+        "tdma.2: received '" +
+            cell.path + "' from 02:00:00:00:00:01 (3000 bytes)\n",
         said.text());
     EXPECT_TRUE(cell.x.station.ready() && cell.y.station.ready());
     EXPECT_EQ(300'000, cell.x.station.setup().slots.at(0).offset);
@@ -120,12 +120,12 @@ TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
     EXPECT_EQ(0U, cell.service->server().foreign() + cell.at_x.applicant.foreign() + cell.at_y.applicant.foreign());
 }
 
-TEST(Rtcfg_server, does_not_ask_a_station_that_is_at_work) {
+TEST(Rtcfg_server, does_not_invite_a_station_that_already_sends) {
     Cell cell;
     Said said;
     cell.x.in_cycle = nullptr;
     cell.x.station.accompany(nullptr, nullptr);
-    ASSERT_TRUE(cell.x.station.reconfigure(config::setup_of(cell.reading.schedule, 1)));  // a file of its own
+    ASSERT_TRUE(cell.x.station.reconfigure(config::setup_of(cell.reading.schedule, 1)));  // from its own file
     cell.run(3000 * ms);
     ASSERT_TRUE(cell.x.station.ready());
     cell.x.in_cycle = [](Machine& me) {
@@ -144,7 +144,7 @@ TEST(Rtcfg_server, does_not_ask_a_station_that_is_at_work) {
     said.text();
 }
 
-TEST(Rtcfg_server, notices_a_dead_station_and_configures_it_again) {
+TEST(Rtcfg_server, reports_a_dead_station_and_configures_it_again) {
     Cell cell;
     Said said;
     cell.run(4000 * ms);
@@ -153,7 +153,7 @@ TEST(Rtcfg_server, notices_a_dead_station_and_configures_it_again) {
     EXPECT_EQ(rtcfg::ClientState::dead, cell.state(0));
     EXPECT_EQ(1U, cell.service->dead());
     EXPECT_EQ(1, cell.m.events[Event::station_dead]);
-    EXPECT_EQ(mac(2), cell.y.last_who[Event::reported_dead]) << "all are told";
+    EXPECT_EQ(mac(2), cell.y.last_who[Event::reported_dead]) << "all stations are notified";
     cell.x.off = cell.x.port.cut = false;  // power-cycled
     cell.at_x.applicant.begin();
     cell.x.next = cell.x.port.clock().local(cell.now);
@@ -165,7 +165,7 @@ TEST(Rtcfg_server, notices_a_dead_station_and_configures_it_again) {
     said.text();
 }
 
-TEST(Rtcfg_server, that_began_anew_finds_the_stations_that_run) {
+TEST(Rtcfg_server, finds_running_stations_after_a_restart) {
     Cell cell;
     Said said;
     cell.run(4000 * ms);
@@ -178,7 +178,7 @@ TEST(Rtcfg_server, that_began_anew_finds_the_stations_that_run) {
     said.text();
 }
 
-TEST(Rtcfg_server, repeats_what_was_lost) {
+TEST(Rtcfg_server, repeats_lost_frames) {
     Cell cell;
     Said said;
     cell.wire.fault = [&cell](Wire::Frame& f) { return f.bytes[13] != 0x22 || cell.wire.random() % 4 != 0; };
@@ -188,7 +188,7 @@ TEST(Rtcfg_server, repeats_what_was_lost) {
     said.text();
 }
 
-TEST(Rtcfg_server, says_that_its_slot_is_too_short_when_nothing_is_heard_of_a_station) {
+TEST(Rtcfg_server, reports_a_slot_that_is_too_short_for_an_offline_station) {
     Cell cell;
     StationSetup small = config::setup_of(cell.reading.schedule, 0);
     small.slots[0].size = 100;
@@ -199,7 +199,7 @@ TEST(Rtcfg_server, says_that_its_slot_is_too_short_when_nothing_is_heard_of_a_st
     EXPECT_EQ(0, cell.x.events[Event::running]);
 }
 
-TEST(Rtcfg_service, of_a_backup_does_without_what_only_the_master_has) {
+TEST(Rtcfg_service, of_a_backup_omits_files_that_only_the_master_has) {
     const auto reading = config::read(
         "cycle 1000\nmaster:\nslot 0 100\nbackup-master:\nname b\nbackup-offset 60\nslot 0 300\n"
         "slave:\nname x\nmac 02:00:00:00:00:03\nstage2 x.cfg\nslot 0 600");
@@ -210,7 +210,7 @@ TEST(Rtcfg_service, of_a_backup_does_without_what_only_the_master_has) {
     EXPECT_EQ(1U, rtcfg::Service(cell.m.station, reading.schedule, 1, none, cell.m).server().clients()) << "x";
 }
 
-TEST(Rtcfg_client, takes_nothing_from_a_second_server_and_no_other_configuration_while_it_runs) {
+TEST(Rtcfg_client, ignores_a_second_server_and_another_configuration_while_running) {
     Cell cell;
     Said said;
     cell.run(4000 * ms);
@@ -232,7 +232,7 @@ TEST(Rtcfg_client, takes_nothing_from_a_second_server_and_no_other_configuration
     said.text();
 }
 
-TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
+TEST(Rtcfg_client, reports_an_invalid_configuration_once_and_accepts_the_next) {
     Cell cell;
     Said said;
     cell.m.off = true;
@@ -243,8 +243,8 @@ TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
     for (int i = 0; i < 5; ++i) cell.inject(m, 9, 10 * ms + i * 5 * ms);
     cell.run(100 * ms);
     EXPECT_EQ(
-        "tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:3:1: error: unknown key 'slott'; "
-        "did you mean 'slot'?; this station waits for another\n",
+        "tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:3:1: error: unknown key 'slott'; "
+        "did you mean 'slot'?; waiting for another\n",
         said.text());
     EXPECT_EQ(State::unconfigured, cell.x.status().state);
     EXPECT_EQ(5U, cell.at_x.applicant.foreign());
@@ -256,7 +256,7 @@ TEST(Rtcfg_client, says_once_what_it_cannot_use_and_takes_the_next) {
     again.text();
 }
 
-TEST(Rtcfg_client, is_not_made_to_talk_for_ever) {
+TEST(Rtcfg_client, reports_at_most_three_invalid_configurations) {
     Cell cell;
     Said said;
     cell.m.off = true;
@@ -270,14 +270,14 @@ TEST(Rtcfg_client, is_not_made_to_talk_for_ever) {
     cell.run(400 * ms);
     const std::string words = said.text();
     EXPECT_EQ(3, std::count(words.begin(), words.end(), '\n')) << words;
-    EXPECT_TRUE(words.ends_with("; this station waits for another, and says no more of such\n")) << words;
-    EXPECT_TRUE(words.starts_with("tdma.2: what 02:00:00:00:00:09 sent as this station's configuration cannot be used; stage 1:1:1: error: there is "
-                                 "no key 'cy?[2Jcle'; "))
+    EXPECT_TRUE(words.ends_with("; waiting for another (further rejections are not reported)\n")) << words;
+    EXPECT_TRUE(words.starts_with("tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:1:1: error: unknown key "
+                                  "'cy?[2Jcle'; "))
         << words;
     EXPECT_EQ(50U, cell.at_x.applicant.foreign());
 }
 
-TEST(Rtcfg_client, survives_whatever_comes) {
+TEST(Rtcfg_client, stays_configured_under_random_frames) {
     Cell cell;
     Said said;
     for (int i = 0; i < 20'000; ++i) {

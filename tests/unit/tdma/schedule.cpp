@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Schedules: read, judged, worked out.
+// Schedules: parsing, checks, timing.
 #include <gtest/gtest.h>
 
 #include "components/fieldbus/tdma/config/schedule_plan.hpp"

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Time ms = 1'000'000;
 
-/// A frame that says nothing, to everybody.
+/// An empty broadcast frame.
 std::vector<std::uint8_t> some_frame(int from, std::size_t length = 60, std::uint8_t content = 0) {
     std::vector<std::uint8_t> frame(length, content);
     std::fill_n(frame.begin(), 6, std::uint8_t{0xff});
@@ -21,7 +21,7 @@ std::vector<std::uint8_t> some_frame(int from, std::size_t length = 60, std::uin
     return frame;
 }
 
-TEST(Clock_estimate, coasts_while_syncs_are_held_up_and_follows_a_clock_that_jumped) {
+TEST(Clock_estimate, ignores_delayed_syncs_and_follows_a_clock_step) {
     constexpr Time way = 5'000;
     ClockEstimate clock;
     Time sent = 0, jump = 0;
@@ -37,10 +37,10 @@ TEST(Clock_estimate, coasts_while_syncs_are_held_up_and_follows_a_clock_that_jum
     EXPECT_LT(error(), 1'000) << "later for good: it is this clock that jumped";
     jump = -50'000;
     for (int i = 0; i < 40; ++i) sync(i % 3 * 300);
-    EXPECT_LT(error(), 1'000) << "nothing comes early; that is believed sooner";
+    EXPECT_LT(error(), 1'000) << "no sync arrives early, so a step in this direction is accepted sooner";
 }
 
-TEST(Station_begins_as_master, when_nobody_else_sends_a_sync) {
+TEST(Master, sends_syncs_when_no_other_station_does) {
     Bed bed;
     Machine& m = bed.add(1, master());
     bed.run(3 * ms);
@@ -51,7 +51,7 @@ TEST(Station_begins_as_master, when_nobody_else_sends_a_sync) {
     EXPECT_GE(m.status().count.syncs_sent, 3U);
 }
 
-TEST(Station_synchronises_and_calibrates, with_clocks_that_differ_by_200_ppm) {
+TEST(Station, synchronises_and_calibrates_with_clocks_that_differ_by_200_ppm) {
     for (const double skew : {-200e-6, 0.0, 200e-6}) {
         Bed bed;
         bed.wire.noise_ns = 300;
@@ -62,7 +62,7 @@ TEST(Station_synchronises_and_calibrates, with_clocks_that_differ_by_200_ppm) {
         EXPECT_EQ(1, s.events[Event::calibrated]);
         EXPECT_NEAR(static_cast<double>(Wire::path), static_cast<double>(s.status().delay), 200) << skew;
         EXPECT_NEAR(-skew, s.status().drift, 2e-6);
-        // Global time is the master's: both machines at one true moment.
+        // Global time is the master's clock: both machines at the same instant.
         const Time t = bed.now;
         EXPECT_NEAR(static_cast<double>(m.station.global(m.port.clock().local(t))),
                     static_cast<double>(s.station.global(s.port.clock().local(t))), 300);
@@ -71,10 +71,10 @@ TEST(Station_synchronises_and_calibrates, with_clocks_that_differ_by_200_ppm) {
     }
 }
 
-TEST(Station_sends_in_its_slot, and_the_jitter_is_below_that_of_the_stamps) {
+TEST(Station, sends_in_its_slot_with_less_jitter_than_the_stamps) {
     for (const double skew : {-200e-6, 200e-6}) {
         Bed bed;
-        bed.wire.noise_ns = 1'500;  // as a kernel's stamps scatter
+        bed.wire.noise_ns = 1'500;  // noise of kernel time stamps
         bed.add(1, master());
         Machine& s = bed.add(2, slave(300'000), {skew, 1'000'000'000});
         bed.run(800 * ms);
@@ -101,7 +101,7 @@ TEST(Station_sends_in_its_slot, and_the_jitter_is_below_that_of_the_stamps) {
     }
 }
 
-TEST(Station_hands_a_frame_over, just_before_its_slot_when_its_thread_is_there_just_before) {
+TEST(Station, passes_a_frame_to_the_port_just_before_its_slot) {
     for (const Time cycle : {1'000'000, 5'000'000, 20'000'000}) {
         Bed bed;
         bed.add(1, master(cycle));
@@ -114,11 +114,11 @@ TEST(Station_hands_a_frame_over, just_before_its_slot_when_its_thread_is_there_j
         s.in_cycle = [](Machine& machine) { machine.station.send(some_frame(2), 0, 0); };
         bed.run(100 * cycle);
         EXPECT_GT(s.status().count.sent, 95U);
-        EXPECT_LT(s.port.farthest, 150'000) << cycle << ": a port without a pacer refuses what is not due within 200 us";
+        EXPECT_LT(s.port.farthest, 150'000) << cycle << ": a port without a pacer rejects frames that are not due within 200 us";
     }
 }
 
-TEST(Station_repeats_a_calibration_round, when_a_request_or_a_reply_is_lost) {
+TEST(Station, repeats_a_calibration_round_when_a_request_or_a_reply_is_lost) {
     for (const int lost : {0x10, 0x11}) {
         Bed bed;
         bed.add(1, master());
@@ -132,7 +132,7 @@ TEST(Station_repeats_a_calibration_round, when_a_request_or_a_reply_is_lost) {
     }
 }
 
-TEST(Station_says_it, when_no_reply_comes_at_all) {
+TEST(Station, reports_calibration_requests_without_a_reply) {
     Bed bed;
     bed.add(1, master());
     Machine& s = bed.add(2, slave(300'000));
@@ -146,7 +146,7 @@ TEST(Station_says_it, when_no_reply_comes_at_all) {
     EXPECT_TRUE(s.station.ready());
 }
 
-TEST(Station_keeps_on, when_the_cycle_number_wraps) {
+TEST(Station, stays_synchronous_when_the_cycle_number_wraps) {
     Bed bed;
     Machine& s = bed.add(2, slave(300'000));
     const auto sync = [&](std::uint32_t cycle, Time at) {
@@ -162,7 +162,7 @@ TEST(Station_keeps_on, when_the_cycle_number_wraps) {
     EXPECT_GT(s.status().cycle, 50U);
 }
 
-TEST(Station_uses_a_slot, only_in_the_cycles_of_its_phasing) {
+TEST(Station, uses_a_slot_only_in_the_cycles_of_its_phasing) {
     Bed bed;
     StationSetup setup = slave(300'000);
     setup.slots.push_back({.id = 3, .offset = 500'000, .period = 4, .phasing = 2, .size = 60});
@@ -184,10 +184,10 @@ TEST(Station_uses_a_slot, only_in_the_cycles_of_its_phasing) {
     EXPECT_NEAR(100, frames, 2);
 }
 
-TEST(Station_fills_a_slot, with_several_frames_of_its_time_most_urgent_first) {
+TEST(Station, fills_a_slot_with_several_frames_in_order_of_priority) {
     Bed bed;
     StationSetup setup = slave(300'000);
-    setup.slots = {{.id = 0, .offset = 300'000, .size = 200}};  // 238 bytes of the wire: two frames of 84, not three
+    setup.slots = {{.id = 0, .offset = 300'000, .size = 200}};  // 238 bytes on the line: two frames of 84, not three
     bed.add(1, master());
     Machine& s = bed.add(2, setup);
     bed.run(600 * ms);
@@ -212,7 +212,7 @@ TEST(Station_fills_a_slot, with_several_frames_of_its_time_most_urgent_first) {
     EXPECT_NEAR(ms, static_cast<double>(times[2] - times[0]), 2'000) << "the third in the next cycle";
 }
 
-TEST(Station_that_missed_a_slot, is_up_to_date_a_few_cycles_later) {
+TEST(Station, catches_up_a_few_cycles_after_a_missed_slot) {
     Bed bed;
     bed.add(1, master());
     Machine& s = bed.add(2, slave(300'000));
@@ -224,7 +224,7 @@ TEST(Station_that_missed_a_slot, is_up_to_date_a_few_cycles_later) {
         begun.push_back(bed.now);
     };
     bed.run(5 * ms);
-    s.next += 400'000;  // its thread is held up beyond the slot
+    s.next += 400'000;  // its thread is delayed beyond the slot
     bed.run(4 * ms);
     bed.wire.watching = true;
     bed.run(10 * ms);
@@ -238,7 +238,7 @@ TEST(Station_that_missed_a_slot, is_up_to_date_a_few_cycles_later) {
     EXPECT_EQ(0U, s.station.waiting(0));
 }
 
-TEST(Station_drops_frames, that_find_no_room_or_no_sync) {
+TEST(Station, drops_frames_without_space_or_sync) {
     Bed bed;
     StationSetup setup = slave(300'000);
     setup.queue = 4;

@@ -19,9 +19,9 @@ namespace tdma_tests {
 namespace {
 
 constexpr Time ms = 1'000'000;
-constexpr std::uint16_t experimental = 0x88b5;  // of IEEE 802: no protocol of this machine's answers it
+constexpr std::uint16_t experimental = 0x88b5;  // experimental Ethertype of IEEE 802: no protocol answers it
 
-/// Why there is no namespace, or nothing.
+/// Creates a network namespace. Returns the reason of a failure.
 std::string enter() {
     if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return "no network namespace may be made here";
     const hal::link::Descriptor tun(::open("/dev/net/tun", O_RDWR | O_CLOEXEC));
@@ -66,7 +66,7 @@ struct Taps : testing::Test, Bed {
         s->station.accompany(nullptr, at_s.get());
         run(600 * ms);
     }
-    /// The wire's time goes on until it comes true; the kernel and the interfaces' threads have theirs.
+    /// Advances the simulated time until the condition is true; the kernel and the interfaces' threads use real time.
     template <class Condition>
     bool eventually(Condition condition) {
         for (int i = 0; i < 20'000; ++i) {
@@ -105,7 +105,7 @@ TEST_F(Taps, carry_a_frame_from_one_to_the_other) {
     put(frame, 12, experimental);
     for (std::uint8_t i = 14; i < 120; ++i) frame[i] = i;
     ssize_t length = 0;
-    ASSERT_TRUE(eventually([&] {  // the kernel drops what is sent while it makes the interface ready
+    ASSERT_TRUE(eventually([&] {  // the kernel drops frames while the interface comes up
         (void)!::send(here.get(), frame.data(), frame.size(), 0);
         return (length = ::recv(there.get(), got.data(), got.size(), 0)) > 0;
     }));
@@ -114,7 +114,7 @@ TEST_F(Taps, carry_a_frame_from_one_to_the_other) {
     EXPECT_GT(at_m->sent(), 0u);
     EXPECT_GT(at_s->received(), 0u);
 
-    // Without a master there is nobody to send to, and the interface says so.
+    // Without a master the interface has no carrier.
     m->off = m->port.cut = true;
     EXPECT_TRUE(eventually([&] { return !asked("other0", SIOCGIFFLAGS, running); }));
     m->off = m->port.cut = false;
@@ -122,12 +122,12 @@ TEST_F(Taps, carry_a_frame_from_one_to_the_other) {
     EXPECT_TRUE(eventually([&] { return asked("other0", SIOCGIFFLAGS, running); }));
 }
 
-TEST_F(Taps, follow_another_schedule_and_go_with_their_station) {
+TEST_F(Taps, follow_another_schedule_and_are_removed_with_their_station) {
     auto opened = open_tap(*at_s, {"hal5", mac(2)}, "tdma.1");
     ASSERT_NE(nullptr, opened.tap) << opened.problem;
-    EXPECT_EQ("the interface hal5 is another process's; give this one another name, as in hal%d",
+    EXPECT_EQ("interface hal5 is in use by another process; use another name, for example hal%d",
               open_tap(*at_m, {"hal5", mac(1)}, "x").problem);
-    EXPECT_EQ("lo is another interface's name, and that is no TAP; give this one another name, as in hal%d",
+    EXPECT_EQ("interface lo exists, but is not a TAP interface; use another name, for example hal%d",
               open_tap(*at_m, {"lo", mac(1)}, "x").problem);
     StationSetup changed = slave(300'000);
     changed.slots.push_back({.id = tunnel_slot, .offset = 700'000, .size = 500});

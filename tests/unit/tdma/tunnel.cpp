@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ordinary packets in slot 1: both ways, beside real-time frames that do not notice, and those that are no packets.
+// Ordinary packets in slot 1, in both directions, next to undisturbed real-time frames; invalid packets.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -66,17 +66,17 @@ TEST(Tunnel, carries_packets_both_ways_in_order) {
     p.run(60 * ms);
     for (unsigned i = 0; i < 40; ++i) {
         Bytes sent = packet(mac(2), mac(1), 28 + i % 2 * (mtu - 28), i);
-        sent.resize(std::max<std::size_t>(sent.size(), ethernet::smallest_frame - rtmac_bytes));  // the padding of a short frame stays
+        sent.resize(std::max<std::size_t>(sent.size(), ethernet::smallest_frame - rtmac_bytes));  // padded like a short frame
         EXPECT_EQ(sent, Pair::next(p.at_s)) << i;
         EXPECT_EQ(packet(i % 3 == 0 ? ethernet::broadcast : mac(1), mac(2), 100 + i, i), Pair::next(p.at_m)) << i;
     }
     EXPECT_EQ(40u, p.at_m.sent());
     EXPECT_EQ(40u, p.at_m.received());
     EXPECT_EQ(40u, p.at_s.received());
-    EXPECT_EQ(0u, p.at_m.dropped() + p.at_s.dropped() + p.at_m.refused() + p.at_s.refused());
+    EXPECT_EQ(0u, p.at_m.dropped() + p.at_s.dropped() + p.at_m.rejected() + p.at_s.rejected());
 }
 
-TEST(Tunnel, leaves_its_slot_to_nobody_and_others_theirs) {
+TEST(Tunnel, uses_its_own_slot_only) {
     Pair quiet, full;
     quiet.wire.watching = full.wire.watching = true;
     for (int i = 0; i < 100; ++i) {
@@ -87,7 +87,7 @@ TEST(Tunnel, leaves_its_slot_to_nobody_and_others_theirs) {
         for (Pair* p : {&quiet, &full}) p->run(ms);
         while (!Pair::next(full.at_m).empty() || !Pair::next(full.at_s).empty()) {}
     }
-    // What is sent in real time leaves at the same nanosecond, whatever is in slot 1.
+    // Real-time frames leave at the same nanosecond, whatever is in slot 1.
     const auto real_time = [](const Pair& p) {
         std::vector<std::pair<int, Time>> when;
         for (const Wire::Frame& f : p.wire.seen)
@@ -121,7 +121,7 @@ TEST(Tunnel, drops_the_newest_when_it_is_full) {
     EXPECT_EQ(1u, p.at_m.dropped());
     p.run(200 * ms);
     for (unsigned i = 0; i < Tunnel::capacity; ++i) EXPECT_EQ(i, mark_of(Pair::next(p.at_s)));
-    // Nobody takes what comes: the cycle goes on, and the oldest stay.
+    // Nothing is read: the cycle continues, and the oldest packets are kept.
     for (unsigned i = 0; i < Tunnel::capacity + 6; ++i) {
         EXPECT_TRUE(p.at_m.give(packet(mac(2), mac(1), 60, i)));
         p.run(2 * ms);
@@ -130,7 +130,7 @@ TEST(Tunnel, drops_the_newest_when_it_is_full) {
     EXPECT_EQ(0u, mark_of(Pair::next(p.at_s)));
 }
 
-TEST(Tunnel, takes_nothing_that_does_not_fit_its_slot) {
+TEST(Tunnel, rejects_frames_that_do_not_fit_its_slot) {
     Pair p;
     EXPECT_TRUE(p.at_m.give(packet(mac(2), mac(1), mtu)));
     EXPECT_FALSE(p.at_m.give(packet(mac(2), mac(1), mtu + 1)));
@@ -153,9 +153,9 @@ TEST(Tunnel, has_the_mtu_of_slot_1) {
     EXPECT_EQ(0u, none.mtu());
     EXPECT_FALSE(none.open()) << "and slot 0 is the real-time frames' alone";
     EXPECT_FALSE(none.give(packet(mac(2), mac(1), 40)));
-    // Another schedule comes while it runs.
+    // The schedule changes while it runs.
     StationSetup room = with_tunnel(master(), 400'000);
-    room.room_for_slots = 2;
+    room.slot_capacity = 2;
     Machine& later = bed.add(3, room);
     Tunnel tunnel{later.station};
     EXPECT_EQ(mtu, tunnel.mtu());
@@ -166,7 +166,7 @@ TEST(Tunnel, has_the_mtu_of_slot_1) {
     EXPECT_EQ(96u, tunnel.mtu());
 }
 
-TEST(Tunnel, sends_nothing_old_when_the_sync_is_back) {
+TEST(Tunnel, sends_no_stale_packets_after_a_sync_loss) {
     Pair p;
     p.m.off = p.m.port.cut = true;
     for (unsigned i = 0; i < 20; ++i) p.at_s.give(packet(mac(1), mac(2), 300, 1));
@@ -194,16 +194,16 @@ struct Hostile {
     void (*spoil)(Bytes&);  // a tunnelled IPv4 packet of 100 bytes from 1 to 2
 };
 class Hostile_frame : public testing::TestWithParam<Hostile> {};
-TEST_P(Hostile_frame, is_counted_and_goes_nowhere) {
+TEST_P(Hostile_frame, is_counted_and_rejected) {
     Pair p;
     Bytes frame(ethernet::largest_frame);
     frame.resize(tunnel(packet(mac(2), mac(1), 100), frame));
     ASSERT_TRUE(is_packet(decode(frame), mac(2)));
     GetParam().spoil(frame);
     EXPECT_FALSE(is_packet(decode(frame), mac(2)));
-    const auto before = p.at_s.refused() + p.s.status().count.foreign;
-    for (int i = 0; i < 5; ++i) p.at_s.arrived(frame, p.now);  // as one would by which a driver's filter was passed by
-    EXPECT_EQ(before + 5, p.at_s.refused());
+    const auto before = p.at_s.rejected() + p.s.status().count.foreign;
+    for (int i = 0; i < 5; ++i) p.at_s.arrived(frame, p.now);  // bypasses the driver's filter
+    EXPECT_EQ(before + 5, p.at_s.rejected());
     EXPECT_TRUE(Pair::next(p.at_s).empty());
     EXPECT_EQ(0u, p.at_s.received());
     EXPECT_TRUE(p.s.station.ready());
@@ -228,7 +228,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Hostile{"longer_than_a_frame", [](Bytes& f) { f.resize(1600); }}),
     [](const auto& test) { return test.param.what; });
 
-TEST(Tunnel, gives_on_only_packets_whatever_comes) {
+TEST(Tunnel, passes_on_only_valid_packets_from_random_frames) {
     Pair p;
     std::mt19937_64 random{7};
     Bytes good(ethernet::largest_frame), out(ethernet::largest_frame);
@@ -246,22 +246,22 @@ TEST(Tunnel, gives_on_only_packets_whatever_comes) {
         EXPECT_EQ(f.size() - rtmac_bytes, length);
     }
     EXPECT_EQ(taken, p.at_s.received());
-    EXPECT_EQ(20'000 - taken, p.at_s.refused());
+    EXPECT_EQ(20'000 - taken, p.at_s.rejected());
     EXPECT_GT(taken, 1000u);
-    EXPECT_GT(p.at_s.refused(), 1000u);
+    EXPECT_GT(p.at_s.rejected(), 1000u);
 }
 
-TEST(Tap, names_are_those_of_interfaces) {
+TEST(Tap, accepts_valid_interface_names) {
     for (const char* good : {"hal0", "rtmac%d", "%d", "a.b-c_d", "fifteen-letters"}) EXPECT_EQ("", wrong_name(good)) << good;
     for (const char* bad : {"", ".", "..", "a/b", "a b", "a:b", "hal%s", "hal%", "%d%d", "sixteen-letters-"}) {
         const std::string expected =
             "'" + std::string(bad) +
-            "' is no name of an interface: at most 15 letters and digits, as in hal0, or hal%d for the first that is free";
+            "' is not a valid interface name; use at most 15 letters and digits, for example hal0, or hal%d for the first free number";
         EXPECT_EQ(expected, wrong_name(bad));
     }
 }
 
-TEST(Tap, networks_are_prefixes_or_masks) {
+TEST(Tap, parses_prefix_lengths_and_netmasks) {
     EXPECT_EQ(24u, parse_prefix("24"));
     EXPECT_EQ(24u, parse_prefix("255.255.255.0"));
     EXPECT_EQ(0u, parse_prefix("0.0.0.0"));

@@ -70,7 +70,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
     const tdma::config::StationEntry* entry = nullptr;
     if (by_rtcfg) {
         tdma::StationSetup unknown;
-        unknown.configured = false, unknown.room_for_slots = tdma::most_slots;
+        unknown.configured = false, unknown.slot_capacity = tdma::most_slots;
         made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift));
         if (std::string problem = made->take_schedule(options, ended); !problem.empty()) return problem;
         entry = &made->applicant_->accepted()->schedule.stations.front();
@@ -199,7 +199,7 @@ std::string TdmaStation::summary() const {
     return fmt::format(
         "TDMA: {}, {} cycles, {} missed; syncs {} received, {} lost; frames {} sent, {} late, {} dropped; clock {:+.1f} ppm, "
         "{} ns to the master, sync jitter {:.0f} ns\n",
-        tdma::word(s.state), cycles_, missed_, s.count.syncs, s.count.syncs_lost, s.count.sent, s.count.late, s.count.dropped,
+        tdma::to_string(s.state), cycles_, missed_, s.count.syncs, s.count.syncs_lost, s.count.sent, s.count.late, s.count.dropped,
         s.drift * 1e6, s.delay, s.jitter);
 }
 

@@ -49,7 +49,7 @@ public:
         case Event::withdrew:
             return "stepped down as master: " + who + " is a master with a smaller address, and no station follows this one; "
                    "resumes when that one is gone, or by: " + again_;
-        case Event::stranger_sync:
+        case Event::unknown_master:
             return "sync from " + who + " ignored: it is not one of the addresses (mac) that the configuration gives the master and its backups";
         case Event::foreign_frame: return who + " sends in slot " + value + " of this station; compare the configurations of both";
         case Event::babbling: return "babbling station: " + who + " sends " + value + " frames in one cycle";

@@ -16,32 +16,33 @@ class OtherPins {
 public:
     OtherPins(hal::Component& c, const hal::Function& f, const config::StationEntry& station)
         : name_(station.name + "."),
-          online_(c, f, (name_ + "online").c_str(), "a frame of it came within a second"),
-          frames_(c, f, (name_ + "frames").c_str(), "frames of it that came here"),
-          late_(c, f, (name_ + "late").c_str(), "of them: those that came outside of its slots"),
-          since_(c, f, (name_ + "since").c_str(), "for how long it has been online, or offline", {.unit = "s"}),
-          drift_(c, f, (name_ + "drift").c_str(), "of its clock, from its calibrations with this station and its answers to pings",
+          online_(c, f, (name_ + "online").c_str(), "a frame of the station was received within 1 s"),
+          frames_(c, f, (name_ + "frames").c_str(), "frames received from the station"),
+          late_(c, f, (name_ + "late").c_str(), "frames received outside its slots"),
+          since_(c, f, (name_ + "since").c_str(), "time since it went online or offline", {.unit = "s"}),
+          drift_(c, f, (name_ + "drift").c_str(), "drift of its clock, from its calibration requests and answers to pings",
                  {.unit = "ppm"}),
-          drift_known_(c, f, (name_ + "drift-known").c_str(), "drift is measured: two stamps of that clock came, 0.3 s apart"),
-          ping_(c, f, (name_ + "ping").c_str(), "another number than before asks the station for an answer"),
-          ping_done_(c, f, (name_ + "ping-done").c_str(), "the newest such number that was answered or given up"),
+          drift_known_(c, f, (name_ + "drift-known").c_str(), "drift is valid: measured from two time stamps 0.3 s apart"),
+          ping_(c, f, (name_ + "ping").c_str(), "a new number sends a ping to the station"),
+          ping_done_(c, f, (name_ + "ping-done").c_str(), "number of the last ping that was answered or failed"),
           ping_result_(c, f, (name_ + "ping-result").c_str(),
-                       "of that one: 1 answered; 2 no answer within a second (or 20 cycles); not sent: 3 no room in the own slots, 4 the "
-                       "station's address is not known, 5 this station does not run"),
-          ping_time_(c, f, (name_ + "ping-time").c_str(), "of the newest that was answered: from the question on the line to the answer",
+                       "result of that ping: 1 answered; 2 timeout (1 s or 20 cycles); not sent: 3 no space in the own slots, 4 unknown "
+                       "address, 5 this station is not running"),
+          ping_time_(c, f, (name_ + "ping-time").c_str(), "round-trip time of the last answered ping",
                      {.unit = "us"}),
-          ping_held_(c, f, (name_ + "ping-held").c_str(), "of that time: at the other station, which waited for its slot", {.unit = "us"}),
-          ping_cycles_(c, f, (name_ + "ping-cycles").c_str(), "the same time in cycles") {
+          ping_held_(c, f, (name_ + "ping-held").c_str(), "part of that time at the other station, waiting for its slot", {.unit = "us"}),
+          ping_cycles_(c, f, (name_ + "ping-cycles").c_str(), "round-trip time in cycles") {
         for (const config::SlotEntry& s : station.slots) slots_.emplace_back(c, f, name_, s.setup);
     }
 
-    /// A ping, when one is wanted. [realtime]
+    /// Sends a ping when the number has changed. [realtime]
     void ask(Station& station, std::size_t n) noexcept {
         if (ping_ == asked_) return;
         asked_ = ping_;
         station.ping(n, asked_);
     }
-    void show(const Heard& h, const Pings::Asked& ping, Time now, Time cycle) noexcept {  // [realtime]
+    /// Shows the state of the station and of the last ping. [realtime]
+    void show(const Heard& h, const Pings::Asked& ping, Time now, Time cycle) noexcept {
         online_ = h.alive;
         frames_ = h.frames;
         late_ = h.late;
@@ -56,15 +57,15 @@ public:
     }
 
 private:
-    /// Where in the cycle a slot of it is; constant.
+    /// The position of one of its slots in the cycle; constant.
     struct SlotPins {
         hal::Out<double>        offset;
         hal::Out<std::uint32_t> period;
 
         SlotPins(hal::Component& c, const hal::Function& f, const std::string& station, const SlotSetup& slot)
-            : offset(c, f, (station + "slot-" + std::to_string(slot.id) + ".offset").c_str(), "when the slot begins, from the sync",
+            : offset(c, f, (station + "slot-" + std::to_string(slot.id) + ".offset").c_str(), "beginning of the slot, from the sync",
                      {.initial = static_cast<double>(slot.offset) * 1e-3, .unit = "us"}),
-              period(c, f, (station + "slot-" + std::to_string(slot.id) + ".period").c_str(), "it is used in one of so many cycles",
+              period(c, f, (station + "slot-" + std::to_string(slot.id) + ".period").c_str(), "the slot is used every this many cycles",
                      {.initial = slot.period}) {}
     };
 

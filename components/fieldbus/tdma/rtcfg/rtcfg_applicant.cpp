@@ -10,10 +10,10 @@ namespace hal::tdma::rtcfg {
 
 namespace {
 
-constexpr std::size_t   most_accepted = 1000;  // a server that changes its mind for ever
-constexpr std::uint32_t most_refusals = 3, most_dead = 100;  // that are said; a hostile station could go on and on
+constexpr std::size_t   most_accepted = 1000;  // against a server that never stops changing
+constexpr std::uint32_t most_rejections = 3, most_dead = 100;  // reported ones, against a hostile station
 
-/// The first error, without what a terminal would take as a command: the text is a stranger's.
+/// Returns the first error without control characters: the text is untrusted.
 std::string first_error(const config::Reading& reading) {
     std::string text = config::to_string(reading, "stage 1");
     text.resize(std::min(text.find('\n'), text.size()));
@@ -34,8 +34,8 @@ Applicant::Applicant(std::string instance, Station& station, Logical own, std::s
 void Applicant::begin() noexcept {
     client_.begin();
     accepted_ = nullptr;
-    offered_ = writing_ = told_server_ = told_other_ = false;
-    file_bytes_ = dead_told_ = refusals_ = 0;
+    offered_ = writing_ = server_reported_ = other_reported_ = false;
+    file_bytes_ = dead_reported_ = rejections_ = 0;
     Offer           offer;
     const Accepted* answer = nullptr;
     File            file;
@@ -47,13 +47,13 @@ void Applicant::on_stage_1(std::span<const std::uint8_t> text, const Address& se
     if (offered_ || text.size() > std::tuple_size_v<decltype(Offer::text)>) return;
     if (accepted_ != nullptr) {
         if (std::equal(text.begin(), text.end(), accepted_->text.begin(), accepted_->text.end())) {
-            client_.accept(server, accepted_->schedule.heartbeat_ms);  // the server began anew: it is told again who is there
+            client_.accept(server, accepted_->schedule.heartbeat_ms);  // the server restarted: announce this station again
             return;
         }
         const State state = station_.status().state;
         if (state != State::unconfigured && state != State::listening) {  // slots in use do not move
             ++foreign_;
-            if (!told_other_) told_other_ = true, events_.on_event(Event::other_configuration, server, 0);
+            if (!other_reported_) other_reported_ = true, events_.on_event(Event::other_configuration, server, 0);
             return;
         }
     }
@@ -71,11 +71,11 @@ void Applicant::on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length
 }
 
 void Applicant::on_dead_station(const Address& who) noexcept {
-    if (dead_told_ < most_dead) ++dead_told_, events_.on_event(Event::reported_dead, who, 0);
+    if (dead_reported_ < most_dead) ++dead_reported_, events_.on_event(Event::reported_dead, who, 0);
 }
 
 void Applicant::on_other_server(const Address& who) noexcept {
-    if (!told_server_) told_server_ = true, events_.on_event(Event::other_server, who, 0);
+    if (!server_reported_) server_reported_ = true, events_.on_event(Event::other_server, who, 0);
 }
 
 bool Applicant::cycle() noexcept {
@@ -88,21 +88,21 @@ bool Applicant::cycle() noexcept {
         return false;
     }
     accepted_ = answer;
-    told_server_ = told_other_ = false;
+    server_reported_ = other_reported_ = false;
     client_.accept(answer->server, answer->schedule.heartbeat_ms);
     return true;
 }
 
 void Applicant::work(std::int64_t now_ns) {
     now_ns_ = now_ns;
-    for (Offer offer; offers_.pop(offer);) judge(offer);
+    for (Offer offer; offers_.pop(offer);) check(offer);
     for (File file; files_.pop(file);) write(file);
     log_.flush(now_ns);
 }
 
-void Applicant::judge(const Offer& offer) {
+void Applicant::check(const Offer& offer) {
     std::string text(reinterpret_cast<const char*>(offer.text.data()), offer.length);
-    if (text == refused_) {
+    if (text == rejected_) {
         answers_.push(nullptr);
         return;
     }
@@ -110,40 +110,38 @@ void Applicant::judge(const Offer& offer) {
     config::Reading   reading = config::read(text);
     const bool        one = reading.good() && reading.schedule.stations.size() == 1 && !reading.schedule.stations[0].slots.empty();
     if (!one || all_.size() >= most_accepted) {
-        refused_ = text;
-        if (++refusals_ <= most_refusals)
-            say("what " + server + " sent as this station's configuration cannot be used" +
-                (reading.good() ? one ? ", it was changed too often" : ": it is not the block of one station, with a slot"
-                                : "; " + first_error(reading)) +
-                "; this station waits for another" + (refusals_ == most_refusals ? ", and says no more of such" : ""));
+        rejected_ = text;
+        if (++rejections_ <= most_rejections)
+            log("rejected the configuration from " + server + ": " +
+                (reading.good() ? one ? "it changed too often" : "it is not the block of one station with a slot" : first_error(reading)) +
+                "; waiting for another" + (rejections_ == most_rejections ? " (further rejections are not reported)" : ""));
         answers_.push(nullptr);
         return;
     }
-    refusals_ = 0;
+    rejections_ = 0;
     StationSetup setup = config::setup_of(reading.schedule, 0);
     const auto&  entry = reading.schedule.stations[0];
     const auto   count = std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");
-    say("configured by " + server + ": it is station " + entry.name + " with " + count + ", the cycle is " +
-        config::microseconds(reading.schedule.cycle));
+    log("configured by " + server + " as station " + entry.name + ": " + count + ", cycle " + config::microseconds(reading.schedule.cycle));
     FaultWords words(setup);
     all_.push_back(std::make_unique<Accepted>(
         Accepted{offer.server, std::move(text), std::move(reading.schedule), std::move(setup), std::move(words)}));
     answers_.push(all_.back().get());
 }
 
-/// Replaces the file whole; a device or a pipe is written in place.
+/// Replaces the file atomically; a device or a pipe is written in place.
 void Applicant::write(const File& file) {
     const std::string server = ethernet::to_string(file.server);
     std::uint32_t     written = 0;
     if (file.length == 0) {
-        say(server + " has no file (stage 2) for this station; '" + path_ + "' is not written");
+        log(server + " has no file (stage 2) for this station; '" + path_ + "' is unchanged");
     } else {
         const std::string why = replace_file(path_, {reinterpret_cast<const char*>(spare_.data()), file.length});
         if (!why.empty()) {
-            say("the file from " + server + " cannot be written to '" + path_ + "': " + why + "; correct stage2=");
+            log("cannot write the file from " + server + " to '" + path_ + "': " + why + "; correct stage2=");
         } else {
             written = file.length;
-            say("the file from " + server + ", " + std::to_string(written) + " bytes, is in '" + path_ + "'");
+            log("received '" + path_ + "' from " + server + " (" + std::to_string(written) + " bytes)");
         }
     }
     written_.push(written);
@@ -154,6 +152,6 @@ void Applicant::finish() {
     log_.close();
 }
 
-void Applicant::say(const std::string& sentence) { log_.print(sentence, now_ns_); }
+void Applicant::log(const std::string& sentence) { log_.print(sentence, now_ns_); }
 
 }  // namespace hal::tdma::rtcfg

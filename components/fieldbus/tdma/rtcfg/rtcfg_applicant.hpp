@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A station without a schedule of its own: takes its block from the RTcfg server of the segment, and a file when it wants one.
+// A station without a schedule of its own: gets its block from the RTcfg server of the segment, and optionally a file.
 //
-//     cycle: arrived(stage 1) --offers--> helper: reads and judges it --answers--> cycle: reconfigures the station, announces it
-//     cycle: all of stage 2 came, swaps buffers --files--> helper: writes the file
+//     cycle: arrived(stage 1) --offers--> helper: parses and checks it --answers--> cycle: reconfigures the station, announces it
+//     cycle: stage 2 is complete, swaps buffers --files--> helper: writes the file
 //
-// One offer is on its way at a time. What was accepted stays until the end: faults in words point into it.
+// One offer is pending at a time. Accepted configurations are kept until the end: fault messages point into them.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@
 
 namespace hal::tdma::rtcfg {
 
-/// A configuration that came and can be used.
+/// A received, valid configuration.
 struct Accepted {
     Address          server{};
     std::string      text;
@@ -29,18 +29,19 @@ struct Accepted {
 
 class Applicant final : private ClientEvents {
 public:
-    /// `file`: where stage 2 is written; empty: it is not asked for. The station outlives it. [setup]
+    /// `file`: where stage 2 is written; empty: not requested. The station must outlive it. [setup]
     Applicant(std::string instance, Station& station, Logical own, std::string file, Events& events);
 
+    /// Returns the protocol client, for Station::accompany(). [setup]
     Client& client() noexcept { return client_; }
     void    begin() noexcept;              ///< forgets the server and its configuration. [setup]
-    /// Before Station::receive(): takes what the helper accepted; true: the station has another configuration now. [realtime]
+    /// Applies what the helper accepted; called before Station::receive(). Returns true when the configuration changed. [realtime]
     bool            cycle() noexcept;
     const Accepted* accepted() const noexcept { return accepted_; }         ///< nullptr: none yet. [realtime]
-    std::uint64_t   foreign() const noexcept { return client_.foreign() + foreign_; }
-    std::uint32_t   file_bytes() const noexcept { return file_bytes_; }     ///< of the file that came last
-    void            work(std::int64_t now_ns);   ///< the helper's turn; prints what came of it
-    void            finish();                    ///< its last turn
+    std::uint64_t   foreign() const noexcept { return client_.foreign() + foreign_; }  ///< frames ignored
+    std::uint32_t   file_bytes() const noexcept { return file_bytes_; }     ///< size of the last file
+    void            work(std::int64_t now_ns);   ///< does the helper's work and prints its result. [helper]
+    void            finish();                    ///< does the remaining work. [helper]
 
 private:
     struct Offer {
@@ -56,9 +57,9 @@ private:
     void on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address& server) noexcept override;
     void on_dead_station(const Address&) noexcept override;
     void on_other_server(const Address&) noexcept override;
-    void judge(const Offer&);
+    void check(const Offer&);
     void write(const File&);
-    void say(const std::string& sentence);
+    void log(const std::string& sentence);
 
     const std::string path_;
     Station&          station_;
@@ -66,21 +67,21 @@ private:
     Client            client_;
     // the cycle's
     const Accepted* accepted_ = nullptr;
-    bool            offered_ = false, writing_ = false, told_server_ = false, told_other_ = false;
+    bool            offered_ = false, writing_ = false, server_reported_ = false, other_reported_ = false;
     std::uint64_t   foreign_ = 0;
-    std::uint32_t   file_bytes_ = 0, dead_told_ = 0;
+    std::uint32_t   file_bytes_ = 0, dead_reported_ = 0;
     // between both
     hal::Queue<Offer>           offers_{2};
-    hal::Queue<const Accepted*> answers_{2};   // nullptr: refused
+    hal::Queue<const Accepted*> answers_{2};   // nullptr: rejected
     hal::Queue<File>            files_{2};
     hal::Queue<std::uint32_t>   written_{2};
-    std::vector<std::uint8_t>   spare_;        // whose turn it is says writing_
+    std::vector<std::uint8_t>   spare_;        // its owner is given by writing_
     // the helper's
     hal::MessageLog                        log_;
-    std::int64_t                           now_ns_ = 0;  // of its turn
+    std::int64_t                           now_ns_ = 0;  // of its call
     std::vector<std::unique_ptr<Accepted>> all_;
-    std::string                            refused_;  // the last, so that it is said once
-    std::uint32_t                          refusals_ = 0;  // in a row
+    std::string                            rejected_;  // the last, reported once
+    std::uint32_t                          rejections_ = 0;  // consecutive
 };
 
 }  // namespace hal::tdma::rtcfg

@@ -11,7 +11,7 @@ Client::Client(Station& station, Logical own, ClientEvents& events, bool wants_f
 void Client::begin() noexcept {
     step_ = Step::waiting;
     acknowledge_ = reply_ = false;
-    said_ = INT64_MIN / 2;
+    sent_at_ = INT64_MIN / 2;
 }
 
 void Client::accept(const Address& server, std::uint16_t heartbeat_ms) noexcept {
@@ -28,20 +28,20 @@ bool Client::send(Message& m) noexcept {
     return length != 0 && station_.send(std::span(frame_).first(length), default_slot, last_priority) == ethernet::Sent::queued;
 }
 
-/// By its IP address where both know one, else by its MAC address.
+/// Compares IP addresses when both are known, otherwise MAC addresses.
 bool Client::is_for_us(const Message& m) const noexcept {
     return own_.by_ip && m.client.by_ip ? m.client == own_ : m.to == station_.address();
 }
 
-/// A part of the file, in its order; one that was lost is asked for again by the acknowledgement of what is there.
+/// Stores the next part of the file; a lost part is requested again by acknowledging the received bytes.
 void Client::take(const Message& m, std::span<const std::uint8_t> data, Time now) noexcept {
     const std::uint32_t offset = m.id == Id::stage_2 ? 0 : m.offset;
-    data = data.first(std::min<std::size_t>(data.size(), length_ - std::min(offset, length_)));  // a short frame's padding is none of it
+    data = data.first(std::min<std::size_t>(data.size(), length_ - std::min(offset, length_)));  // without the padding of a short frame
     if (offset == received_ && !data.empty()) {
         std::copy(data.begin(), data.end(), file_.begin() + offset);
         received_ += static_cast<std::uint32_t>(data.size());
     }
-    said_ = now;
+    sent_at_ = now;
     if (++since_ >= burst_ || received_ == length_ || m.id == Id::stage_2) acknowledge_ = true;
     if (received_ == length_) {
         step_ = Step::finished;
@@ -58,7 +58,7 @@ void Client::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
     switch (m.id) {
     case Id::stage_1:
         if (!is_for_us(m)) return;
-        if (step_ != Step::waiting && m.from != server_ && m.from != station_.status().master) {  // two servers: the first has it
+        if (step_ != Step::waiting && m.from != server_ && m.from != station_.status().master) {  // two servers: the first one counts
             ++foreign_;
             events_.on_other_server(m.from);
             return;
@@ -77,13 +77,13 @@ void Client::arrived(std::span<const std::uint8_t> frame, Time now) noexcept {
         break;
     case Id::stage_2_fragment:
         if (step_ == Step::receiving && m.from == server_ && m.to == station_.address()) return take(m, m.data, now);
-        if (step_ >= Step::finished && m.from == server_) return acknowledge_ = true, void();  // its acknowledgement was lost
+        if (step_ >= Step::finished && m.from == server_) return acknowledge_ = true, void();  // the acknowledgement was lost
         break;
     case Id::announce_new: reply_to_ = m.from, reply_ = configured(); return;
     case Id::dead_station:
         if (configured() && m.from == server_) return events_.on_dead_station(m.dead);
         break;
-    default: return;  // between others
+    default: return;  // for other stations
     }
     ++foreign_;
 }
@@ -94,7 +94,7 @@ void Client::before_slots(Time now) noexcept {
         m.id = Id::announce_reply, m.to = reply_to_;
         reply_ = !send(m);
     }
-    const bool late = now - said_ >= patience;
+    const bool late = now - sent_at_ >= retry_after;
     switch (step_) {
     case Step::waiting: break;
     case Step::announcing:
@@ -102,7 +102,7 @@ void Client::before_slots(Time now) noexcept {
         m = {};
         m.id = Id::announce_new, m.to = ethernet::broadcast, m.flags = wants_file_ ? wants_stage_2 : is_ready, m.burst = burst_;
         if (!send(m)) break;
-        said_ = now;
+        sent_at_ = now;
         if (!wants_file_) step_ = Step::finished;
         break;
     case Step::receiving:
@@ -112,16 +112,16 @@ void Client::before_slots(Time now) noexcept {
             m = {};
             m.id = Id::acknowledge, m.to = server_, m.length = received_;
             if (!send(m)) break;
-            acknowledge_ = false, since_ = 0, said_ = now;
+            acknowledge_ = false, since_ = 0, sent_at_ = now;
         }
         if (step_ == Step::receiving) break;
         m = {};
         if (step_ == Step::finished) {
             m.id = Id::ready, m.to = ethernet::broadcast;
-            if (send(m)) step_ = Step::ready, said_ = now;
-        } else if (heartbeat_ms_ != 0 && now - said_ >= static_cast<Time>(heartbeat_ms_) * 1'000'000) {
+            if (send(m)) step_ = Step::ready, sent_at_ = now;
+        } else if (heartbeat_ms_ != 0 && now - sent_at_ >= static_cast<Time>(heartbeat_ms_) * 1'000'000) {
             m.id = Id::heartbeat, m.to = server_;
-            if (send(m)) said_ = now;
+            if (send(m)) sent_at_ = now;
         }
         break;
     }

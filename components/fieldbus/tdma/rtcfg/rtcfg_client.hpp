@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Takes a station's configuration from a server: stage 1 (its block of the schedule) as soon as it is heard, stage 2 (a file of any
-// kind) when the station may send; then shows with heartbeats that it is alive.
+// Gets the configuration of a station from a server (RTnet, Documentation/RTcfg): stage 1 (its block of the schedule) as soon as it is
+// received, stage 2 (any file) when the station may send; then sends heartbeats.
 #pragma once
 
 #include <vector>
@@ -12,35 +12,36 @@ namespace hal::tdma::rtcfg {
 
 inline constexpr std::size_t largest_stage_2 = 65536;  ///< bytes
 
-/// [realtime] called by the client
+/// Events of the client. [realtime]
 class ClientEvents {
 public:
     virtual ~ClientEvents() = default;
-    /// Stage 1 from there. Nothing comes of it before accept().
+    /// Stage 1 received; accept() uses it.
     virtual void on_stage_1(std::span<const std::uint8_t>, const Address& server) noexcept = 0;
-    /// All `length` bytes of stage 2 are in `file`, which may be swapped for another of its size; 0: the server has none.
+    /// Stage 2 is complete: `length` bytes in `file`, which may be swapped for another vector of its size; 0: the server has no file.
     virtual void on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address& server) noexcept = 0;
+    /// The server reports a dead station.
     virtual void on_dead_station(const Address&) noexcept = 0;
-    /// Another server than the accepted one; it is not listened to.
+    /// Ignored a second server.
     virtual void on_other_server(const Address&) noexcept = 0;
 };
 
 class Client final : public Companion {
 public:
-    /// `own`: what the server calls this station, beside its MAC address. It asks for stage 2 when `wants_file`. [setup]
+    /// `own`: identifies this station besides its MAC address. Requests stage 2 when `wants_file`. [setup]
     Client(Station& station, Logical own, ClientEvents& events, bool wants_file = true);
 
     void arrived(std::span<const std::uint8_t> frame, Time now) noexcept override;
     void before_slots(Time now) noexcept override;
-    void begin() noexcept;  ///< [realtime] forgets the server
-    /// What this server sent as stage 1 is used: it is this station's from now on, and is told so. [realtime]
+    void begin() noexcept;  ///< forgets the server. [realtime]
+    /// Accepts a server whose stage 1 is used, and announces this station to it. [realtime]
     void          accept(const Address& server, std::uint16_t heartbeat_ms) noexcept;
     bool          configured() const noexcept { return step_ != Step::waiting; }
     bool          complete() const noexcept { return step_ == Step::ready; }
-    std::uint64_t foreign() const noexcept { return foreign_; }  ///< frames that were not acted on: cut, invented, of others
+    std::uint64_t foreign() const noexcept { return foreign_; }  ///< frames ignored: truncated, forged, of others
 
 private:
-    static constexpr Time patience = 1'000'000'000;
+    static constexpr Time retry_after = 1'000'000'000;
     enum class Step : std::uint8_t { waiting, announcing, receiving, finished, ready };
     void take(const Message&, std::span<const std::uint8_t> data, Time now) noexcept;
     bool send(Message& m) noexcept;
@@ -58,7 +59,7 @@ private:
     bool                                              acknowledge_ = false;
     std::uint16_t                                     heartbeat_ms_ = 1000;
     std::uint64_t                                     foreign_ = 0;
-    Time                                              said_ = INT64_MIN / 2;
+    Time                                              sent_at_ = INT64_MIN / 2;
     Address                                           reply_to_{};
     bool                                              reply_ = false;
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};

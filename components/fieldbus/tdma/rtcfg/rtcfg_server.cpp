@@ -23,11 +23,11 @@ void Server::begin() noexcept {
 void Server::serve(Time now) noexcept {
     serves_ = true, began_ = now;
     if (station_.setup().role == Role::master) return;
-    const Time known = now + 10 * station_.setup().cycle;  // by then all have heard who sends the syncs
+    const Time known = now + 10 * station_.setup().cycle;  // by then all have heard the master
     for (Client& c : clients_) c.invited = known - invitation;
 }
 
-/// Another one serves: who is there it learns anew when its turn comes again.
+/// Another server is active: forgets the clients.
 void Server::rest() noexcept {
     if (!serves_) return;
     serves_ = false;
@@ -43,7 +43,7 @@ void Server::become(Client& c, ClientState state) noexcept {
     if (events_ != nullptr) events_->on_client(static_cast<std::size_t>(&c - clients_.data()), state, c.setup.mac);
 }
 
-/// Who sent it; by its IP address only where that is all that is known, or the one that had it is gone.
+/// Returns the sender; by its IP address only when the MAC address is unknown or that client is lost.
 Server::Client* Server::find(const Message& m) noexcept {
     for (Client& c : clients_)
         if (c.setup.mac == m.from) return &c;
@@ -81,7 +81,7 @@ bool Server::take(Client& c, const Message& m, Time now) noexcept {
         become(c, (m.flags & wants_stage_2) != 0 ? ClientState::configuring : ClientState::ready);
         return true;
     case Id::acknowledge:
-        if (c.state != ClientState::configuring || m.length > c.sent) return c.state == ClientState::ready;  // twice: no harm
+        if (c.state != ClientState::configuring || m.length > c.sent) return c.state == ClientState::ready;  // a repetition is harmless
         c.heard = now;
         c.sent = m.length;
         c.left = c.burst;
@@ -90,10 +90,10 @@ bool Server::take(Client& c, const Message& m, Time now) noexcept {
     case Id::heartbeat:
         c.heard = now;
         if (c.state == ClientState::searching || c.state == ClientState::dead) c.restart = true;
-        else become(c, ClientState::ready);  // a heartbeat: the frame that said so was lost
+        else become(c, ClientState::ready);  // a heartbeat: the ready frame was lost
         return true;
     case Id::announce_reply: return true;
-    default: return false;  // a server's: there is another one
+    default: return false;  // from another server
     }
 }
 
@@ -103,7 +103,7 @@ bool Server::send(Message& m) noexcept {
     return length != 0 && station_.send(std::span(frame_).first(length), default_slot, last_priority) == ethernet::Sent::queued;
 }
 
-/// One frame of what the client does not have yet.
+/// Sends the next frame of the file.
 bool Server::send_stage_2(Client& c) noexcept {
     const auto&       all = c.setup.stage_2;
     const std::span   data(reinterpret_cast<const std::uint8_t*>(all.data()), all.size());
@@ -128,7 +128,7 @@ bool Server::send_stage_2(Client& c) noexcept {
     return true;
 }
 
-/// True: a frame was queued.
+/// Returns true when a frame was queued.
 bool Server::invite(Client& c, Time now) noexcept {
     if (c.state != ClientState::searching && c.state != ClientState::dead) return false;
     if (now - c.invited < invitation || (now - c.seen < invitation && !c.restart)) return false;
@@ -137,8 +137,8 @@ bool Server::invite(Client& c, Time now) noexcept {
     m.client = c.setup.logical, m.server = own_;
     m.data = std::span(reinterpret_cast<const std::uint8_t*>(c.setup.stage_1.data()), c.setup.stage_1.size());
     if (stage_1_bytes(m) > station_.room(default_slot)) {
-        if (!c.told_too_long && now - std::max(c.seen, began_) > long_silence && events_ != nullptr) {
-            c.told_too_long = true;
+        if (!c.too_long_reported && now - std::max(c.seen, began_) > long_silence && events_ != nullptr) {
+            c.too_long_reported = true;
             events_->on_too_long(static_cast<std::size_t>(&c - clients_.data()));
         }
         return false;
@@ -159,7 +159,7 @@ void Server::before_slots(Time now) noexcept {
         if (!send(m)) return;
         become(c, ClientState::dead);
     }
-    if (clients_.empty() || station_.waiting(default_slot) > 2) return;  // what others send goes first
+    if (clients_.empty() || station_.waiting(default_slot) > 2) return;  // lowest priority
     for (std::size_t i = 0; i < clients_.size(); ++i) {
         Client& c = clients_[next_++ % clients_.size()];
         if (c.state == ClientState::configuring && c.left != 0 && send_stage_2(c)) return;

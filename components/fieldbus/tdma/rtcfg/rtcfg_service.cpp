@@ -10,7 +10,7 @@ namespace hal::tdma::rtcfg {
 
 namespace {
 
-/// Bytes behind the Ethernet header in its slot 0.
+/// Returns the payload bytes of slot 0.
 std::size_t room_of(const config::StationEntry& e) {
     for (const config::SlotEntry& slot : e.slots)
         if (slot.setup.id == default_slot) return slot.setup.size;
@@ -32,23 +32,24 @@ std::vector<Server::ClientSetup> Service::clients_of(const config::Schedule& sch
         if (i == own || e.role == Role::master || (!e.ip && !e.mac)) continue;
         Server::ClientSetup client{e.mac.value_or(Address{}), logical_of(e), config::block_of(schedule, i), {}};
         if (!e.stage_2.empty()) {
-            const bool must = schedule.stations[own].role == Role::master;  // a backup serves as well as it can
+            const bool must = schedule.stations[own].role == Role::master;  // a backup omits what it cannot send
             Message first;
             first.client = client.logical;
             first.data = std::span(reinterpret_cast<const std::uint8_t*>(client.stage_1.data()), client.stage_1.size());
             if (const std::size_t needs = stage_1_bytes(first), has = room_of(schedule.stations[own]); must && needs > has)
-                throw std::invalid_argument("station " + e.name + " has a stage2, so the master sends it its block, too: " +
-                                            std::to_string(needs) + " bytes in one frame, and the master's slot 0 has " +
-                                            (has == 0 ? "none: write slot 0 OFFSET" : std::to_string(has) + ": make it longer") +
-                                            ", as in slot 0 100 1/1 " + std::to_string(needs));
+                throw std::invalid_argument("slot 0 of the master is too short for station " + e.name +
+                                            ", which has a stage2: its block needs " + std::to_string(needs) +
+                                            " bytes in one frame, slot 0 " +
+                                            (has == 0 ? "is missing; add one" : "has " + std::to_string(has) + "; make it longer") +
+                                            ", for example slot 0 100 1/1 " + std::to_string(needs));
             const std::string which = "stage2 of station " + e.name + ": the file '" + e.stage_2 + "'";
             if (!read(e.stage_2, client.stage_2)) {
                 if (must) throw std::invalid_argument(which + " cannot be read: " + client.stage_2);
                 client.stage_2.clear();
             }
             if (client.stage_2.size() > largest_stage_2)
-                throw std::invalid_argument(which + " has " + std::to_string(client.stage_2.size()) + " bytes; stations take " +
-                                            std::to_string(largest_stage_2) + " at most");
+                throw std::invalid_argument(which + " has " + std::to_string(client.stage_2.size()) + " bytes (limit " +
+                                            std::to_string(largest_stage_2) + ")");
         }
         clients.push_back(std::move(client));
         numbers_.push_back(i);

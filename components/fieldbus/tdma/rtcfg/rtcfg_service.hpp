@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the master of a segment, or a backup in its place, does for stations without a schedule: gives each of its file its block and its
-// file, by RTcfg.
+// The service of a master, or of a backup in its place, for stations without a schedule: sends each one its block and its file by RTcfg.
 #pragma once
 
 #include <functional>
@@ -12,18 +11,18 @@
 
 namespace hal::tdma::rtcfg {
 
-/// A station that stage 1 cannot reach has neither an ip nor a mac in the file, and is left out. [setup]
+/// Serves all stations of the schedule that have an ip or a mac.
 class Service final : private ServerEvents {
 public:
-    /// The bytes of a file that stage 2 sends, or false and the reason in `bytes`.
+    /// Reads a file for stage 2 into `bytes`. Returns false and sets `bytes` to the reason.
     using Read = std::function<bool(const std::string& name, std::string& bytes)>;
 
-    /// All outlive it. Throws std::invalid_argument when a stage 2 file cannot be sent; a backup has none for that station then. [setup]
+    /// The arguments must outlive it. Throws std::invalid_argument when a stage 2 file cannot be sent; a backup omits that file. [setup]
     Service(Station& station, const config::Schedule& schedule, std::size_t own, const Read& read, Events& events);
 
     Server&       server() noexcept { return server_; }
     void          begin() noexcept;                       ///< [setup]
-    std::uint32_t dead() const noexcept { return dead_; } ///< clients that were there and are not
+    std::uint32_t dead() const noexcept { return dead_; } ///< clients that went offline
 
 private:
     void                             on_client(std::size_t client, ClientState, const Address&) noexcept override;
@@ -31,7 +30,7 @@ private:
     static Logical                   logical_of(const config::StationEntry&);
     std::vector<Server::ClientSetup> clients_of(const config::Schedule&, std::size_t own, const Read&);
 
-    std::vector<std::size_t> numbers_;  // of clients in the schedule
+    std::vector<std::size_t> numbers_;  // indices of the clients in the schedule
     std::vector<bool>        is_dead_;
     std::uint32_t            dead_ = 0;
     Events&                  events_;

@@ -21,7 +21,7 @@ const Address* BabbleMonitor::babbler(std::uint32_t limit, std::uint32_t& frames
     frames = limit;
     for (std::size_t i = 0; i < used_; ++i)
         if (peers_[i].most > frames) frames = peers_[i].most, found_ = peers_[i].address, worst = &found_;
-    used_ = 0;  // an address that was invented once does not take a place for ever
+    used_ = 0;  // a forged address does not keep its entry
     return worst;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Who else sends, and how much: finds a station that babbles. It goes by when frames arrived: a thread that begins late, or was held up,
-// finds those of many cycles waiting, and nobody has babbled.
+// Finds a station that babbles, from the arrival times of frames: a thread that was delayed finds the frames of many cycles, none of which
+// is babbling.
 #pragma once
 
 #include <array>
@@ -13,17 +13,19 @@ class BabbleMonitor {
 public:
     static constexpr std::size_t most_stations = 64;
 
-    /// A frame came at that time. [realtime]
+    /// Counts a frame that arrived at `arrived` (local ns). [realtime]
     void heard(const Address&, Time arrived, Time cycle) noexcept;
-    /// All that is there was heard: who sent more than `limit` frames within one cycle's time, and how many; nullptr: nobody. [realtime]
+    /// Returns the station that sent most, if that is more than `limit` frames within one cycle, and sets `frames`; nullptr: none.
+    /// [realtime]
     const Address* babbler(std::uint32_t limit, std::uint32_t& frames) noexcept;
+    /// Forgets all frames. [realtime]
     void clear() noexcept { used_ = 0; }
 
 private:
     struct Peer {
         Address       address{};
-        Time          since = 0;             // a cycle's time begins with a frame
-        std::uint32_t frames = 0, most = 0;  // in it, and in the fullest
+        Time          since = 0;             // local; a cycle begins with a frame
+        std::uint32_t frames = 0, most = 0;  // in this cycle, and in the fullest one
     };
     std::array<Peer, most_stations> peers_{};
     std::size_t                     used_ = 0;

@@ -8,7 +8,7 @@ namespace hal::tdma {
 
 namespace {
 
-constexpr Time longest_delay = 5'000'000;  // a switch that holds a frame for longer is of no use to a cycle
+constexpr Time longest_delay = 5'000'000;  // a slower switch is unusable for cyclic traffic
 constexpr Time longest_round = 10'000'000'000;
 
 }  // namespace
@@ -21,8 +21,8 @@ void Calibration::begin(std::uint32_t rounds) noexcept {
 bool Calibration::due(std::uint32_t cycle, std::uint32_t period) noexcept {
     if (!active_) return false;
     if (!waiting_) return true;
-    // Cycle numbers wrap: the difference is what counts. RTnet's stations wait for ever here. The time-out is two periods, and up to
-    // two more in turn: otherwise what disturbs the bus regularly may meet every single request.
+    // Cycle numbers wrap: the difference is what counts. RTnet's stations wait forever here. The timeout alternates between two and four
+    // periods, so that a periodic disturbance does not hit every request.
     const std::uint32_t limit = (2 + unanswered_ % 3) * period;
     if (static_cast<std::int32_t>(cycle - reply_cycle_) <= static_cast<std::int32_t>(limit)) return false;
     waiting_ = false;
@@ -36,7 +36,7 @@ void Calibration::sent(std::uint32_t reply_cycle, Time not_before, Time reply_at
 
 bool Calibration::take(const Reply& r, Time arrived, double drift, Time tolerance) noexcept {
     if (!active_ || !waiting_) return false;
-    // The stamp is the driver's, made when the request left. A reply to an earlier one, or an invented one, is another's.
+    // The driver stamps the request when it leaves. Ignores replies to an earlier request and forged ones.
     if (r.request_stamp < not_before_ - 1'000 || arrived - reply_at_ > tolerance || r.request_stamp >= arrived ||
         arrived - r.request_stamp > longest_round)
         return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How long a frame is on its way to the master: rounds of a request and a reply in the station's own slot, and the median of what they
-// say. One round is on its way at a time; one that is not answered in time is given up and repeated.
+// Measures the path delay to the master (RTnet, Documentation/TDMA): rounds of a request and a reply in the station's own slot, and their
+// median. One round is pending at a time; without an answer in time it is repeated.
 //
 //     delay = ((received reply - sent request) (1 + drift) - (sent reply - received request)) / 2
 #pragma once
@@ -15,31 +15,33 @@ class Calibration {
 public:
     static constexpr std::uint32_t most_rounds = 250;
 
-    /// [realtime]
+    /// Starts a calibration of 1..250 rounds. [realtime]
     void begin(std::uint32_t rounds) noexcept;
-    void end() noexcept { active_ = waiting_ = false; }  ///< what was measured by now counts nothing. [realtime]
+    /// Ends the calibration without a result. [realtime]
+    void end() noexcept { active_ = waiting_ = false; }
     bool active() const noexcept { return active_; }
-    /// A request may go out in this cycle: none is on its way, or the last was not answered. [realtime]
+    /// Returns true when a request may be sent in this cycle: none is pending, or the last one timed out. [realtime]
     bool due(std::uint32_t cycle, std::uint32_t period) noexcept;
-    /// One goes out; the master answers in `reply_cycle`. Times are local. [realtime]
+    /// Notes a request; the master answers in `reply_cycle`. Times are local, ns. [realtime]
     void sent(std::uint32_t reply_cycle, Time not_before, Time reply_at) noexcept;
-    /// The slot of this cycle is the master's, for its reply. [realtime]
+    /// Returns true when the master uses the slot of this cycle for its reply. [realtime]
     bool reserved(std::uint32_t cycle) const noexcept { return waiting_ && cycle == reply_cycle_; }
-    /// True: it was the last round, and delay() is the result. A reply that comes later than `tolerance` after its slot is none. [realtime]
+    /// Evaluates a reply. Returns true when it completed the last round; delay() is the result. Ignores a reply later than `tolerance`
+    /// (ns) after its slot. [realtime]
     bool take(const Reply&, Time arrived, double drift, Time tolerance) noexcept;
-    /// What is on its way counts no more: another master. [realtime]
+    /// Drops the pending round, after a change of the master. [realtime]
     void forget() noexcept { waiting_ = false; }
 
-    Time          delay() const noexcept { return delay_; }
+    Time          delay() const noexcept { return delay_; }  ///< one way, ns
     std::uint32_t done() const noexcept { return done_; }
-    std::uint32_t unanswered() const noexcept { return unanswered_; }         ///< in all
-    std::uint32_t unanswered_row() const noexcept { return unanswered_row_; } ///< since the last reply
+    std::uint32_t unanswered() const noexcept { return unanswered_; }         ///< requests without a reply
+    std::uint32_t unanswered_row() const noexcept { return unanswered_row_; } ///< of them, since the last reply
 
 private:
     bool                          active_ = false, waiting_ = false;
     std::uint32_t                 rounds_ = 0, done_ = 0, reply_cycle_ = 0, unanswered_ = 0, unanswered_row_ = 0;
-    Time                          not_before_ = 0;  // local time before which the request did not leave
-    Time                          reply_at_ = 0;    // of the slot of the reply, local
+    Time                          not_before_ = 0;  // local; the request left no earlier
+    Time                          reply_at_ = 0;    // local time of the reply's slot
     Time                          delay_ = 0;
     std::array<Time, most_rounds> measured_{};
 };

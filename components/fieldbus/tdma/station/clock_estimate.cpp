@@ -10,14 +10,13 @@ namespace {
 
 constexpr double alpha_end = 0.05;
 constexpr double outlier_sigmas = 5.0, smallest_outlier_ns = 2'000.0;
-// In a row; then the clock itself has jumped. Syncs come late when they are held up, on a busy computer for many cycles, and meanwhile the
-// drift is known; none comes early.
+// Consecutive outliers after which the clock has jumped. Syncs may be delayed, on a busy computer for many cycles, but never arrive early.
 constexpr std::uint32_t most_early = 8, most_late = 100;
 constexpr double        largest_drift = 1e-3;  // 1000 ppm: no crystal
 constexpr double        long_ns = 1e9;         // time constant of the long average
-constexpr double        certain = 2e-6;        // a slope known to that much (sigma) may be led with
+constexpr double        certain = 2e-6;        // uncertainty (sigma) of a drift that a master may use
 constexpr double        smallest_noise_ns = 100.0;
-constexpr std::uint32_t least_taken = 32;      // syncs for a slope that is certain
+constexpr std::uint32_t least_taken = 32;      // syncs for a certain drift
 constexpr double        decay_per_ns = 20e-6 / 1e9;
 
 /// Gains of a least-squares line through n points, and not less than `alpha_least`, critically damped.
@@ -66,7 +65,7 @@ double ClockEstimate::uncertainty() const noexcept {
 
 double ClockEstimate::drift() const noexcept { return leading_ ? drift_ : is_certain() ? long_drift_ : holds_ ? held_ : drift_; }
 
-/// The same measurement, with a long memory.
+/// Updates the long average.
 void ClockEstimate::take_long(double measured, double dt) noexcept {
     if (long_taken_ == 0) {
         long_offset_ = measured, long_drift_ = 0.0, long_taken_ = 1;
@@ -100,7 +99,7 @@ bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
             clear();
             return take(sent, arrived, delay);
         }
-    } else if (std::abs(e) > largest_drift * dt + 1e6) {  // it begins with another clock's times
+    } else if (std::abs(e) > largest_drift * dt + 1e6) {  // begins with the times of another clock
         clear();
         return take(sent, arrived, delay);
     }

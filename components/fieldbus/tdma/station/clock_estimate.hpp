@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The global clock as a station sees it, estimated from syncs: global = local + offset, where the offset grows with the drift.
 //
-// Two alpha-beta filters of the measured offsets, e = measured - predicted: offset += alpha e, drift += beta e / dt. Both begin with the
-// gains that weigh all measurements alike (a least-squares line) and end with fixed ones. The short one (40 syncs) gives the offset and
+// Two alpha-beta filters of the measured offsets, e = measured - predicted: offset += alpha e, drift += beta e / dt. Both begin with gains
+// that weight all measurements equally (a least-squares line) and end with fixed ones. The short one (40 syncs) gives the offset and
 // follows a step quickly; its slope scatters by sigma / dt / 240. The long one (seconds) gives the drift, which calibration, the user and a
-// station that begins to lead need.
+// station that becomes the master need.
 //
-// Holdover: a station that begins to lead keeps the offset and the long average's drift, provided that the drift is known to 2 ppm, and
-// otherwise the last one that was; with none it leads at its own crystal's rate. While it leads, the drift goes to zero, the station's own
-// crystal, by at most 20 ppm a second: an error does not outlive the station's lead, and is not passed from master to master.
+// Holdover: a station that becomes the master keeps the offset and the drift of the long average if that is known to 2 ppm, otherwise the
+// last drift that was; without one it uses its own crystal. While it is the master, the drift decays to zero, the rate of its crystal, by at
+// most 20 ppm per second, so that an error is not passed from master to master.
 #pragma once
 
 #include "station_setup.hpp"
@@ -17,19 +17,19 @@ namespace hal::tdma {
 
 class ClockEstimate {
 public:
-    /// Starts anew. [realtime]
+    /// Discards the estimate. [realtime]
     void clear() noexcept { *this = {}; }
-    /// Nobody corrects this clock from here on: it goes on as estimated, or is the global one. [realtime]
+    /// Makes this clock the global one: it continues as estimated, without further corrections. [realtime]
     void lead(Time local) noexcept;
-    /// While leading, once a cycle: the drift decays to the station's own crystal. [realtime]
+    /// Lets the drift decay to the station's own crystal; called once a cycle while leading. [realtime]
     void decay(Time local) noexcept;
 
-    /// A sync, sent at `sent` (global), arrived at `arrived` (local), on its way for `delay`. False: so far off that it was not used.
-    /// [realtime]
+    /// Uses a sync, sent at `sent` (global ns), arrived at `arrived` (local ns), with a path delay of `delay` (ns). Returns false for an
+    /// outlier. [realtime]
     bool take(Time sent, Time arrived, Time delay) noexcept;
-    /// The delay was measured anew: it is `by` longer than what take() was told so far. [realtime]
+    /// Corrects the offset after a calibration: the delay is `by` ns longer than that given to take() so far. [realtime]
     void delay_changed(Time by) noexcept { offset_ += static_cast<double>(by), long_offset_ += static_cast<double>(by); }
-    /// Syncs come from another master: its rate is measured anew, and the last one is kept until that is known. [realtime]
+    /// Measures the rate of a new master; the last rate is used until that is known. [realtime]
     void another_master() noexcept;
 
     bool   known() const noexcept { return leading_ || taken_ >= 2; }
@@ -37,22 +37,22 @@ public:
     Time   global(Time local) const noexcept;
     Time   local(Time global) const noexcept;
     Time   offset(Time local) const noexcept { return global(local) - local; }
-    double drift() const noexcept;                    ///< d offset / d local: the long average where there is one
+    double drift() const noexcept;                    ///< d offset / d local, 1e-6 is 1 ppm: the long average if known
     double uncertainty() const noexcept;              ///< of the long average's slope, one sigma
-    double jitter() const noexcept;                   ///< rms of what is not explained, ns
+    double jitter() const noexcept;                   ///< rms of the residuals, ns
 
 private:
     bool is_certain() const noexcept;
     void take_long(double measured, double dt) noexcept;
 
-    Time          base_ = 0;          // the offset's whole part: kept apart, for a double has 53 bits
+    Time          base_ = 0;          // integer part of the offset, because a double has 53 bits
     Time          at_ = 0;            // local time of `offset_` and `long_offset_`
     double        offset_ = 0.0, drift_ = 0.0;
     double        square_ = 0.0;      // mean square of e
     double        long_offset_ = 0.0, long_drift_ = 0.0;
-    double        held_ = 0.0;        // the last slope that was certain
+    double        held_ = 0.0;        // the last certain drift
     double        interval_ = 0.0;    // mean time between syncs, ns
-    std::uint32_t taken_ = 0, outliers_ = 0;  // outliers: in a row, all early or all late
+    std::uint32_t taken_ = 0, outliers_ = 0;  // outliers: consecutive, all early or all late
     std::uint32_t long_taken_ = 0;
     bool          early_ = false, leading_ = false, holds_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stations that run on the schedule this station leads: those that calibrated with it, and those whose frames come.
+// The stations that follow this master's schedule: those that calibrated with it, and those whose frames it receives.
 #pragma once
 
 #include <algorithm>
@@ -13,17 +13,19 @@ class Followers {
 public:
     static constexpr std::size_t most = 64;
 
-    /// A station asked for its delay. [realtime]
+    /// Notes a calibration request. [realtime]
     void calibrated(const Address& who, Time now) noexcept { heard(who, now); }
-    /// It sent something else. [realtime]
+    /// Notes any other frame. [realtime]
     void sent(const Address& who, Time now) noexcept {
         if (Follower* f = heard(who, now)) f->sends = true;
     }
-    /// Whether there is one: a station that sends was heard within `silence`; one that never sends is there since it calibrated. [realtime]
-    bool any(Time now, Time silence) const noexcept {
+    /// Returns true when there is a follower: a sending station heard within `timeout` (ns), or one that calibrated and never sends.
+    /// [realtime]
+    bool any(Time now, Time timeout) const noexcept {
         return std::any_of(list_.begin(), list_.begin() + static_cast<std::ptrdiff_t>(used_),
-                           [&](const Follower& f) { return !f.sends || now - f.heard <= silence; });
+                           [&](const Follower& f) { return !f.sends || now - f.heard <= timeout; });
     }
+    /// Forgets all followers. [realtime]
     void clear() noexcept { used_ = 0; }
 
 private:
@@ -32,7 +34,7 @@ private:
         Time    heard = 0;
         bool    sends = false;
     };
-    /// Its place; the one silent for longest makes room.
+    /// Returns its entry; a new one replaces the least recently heard when the list is full.
     Follower* heard(const Address& who, Time now) noexcept {
         const auto end = list_.begin() + static_cast<std::ptrdiff_t>(used_);
         auto       f = std::find_if(list_.begin(), end, [&](const Follower& x) { return x.who == who; });

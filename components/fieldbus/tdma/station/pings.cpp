@@ -25,38 +25,38 @@ bool Pings::take(std::size_t n, const Address& from, const Echo& echo, Time arri
     if (n >= list_.size()) return false;
     Entry& e = list_[n];
     if (e.step != Step::sent || from != e.to || echo.number != e.asked.number) return false;
-    // An invented one: the stamp is the driver's, made when the ping left.
-    if (echo.ping_stamp < e.not_before - 1'000 || echo.ping_stamp >= arrived || arrived - echo.ping_stamp > 10 * patience) return false;
+    // The driver stamps the ping when it leaves; any other stamp is forged.
+    if (echo.ping_stamp < e.not_before - 1'000 || echo.ping_stamp >= arrived || arrived - echo.ping_stamp > 10 * timeout) return false;
     const Time round_trip = arrived - echo.ping_stamp;
     const auto held = static_cast<std::uint64_t>(echo.stamp) - static_cast<std::uint64_t>(echo.received);
-    if (echo.received > echo.stamp || held > static_cast<std::uint64_t>(10 * patience)) return false;
+    if (echo.received > echo.stamp || held > static_cast<std::uint64_t>(10 * timeout)) return false;
     e.asked.round_trip = round_trip;
     e.asked.held = std::min(static_cast<Time>(held), round_trip);
     end(e, Outcome::answered);
     return true;
 }
 
-void Pings::look(Time now, Time longest, bool running) noexcept {
+void Pings::expire(Time now, Time timeout_ns, bool running) noexcept {
     for (Entry& e : list_) {
         if (e.step == Step::idle) continue;
         if (e.began == 0) e.began = now;
-        if (now - e.began <= longest) continue;
+        if (now - e.began <= timeout_ns) continue;
         end(e, e.step == Step::sent ? Outcome::unanswered : running ? Outcome::no_room : Outcome::not_running);
     }
 }
 
-void Pings::owe(const Owed& answer) noexcept {
-    const auto last = owed_.begin() + static_cast<std::ptrdiff_t>(owing_);
-    const auto same = std::find_if(owed_.begin(), last, [&](const Owed& o) { return o.to == answer.to; });
-    if (same == last && owing_ == owed_.size()) return;
-    if (same == last) ++owing_;
+void Pings::queue_answer(const Owed& answer) noexcept {
+    const auto last = queue_.begin() + static_cast<std::ptrdiff_t>(answers_);
+    const auto same = std::find_if(queue_.begin(), last, [&](const Owed& o) { return o.to == answer.to; });
+    if (same == last && answers_ == queue_.size()) return;
+    if (same == last) ++answers_;
     *same = answer;
 }
 
-void Pings::paid() noexcept {
-    if (owing_ == 0) return;
-    std::move(owed_.begin() + 1, owed_.begin() + static_cast<std::ptrdiff_t>(owing_), owed_.begin());
-    --owing_;
+void Pings::pop_answer() noexcept {
+    if (answers_ == 0) return;
+    std::move(queue_.begin() + 1, queue_.begin() + static_cast<std::ptrdiff_t>(answers_), queue_.begin());
+    --answers_;
 }
 
 }  // namespace hal::tdma

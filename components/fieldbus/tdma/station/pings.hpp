@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Is a station there, and how long does a question and its answer take? Both leave in their sender's own slot, when real-time frames have
-// left room in it; a station has one ping on its way to each other one, and owes each asker one answer at most.
+// Pings between stations: reachability and round-trip time. Request and answer use the time that real-time frames leave in their senders'
+// slots. A station has at most one pending ping to each other station, and one pending answer for each.
 #pragma once
 
 #include <array>
@@ -12,24 +12,24 @@ namespace hal::tdma {
 
 /// How a ping ended.
 enum class Outcome : std::uint8_t {
-    none,         ///< none has ended yet
+    none,         ///< no ping has ended yet
     answered,
-    unanswered,   ///< it left, and nothing came back in time
-    no_room,      ///< it never left: frames filled the slots of this station, or it has none
-    no_address,   ///< it never left: the station was not heard yet, and its `mac` is not in the schedule
-    not_running,  ///< it never left: this station might not send
+    unanswered,   ///< sent, but no answer within the timeout
+    no_room,      ///< not sent: no space in the slots of this station
+    no_address,   ///< not sent: no frame of the station received yet, and no `mac` in the schedule
+    not_running,  ///< not sent: this station was not running
 };
 
 class Pings {
 public:
-    static constexpr Time patience = 1'000'000'000;  ///< from the wish to the answer
+    static constexpr Time timeout = 1'000'000'000;  ///< ns, from ask() to the answer
 
     struct Asked {
-        std::uint32_t number = 0;   ///< of the newest
-        std::uint32_t done = 0;     ///< of the newest that ended
+        std::uint32_t number = 0;   ///< of the last ping
+        std::uint32_t done = 0;     ///< of the last ping that ended
         Outcome       outcome = Outcome::none;
-        Time          round_trip = 0;  ///< on this station's clock, from the frame's leaving to the answer's coming
-        Time          held = 0;        ///< of it: at the other station, on that one's clock
+        Time          round_trip = 0;  ///< ns on this station's clock, from sending to reception
+        Time          held = 0;        ///< ns of it at the other station, on its clock
     };
     struct Owed {
         Address       to{};
@@ -37,28 +37,32 @@ public:
         std::uint32_t number = 0;
     };
 
-    /// As many as there are others in the setup. [setup]
+    /// Allocates an entry per other station of the setup. [setup]
     explicit Pings(std::size_t others = 0) : list_(others) {}
     std::size_t  size() const noexcept { return list_.size(); }
     const Asked& operator[](std::size_t n) const noexcept { return list_[n].asked; }
 
-    /// Another one to that station; what was on its way to it counts no more. [realtime]
+    /// Requests a ping to station `n`; cancels a pending one. [realtime]
     void ask(std::size_t n, std::uint32_t number) noexcept;
-    /// The next station whose ping waits for a turn; size(): none. [realtime]
+    /// Returns the next station whose ping is to be sent; size(): none. [realtime]
     std::size_t waiting() const noexcept;
-    void        sent(std::size_t n, const Address& to, Time not_before) noexcept;  ///< [realtime]
-    void        fail(std::size_t n, Outcome why) noexcept { end(list_[n], why); }   ///< [realtime]
-    /// True: it answers the ping that is on its way. [realtime]
+    /// Notes that the ping was sent, no earlier than `not_before` (local ns). [realtime]
+    void        sent(std::size_t n, const Address& to, Time not_before) noexcept;
+    /// Ends the ping without an answer. [realtime]
+    void        fail(std::size_t n, Outcome why) noexcept { end(list_[n], why); }
+    /// Evaluates an answer. Returns true when it answers the pending ping. [realtime]
     bool take(std::size_t n, const Address& from, const Echo& echo, Time arrived) noexcept;
-    /// Once a cycle: what has waited too long has ended. [realtime]
-    void look(Time now, Time longest, bool running) noexcept;
+    /// Ends pings older than `timeout_ns`; called once a cycle. [realtime]
+    void expire(Time now, Time timeout_ns, bool running) noexcept;
 
-    /// Somebody asked. [realtime]
-    void owe(const Owed&) noexcept;
-    /// The oldest answer that waits for a turn; nullptr: none. [realtime]
-    const Owed* owed() const noexcept { return owing_ == 0 ? nullptr : &owed_.front(); }
-    void        paid() noexcept;  ///< [realtime]
-    void        forgive() noexcept { owing_ = 0; }  ///< [realtime]
+    /// Queues an answer; replaces a pending one to the same station. [realtime]
+    void queue_answer(const Owed&) noexcept;
+    /// Returns the oldest queued answer; nullptr: none. [realtime]
+    const Owed* answer() const noexcept { return answers_ == 0 ? nullptr : &queue_.front(); }
+    /// Removes the oldest queued answer. [realtime]
+    void pop_answer() noexcept;
+    /// Removes all queued answers. [realtime]
+    void clear_answers() noexcept { answers_ = 0; }
 
 private:
     enum class Step : std::uint8_t { idle, wanted, sent };
@@ -71,8 +75,8 @@ private:
     static void end(Entry& e, Outcome how) noexcept { e.step = Step::idle, e.asked.done = e.asked.number, e.asked.outcome = how; }
 
     std::vector<Entry>   list_;
-    std::array<Owed, 16> owed_{};
-    std::size_t          owing_ = 0;
+    std::array<Owed, 16> queue_{};
+    std::size_t          answers_ = 0;
 };
 
 }  // namespace hal::tdma

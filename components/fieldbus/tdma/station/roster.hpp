@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is heard of each other station of the schedule. A switch passes on what is for this station or for all; other frames are not seen.
+// The state of each other station, from its received frames. A switch forwards only frames for this station or for all.
 #pragma once
 
 #include <cmath>
@@ -9,24 +9,24 @@
 namespace hal::tdma {
 
 struct Heard {
-    bool          alive = false;  ///< something came within a second
-    Time          since = 0;      ///< when that changed, local; 0: never
-    Time          at = 0;         ///< of the newest frame, local
-    Address       from{};         ///< who that is; zeros: not known yet
-    std::uint64_t frames = 0;     ///< its frames, syncs included
-    std::uint64_t late = 0;       ///< of them: those that came outside of its slots
-    double        drift = 0.0;    ///< of its clock against global time, from its calibration requests and answers to pings, when …
-    bool          drift_known = false;  ///< … there were enough
+    bool          alive = false;  ///< a frame was received within a second
+    Time          since = 0;      ///< last change of alive, local ns; 0: never
+    Time          at = 0;         ///< last frame, local ns
+    Address       from{};         ///< its address; zeros: not known yet
+    std::uint64_t frames = 0;     ///< frames received, syncs included
+    std::uint64_t late = 0;       ///< frames received outside its slots
+    double        drift = 0.0;    ///< of its clock against global time, 1e-6 is 1 ppm
+    bool          drift_known = false;  ///< enough time stamps for the drift
 };
 
 class Roster {
 public:
-    /// Names follow the setup's `others`. [setup]
+    /// Allocates an entry per station, in the order of the setup's `others`. [setup]
     explicit Roster(std::size_t count = 0) : list_(count) {}
     const Heard& operator[](std::size_t n) const noexcept { return list_[n].heard; }
     std::size_t  size() const noexcept { return list_.size(); }
 
-    /// A frame of that station came. [realtime]
+    /// Notes a frame of station `n`. [realtime]
     void frame(std::size_t n, const Address& from, Time now, bool late) noexcept {
         if (n >= list_.size()) return;
         Heard& h = list_[n].heard;
@@ -35,7 +35,8 @@ public:
         ++h.frames;
         if (late) ++h.late;
     }
-    /// It asked for its delay, or answered a ping: two of its stamps 0.3 s apart give its drift. Its clock may have jumped. [realtime]
+    /// Uses a time stamp of its clock, from a calibration request or an answer to a ping: two of them 0.3 s to 10 s apart give its drift,
+    /// unless its clock jumped. [realtime]
     void stamp(std::size_t n, Time its, Time global) noexcept {
         if (n >= list_.size()) return;
         Entry& e = list_[n];
@@ -51,10 +52,10 @@ public:
         }
         e.stamped = global, e.stamp = its;
     }
-    /// Once a cycle. [realtime]
-    void look(Time now, Time silence) noexcept {
+    /// Marks stations offline that were not heard for `timeout` (ns); called once a cycle. [realtime]
+    void expire(Time now, Time timeout) noexcept {
         for (Entry& e : list_)
-            if (e.heard.alive && now - e.heard.at > silence) e.heard.alive = false, e.heard.since = e.heard.at;
+            if (e.heard.alive && now - e.heard.at > timeout) e.heard.alive = false, e.heard.since = e.heard.at;
     }
     void clear() noexcept {
         for (Entry& e : list_) e = {};

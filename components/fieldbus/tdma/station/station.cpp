@@ -7,7 +7,7 @@
 
 namespace hal::tdma {
 
-const char* word(State state) noexcept {
+const char* to_string(State state) noexcept {
     constexpr const char* words[] = {"listening", "synchronising", "calibrating", "running", "withdrawn", "unconfigured"};
     return words[static_cast<std::size_t>(state)];
 }
@@ -15,18 +15,19 @@ const char* word(State state) noexcept {
 namespace {
 
 void check(const StationSetup& s) {
-    if (s.cycle < 1000) throw std::invalid_argument("a cycle has at least 1 us");
-    if (s.slots.size() > most_slots) throw std::invalid_argument("a station has at most " + std::to_string(most_slots) + " slots");
-    if (s.phase < 0 || s.phase >= s.cycle) throw std::invalid_argument("the phase lies within the cycle");
-    if (s.backup_offset < 0 || s.backup_offset >= s.cycle) throw std::invalid_argument("the backup offset lies within the cycle");
+    if (s.cycle < 1000) throw std::invalid_argument("cycle below 1 us");
+    if (s.slots.size() > most_slots)
+        throw std::invalid_argument(std::to_string(s.slots.size()) + " slots; a station has at most " + std::to_string(most_slots));
+    if (s.phase < 0 || s.phase >= s.cycle) throw std::invalid_argument("phase outside the cycle");
+    if (s.backup_offset < 0 || s.backup_offset >= s.cycle) throw std::invalid_argument("backup offset outside the cycle");
     for (std::size_t i = 0; i < s.slots.size(); ++i) {
         const SlotSetup&  slot = s.slots[i];
         const std::string which = "slot " + std::to_string(slot.id);
-        if (slot.offset < 0 || slot.offset >= s.cycle) throw std::invalid_argument(which + " lies outside the cycle");
-        if (slot.period == 0 || slot.phasing >= slot.period) throw std::invalid_argument(which + " has a phasing beyond its period");
+        if (slot.offset < 0 || slot.offset >= s.cycle) throw std::invalid_argument(which + " is outside the cycle");
+        if (slot.period == 0 || slot.phasing >= slot.period) throw std::invalid_argument(which + ": phasing exceeds its period");
         if (slot.size > ethernet::largest_frame - ethernet::header_bytes) throw std::invalid_argument(which + " is longer than a frame");
         for (std::size_t k = 0; k < i; ++k)
-            if (s.slots[k].id == slot.id) throw std::invalid_argument(which + " is there twice");
+            if (s.slots[k].id == slot.id) throw std::invalid_argument("duplicate " + which);
     }
 }
 
@@ -40,7 +41,7 @@ Station::Station(const StationSetup& setup, Events* events) : events_(events) {
     pings_ = Pings(setup_.others.size() + (setup_.asks_master ? 1 : 0));
     slots_.reserve(most_slots);
     for (const SlotSetup& s : setup.slots) slots_.emplace_back(s, setup.queue);
-    while (slots_.size() < std::min(setup.room_for_slots, most_slots))
+    while (slots_.size() < std::min(setup.slot_capacity, most_slots))
         slots_.emplace_back(SlotSetup{.id = unused_slot, .size = 0}, setup.queue);
     begin();
 }
@@ -51,7 +52,7 @@ void Station::attach(ethernet::Port& port) {
     for (Slot& s : slots_) s.clear();
     status_.count = {};
     roster_.clear();
-    told_unheard_ = false;
+    unheard_reported_ = false;
     no_carrier_ = 0;
     begin();
 }
@@ -64,7 +65,7 @@ bool Station::reconfigure(const StationSetup& s) noexcept {
     setup_.guard = s.guard;
     setup_.lost_limit = s.lost_limit, setup_.rounds = s.rounds, setup_.speed = s.speed, setup_.babble_limit = s.babble_limit;
     setup_.backup_from = s.backup_from;
-    setup_.slots.assign(s.slots.begin(), s.slots.end());  // its memory was reserved
+    setup_.slots.assign(s.slots.begin(), s.slots.end());  // within the reserved capacity
     setup_.configured = true;
     begin();
     return true;
@@ -78,8 +79,8 @@ void Station::begin() noexcept {
     clock_.clear();
     babble_monitor_.clear();
     followers_.clear();
-    pings_.forgive();
-    other_heard_ = 0, other_told_ = established_ = false;
+    pings_.clear_answers();
+    other_heard_ = 0, other_reported_ = established_ = false;
     for (Pending& p : pending_) p.used = false;
     based_ = heard_ever_ = sent_any_ = own_schedule_ = false;
     began_ = 0, good_row_ = foreign_row_ = intruder_row_ = 0, lead_wait_ = 0;
@@ -87,7 +88,7 @@ void Station::begin() noexcept {
     calibration_.begin(setup_.rounds);
     recalibration_ = 0;
     claimants_ = {};
-    newcomer_row_ = 0, unfit_sync_ = 0, punctual_row_ = out_of_step_ = 0, told_schedule_ = false;
+    newcomer_row_ = 0, unfit_sync_ = 0, master_row_ = out_of_step_ = 0, schedule_reported_ = false;
     limit_ = setup_.babble_limit != 0 ? setup_.babble_limit : 64;
     ready_.store(false, std::memory_order_relaxed);
 }
@@ -100,9 +101,9 @@ void Station::become(State state, Time) noexcept {
     status_.state = state;
     const bool ready = state == State::running;
     ready_.store(ready, std::memory_order_relaxed);
-    if (ready) say(Event::running);
+    if (ready) report(Event::running);
     else
-        for (Slot& s : slots_) s.clear();  // what was meant for a cycle long past must not be sent when the sync is back
+        for (Slot& s : slots_) s.clear();  // stale frames must not be sent after the next sync
 }
 
 const Slot* Station::find(unsigned id) const noexcept {
@@ -129,7 +130,7 @@ ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot,
     if (s == nullptr || frame.size() < ethernet::header_bytes || frame.size() > ethernet::header_bytes + s->room()) result = refused;
     else if (!ready()) result = down;
     else if (!s->push(frame, std::min(priority, last_priority), finisher)) result = full;
-    if (result != queued && result != full) ++status_.count.dropped;  // full: its sender has it still
+    if (result != queued && result != full) ++status_.count.dropped;  // full: the sender keeps it
     return result;
 }
 

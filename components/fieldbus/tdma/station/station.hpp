@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// One station on a segment with TDMA discipline: master, backup master or slave. It has no thread: receive() at the beginning of the
-// caller's cycle takes what came and keeps the clock, transmit() at its end hands the port every frame whose time is between now and the
-// same moment of the next cycle. The caller's thread has the period of the TDMA cycle and follows error().
+// One station on a segment with TDMA discipline (RTnet, Documentation/TDMA): master, backup master or slave. It has no thread: receive() at
+// the beginning of the caller's cycle processes the received frames and synchronises the clock, transmit() at its end passes every frame
+// that is due before the same moment of the next cycle to the port. The caller's thread has the period of the TDMA cycle and is
+// synchronised by error().
 //
 //     hal::tdma::Station station(setup, &events);   // [setup]
-//     station.attach(port);                          // [setup] one with Ethertypes Station::types
+//     station.attach(port);                          // [setup] opened for the Ethertypes Station::types
 //     each cycle: station.receive(now); … station.send(frame, slot, priority); … station.transmit(now);
-//                 next deadline = now + cycle + what a controller makes of station.error()
+//                 next deadline = now + cycle + a controller's correction for station.error()
 //
-// `now` is when the cycle was due, on the port's clock; what error() asks for moves it.
+// `now` is the deadline of the cycle on the port's clock, ns.
 #pragma once
 
 #include <algorithm>
@@ -27,51 +28,52 @@
 
 namespace hal::tdma {
 
-/// What else is on the segment: RTcfg, the tunnel.
+/// Another protocol on the segment: RTcfg, the tunnel.
 class Companion {
 public:
     virtual ~Companion() = default;
-    /// A frame of Ethertype 0x9022, or a tunnelled one. Valid during the call. [realtime]
+    /// Receives a frame of Ethertype 0x9022, or a tunnelled one, which is valid during the call. [realtime]
     virtual void arrived(std::span<const std::uint8_t> frame, Time now) noexcept = 0;
-    /// Before the slots are filled: it may send(). [realtime]
+    /// Is called before the slots are filled: it may send(). [realtime]
     virtual void before_slots(Time now) noexcept = 0;
-    /// A frame of any kind came from there. [realtime]
+    /// Notes a frame of any kind. [realtime]
     virtual void heard(const Address&, Time /*now*/) noexcept {}
 };
 
 class Station final : public ethernet::Discipline {
 public:
-    static constexpr std::array<std::uint16_t, 3> types{rtmac_type, rtcfg_type, cane_type};  ///< 0x9023 to see who is in our slots
+    static constexpr std::array<std::uint16_t, 3> types{rtmac_type, rtcfg_type, cane_type};  ///< 0x9023 to detect frames in own slots
 
-    /// [setup] Throws std::invalid_argument when the setup cannot be. `events` outlives it.
+    /// Throws std::invalid_argument for an invalid setup. `events` must outlive it. [setup]
     explicit Station(const StationSetup& setup, Events* events = nullptr);
 
-    void attach(ethernet::Port& port);  ///< [setup] begins anew; the port outlives it or detach()
-    void detach() noexcept { port_ = nullptr; }
-    /// Given frames of their Ethertype; nullptr: nobody. [setup]
+    /// Starts on a port, which must outlive the station or detach(). [setup]
+    void attach(ethernet::Port& port);
+    void detach() noexcept { port_ = nullptr; }  ///< [setup]
+    /// Sets the receivers of RTcfg and tunnelled frames; nullptr: none. [setup]
     void accompany(Companion* rtcfg, Companion* tunnel) noexcept { rtcfg_ = rtcfg, tunnel_ = tunnel; }
-    /// Another schedule, with as many slots as there was room for at most: what RTcfg brought. Begins anew. [realtime]
+    /// Changes the schedule and restarts, after RTcfg. Returns false when it has more slots than StationSetup::slot_capacity. [realtime]
     bool reconfigure(const StationSetup&) noexcept;
 
-    void receive(Time now) noexcept;   ///< [realtime]
-    void transmit(Time now) noexcept;  ///< [realtime] the same `now`, behind receive()
-    void reset() noexcept;             ///< [realtime] a withdrawn master begins anew
+    void receive(Time now) noexcept;   ///< processes received frames. [realtime]
+    void transmit(Time now) noexcept;  ///< sends; with the same `now`, after receive(). [realtime]
+    void reset() noexcept;             ///< restarts a master that stepped down. [realtime]
 
     const Status&       status() const noexcept { return status_; }
     const StationSetup& setup() const noexcept { return setup_; }
-    /// How much later (negative: earlier) this cycle should have begun; 0 while that is not known. [realtime]
+    /// Returns how much later (negative: earlier) this cycle should have begun, ns; 0 while unknown. [realtime]
     Time error() const noexcept { return status_.error; }
-    Time global(Time local) const noexcept { return clock_.global(local); }  ///< [realtime]
+    Time global(Time local) const noexcept { return clock_.global(local); }  ///< ns. [realtime]
     Time local(Time global) const noexcept { return clock_.local(global); }  ///< [realtime]
-    /// Beginning (the scheduled sync) of a cycle near this one on the port's clock. [realtime]
+    /// Returns the beginning (scheduled sync) of a cycle near this one, on the port's clock, ns. [realtime]
     Time        cycle_start(std::uint32_t cycle) const noexcept { return clock_.local(start_of(cycle)); }
-    std::size_t waiting(unsigned slot) const noexcept;  ///< frames in its queue. [realtime]
+    std::size_t waiting(unsigned slot) const noexcept;  ///< frames queued for it. [realtime]
 
-    /// What is heard of the other stations of the setup, in its order. [realtime]
+    /// Returns the state of the other stations, in the order of the setup. [realtime]
     const Roster& roster() const noexcept { return roster_; }
 
-    /// Asks the other station with that place in the setup (behind the last: the master, with asks_master), in the next slot with room;
-    /// pings() has what comes of it. [realtime]
+    /// Sends a ping to the other station with this index in the setup (after the last: the master, with asks_master), in the next slot with
+    /// space; pings() has the result. [realtime]
     void         ping(std::size_t other, std::uint32_t number) noexcept { pings_.ask(other, number); }
     const Pings& pings() const noexcept { return pings_; }  ///< [realtime]
 
@@ -85,9 +87,9 @@ public:
 
 private:
     static constexpr std::size_t most_pending = 64;  // as RTnet's master
-    static constexpr std::uint32_t rows = 3;  // that often in a row makes it a fact
-    static constexpr std::uint32_t silence_after = 1000;  // cycles until the same complaint is repeated
-    static constexpr Time gone_after = 1'000'000'000;  // silence after which a second master is gone, and a station that sends is
+    static constexpr std::uint32_t rows = 3;  // consecutive observations that confirm something
+    static constexpr std::uint32_t silence_after = 1000;  // cycles until the same event is repeated
+    static constexpr Time gone_after = 1'000'000'000;  // ns without frames: a second master, or a station that sends, is lost
     struct Pending {
         Address       to{};
         Time          stamp = 0, received = 0, offset = 0;
@@ -95,17 +97,17 @@ private:
         bool          used = false;
     };
 
-    /// Who sends syncs that are not of this station's schedule, and in which they are.
+    /// A sender of syncs of another schedule, and that schedule.
     struct Claimant {
         Address       who{};
-        std::uint32_t cycle = 0, row = 0;  // row: syncs in a row that go on
+        std::uint32_t cycle = 0, row = 0;  // row: consecutive consistent syncs
         Time          scheduled = 0, every = 0;
     };
 
     void        begin() noexcept;
     const Slot* find(unsigned id) const noexcept;
     void        become(State, Time now) noexcept;
-    void        say(Event event, const Address& who = {}, Time value = 0) noexcept {
+    void        report(Event event, const Address& who = {}, Time value = 0) noexcept {
         if (events_ != nullptr) events_->on_event(event, who, value);
     }
 
@@ -114,7 +116,7 @@ private:
     void            take_sync(const Decoded&, Time arrived, Time now) noexcept;
     void            take_foreign_sync(const Decoded&, Time now) noexcept;
     bool            is_allowed(const Address& master) noexcept;
-    void            look_at_carrier(Time now) noexcept;
+    void            check_carrier(Time now) noexcept;
     std::size_t     other_of(const Address& from, Time arrived, std::size_t length) const noexcept;
     void            note(const Decoded&, Time arrived, std::size_t length, Time now) noexcept;
     bool            is_in_slot(const Other&, Time at, std::uint32_t cycle) const noexcept;
@@ -124,7 +126,7 @@ private:
     void            take_request(const Decoded&, Time arrived) noexcept;
     void            take_reply(const Decoded&, Time arrived, Time now) noexcept;
     void            take_echo(const Decoded&, Time arrived) noexcept;
-    void            look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
+    void            check_slot(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
     void            advance(Time now) noexcept;
     void            count_silence(Time now) noexcept;
     void            start_leading(Time now) noexcept;
@@ -138,18 +140,18 @@ private:
     bool send_request(const Slot&, std::uint32_t cycle, Time local_at) noexcept;
     bool launch(std::span<const std::uint8_t> frame, const ethernet::Launch&) noexcept;
 
-    /// A master's sync, not a backup's.
-    bool is_punctual(Time lateness) const noexcept {
+    /// Returns true for the lateness of a master's sync, false for a backup's.
+    bool is_from_master(Time lateness) const noexcept {
         const Time limit = setup_.backup_from != 0 ? setup_.backup_from / 2 : setup_.guard;
         return lateness <= limit && lateness >= -limit;
     }
-    /// How far ahead transmit() sends. A little more than a cycle: the next sync is just a cycle away, and the thread is never quite in step.
-    /// Not more than that little: a port without a pacer takes a slot just behind the thread when it is due, not a cycle before.
+    /// Returns how far ahead transmit() sends: slightly more than a cycle, because the next sync is one cycle ahead and the thread is never
+    /// exactly in phase; not more, because a port without a pacer sends a slot right after the thread when it is due, not a cycle before.
     Time reach() const noexcept { return setup_.lead + setup_.cycle + std::min<Time>(setup_.cycle / 32, 31'250); }
-    Time start_of(std::uint32_t cycle) const noexcept {  // global; numbers wrap
+    Time start_of(std::uint32_t cycle) const noexcept {  // global; cycle numbers wrap
         return start_ + static_cast<Time>(static_cast<std::int32_t>(cycle - number_)) * setup_.cycle;
     }
-    /// When in which cycle the first bit of a frame of that length left a station as far away as the master; the offset in that cycle.
+    /// Returns the offset in its cycle at which a received frame left its sender, if that is as far away as the master; sets `cycle`.
     Time left_at(Time arrived, std::size_t length, std::uint32_t& cycle) const noexcept {
         const Time longer = 2 * (wire(length) - wire(0));  // stored and forwarded once
         const Time into = clock_.global(arrived) - status_.delay - longer - start_;
@@ -163,7 +165,7 @@ private:
     }
 
     StationSetup                      setup_;
-    std::vector<Slot>                 slots_;  // as the setup names them: calibration uses the first
+    std::vector<Slot>                 slots_;  // in the order of the setup: calibration uses the first
     Events*                           events_;
     ethernet::Port*                   port_ = nullptr;
     Companion *                       rtcfg_ = nullptr, *tunnel_ = nullptr;
@@ -181,39 +183,39 @@ private:
     bool                    based_ = false;  // number_ and start_ are known
     std::uint32_t           number_ = 0;  // of a cycle …
     Time                    start_ = 0;  // … and its scheduled sync, global
-    bool                    heard_ = false;  // a sync of this schedule since the last receive()
-    std::uint32_t           heard_cycle_ = 0;  // the number of the newest
+    bool                    heard_ = false;  // a sync of this schedule in the last receive()
+    std::uint32_t           heard_cycle_ = 0;  // cycle number of the last one
     bool                    heard_ever_ = false;
     Time                    last_sync_ = 0;  // local
     Time                    began_ = 0;  // local; 0: before the first cycle
-    Time                    sent_until_ = 0;  // global; slots up to here have had their turn
+    Time                    sent_until_ = 0;  // global; slots up to here are done
     bool                    sent_any_ = false;
     std::uint32_t           lead_wait_ = 0;  // cycles before a returning master leads again
-    bool                    own_schedule_ = false;  // nobody else's time is kept: this master was the first
-    std::uint32_t           good_row_ = 0;  // syncs of one schedule in a row
+    bool                    own_schedule_ = false;  // this master was the first: its clock is the global time
+    std::uint32_t           good_row_ = 0;  // consecutive syncs of one schedule
     std::uint32_t           foreign_row_ = 0;  // syncs of another schedule since the last of this one
     std::uint32_t           intruder_row_ = 0;
-    std::uint32_t           foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the same is said again
-    std::uint32_t           recalibration_ = 0;  // requests only in each so-manieth cycle, beside frames; 0: in each
-    Address                 measured_{};  // the master that the delay is of …
-    std::uint32_t           measured_heard_ = 0;  // … and the cycle of its newest sync
-    bool                    told_uncalibrated_ = false;
+    std::uint32_t           foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the event is repeated
+    std::uint32_t           recalibration_ = 0;  // requests in every n-th cycle only, besides frames; 0: in every cycle
+    Address                 measured_{};  // the calibrated master …
+    std::uint32_t           measured_heard_ = 0;  // … and the cycle of its last sync
+    bool                    uncalibrated_reported_ = false;
     std::array<Claimant, 4> claimants_{};
     std::size_t             next_claimant_ = 0;
     Address                 newcomer_{};
-    std::uint32_t           newcomer_row_ = 0;  // of its syncs, while another is the master
-    Time                    unfit_sync_ = 0;  // when the last came while it listened, local; 0: none
-    Address                 other_{};  // the second master that was named
-    Time                    other_heard_ = 0;  // its last sync, local; 0: none, or gone
-    bool                    other_told_ = false;
-    bool                    established_ = false;  // others ran on this schedule when the second master was first heard
-    Time                    no_carrier_ = 0;  // since when, local; 0: there is one
-    std::uint32_t           stranger_gap_ = 0;
-    Address                 punctual_{};
-    std::uint32_t           punctual_row_ = 0;  // its syncs in a row that a master sent, not a backup
-    std::uint32_t           out_of_step_ = 0;  // cycles it has been synchronising for
-    bool                    told_schedule_ = false;
-    bool                    told_unheard_ = false;  // since attach()
+    std::uint32_t           newcomer_row_ = 0;  // its syncs while another station is the master
+    Time                    unfit_sync_ = 0;  // last one while listening, local; 0: none
+    Address                 other_{};  // the reported second master
+    Time                    other_heard_ = 0;  // its last sync, local; 0: none, or lost
+    bool                    other_reported_ = false;
+    bool                    established_ = false;  // there were followers when the second master was first heard
+    Time                    no_carrier_ = 0;  // since when, local; 0: carrier present
+    std::uint32_t           unknown_gap_ = 0;
+    Address                 master_{};          // sender of the last sync of a master
+    std::uint32_t           master_row_ = 0;    // its consecutive syncs
+    std::uint32_t           out_of_step_ = 0;  // cycles in state synchronising
+    bool                    schedule_reported_ = false;
+    bool                    unheard_reported_ = false;  // since attach()
     std::uint32_t           limit_ = 32;  // frames of one station in a cycle
 };
 

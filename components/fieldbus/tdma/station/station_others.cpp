@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a station makes of others that it does not expect: a second master, a stranger, a frame in a slot that is not its sender's.
+// Unexpected stations: a second master, an unknown master, frames outside the slots of their sender.
 #include <algorithm>
 #include <cstdlib>
 
@@ -7,7 +7,7 @@
 
 namespace hal::tdma {
 
-/// What its sender's syncs are like, with this one.
+/// Updates and returns what is known of the sender's schedule.
 const Station::Claimant& Station::claim(const Decoded& d) noexcept {
     const Sync& s = d.sync;
     Claimant*   c = nullptr;
@@ -25,12 +25,12 @@ const Station::Claimant& Station::claim(const Decoded& d) noexcept {
     return *c;
 }
 
-/// A sync of a schedule that is not the one this station keeps.
+/// Handles a sync of another schedule.
 void Station::take_foreign_sync(const Decoded& d, Time now) noexcept {
     ++status_.count.foreign;
     const bool is_master = !status_.leading && d.from == status_.master;
-    if (is_master && ++foreign_row_ >= rows) {  // it restarted: its old schedule is gone
-        say(Event::sync_lost, d.from, 0);
+    if (is_master && ++foreign_row_ >= rows) {  // it restarted with a new schedule
+        report(Event::sync_lost, d.from, 0);
         ++status_.count.losses;
         return begin();
     }
@@ -38,37 +38,37 @@ void Station::take_foreign_sync(const Decoded& d, Time now) noexcept {
     const bool first = other_heard_ == 0;
     other_ = d.from, other_heard_ = now;
     if (first) established_ = followers_.any(now, gone_after);
-    if (foreign_gap_ == 0 || !other_told_) {
-        foreign_gap_ = silence_after, other_told_ = true;
-        say(Event::other_master, d.from);
+    if (foreign_gap_ == 0 || !other_reported_) {
+        foreign_gap_ = silence_after, other_reported_ = true;
+        report(Event::other_master, d.from);
     }
-    if (!status_.leading || established_) return;  // a schedule on which others run is not given up
+    if (!status_.leading || established_) return;  // a schedule with followers is kept
     const Time lateness = d.sync.stamp - d.sync.scheduled;
-    if (setup_.role == Role::master && is_punctual(lateness)) {
+    if (setup_.role == Role::master && is_from_master(lateness)) {
         if (d.from < address_) unfit_sync_ = now, withdraw(Event::withdrew, d.from);
         return;
     }
-    // A backup gives way to a master; a master whose segment has a backup's schedule by now listens, and takes it over.
-    if (setup_.role == Role::master || is_punctual(lateness)) {
-        say(Event::yielded, d.from);
+    // A backup yields to a master; a master that finds a backup's schedule listens and takes that over.
+    if (setup_.role == Role::master || is_from_master(lateness)) {
+        report(Event::yielded, d.from);
         begin();
         began_ = unfit_sync_ = now;
     }
 }
 
-/// A configuration that names the master and its backups is a white list.
+/// The addresses of the master and its backups in the schedule are an allow list.
 bool Station::is_allowed(const Address& master) noexcept {
     if (setup_.masters.empty() || std::find(setup_.masters.begin(), setup_.masters.end(), master) != setup_.masters.end()) return true;
     ++status_.count.foreign;
-    if (stranger_gap_ == 0) {
-        stranger_gap_ = silence_after;
-        say(Event::stranger_sync, master);
+    if (unknown_gap_ == 0) {
+        unknown_gap_ = silence_after;
+        report(Event::unknown_master, master);
     }
     return false;
 }
 
 /// A station that led and was cut off for this duration has lost its followers: when it meets another schedule, that one takes precedence.
-void Station::look_at_carrier(Time now) noexcept {
+void Station::check_carrier(Time now) noexcept {
     if (!port_->statistics().up) {
         if (no_carrier_ == 0) no_carrier_ = now;
         return;
@@ -82,14 +82,14 @@ void Station::withdraw(Event why, const Address& who) noexcept {
     status_.leading = status_.synchronous = false;
     status_.master = who;
     become(State::withdrawn, 0);
-    say(why, who);
+    report(why, who);
 }
 
-/// Of a schedule from RTcfg a station knows its own block only, and believes everybody.
+/// With a schedule from RTcfg a station knows its own block only, and accepts all senders.
 ethernet::Discipline::Origin Station::origin(const Address& from, std::int64_t arrived, std::size_t length) const noexcept {
     if (setup_.others.empty()) return Origin::plausible;
     const bool named = std::any_of(setup_.others.begin(), setup_.others.end(), [&](const Other& o) { return o.mac == from; });
-    // Blocks without an address may be of any station that is in none; the sender of the syncs has one of a master.
+    // A block without an address may belong to any station without a block; the sender of the syncs has a block of a master.
     const auto may_be = [&](const Other& o) {
         return named ? o.mac == from : o.mac == Address{} && (o.role != Role::slave || from != status_.master);
     };
@@ -102,7 +102,7 @@ ethernet::Discipline::Origin Station::origin(const Address& from, std::int64_t a
     return Origin::out_of_slot;
 }
 
-/// With what launching, the way and the stamp here may add.
+/// Allows for the lateness of the sender, the path delay and the time stamp.
 bool Station::is_in_slot(const Other& o, Time at, std::uint32_t cycle) const noexcept {
     const Time early = std::max<Time>(2'000, setup_.guard), late = setup_.guard + std::max<Time>(20'000, setup_.cycle / 20);
     for (const SlotSetup& slot : o.slots) {
@@ -115,7 +115,7 @@ bool Station::is_in_slot(const Other& o, Time at, std::uint32_t cycle) const noe
     return false;
 }
 
-/// Which of the others it is: by its address, or of those without one by what was heard before, by its syncs, or by its slot.
+/// Returns the index of the sender: by its address, or for blocks without one by earlier frames, its syncs, or its slot.
 std::size_t Station::other_of(const Address& from, Time arrived, std::size_t length) const noexcept {
     const auto& others = setup_.others;
     for (std::size_t n = 0; n < others.size(); ++n)
@@ -131,10 +131,10 @@ std::size_t Station::other_of(const Address& from, Time arrived, std::size_t len
 }
 
 void Station::note(const Decoded& d, Time arrived, std::size_t length, Time now) noexcept {
-    const bool by_slot = d.kind != Kind::sync && d.kind != Kind::reply;  // a reply is in the slot of the one that asked
+    const bool by_slot = d.kind != Kind::sync && d.kind != Kind::reply;  // a reply is in the requester's slot
     std::size_t n = other_of(d.from, arrived, length);
-    if (d.kind == Kind::sync && n == setup_.others.size()) {  // of a block without an address
-        const Role role = is_punctual(d.sync.stamp - d.sync.scheduled) ? Role::master : Role::backup;
+    if (d.kind == Kind::sync && n == setup_.others.size()) {  // a block without an address
+        const Role role = is_from_master(d.sync.stamp - d.sync.scheduled) ? Role::master : Role::backup;
         for (std::size_t i = 0; i < setup_.others.size(); ++i)
             if (const Other& o = setup_.others[i]; o.mac == Address{} && o.role == role && !roster_[i].alive) n = i;
     } else if (n == setup_.others.size()) {
@@ -148,7 +148,7 @@ void Station::note(const Decoded& d, Time arrived, std::size_t length, Time now)
     if (d.kind == Kind::request && status_.leading) roster_.stamp(n, d.request.stamp, clock_.global(arrived));
 }
 
-/// Its stamps are of the other station's own clock: two of them give its drift.
+/// The stamps are from the other station's clock: two of them give its drift.
 void Station::take_echo(const Decoded& d, Time arrived) noexcept {
     for (std::size_t n = 0; n < pings_.size(); ++n) {
         if (!pings_.take(n, d.from, d.echo, arrived)) continue;
@@ -158,10 +158,10 @@ void Station::take_echo(const Decoded& d, Time arrived) noexcept {
     ++status_.count.foreign;
 }
 
-/// Does somebody else use a slot of ours? Only a station that knows how long frames are on their way can tell.
-void Station::look_at(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
+/// Detects frames of other stations in own slots; needs the path delay.
+void Station::check_slot(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
     if (status_.state != State::running || !status_.calibrated || own_schedule_) return;
-    const Time tolerance = std::max<Time>(2'000, setup_.guard / 2);  // no frame of another slot begins so near
+    const Time tolerance = std::max<Time>(2'000, setup_.guard / 2);  // frames of other slots are farther away
     std::uint32_t cycle = 0;
     const Time    at = left_at(arrived, frame.size(), cycle);
     for (const Slot& s : slots_) {
@@ -172,7 +172,7 @@ void Station::look_at(std::span<const std::uint8_t> frame, const Address& from, 
         if (++intruder_row_ >= rows && intruder_gap_ == 0) {
             intruder_gap_ = silence_after;
             intruder_row_ = 0;
-            say(Event::foreign_frame, from, slot.id);
+            report(Event::foreign_frame, from, slot.id);
         }
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a station makes of the frames that come, and of those that do not.
+// Received frames, and missing ones.
 #include <algorithm>
 #include <cstdlib>
 
@@ -10,10 +10,10 @@ namespace hal::tdma {
 namespace {
 
 constexpr std::size_t   most_arrivals = 1024;  // in a cycle: a babbling station must not hold the thread
-constexpr std::uint32_t soon_back = 100;       // cycles that a master may be away without being measured again
-constexpr Time          unfit_for = 100'000'000;         // a master does not begin so soon after another's sync
+constexpr std::uint32_t soon_back = 100;       // cycles after which a returning master needs a new calibration
+constexpr Time          unfit_for = 100'000'000;         // delay of a master after another one's sync
 constexpr Time          too_long_unheard = 5'000'000'000;
-constexpr Time          too_long_out = 5'000'000'000;    // to come into phase takes a fraction of it
+constexpr Time          too_long_out = 5'000'000'000;    // coming into phase takes a fraction of this
 
 }  // namespace
 
@@ -22,22 +22,22 @@ void Station::receive(Time now) noexcept {
     const bool first = began_ == 0;
     if (first) began_ = now;
     heard_ = false;
-    look_at_carrier(now);
+    check_carrier(now);
     for (std::size_t i = 0; i < most_arrivals; ++i) {
         const auto arrival = port_->receive(now);
         if (!arrival) break;
-        if (first && arrival->time_ns < now - setup_.cycle) continue;  // from between the open and the thread's first cycle
+        if (first && arrival->time_ns < now - setup_.cycle) continue;  // received before the thread's first cycle
         take(*arrival, now);
     }
-    for (std::uint32_t* gap : {&foreign_gap_, &intruder_gap_, &babble_gap_, &stranger_gap_})
+    for (std::uint32_t* gap : {&foreign_gap_, &intruder_gap_, &babble_gap_, &unknown_gap_})
         if (*gap != 0) --*gap;
     std::uint32_t frames = 0;
     if (const Address* who = babble_monitor_.babbler(limit_, frames); who != nullptr && babble_gap_ == 0) {
         babble_gap_ = silence_after;
-        say(Event::babbling, *who, frames);
+        report(Event::babbling, *who, frames);
     }
-    roster_.look(now, gone_after);
-    pings_.look(now, std::max(Pings::patience, 20 * setup_.cycle), status_.state == State::running);
+    roster_.expire(now, gone_after);
+    pings_.expire(now, std::max(Pings::timeout, 20 * setup_.cycle), status_.state == State::running);
     advance(now);
     count_silence(now);
 }
@@ -58,22 +58,22 @@ void Station::take(const ethernet::Arrival& arrival, Time now) noexcept {
     switch (d.kind) {
     case Kind::sync: take_sync(d, arrival.time_ns, now); return;
     case Kind::request:
-        look_at(frame, d.from, arrival.time_ns);
+        check_slot(frame, d.from, arrival.time_ns);
         if (d.to == address_) take_request(d, arrival.time_ns);
         return;
-    case Kind::reply:  // in the slot of the one that asked
+    case Kind::reply:  // in the requester's slot
         if (d.to == address_) take_reply(d, arrival.time_ns, now);
         return;
     case Kind::ping:
-        look_at(frame, d.from, arrival.time_ns);
-        if (d.to == address_ && status_.state == State::running) pings_.owe({d.from, d.ping.stamp, arrival.time_ns, d.ping.number});
+        check_slot(frame, d.from, arrival.time_ns);
+        if (d.to == address_ && status_.state == State::running) pings_.queue_answer({d.from, d.ping.stamp, arrival.time_ns, d.ping.number});
         return;
     case Kind::echo:
-        look_at(frame, d.from, arrival.time_ns);
+        check_slot(frame, d.from, arrival.time_ns);
         if (d.to == address_) take_echo(d, arrival.time_ns);
         return;
     case Kind::tunnelled:
-        look_at(frame, d.from, arrival.time_ns);
+        check_slot(frame, d.from, arrival.time_ns);
         if (tunnel_ != nullptr) tunnel_->arrived(frame, now);
         return;
     case Kind::none: break;
@@ -82,14 +82,14 @@ void Station::take(const ethernet::Arrival& arrival, Time now) noexcept {
         ++status_.count.foreign;
         return;
     }
-    look_at(frame, d.from, arrival.time_ns);
+    check_slot(frame, d.from, arrival.time_ns);
     if (rtcfg_ != nullptr && frame[12] == rtcfg_type >> 8 && frame[13] == (rtcfg_type & 0xff)) rtcfg_->arrived(frame, now);
 }
 
 void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     const Sync& s = d.sync;
     const Time  lateness = static_cast<Time>(static_cast<std::uint64_t>(s.stamp) - static_cast<std::uint64_t>(s.scheduled));
-    // Times that a clock of nanoseconds does not have in a hundred years, or a sync sent in another cycle than its own, are no sync.
+    // Ignores times outside a century, and a sync sent in another cycle than its own.
     constexpr Time century = 3'155'760'000'000'000'000;
     if (s.scheduled < -century || s.scheduled > century || lateness <= -setup_.cycle || lateness >= setup_.cycle) {
         ++status_.count.foreign;
@@ -103,16 +103,16 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
         return;
     }
     if (setup_.role == Role::master && !status_.leading) {
-        // A backup's syncs are late by its offset: whose are not is another master, and there is nothing to take over from it.
-        punctual_row_ = !is_punctual(lateness) ? 0 : d.from == punctual_ ? punctual_row_ + 1 : 1;
-        punctual_ = d.from;
-        if (punctual_row_ >= rows) return withdraw(Event::master_there, d.from);
+        // The syncs of a backup are delayed by its offset. Without a delay the sender is another master: nothing to take over.
+        master_row_ = !is_from_master(lateness) ? 0 : d.from == master_ ? master_row_ + 1 : 1;
+        master_ = d.from;
+        if (master_row_ >= rows) return withdraw(Event::master_there, d.from);
     }
     if (status_.state == State::listening) return listen_to(d, arrived, now);
     const bool fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
     if (!fits) return take_foreign_sync(d, now);
     if (heard_ever_ && static_cast<std::int32_t>(s.cycle - heard_cycle_) <= 0 && !(status_.leading && setup_.role == Role::master)) return;
-    // Who is new is believed the second time; until then its sync keeps the beat, so that a backup that takes over is not missed.
+    // A new sender is accepted after its second sync; until then its sync counts as received, so that a backup's take-over is not a loss.
     if (d.from != status_.master || status_.leading) {
         const bool again = d.from == newcomer_ && newcomer_row_ != 0;
         newcomer_ = d.from, newcomer_row_ = 1;
@@ -128,14 +128,14 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     if (status_.leading) {
         const Time own = setup_.role == Role::backup ? setup_.backup_offset : 0;
         if (setup_.role == Role::master) {
-            // A backup that missed one of ours does no harm; a second master as punctual as this one does.
-            if (!is_punctual(lateness)) return;
+            // A backup that missed a sync is harmless, a second master is not.
+            if (!is_from_master(lateness)) return;
             return take_foreign_sync(d, now);
         }
         const Time apart = setup_.backup_from != 0 ? std::min(setup_.guard, setup_.backup_from) : setup_.guard;
-        if (lateness >= own - apart / 2) return;  // another backup, behind this one
+        if (lateness >= own - apart / 2) return;  // another backup with a larger offset
         status_.leading = false;
-        say(Event::yielded, d.from);
+        report(Event::yielded, d.from);
     }
     foreign_row_ = 0;
     if (heard_ever_) status_.count.syncs_lost += s.cycle - heard_cycle_ - 1;
@@ -143,8 +143,8 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
         status_.master = d.from;
         calibration_.forget();
         clock_.another_master();
-        say(Event::master_changed, d.from);
-        // One that was away for a few cycles is measured already: a backup that led for one must not cost all stations a hundred requests.
+        report(Event::master_changed, d.from);
+        // A master that was lost for a few cycles only is calibrated already.
         if (d.from == measured_ && s.cycle - measured_heard_ <= soon_back) calibration_.end(), recalibration_ = 0;
         else if (status_.calibrated && !setup_.slots.empty()) calibration_.begin(setup_.rounds), recalibration_ = 8;
     }
@@ -156,7 +156,7 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     clock_.take(s.stamp, arrived, status_.delay);
 }
 
-/// Three of one schedule in a row make it this station's: a single frame may be anything.
+/// Adopts a schedule after three consistent syncs: a single frame may be anything.
 void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
     const Sync&     s = d.sync;
     const bool      fits = based_ && std::abs(s.scheduled - start_of(s.cycle)) <= setup_.cycle / 8;
@@ -164,11 +164,11 @@ void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
     if (!fits) unfit_sync_ = now;
     if (c.row >= rows && std::abs(c.every - setup_.cycle) > setup_.cycle / 8) {
         ++status_.count.foreign;
-        if (!told_schedule_) say(Event::other_schedule, d.from, c.every);
-        told_schedule_ = true;
+        if (!schedule_reported_) report(Event::other_schedule, d.from, c.every);
+        schedule_reported_ = true;
         return;
     }
-    good_row_ = fits && s.cycle != heard_cycle_ ? good_row_ + 1 : c.row >= rows ? rows : 1;  // of two masters the first that has three
+    good_row_ = fits && s.cycle != heard_cycle_ ? good_row_ + 1 : c.row >= rows ? rows : 1;  // of two masters, the first with three
     if (!fits) clock_.clear();
     number_ = s.cycle, start_ = s.scheduled, based_ = true;
     clock_.take(s.stamp, arrived, status_.delay);
@@ -212,20 +212,20 @@ void Station::take_reply(const Decoded& d, Time arrived, Time now) noexcept {
     const bool          complete = calibration_.take(d.reply, arrived, clock_.drift(), setup_.cycle / 4);
     if (complete || calibration_.done() != before) ++status_.count.replies;
     if (!complete) return;
-    told_uncalibrated_ = false;
+    uncalibrated_reported_ = false;
     recalibration_ = 0;
     clock_.delay_changed(calibration_.delay() - status_.delay);
     status_.delay = calibration_.delay();
     measured_ = d.from, measured_heard_ = heard_cycle_;
     status_.calibrated = true;
-    say(Event::calibrated, d.from, status_.delay);
+    report(Event::calibrated, d.from, status_.delay);
     if (status_.state == State::calibrating) {
         if (setup_.role == Role::master) lead_wait_ = 2;
         become(State::running, now);
     }
 }
 
-/// Which cycle is it, and how far is the thread from where it should be?
+/// Determines the cycle number and the phase error of the thread.
 void Station::advance(Time now) noexcept {
     status_.drift = clock_.drift();
     status_.jitter = clock_.jitter();
@@ -240,7 +240,7 @@ void Station::advance(Time now) noexcept {
     const Time cycles = into >= 0 ? into / setup_.cycle : -((-into + setup_.cycle - 1) / setup_.cycle);
     number_ += static_cast<std::uint32_t>(cycles);
     start_ += cycles * setup_.cycle;
-    if (own_schedule_) start_ = status_.global - setup_.phase;  // its thread's grid is the schedule
+    if (own_schedule_) start_ = status_.global - setup_.phase;  // its thread defines the schedule
     status_.cycle = number_;
     status_.error = clock_.local(start_ + setup_.phase) - now;
 }
@@ -251,21 +251,21 @@ void Station::start_leading(Time now) noexcept {
         own_schedule_ = based_ = true;
         number_ = 0;
         start_ = now - setup_.phase;
-        status_.calibrated = true;  // it is the clock
+        status_.calibrated = true;  // its clock is the global time
     } else {
         clock_.lead(now);
     }
     status_.leading = status_.synchronous = true;
     status_.master = address_;
     ++status_.count.take_overs;
-    say(Event::leading, address_);
+    report(Event::leading, address_);
     if (status_.state != State::running) become(State::running, now);
 }
 
 bool Station::may_lead() const noexcept {
     if (setup_.role != Role::backup || status_.state != State::running || !heard_ever_) return false;
-    // With a phase the thread looks after the sync of its cycle was due; without one the newest that can be here is the last cycle's. So it
-    // is for a thread that cannot come into phase, as another station's in one process, and looks too early by more than the guard.
+    // With a phase the thread runs after the sync of its cycle; without one the newest possible sync is that of the last cycle. The same
+    // holds for a thread that cannot come into phase, of a second station in the process, and runs too early by more than the guard.
     const std::uint32_t newest = setup_.phase > 0 && status_.error <= setup_.guard ? number_ : number_ - 1;
     return static_cast<std::int32_t>(newest - heard_cycle_) > 0;
 }
@@ -275,8 +275,8 @@ void Station::count_silence(Time now) noexcept {
     status_.silent_cycles = status_.leading || unheard < 0 ? 0 : static_cast<std::uint32_t>(unheard);
     if (other_heard_ != 0 && now - other_heard_ > gone_after) {
         other_heard_ = 0;
-        if (other_told_) say(Event::other_master_gone, other_);
-        other_told_ = false;
+        if (other_reported_) report(Event::other_master_gone, other_);
+        other_reported_ = false;
     }
     status_.master_active = status_.leading || (heard_ever_ && status_.silent_cycles == 0);
     switch (status_.state) {
@@ -288,9 +288,9 @@ void Station::count_silence(Time now) noexcept {
             based_ = false;
             start_leading(now);
             advance(now);
-        } else if (!told_unheard_ && status_.count.syncs == 0 && now - began_ > too_long_unheard) {
-            told_unheard_ = true;
-            say(Event::unheard);
+        } else if (!unheard_reported_ && status_.count.syncs == 0 && now - began_ > too_long_unheard) {
+            unheard_reported_ = true;
+            report(Event::unheard);
         }
         return;
     case State::withdrawn:
@@ -300,16 +300,16 @@ void Station::count_silence(Time now) noexcept {
     case State::synchronising:
         if (clock_.settled() && std::abs(status_.error) < setup_.cycle / 16) {
             status_.synchronous = true;
-            say(Event::synchronised, status_.master);
+            report(Event::synchronised, status_.master);
             become(setup_.slots.empty() ? State::running : State::calibrating, now);
         } else if (++out_of_step_ == static_cast<std::uint32_t>(too_long_out / setup_.cycle) && status_.error != 0) {
-            say(Event::out_of_step, status_.master, std::abs(status_.error));
+            report(Event::out_of_step, status_.master, std::abs(status_.error));
         }
         break;
     case State::calibrating:
-        if (calibration_.unanswered_row() >= 20 && !told_uncalibrated_) {
-            told_uncalibrated_ = true;
-            say(Event::uncalibrated, status_.master, calibration_.unanswered_row());
+        if (calibration_.unanswered_row() >= 20 && !uncalibrated_reported_) {
+            uncalibrated_reported_ = true;
+            report(Event::uncalibrated, status_.master, calibration_.unanswered_row());
         }
         break;
     case State::running:
@@ -327,7 +327,7 @@ void Station::count_silence(Time now) noexcept {
         for (Slot& s : slots_) s.clear();
         begin();
         began_ = now;
-        say(Event::sync_lost, master, since);
+        report(Event::sync_lost, master, since);
     }
 }
 

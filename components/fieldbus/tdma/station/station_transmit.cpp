@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a station sends: every frame whose turn is within a cycle's length from now, in the order of their times.
+// Sends every frame that is due within the next cycle, in order of time.
 #include <algorithm>
 
 #include "station.hpp"
@@ -16,14 +16,14 @@ bool Station::launch(std::span<const std::uint8_t> frame, const ethernet::Launch
 void Station::send_sync(std::uint32_t cycle, Time global_at) noexcept {
     const Time  at = clock_.local(global_at);
     const Frame frame = encode(address_, Sync{cycle, global_at, start_of(cycle)});
-    // The stamp is written when it leaves: its time is the port's, the receivers expect the global one.
+    // The port stamps the frame when it leaves; stamp_add_ns converts to global time.
     if (launch(frame, {.at_ns = at, .guard_ns = setup_.cycle / 2, .stamp_at = sync_stamp_at, .stamp_add_ns = global_at - at}))
         ++status_.count.syncs_sent;
 }
 
 bool Station::send_request(const Slot& slot, std::uint32_t cycle, Time local_at) noexcept {
-    // RTnet's stations give the master one period of the slot for its answer. A master whose thread has not run since the request came
-    // could not keep that when the slot is early in the cycle, so it gets two cycles at least.
+    // RTnet's stations give the master one period of the slot for its answer. That is too short for an early
+    // slot when the master's thread runs later, so the reply is at least two cycles later.
     const std::uint32_t period = slot.setup().period;
     const std::uint32_t reply_cycle = cycle + period * std::max(1U, (2 + period - 1) / period);
     const Frame         frame = encode(status_.master, address_, Request{local_at, reply_cycle, slot.setup().offset});
@@ -37,7 +37,7 @@ void Station::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
     const Time global_at = start_of(cycle) + slot.setup().offset;
     const Time at = clock_.local(global_at);
     if (index == 0 && calibration_.active() && !status_.leading) {
-        if (calibration_.reserved(cycle)) return;  // the master's, for its reply
+        if (calibration_.reserved(cycle)) return;  // reserved for the master's reply
         const bool turn = status_.state == State::calibrating || recalibration_ == 0 || cycle / slot.setup().period % recalibration_ == 0;
         if (turn && calibration_.due(cycle, slot.setup().period)) {
             send_request(slot, cycle, at);
@@ -56,27 +56,29 @@ void Station::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
     send_pings(slot, at, used);
 }
 
-/// In what the real-time frames have left of a turn.
+/// Uses the time that real-time frames leave in a turn.
 void Station::send_pings(const Slot& slot, Time slot_at, std::size_t used) noexcept {
     constexpr std::size_t takes = ethernet::wire_bytes(ethernet::smallest_frame);
     while (used + takes <= slot.turn_bytes()) {
         const Time at = slot_at + wire_time(used);
-        if (const Pings::Owed* owed = pings_.owed(); owed != nullptr) {
+        if (const Pings::Owed* owed = pings_.answer(); owed != nullptr) {
             const Frame frame = encode(owed->to, address_, Echo{owed->ping_stamp, owed->received, at, owed->number});
             if (launch(frame, {.at_ns = at, .guard_ns = setup_.guard, .stamp_at = echo_stamp_at, .stamp_add_ns = 0})) ++status_.count.sent;
-            pings_.paid();
+            pings_.pop_answer();
             used += takes;
             continue;
         }
         const std::size_t n = pings_.waiting();
         if (n == pings_.size()) return;
-        const Address to = n >= setup_.others.size() ? status_.master : roster_[n].from != Address{} ? roster_[n].from : setup_.others[n].mac;
+        const Address to = n >= setup_.others.size()            ? status_.master
+                           : roster_[n].from != Address{} ? roster_[n].from
+                                                          : setup_.others[n].mac;
         if (to == Address{}) {
             pings_.fail(n, Outcome::no_address);
             continue;
         }
         const Frame frame = encode(to, address_, Ping{at, pings_[n].number});
-        if (!launch(frame, {.at_ns = at, .guard_ns = setup_.guard, .stamp_at = ping_stamp_at, .stamp_add_ns = 0})) return;  // once more
+        if (!launch(frame, {.at_ns = at, .guard_ns = setup_.guard, .stamp_at = ping_stamp_at, .stamp_add_ns = 0})) return;  // try again
         ++status_.count.sent;
         pings_.sent(n, to, at);
         used += takes;

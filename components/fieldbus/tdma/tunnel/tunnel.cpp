@@ -15,7 +15,7 @@ constexpr std::size_t largest_payload = ethernet::largest_frame - ethernet::head
 
 bool is_group(const Address& a) noexcept { return (a[0] & 1) != 0; }
 
-/// As long as its own header says (RFC 791, 826, 8200); the padding of a short frame comes behind.
+/// Returns true when the packet has the length in its header (RFC 791, 826, 8200); padding may follow.
 bool is_whole(std::uint16_t type, std::span<const std::uint8_t> p) noexcept {
     switch (type) {
     case ipv4: {
@@ -47,7 +47,7 @@ std::size_t tunnel_mtu(const StationSetup& setup) noexcept {
 Tunnel::Tunnel(Station& station) : station_(station), mtu_(tunnel_mtu(station.setup())) {}
 
 void Tunnel::arrived(std::span<const std::uint8_t> frame, Time) noexcept {
-    if (!is_packet(decode(frame), station_.address())) return count(refused_);
+    if (!is_packet(decode(frame), station_.address())) return count(rejected_);
     Packet* place = in_.place();
     if (place == nullptr) return count(dropped_in_);
     std::copy(frame.begin(), frame.end(), place->bytes.begin());
@@ -58,7 +58,7 @@ void Tunnel::arrived(std::span<const std::uint8_t> frame, Time) noexcept {
 
 void Tunnel::before_slots(Time now) noexcept {
     mtu_.store(tunnel_mtu(station_.setup()), std::memory_order_relaxed);
-    // Calls come once a cycle while the station runs.
+    // Called once a cycle while the station is running.
     if (now - last_ > 2 * station_.setup().cycle)
         for (; out_.front() != nullptr; out_.pop()) count(dropped_old_);
     last_ = now;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Ordinary packets across the segment in slot 1, behind the RTmac header with its tunnelling flag (RTnet, Documentation/RTmac): what
-// RTnet's virtual interface does. The cycle has one side of it, an ordinary thread (tap.hpp) the other; they meet in two queues.
+// Ordinary packets across the segment in slot 1, with the tunnelling flag of the RTmac header (RTnet, Documentation/RTmac), like RTnet's
+// virtual interface. The cycle uses one side, an ordinary thread (tap.hpp) the other; two queues connect them.
 //
-// What does not fit is dropped, the newest first, as any interface does it; IP and TCP live with that. Packets that waited while the
-// station was silent are old and are not sent.
+// When a queue is full, new packets are dropped, as by any interface. Packets that waited while the station did not send are stale and
+// dropped too.
 #pragma once
 
 #include <atomic>
@@ -13,24 +13,24 @@
 
 namespace hal::tdma {
 
-/// Bytes of an IP packet that a slot of `size` bytes carries: at most 1496; 0: fewer than IP needs, which are 68 (RFC 791). [any]
+/// Returns the MTU of a slot of `size` bytes: at most 1496; 0 when it is below the 68 bytes that IP needs (RFC 791). [any]
 constexpr std::size_t tunnel_mtu(std::size_t size) noexcept {
     constexpr std::size_t smallest = 68, largest = ethernet::largest_frame - ethernet::header_bytes - rtmac_bytes;
     return size < smallest + rtmac_bytes ? 0 : size - rtmac_bytes < largest ? size - rtmac_bytes : largest;
 }
 
-/// Of a station's slot for ordinary packets; 0: it has none. [any]
+/// Returns the MTU of a station's slot for ordinary packets; 0: no such slot. [any]
 std::size_t tunnel_mtu(const StationSetup&) noexcept;
 
-/// A tunnelled frame that may be handed to the IP stack of `own`: for it or for a group, from one station, of an Ethertype that is
-/// none of the segment's own, and at least as long as its IP or ARP header says. [any]
+/// Returns true for a tunnelled frame that may be passed to the IP stack of `own`: addressed to it or to a group, from a single station,
+/// not of an Ethertype of the segment, and at least as long as its IP or ARP header states. [any]
 bool is_packet(const Decoded& frame, const Address& own) noexcept;
 
 class Tunnel final : public Companion {
 public:
-    static constexpr std::size_t capacity = 64;  ///< packets that may wait, each way
+    static constexpr std::size_t capacity = 64;  ///< packets in each queue
 
-    /// Of a station that outlives it; it is given to Station::accompany. [setup]
+    /// `station` must outlive it; register it by Station::accompany(). [setup]
     explicit Tunnel(Station& station);
 
     // The cycle's side.
@@ -38,19 +38,20 @@ public:
     void before_slots(Time now) noexcept override;                                  ///< [realtime]
 
     // The thread's side.
-    /// An Ethernet frame for slot 1. False, and counted: no room, too long, or the station may not send. [any] one thread
+    /// Queues an Ethernet frame for slot 1. Returns false and counts it when the queue is full, the frame is too long, or the station may
+    /// not send. [any] one thread
     bool give(std::span<const std::uint8_t> frame) noexcept;
-    /// The oldest Ethernet frame that came, in `out` of at least largest_frame bytes; its length, 0: there is none. [any] one thread
+    /// Copies the oldest received Ethernet frame to `out` (at least largest_frame bytes) and returns its length; 0: none. [any] one thread
     std::size_t take(std::span<std::uint8_t> out) noexcept;
 
-    std::size_t mtu() const noexcept { return mtu_.load(std::memory_order_relaxed); }  ///< 0: no slot 1, or too small a one. [any]
+    std::size_t mtu() const noexcept { return mtu_.load(std::memory_order_relaxed); }  ///< 0: no slot 1, or too short. [any]
     bool        open() const noexcept { return mtu() != 0 && station_.ready(); }       ///< packets may pass. [any]
 
-    std::uint64_t sent() const noexcept { return read(sent_); }          ///< handed to slot 1. [any]
-    std::uint64_t received() const noexcept { return read(received_); }  ///< for the IP stack. [any]
-    /// No room, either way, or too old. [any]
+    std::uint64_t sent() const noexcept { return read(sent_); }          ///< packets passed to slot 1. [any]
+    std::uint64_t received() const noexcept { return read(received_); }  ///< packets for the IP stack. [any]
+    /// Packets dropped in either direction: queue full, or stale. [any]
     std::uint64_t dropped() const noexcept { return read(dropped_out_) + read(dropped_old_) + read(dropped_in_); }
-    std::uint64_t refused() const noexcept { return read(refused_); }    ///< came, and are no packets for this station. [any]
+    std::uint64_t rejected() const noexcept { return read(rejected_); }  ///< received frames that are not packets for this station. [any]
 
 private:
     struct Packet {
@@ -65,7 +66,7 @@ private:
     link::Ring<Packet>        out_{capacity}, in_{capacity};  // thread to cycle, cycle to thread; whole RTmac frames
     std::atomic<std::size_t> mtu_{0};                        // written by the cycle
     Time                     last_ = 0;                      // the cycle's: when the slots were filled
-    Counter                  sent_{0}, received_{0}, dropped_old_{0}, dropped_in_{0}, refused_{0};  // written by the cycle
+    Counter                  sent_{0}, received_{0}, dropped_old_{0}, dropped_in_{0}, rejected_{0};  // written by the cycle
     Counter                  dropped_out_{0};                                                       // written by the thread
 };
 

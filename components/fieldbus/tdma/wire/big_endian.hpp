@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers in frames: big endian, as all of RTnet's.
+// Numbers in frames: big endian, as in all frames of RTnet.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace hal::tdma {
 
-/// The number of sizeof(T) bytes at `at`, which must be inside. [any]
+/// Reads the number of sizeof(T) bytes at `at`, which must be within `bytes`. [any]
 template <class T>
 constexpr T get(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
     std::uint64_t value = 0;
@@ -16,7 +16,7 @@ constexpr T get(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
     return static_cast<T>(value);
 }
 
-/// The same, written. [any]
+/// Writes the number at `at`, which must be within `bytes`. [any]
 template <class T>
 constexpr void put(std::span<std::uint8_t> bytes, std::size_t at, T value) noexcept {
     for (std::size_t i = 0; i < sizeof(T); ++i)

@@ -9,7 +9,7 @@ namespace hal::tdma::rtcfg {
 
 namespace {
 
-/// Takes fields from the front; a field that is not there ends it.
+/// Reads fields from the front; a missing field makes it fail.
 class Taker {
 public:
     explicit Taker(std::span<const std::uint8_t> bytes) noexcept : bytes_(bytes) {}
@@ -36,7 +36,7 @@ private:
     bool                          good_ = true;
 };
 
-/// Puts fields at the end; what finds no room ends it.
+/// Appends fields; one that does not fit makes it fail.
 class Putter {
 public:
     explicit Putter(std::span<std::uint8_t> bytes) noexcept : bytes_(bytes) {}
@@ -80,7 +80,7 @@ bool decode(std::span<const std::uint8_t> frame, Message& m) noexcept {
     m = {};
     std::copy_n(frame.begin(), 6, m.to.begin());
     std::copy_n(frame.begin() + 6, 6, m.from.begin());
-    const std::uint8_t id = frame[ethernet::header_bytes] & 0x1f;  // bits 5 to 7: a version that is to be ignored
+    const std::uint8_t id = frame[ethernet::header_bytes] & 0x1f;  // bits 5..7: a version to be ignored
     if (id >= ids) return false;
     m.id = static_cast<Id>(id);
     Taker t(frame.subspan(ethernet::header_bytes + 1));

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The frames of RTcfg 1.8 (RTnet, Documentation/RTcfg), Ethertype 0x9022: how a server gives stations their configuration.
+// The frames of RTcfg 1.8 (RTnet, Documentation/RTcfg), Ethertype 0x9022: the configuration of stations by a server.
+//
+//     Message m;                                    // a heartbeat of a client
+//     m.id = Id::heartbeat, m.to = server, m.from = own;
+//     const std::size_t length = encode(m, frame);  // 0: `frame` is too short
+//     if (decode(received, m)) …                    // m.data points into `received`
 #pragma once
 
 #include <array>
@@ -10,6 +15,7 @@
 
 namespace hal::tdma::rtcfg {
 
+/// Frame IDs (RTcfg 1.8, Frame Formats).
 enum class Id : std::uint8_t {
     stage_1,
     announce_new,
@@ -25,14 +31,14 @@ inline constexpr unsigned ids = 9;
 
 inline constexpr std::uint8_t wants_stage_2 = 1, is_ready = 2;  ///< flags
 
-/// How stations are told apart: by their MAC address, which the frame has anyway, or by an IPv4 address.
+/// The logical address of a station: its MAC address, from the Ethernet header, or an IPv4 address.
 struct Logical {
     bool                        by_ip = false;
     std::array<std::uint8_t, 4> ip{};
     bool                        operator==(const Logical&) const = default;
 };
 
-/// Every field of every frame; which of them count says `id`.
+/// The fields of all frames; `id` determines which are used.
 struct Message {
     Id                            id = Id::heartbeat;
     Address                       to{}, from{};
@@ -41,22 +47,22 @@ struct Message {
     std::uint8_t                  flags = 0;      ///< announcements, stage 2
     std::uint32_t                 active = 0;     ///< stage 2: stations
     std::uint16_t                 heartbeat_ms = 0;
-    std::uint32_t                 length = 0;     ///< stage 2: of all fragments; acknowledge: bytes that have come
+    std::uint32_t                 length = 0;     ///< stage 2: bytes of all fragments; acknowledge: bytes received
     std::uint32_t                 offset = 0;     ///< fragment
     Address                       dead{};         ///< dead station: its MAC address
     std::span<const std::uint8_t> data{};  ///< stage 1, stage 2 and its fragments; points into the frame
 };
 
-/// Never reads beyond `frame`; false: it is none of these, or cut. A fragment's data includes the padding of a short frame: its reader
-/// knows how much is missing. [any]
+/// Decodes an untrusted frame. Returns false when it is not an RTcfg frame or truncated. The data of a fragment includes the padding of a
+/// short frame: the reader knows the remaining length. [any]
 bool decode(std::span<const std::uint8_t> frame, Message& out) noexcept;
 
-/// The length in `out`, at least the smallest frame, padded with zeros; 0 when it does not fit. [any]
+/// Encodes a frame and returns its length in `out`, padded with zeros to the smallest frame; 0 when it does not fit. [any]
 std::size_t encode(const Message&, std::span<std::uint8_t> out) noexcept;
 
-/// Behind the Ethernet header of a stage 1 frame. [any]
+/// Returns the payload bytes of a stage 1 frame. [any]
 inline std::size_t stage_1_bytes(const Message& m) noexcept { return 5 + (m.client.by_ip ? 8 : 0) + m.data.size(); }
-/// Bytes of data that a stage 2 frame and a fragment have room for in a frame with `payload` bytes behind the Ethernet header. [any]
+/// Return the data bytes that fit into a stage 2 frame and into a fragment with `payload` bytes after the Ethernet header. [any]
 constexpr std::size_t stage_2_room(std::size_t payload) noexcept { return payload > 12 ? payload - 12 : 0; }
 constexpr std::size_t fragment_room(std::size_t payload) noexcept { return payload > 5 ? payload - 5 : 0; }
 

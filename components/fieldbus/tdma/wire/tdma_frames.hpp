@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The frames of RTmac 2.0 and TDMA 2.1a (RTnet, Documentation/RTmac and Documentation/TDMA), Ethertype 0x9021. All fields big endian.
-// What comes from the wire is taken as hostile: a frame is whole and of our versions, or it is nothing.
+// The frames of RTmac 2.0 and TDMA 2.1a (RTnet, Documentation/RTmac and Documentation/TDMA), Ethertype 0x9021. All fields are big endian.
+// Received frames are untrusted: the decoder accepts a complete frame of these versions or nothing.
+//
+//     const Frame frame = encode(own, Sync{cycle, global_ns, scheduled_ns});
+//     if (const Decoded d = decode(received); d.kind == Kind::sync) use(d.sync.scheduled);
 #pragma once
 
 #include <array>
@@ -20,43 +23,44 @@ inline constexpr std::uint8_t  rtmac_version = 0x02;
 inline constexpr std::uint16_t tdma_discipline = 0x0001, tdma_version = 0x0201;
 
 inline constexpr std::size_t rtmac_bytes = 4;      ///< of the RTmac header, behind the Ethernet header
-inline constexpr std::size_t sync_stamp_at = 26;   ///< places of the times of sending, for Launch::stamp_at
+inline constexpr std::size_t sync_stamp_at = 26;   ///< offsets of the time stamps, for Launch::stamp_at
 inline constexpr std::size_t request_stamp_at = 22;
 inline constexpr std::size_t reply_stamp_at = 38;
 inline constexpr std::size_t ping_stamp_at = 22, echo_stamp_at = 38;
 
-/// Begins a cycle; from the master to all.
+/// Begins a cycle; broadcast by the master.
 struct Sync {
     std::uint32_t cycle = 0;
-    Time          stamp = 0;      ///< when it was sent, global time
-    Time          scheduled = 0;  ///< when it should have been
+    Time          stamp = 0;      ///< transmission, global time
+    Time          scheduled = 0;  ///< scheduled transmission, global time
 };
 
-/// A station asks the master for its times; the answer comes in the station's own slot.
+/// Calibration request of a station to the master; the reply is sent in the station's own slot.
 struct Request {
-    Time          stamp = 0;  ///< when it was sent, the station's clock
+    Time          stamp = 0;  ///< transmission, on the station's clock
     std::uint32_t reply_cycle = 0;
     Time          reply_offset = 0;  ///< from that cycle's scheduled sync
 };
 
+/// Calibration reply of the master.
 struct Reply {
-    Time request_stamp = 0;  ///< that of the request
-    Time received = 0;       ///< when the master got it, global time
-    Time stamp = 0;          ///< when the master sent this, global time
+    Time request_stamp = 0;  ///< stamp of the request
+    Time received = 0;       ///< reception of the request, global time
+    Time stamp = 0;          ///< transmission of the reply, global time
 };
 
-/// Not RTnet's: a station asks another one, in its own slot. Who does not know it counts a foreign frame, and does not answer.
+/// Ping of a station to another, in its own slot. An extension of RTnet: other implementations ignore it.
 struct Ping {
-    Time          stamp = 0;  ///< when it was sent, the asking station's clock
+    Time          stamp = 0;  ///< transmission, on the sender's clock
     std::uint32_t number = 0;
 };
 
-/// The answer, in a slot of the station that was asked.
+/// Answer to a ping, in a slot of its receiver.
 struct Echo {
-    Time          ping_stamp = 0;  ///< that of the ping
-    Time          received = 0;    ///< when the ping was there, and …
-    Time          stamp = 0;       ///< … when this was sent, both on the answering station's clock
-    std::uint32_t number = 0;      ///< that of the ping
+    Time          ping_stamp = 0;  ///< stamp of the ping
+    Time          received = 0;    ///< reception of the ping, on the answering station's clock
+    Time          stamp = 0;       ///< transmission, on the same clock
+    std::uint32_t number = 0;      ///< number of the ping
 };
 
 /// A packet of another protocol, in a slot.
@@ -65,18 +69,20 @@ struct Tunnelled {
     std::span<const std::uint8_t> payload;
 };
 
+/// Kinds of frames.
 enum class Kind : std::uint8_t { none, sync, request, reply, tunnelled, ping, echo };
 
-/// Why a frame is nothing to us.
+/// Why a frame is rejected.
 enum class Defect : std::uint8_t {
     none,
-    cut,         ///< shorter than what it says it is
-    ethertype,   ///< another one
-    version,     ///< of RTmac or TDMA
-    discipline,  ///< RTmac, but not TDMA
-    frame_id,    ///< a TDMA frame that does not exist
+    cut,         ///< truncated
+    ethertype,   ///< another Ethertype
+    version,     ///< unsupported version of RTmac or TDMA
+    discipline,  ///< RTmac with another discipline
+    frame_id,    ///< unknown TDMA frame ID
 };
 
+/// A decoded frame; the member that `kind` names is valid.
 struct Decoded {
     Kind      kind = Kind::none;
     Defect    defect = Defect::none;
@@ -89,10 +95,10 @@ struct Decoded {
     Echo      echo;
 };
 
-/// Never reads beyond `frame`. [any]
+/// Decodes an untrusted frame. [any]
 Decoded decode(std::span<const std::uint8_t> frame) noexcept;
 
-/// All of them fit the smallest frame.
+/// An encoded frame; each kind fits the smallest Ethernet frame.
 using Frame = std::array<std::uint8_t, ethernet::smallest_frame>;
 
 Frame encode(const Address& from, const Sync&) noexcept;                              ///< [any]
@@ -101,9 +107,10 @@ Frame encode(const Address& to, const Address& from, const Reply&) noexcept;    
 Frame encode(const Address& to, const Address& from, const Ping&) noexcept;           ///< [any]
 Frame encode(const Address& to, const Address& from, const Echo&) noexcept;           ///< [any]
 
-/// An Ethernet frame as a tunnelled one, in `out`; its length, or 0 when it does not fit or is none. [any]
+/// Encodes an Ethernet frame as a tunnelled one in `out` and returns its length; 0 when it is invalid or does not fit. [any]
 std::size_t tunnel(std::span<const std::uint8_t> frame, std::span<std::uint8_t> out) noexcept;
-/// And back: the Ethernet frame that was tunnelled; 0 when `frame` is no tunnelled one. The padding of a short frame stays. [any]
+/// Decodes a tunnelled frame to the Ethernet frame in `out` and returns its length; 0 when it is not tunnelled or does not fit. The
+/// padding of a short frame is kept. [any]
 std::size_t untunnel(std::span<const std::uint8_t> frame, std::span<std::uint8_t> out) noexcept;
 
 }  // namespace hal::tdma

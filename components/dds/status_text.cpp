@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "words.hpp"
+#include "status_text.hpp"
 
 #include <algorithm>
 
@@ -68,34 +68,34 @@ std::map<std::string, std::string> signals_of(const std::string& layout) {
 
 }  // namespace
 
-std::string difference(const std::string& sends, const std::string& sender, const std::string& takes, const std::string& taker) {
-    if (sends == takes) return {};
-    const auto there = signals_of(sends), here = signals_of(takes);
+std::string difference(const std::string& sent, const std::string& sender, const std::string& expected, const std::string& receiver) {
+    if (sent == expected) return {};
+    const auto there = signals_of(sent), here = signals_of(expected);
     const auto only = [](const std::string& signal, const std::string& node) {
-        return "signal '" + signal + "' is known to node '" + node + "' only";
+        return "signal '" + signal + "' exists on node '" + node + "' only";
     };
-    const auto types = [&](const std::string& signal, const std::string& sent, const std::string& taken) {
-        return "signal '" + signal + "' is " + sent + " on node '" + sender + "' and " + taken + " on node '" + taker + "'";
+    const auto types = [&](const std::string& signal, const std::string& theirs, const std::string& ours) {
+        return "signal '" + signal + "' is " + theirs + " on node '" + sender + "' and " + ours + " on node '" + receiver + "'";
     };
     for (const auto& [signal, type] : here) {
         const auto other = there.find(signal);
-        if (other == there.end()) return only(signal, taker);
+        if (other == there.end()) return only(signal, receiver);
         if (other->second != type) return types(signal, other->second, type);
     }
     for (const auto& [signal, type] : there)
         if (!here.contains(signal)) return only(signal, sender);
-    return "their signals stand in another order";
+    return "the signals are in a different order";
 }
 
-std::string shown(std::string words) {
-    words.resize(std::min<std::size_t>(words.size(), 600));
+std::string shown(std::string text) {
+    text.resize(std::min<std::size_t>(text.size(), 600));
     unsigned char before = 0;
-    for (char& c : words) {
+    for (char& c : text) {
         const auto byte = static_cast<unsigned char>(c);
         if (byte < 0x20 || byte == 0x7F || (before == 0xC2 && byte < 0xA0)) c = '?';  // control characters, U+0080 to U+009F too
         before = byte;
     }
-    return words;
+    return text;
 }
 
 }  // namespace hal::dds

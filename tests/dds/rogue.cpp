@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A stranger on a topic, for the tests: dds_stranger TOPIC FIELDS WORD...
+// A program that misbehaves on a topic, for the tests: dds_rogue TOPIC FIELDS WORD...
 //   type=NAME      another name of the type          count=N        samples (default 0: until the end of standard input)
-//   rate=HZ        samples per second; 0: a flood    clock=SECONDS  how much its clock is ahead
+//   rate=HZ        samples per second; 0: a flood    clock=SECONDS  its clock is ahead by this
 //   bytes=HEX      sends these bytes instead         value=X        in the first field, a float
-//   reliable=0     best effort                       listen         prints what comes instead
-//   depth=N        samples kept until they were read
+//   reliable=0     best effort                       listen         prints received samples instead
+//   depth=N        samples kept until they are delivered
 //   domain=N, security=FOLDER, server=ADDRESS:PORT, interfaces=…
-// Ends with standard input; says "matched" when somebody is there.
+// Ends with standard input; prints "matched" when it has a peer.
 #include <poll.h>
 #include <unistd.h>
 
@@ -60,22 +60,22 @@ bool input_ended() {
     return ::poll(&p, 1, 0) > 0 && ::read(STDIN_FILENO, &c, 1) <= 0;
 }
 
-void say(const std::string& line) {
+void print(const std::string& line) {
     std::puts(line.c_str());
     std::fflush(stdout);
 }
 
-struct Talk final : Listener {
-    explicit Talk(const Schema& s) : schema(s) {}
+struct Printer final : Listener {
+    explicit Printer(const Schema& s) : schema(s) {}
     void on_sample(const Sample& s) noexcept override {
         std::vector<hal_value> v(schema.fields.size());
-        if (!decode(schema, s.bytes, v)) say("malformed");
-        else say("sample " + std::to_string(s.sequence) + " " + std::to_string(v[0].real));
+        if (!decode(schema, s.bytes, v)) print("malformed");
+        else print("sample " + std::to_string(s.sequence) + " " + std::to_string(v[0].real));
     }
-    void on_event(Event e, int count, const std::string& words) noexcept override {
-        if (e == Event::matched) say("matched " + std::to_string(count));
-        if (e == Event::unmatched) say("unmatched " + std::to_string(count));
-        if (e == Event::wrong_type || e == Event::wrong_quality) say(words);
+    void on_event(Event e, int count, const std::string& text) noexcept override {
+        if (e == Event::matched) print("matched " + std::to_string(count));
+        if (e == Event::unmatched) print("unmatched " + std::to_string(count));
+        if (e == Event::wrong_type || e == Event::wrong_quality) print(text);
     }
     const Schema& schema;
 };
@@ -100,7 +100,7 @@ void write_all(Writer& writer, const Options& o, const Schema& schema) {
         }
         if (o.rate > 0) std::this_thread::sleep_for(std::chrono::duration<double>(1 / o.rate));
     }
-    say("sent " + std::to_string(sent));
+    print("sent " + std::to_string(sent));
     writer.wait_for_acknowledgments(60'000'000'000);
 }
 
@@ -109,23 +109,23 @@ void write_all(Writer& writer, const Options& o, const Schema& schema) {
 int main(int argc, char** argv) try {
     Options o;
     for (int i = 3; i < argc; ++i)
-        if (!option(o, argv[i])) throw std::runtime_error(std::string("what is ") + argv[i]);
-    if (argc < 3) throw std::runtime_error("dds_stranger TOPIC FIELDS WORD...");
+        if (!option(o, argv[i])) throw std::runtime_error(std::string("unknown word ") + argv[i]);
+    if (argc < 3) throw std::runtime_error("dds_rogue TOPIC FIELDS WORD...");
     const Schema schema = Schema::of_fields(argv[2], o.type);
     const TopicType topic{argv[1], schema.type, std::max<std::size_t>(schema.sample.size(), o.bytes.size())};
-    Talk talk(schema);
+    Printer printer(schema);
     const auto participant = open(o.settings);
     if (o.listen) {
-        const auto reader = participant->reader(topic, o.quality, &talk);
-        say("ready");
+        const auto reader = participant->reader(topic, o.quality, &printer);
+        print("ready");
         while (!input_ended()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
     } else {
-        const auto writer = participant->writer(topic, o.quality, &talk);
-        say("ready");
+        const auto writer = participant->writer(topic, o.quality, &printer);
+        print("ready");
         write_all(*writer, o, schema);
     }
     return 0;
 } catch (const std::exception& e) {
-    std::fprintf(stderr, "dds_stranger: %s\n", e.what());
+    std::fprintf(stderr, "dds_rogue: %s\n", e.what());
     return 1;
 }

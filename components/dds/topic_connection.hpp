@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a component with a topic has while it runs.
+// The connection of a running component to its topic.
 #pragma once
 
 #include <algorithm>
@@ -13,32 +13,32 @@
 
 namespace hal::dds {
 
-/// Its participant, its writer or reader, the beacon that tells hal top of the instance, and its place in the DDS thread.
+/// The participant, the writer or reader, the status beacon for `hal top`, and the component's registration with the DDS thread.
 template <class Endpoint>
-class Attendance {
+class TopicConnection {
 public:
-    /// `make(participant)` makes the endpoint. What it throws has left nothing behind. [setup]
+    /// Opens the participant and creates the endpoint by `make(participant)`. An exception from it leaves nothing open. [setup]
     template <class Make>
-    void begin(const Arguments& arguments, const Settings& settings, Served& served, Make make) {
-        auto participant = open(settings);
+    void open(const Arguments& arguments, const Settings& settings, Served& served, Make make) {
+        auto participant = dds::open(settings);
         endpoint_ = make(*participant);
         participant_ = std::move(participant);
         try {
             beacon_ = beacon(participant_, hal::extension<hal_status>(HAL_STATUS));
-        } catch (const std::exception& e) {  // permissions need not know of it
-            arguments.say(std::string("hal top does not show this instance: ") + e.what());
+        } catch (const std::exception& e) {  // the permissions may deny the status topic
+            arguments.log(std::string("not visible in hal top: ") + e.what());
         }
         serve(served);
     }
-    /// Also when begin() was not called, or threw. [setup]
-    void end(Served& served) noexcept {
+    /// Closes everything; does nothing when it is not open. [setup]
+    void close(Served& served) noexcept {
         if (participant_) withdraw(served);
         endpoint_.reset();
         beacon_.reset();
         participant_.reset();
     }
-    /// A participant by the prefix of its GUIDs: its name, or the prefix. After begin(). Not in a cycle.
-    std::string called(const std::array<std::uint8_t, 16>& guid) const {
+    /// Returns the name and GUID prefix of a participant, or the prefix alone. While open; never in a cycle.
+    std::string describe(const std::array<std::uint8_t, 16>& guid) const {
         std::string digits;
         for (std::size_t n = 0; n < 12; ++n) {
             constexpr const char* hex = "0123456789abcdef";
@@ -48,19 +48,19 @@ public:
             if (std::equal(k.prefix.begin(), k.prefix.end(), guid.begin()) && !k.name.empty()) return "'" + k.name + "' (" + digits + ")";
         return digits;
     }
-    /// After begin(). [any]
+    /// Returns the endpoint. While open. [any]
     Endpoint& endpoint() const noexcept { return *endpoint_; }
 
-    /// What the engine tells of others on the topic; `lacks` is the sentence about a quality that does not fit. Threads of the engine.
-    void met(const Arguments& arguments, Event e, int count, const std::string& words, const std::string& lacks) noexcept {
+    /// Handles an event of the engine; `mismatch` begins the message about an incompatible QoS. Threads of the engine.
+    void handle(const Arguments& arguments, Event e, int count, const std::string& text, const std::string& mismatch) noexcept {
         switch (e) {
         case Event::matched: wrong_type_.store(false, std::memory_order_relaxed); [[fallthrough]];
         case Event::unmatched: matched_.store(static_cast<std::uint32_t>(count), std::memory_order_relaxed); break;
         case Event::wrong_type:
             wrong_type_.store(true, std::memory_order_relaxed);
-            arguments.say(words);
+            arguments.log(text);
             break;
-        case Event::wrong_quality: arguments.say(lacks + words); break;
+        case Event::wrong_quality: arguments.log(mismatch + text); break;
         default: break;
         }
     }
