@@ -29,12 +29,12 @@ bool Frame::same(const Frame& other) const noexcept {
            std::memcmp(data.data(), other.data.data(), bytes().size()) == 0;
 }
 
-const char* word(State state) noexcept {
+const char* to_string(State state) noexcept {
     constexpr const char* words[] = {"active", "warning", "passive", "bus off", "down"};
     return words[static_cast<std::size_t>(state)];
 }
 
-const char* word(Sent sent) noexcept {
+const char* to_string(Sent sent) noexcept {
     constexpr const char* words[] = {"queued", "full", "bus off", "down", "refused"};
     return words[static_cast<std::size_t>(sent)];
 }
@@ -43,7 +43,8 @@ std::string to_string(const Rejected& r) {
     char address[18];
     std::snprintf(address, sizeof address, "%02x:%02x:%02x:%02x:%02x:%02x", static_cast<unsigned>(r.from >> 40 & 0xff),
                   static_cast<unsigned>(r.from >> 32 & 0xff), static_cast<unsigned>(r.from >> 24 & 0xff),
-                  static_cast<unsigned>(r.from >> 16 & 0xff), static_cast<unsigned>(r.from >> 8 & 0xff), static_cast<unsigned>(r.from & 0xff));
+                  static_cast<unsigned>(r.from >> 16 & 0xff), static_cast<unsigned>(r.from >> 8 & 0xff),
+                                        static_cast<unsigned>(r.from & 0xff));
     const std::string who = address;
     char command[40];
     std::snprintf(command, sizeof command, "%s (%03Xh)",

@@ -99,7 +99,7 @@ enum class State : std::uint8_t {
     down,     ///< the interface is down, unplugged, or the peer has gone; the driver keeps trying to come back
 };
 /// "active", "warning", "passive", "bus off", "down". [any]
-const char* word(State) noexcept;
+const char* to_string(State) noexcept;
 
 enum class Sent : std::uint8_t {
     queued,   ///< it will be sent in its turn
@@ -108,7 +108,7 @@ enum class Sent : std::uint8_t {
     down,     ///< dropped and counted: no bus
     refused,  ///< dropped and counted: not a valid frame, or FD on a bus without, or the link only listens
 };
-const char* word(Sent) noexcept;
+const char* to_string(Sent) noexcept;
 
 /// Counts since open.
 struct Statistics {
@@ -173,8 +173,8 @@ struct Description {
     std::string file{};           ///< of a capture; empty: none
 };
 
-/// How long values take between this station and another, where that is known beforehand. Cycles are this station's, counted from the one in
-/// which a value is written or read here.
+/// How long values take between this station and another, where that is known beforehand. Cycles are this station's, counted from the one
+/// in which a value is written or read here.
 struct DeliveryTime {
     std::string station;          ///< the other one
     std::int64_t there_ns = 0;    ///< from the beginning of the cycle that writes a value to the moment when the other one takes it

@@ -5,7 +5,7 @@
 
 namespace hal::ethernet {
 
-const char* word(Sent sent) noexcept {
+const char* to_string(Sent sent) noexcept {
     constexpr const char* words[] = {"queued", "full", "late", "down", "refused"};
     return words[static_cast<std::size_t>(sent)];
 }

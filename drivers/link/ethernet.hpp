@@ -77,7 +77,7 @@ enum class Sent : std::uint8_t {
     down,    ///< no link; dropped and counted
     refused, ///< longer than the segment takes, or shorter than a header; dropped and counted
 };
-const char* word(Sent) noexcept;
+const char* to_string(Sent) noexcept;
 
 struct Statistics {
     bool up = true;               ///< the link has a carrier
@@ -164,7 +164,8 @@ struct Opened {
 };
 
 /// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&…`: `speed=100`, `policy=block`, `spin=50us`, `mac=02:00:00:00:00:07`,
-/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`, `forward=2us`, `noise=1us`. They win over the options given.
+/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`, `forward=2us`, `noise=1us`. They win
+/// over the options given.
 Opened open(std::string_view address, const Options& options = {});
 /// [setup] Describes the port that open() would return, as far as the address itself determines it; opens nothing. An unknown driver has an
 /// empty `transport`.

@@ -41,7 +41,7 @@ protected:
             timespec pause{0, 10'000'000};
             nanosleep(&pause, nullptr);
         }
-        EXPECT_STREQ(word(link.state()), word(wanted));
+        EXPECT_STREQ(to_string(link.state()), to_string(wanted));
     }
     static void run(const std::string& command) { ASSERT_EQ(std::system(command.c_str()), 0) << command; }
 };

@@ -105,7 +105,7 @@ class OneShot(Drive):
         self.node("--set", "dc-link-0=10")
         self.assertRegex(self.refused("A", "on"),
                          r'^A: enable: drive stays in "switch on disabled" after "shutdown" for \d+\.\d\d s \(statusword 0x0260\); '
-                         r"voltage-enabled is 0: has its power stage supply\?\n$")
+                         r"voltage-enabled is 0: check the supply of the power stage\n$")
         self.assertEqual("B: node 2 has no such axis: object 6841 is missing\n", self.refused("B", "on"))
         self.assertRegex(self.bad("can", "drive", self.bus, "--node", 9, "--timeout", "50ms", "A", "on"),
                          r"^hal can drive: node 9 did not answer within 0.15 s \(asked for 6041:0\); the bus is active; hal can scan udp:\S+ shows who is there\n$")

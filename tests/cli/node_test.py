@@ -118,7 +118,7 @@ class Devices(Node):
         self.expect(again, "program 2.1 runs")
 
     def test_a_flash_that_cannot_be_kept_is_said(self):
-        self.assertEqual("hal node bootloader: there is no folder for 'nowhere/flash.bin'; type: mkdir -p nowhere\n",
+        self.assertEqual("hal node bootloader: cannot create 'nowhere/flash.bin': missing folder; type: mkdir -p nowhere\n",
                          self.bad("node", "bootloader", "--link", self.bus, "--id", 4, "--flash", "nowhere/flash.bin"))
         (self.folder / "nowhere").mkdir()
         device = self.node("bootloader", "--id", 4, "--flash", "nowhere/flash.bin")
@@ -220,22 +220,22 @@ class WrongWords(Node):
             ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "nothing can be set of a bootloader",
             ("bootloader", "--make-image", "2"): "'2' is no version; write 2.1",
             ("drive", "--link", self.bus, "--id", "5", "--motor", "weight:3"):
-                "'weight:3' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of resolution, endless, inertia, viscous-friction, "
+                "invalid motor parameter 'weight:3'; write NAME:VALUE, as in inertia:1e-4; names: resolution, endless, inertia, viscous-friction, "
                 "coulomb-friction, rated-torque, peak-torque, rated-current, rated-voltage, highest-speed, start, negative-limit, positive-limit, "
                 "negative-stop, positive-stop, home-from, home-to, brake-torque",
             ("jr3", "--record", "line.bin"): "for how long? add --for 2s; the calibration comes through in 1.02 s",
             ("jr3", "--link", self.bus, "--stream", "none.bin"): "cannot read 'none.bin': No such file or directory",
-            ("io", "--link", self.bus, "--id", "5", "--fault", "mute:every=0"): "'every=0' is no property of the fault mute; write every=3, from=5s or for=1s",
+            ("io", "--link", self.bus, "--id", "5", "--fault", "mute:every=0"): "invalid property 'every=0' of fault mute; write every=3, from=5s or for=1s",
         }
         for words, said in cases.items():
             self.assertEqual(f"hal node {words[0]}: {said}\n", self.bad("node", *words))
         self.assertIn("--axes: Value 9 not in range 1 to 8", self.bad("node", "drive", "--axes", "9"))
         self.assertEqual("hal: unknown command 'node drve'; did you mean 'node drive'?\n", self.bad("node", "drve"))
-        self.assertIn("there is no fault 'lat-sdo'; there are mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
+        self.assertIn("unknown fault 'lat-sdo'; use one of: mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
 
     def test_faults_are_listed(self):
         text = self.good("node", "faults")
-        self.assertIn("late-sdo        every SDO answer leaves late, by `time`; time=700ms\n", text)
+        self.assertIn("late-sdo        every SDO response is delayed by `time`; time=700ms\n", text)
         self.assertEqual(32, text.count("\n"))
 
 

@@ -114,7 +114,8 @@ int finish_sending(Bus& bus, const Options& options, std::uint64_t wanted) {
     }
     const can::Statistics s = bus.link->statistics();
     if (s.dropped == 0 && s.queued == 0) return 0;
-    return fail(options, fmt::format("{} of {} frames were not sent; the bus is {}{}", s.dropped + s.queued, wanted, can::word(s.state),
+    return fail(options, fmt::format("{} of {} frames were not sent; the bus is {}{}", s.dropped + s.queued, wanted,
+                can::to_string(s.state),
                                      s.queued > 0 ? ": is another node there to acknowledge, at this bit rate?" : ""));
 }
 

@@ -216,7 +216,7 @@ bool HandAxis::begin_motion(Mode mode) {
     }
     if (machine_.failure()) return report();
     if (!command_.enable || state_of(feedback_.statusword) != State::operation_enabled)
-        return refuse(fmt::format("is not on (drive is in \"{}\"); type: {} on", word(state_of(feedback_.statusword)), letter()));
+        return refuse(fmt::format("is not on (drive is in \"{}\"); type: {} on", to_string(state_of(feedback_.statusword)), letter()));
     command_.mode = mode, command_.home = command_.go = false;
     touched_ = in_motion_ = true;
     return until([&] { return machine_.active(); });

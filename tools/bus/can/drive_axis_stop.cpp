@@ -17,7 +17,7 @@ bool HandAxis::overdue() {
     if (!in_motion_)
         return refuse(
             fmt::format("not done within {:g} s (timeout; drive is in \"{}\", statusword 0x{:04X}); for more time add: within {:g}s",
-                        seconds, word(state_of(feedback_.statusword)), feedback_.statusword, 2 * seconds));
+                        seconds, to_string(state_of(feedback_.statusword)), feedback_.statusword, 2 * seconds));
     allow(rules.limits.stop);
     interrupted = nullptr;
     const bool stopped = machine_.enabled() && stop();

@@ -115,7 +115,7 @@ bool DriveShell::query(HandAxis& a, const std::string& name) {
                               : name == "speed"  ? fmt::format("{:.10g}", a.velocity())
                               : name == "torque" ? fmt::format("{:.10g}", a.rules.torque.to_user(seen.torque))
                               : name == "mode"   ? std::string(abbreviation(seen.mode))
-                                                 : std::string(word(state_of(seen.statusword)));
+                                                 : std::string(to_string(state_of(seen.statusword)));
     return print_line(fmt::format("{}: {} {}", a.letter(), name, value));
 }
 
@@ -159,7 +159,7 @@ bool DriveShell::status(HandAxis& a) {
     const AxisFeedback& seen = a.seen();
     const State state = state_of(seen.statusword);
     std::string text =
-        fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), word(state), abbreviation(seen.mode), seen.statusword);
+        fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), to_string(state), abbreviation(seen.mode), seen.statusword);
     constexpr std::pair<std::uint16_t, const char*> bits[] = {{status::voltage_enabled, "voltage enabled"},
                                                               {status::warning, "warning"},
                                                               {status::remote, "remote"},

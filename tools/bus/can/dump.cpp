@@ -126,13 +126,13 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
         return print(fmt::format(
             R"({{"statistics":{{{}"frames":{},"seconds":{:.3f},"load_percent":{},"errors":{},"lost":{},"bus_offs":{},"state":"{}"}}}})"
             "\n",
-            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs, can::word(s.state)));
+            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs, can::to_string(s.state)));
     }
     const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load) : "unknown (add ?bitrate=500k to the address)";
     write_all(STDERR_FILENO,
               fmt::format("{}{}{} frame{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", source.name, source.name.empty() ? "" : ": ",
                           source.frames, source.frames == 1 ? "" : "s", seconds, share, s.errors, s.lost,
-                          about.transport == "capture" ? "" : fmt::format(", bus {}", can::word(s.state))));
+                          about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state))));
     return true;
 }
 

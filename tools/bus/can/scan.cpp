@@ -74,7 +74,7 @@ int run_can_scan(const ScanOptions& options) {
         return fail(
             options,
             fmt::format("no node answered within {:g} s; the bus is {}, {} frames of others were heard; are bit rate and wiring right?",
-                        static_cast<double>(for_ns) / 1e9, can::word(s.state), heard));
+                        static_cast<double>(for_ns) / 1e9, can::to_string(s.state), heard));
     std::string text;
     for (const auto& [id, n] : nodes) {
         const char* state =

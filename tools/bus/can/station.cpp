@@ -103,7 +103,8 @@ std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16
     case Abort::local_control: return "a switch at the device, or its own program, has the command";
     case Abort::device_state:
         if (index == 0x1f50)
-            return fmt::format("its program is stopped and cleared before: hal can sdo write {0} {1} 1F51:1 0 --type u8, then 3", bus, node);
+            return fmt::format("its program is stopped and cleared before: hal can sdo write {0} {1} 1F51:1 0 --type u8, then 3", bus,
+                               node);
         return fmt::format("most settings are taken in pre-operational: hal can nmt {} preop {}", bus, node);
     case Abort::hardware: return fmt::format("see its error register: hal can sdo read {} {} 1001", bus, node);
     case Abort::no_resource: return "all SDO channels of the device are in use";
@@ -121,7 +122,7 @@ int Station::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request
         return fail(options_,
                     fmt::format("node {} did not answer within {:g} s (asked for {}); the bus is {}; hal can scan {} shows who is there",
                                 node, static_cast<double>(settings_of(timeout_ns_).timeout) * (settings_of(timeout_ns_).resends + 1) / 1e9,
-                                object, can::word(s.state), options_.words.front()));
+                                object, can::to_string(s.state), options_.words.front()));
     }
     const std::string what = advice(request.abort, options_.words.front(), node, request.index);
     return fail(options_, fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object,

@@ -111,7 +111,7 @@ public:
         for (can::Rejected what; node_.link().rejected(what);) say(can::to_string(what));
         if (const auto bus = node_.link().state(); bus != bus_) {
             bus_ = bus;
-            say(fmt::format("bus {}", can::word(bus)));
+            say(fmt::format("bus {}", can::to_string(bus)));
         }
         log_.flush(now);
         std::string text;
@@ -224,7 +224,8 @@ int run_node(const NodeOptions& options, const NodeKind& kind, canopen::Program&
     std::string problem;
     std::uint8_t id = 0;
     if (options.link.empty())
-        return fail(options, "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node " + kind.name);
+        return fail(options,
+                    "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node " + kind.name);
     if (!parse_id(options, kind, id, problem)) return fail(options, problem);
     const NodeOptions& given = options;
     if (given.tdma.empty())
