@@ -107,12 +107,12 @@ class Dump(Can):
         self.write("c.log", CAPTURE)
         self.assertEqual("hal can dump: 'xyz' is no filter; write an identifier in hex, 181, or one with the bits that count, 180/780\n",
                          self.bad_can("dump", "replay:c.log", "--filter", "xyz"))
-        self.assertEqual("hal can dump: 'bus' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+        self.assertEqual("hal can dump: 'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
                          "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE\n", self.bad_can("dump", "bus"))
         self.assertEqual("hal can dump: 'sim:arm' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to "
                          "one that they do: hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and "
                          "here udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))
-        self.assertIn("hal can dump: 'more' is no address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
+        self.assertIn("hal can dump: 'more' is not the address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
         self.assertEqual("hal can dump: --time: unknown form 'utc'; use relative, delta or absolute\n",
                          self.bad_can("dump", "replay:c.log", "--time", "utc"))
         self.assertEqual("hal: unknown command 'can dmp'; did you mean 'can dump'?\n", self.bad_can("dmp"))

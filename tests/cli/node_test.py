@@ -213,7 +213,7 @@ class WrongWords(Node):
             ("io",): "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node io",
             ("io", "--link", self.bus): "which node-id shall it have? add --id 5; none for one that an LSS master gives",
             ("io", "--link", self.bus, "--id", "128"): "'128' is no node-id; write 1 to 127, 0x50, or none for one that an LSS master gives",
-            ("io", "--link", "bus", "--id", "5"): "'bus' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
+            ("io", "--link", "bus", "--id", "5"): "'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
                                                   "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE",
             ("io", "--link", self.bus, "--id", "5", "--set", "in-64=1"): "there is no 'in-64' to set; there are in-0 … in-63, analog-in-0 … analog-in-11",
             ("io", "--link", self.bus, "--id", "5", "--set", "in-6"): "'in-6' sets nothing; write NAME=VALUE, or NAME=VALUE@2s for later",

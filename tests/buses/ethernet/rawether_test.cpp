@@ -110,9 +110,9 @@ TEST_F(Raw, two_users_of_one_interface_do_not_hear_each_other) {
 
 TEST_F(Raw, the_mtu_of_the_interface_is_the_limit) {
     auto here = a(), there = b();
-    EXPECT_EQ(here->send(Bytes(13), {}, 0), Sent::refused);
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1501)), {}, 0), Sent::refused);
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(15)), {.stamp_at = 22}, 0), Sent::refused);
+    EXPECT_EQ(here->send(Bytes(13), {}, 0), Sent::rejected);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1501)), {}, 0), Sent::rejected);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(15)), {.stamp_at = 22}, 0), Sent::rejected);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {}, 0), Sent::queued);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {.stamp_at = 22}, 0), Sent::queued);
     EXPECT_EQ(firsts(*there, 2), "11");
@@ -121,7 +121,7 @@ TEST_F(Raw, the_mtu_of_the_interface_is_the_limit) {
     EXPECT_EQ(here->statistics().errors, 3U);
     ASSERT_TRUE(command("ip link set " + a_ + " mtu 500"));
     EXPECT_TRUE(eventually([&] { return here->statistics().mtu == 500; }));
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(501)), {}, 0), Sent::refused);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(501)), {}, 0), Sent::rejected);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(500, 2)), {}, 0), Sent::queued);
     EXPECT_EQ(firsts(*there, 1), "2");
 }
@@ -340,9 +340,9 @@ TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
 }
 
 TEST_F(Raw, an_open_that_cannot_be_says_what_to_do) {
-    EXPECT_EQ(open("eth:nosuch0").problem.substr(0, 60), "eth:nosuch0: there is no interface 'nosuch0' here; there are");
+    EXPECT_EQ(open("eth:nosuch0").problem.substr(0, 60), "eth:nosuch0: no interface 'nosuch0'; interfaces are");
     EXPECT_NE(open("eth:nosuch0").problem.find(a_), std::string::npos);
-    EXPECT_EQ(open("eth:").problem.substr(0, 53), "eth:: the interface is missing; write eth:enp3s0; the");
+    EXPECT_EQ(open("eth:").problem.substr(0, 53), "eth:: missing interface; write eth:enp3s0; the");
     EXPECT_EQ(open("eth:" + a_, {.types = std::vector<std::uint16_t>(65)}).problem,
               "eth:" + a_ + ": more than 64 Ethertypes on one port; open it once for each kind of user");
 }
