@@ -6,7 +6,7 @@
 namespace hal::ethernet {
 
 const char* to_string(Sent sent) noexcept {
-    constexpr const char* words[] = {"queued", "full", "late", "down", "refused"};
+    constexpr const char* words[] = {"queued", "full", "late", "down", "rejected"};
     return words[static_cast<std::size_t>(sent)];
 }
 

@@ -407,7 +407,7 @@ TEST(CaneDescribe, names_the_segment_without_opening_it) {
     EXPECT_TRUE(can::describe("tok:en").transport.empty());
 }
 
-TEST(CaneOpen, says_what_is_wrong_and_what_to_type) {
+TEST(CaneOpen, reports_what_is_wrong_and_what_to_type) {
     EXPECT_EQ(can::open("cane:").problem, "cane:: missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory");
     EXPECT_EQ(can::open("cane:sim:x?format=both").problem, "cane:sim:x?format=both: invalid format 'both'; write single or packed");
     EXPECT_EQ(can::open("cane:sim:x?slot=2").problem,
@@ -415,7 +415,7 @@ TEST(CaneOpen, says_what_is_wrong_and_what_to_type) {
     EXPECT_EQ(can::open("cane:sim:x?node5=1").problem,
               "cane:sim:x?node5=1: invalid node5 '1'; write the address of a station, as in 02:00:00:00:00:05");
     EXPECT_EQ(can::open("cane:sim:x?node200=02:00:00:00:00:05").problem,
-              "cane:sim:x?node200=02:00:00:00:00:05: 'node200' names no node; write node5=02:00:00:00:00:05");
+              "cane:sim:x?node200=02:00:00:00:00:05: invalid node 'node200'; write node5=02:00:00:00:00:05");
     EXPECT_EQ(can::open("cane:sim:x?fd").problem, "cane:sim:x?fd: 0x9023 frames cannot carry CAN FD; remove fd");
 }
 

@@ -377,7 +377,7 @@ TEST(Segment, serves_threads_of_one_process) {
     EXPECT_EQ(b->statistics().lost, 0U);
 }
 
-TEST(Ethernet, an_address_that_is_none_says_what_to_write) {
+TEST(Ethernet, open_reports_what_to_write_for_an_invalid_address) {
     EXPECT_EQ(open("net0").problem, "'net0' is not the address of an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
                                     "sim:NAME for a segment in memory or replay:FILE");
     EXPECT_EQ(open("sim:").problem, "sim:: missing name of the segment; write sim:net0");
@@ -387,10 +387,10 @@ TEST(Ethernet, an_address_that_is_none_says_what_to_write) {
     EXPECT_EQ(open("sim:x?priority=100").problem, "sim:x?priority=100: invalid priority '100'; write a number 1..99");
     EXPECT_EQ(open("sim:x?mac=03:00:00:00:00:01").problem,
               "sim:x?mac=03:00:00:00:00:01: invalid mac '03:00:00:00:00:01'; write a unicast address, as in 02:00:00:00:00:07");
-    EXPECT_EQ(open("sim:x?fast").problem.substr(0, 37), "sim:x?fast: there is no option 'fast'");
+    EXPECT_TRUE(open("sim:x?fast").problem.starts_with("sim:x?fast: unknown option 'fast'; options are policy, ")) << open("sim:x?fast").problem;
 }
 
-TEST(Ethernet, addresses_are_written_and_read) {
+TEST(Ethernet, addresses_are_formatted_and_parsed) {
     EXPECT_EQ(to_string(Address{2, 0xab, 0, 0xff, 9, 0x10}), "02:ab:00:ff:09:10");
     EXPECT_EQ(parse_address("02:AB:00:ff:09:10"), (Address{2, 0xab, 0, 0xff, 9, 0x10}));
     for (const char* wrong : {"", "02:ab:00:ff:09", "02:ab:00:ff:09:1", "02:ab:00:ff:09:1g", "02:ab:00:ff:09:100", "02.ab.00.ff.09.10"})
@@ -407,16 +407,16 @@ TEST(Ethernet, discipline_is_found_through_any_port_of_its_line) {
     const auto first = open("sim:disciplined/a?speed=1000"), second = open("sim:disciplined/a"), other = open("sim:disciplined/b");
     EXPECT_TRUE(offer_discipline(*first.port, &one));
     EXPECT_FALSE(offer_discipline(*second.port, &two));
-    const auto seat = discipline_of(*second.port);
-    ASSERT_NE(seat, nullptr);
-    EXPECT_TRUE(seat->holds(&one));
-    EXPECT_EQ(discipline_of(*first.port), seat);
+    const auto handle = discipline_of(*second.port);
+    ASSERT_NE(handle, nullptr);
+    EXPECT_TRUE(handle->holds(&one));
+    EXPECT_EQ(discipline_of(*first.port), handle);
     EXPECT_EQ(discipline_of(*other.port), nullptr);
     withdraw_discipline(&one);
     EXPECT_EQ(discipline_of(*first.port), nullptr);
-    EXPECT_FALSE(seat->with([](Discipline&) { FAIL(); }));
+    EXPECT_FALSE(handle->with([](Discipline&) { FAIL(); }));
     EXPECT_TRUE(offer_discipline(*second.port, &two));
-    EXPECT_TRUE(seat->holds(&two));  // who had the first has the second now
+    EXPECT_TRUE(handle->holds(&two));  // the handle of the first leads to the second
     withdraw_discipline(&two);
 }
 

@@ -124,7 +124,7 @@ class Tdma(Case):
 
     def test_a_recording_reports_missing_samples(self):
         for words, problem in (("", "into which file? write file=seen.pcapng"),
-                               ("file=none/seen.pcapng", "none/seen.pcapng cannot be written: No such file or directory"),
+                               ("file=none/seen.pcapng", "cannot write none/seen.pcapng: No such file or directory"),
                                ("file=seen.pcapng link=sim:", "sim:: missing name of the segment; write sim:net0")):
             self.write("record.hal", f"loadrt segment_record {words}\nstart\n")
             self.assertIn(f"error: 'segment-record.0' (segment_record) cannot start: {problem} [start-failed]\n", self.bad("sim", "record.hal"))
