@@ -172,14 +172,14 @@ struct Opened {
 /// Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&…`: `speed=100`, `policy=block`, `spin=50us`, `mac=02:00:00:00:00:07`,
 /// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`, `forward=2us`, `noise=1us`. They take
 /// precedence over `options`. [setup]
-/// over the options given.
+Opened open(std::string_view address, const Options& options = {});
 /// Describes the port that open() would return, as far as the address determines it, without opening it. `transport` is empty for an
 /// unknown driver. [setup]
-/// empty `transport`.
 Description describe(std::string_view address);
+
 /// Convert an address to "02:00:00:00:00:07" and back; nullopt for an invalid text. [any]
-/// "02:00:00:00:00:07", and back; nothing when it is none. [any]
 std::string to_string(const Address&);
+
 std::optional<Address> parse_address(std::string_view text) noexcept;
 
 #pragma GCC visibility pop

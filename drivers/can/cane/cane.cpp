@@ -212,8 +212,7 @@ private:
             const auto payload = room();
             const std::size_t header = packed_header + (settings_.key ? counter_bytes : 0), tail = settings_.key ? tag_bytes : 0;
             const auto space = payload < header + tail ? std::span<std::uint8_t>{}
-                                                       : std::span(frame_).subspan(ethernet::header_bytes + header,
-                                                                   payload - header - tail);
+                                                       : std::span(frame_).subspan(ethernet::header_bytes + header, payload - header - tail);
             std::size_t bytes = 0, counts[2] = {0, 0};
             std::optional<ethernet::Address> to;
             bool to_all = false, first = true, is_full = false;
@@ -287,8 +286,7 @@ private:
         };
         Frame f;
         if (settings_.format == Format::single) {
-            if (get_single(whole.subspan(ethernet::header_bytes), settings_.order,
-                f) != Wrong::none) return Counting::add(counting_.errors);
+            if (get_single(whole.subspan(ethernet::header_bytes), settings_.order, f) != Wrong::none) return Counting::add(counting_.errors);
             if (is_allowed(f)) keep(f, from, arrival.time_ns);
             return;
         }

@@ -29,8 +29,8 @@ bool SpinBudget::is_needed() {
 
 Pacer::Pacer(Sender& sender, const Options& options)
     : sender_(sender), spin_ns_(options.policy == Policy::block ? 0 : options.policy == Policy::spin ? INT64_MAX : options.spin_ns),
-      places_(link::Ring<std::uint32_t>(options.send_capacity).capacity()), unused_(options.send_capacity),
-              outgoing_(options.send_capacity),
+      places_(link::Ring<std::uint32_t>(options.send_capacity).capacity()), unused_(options.send_capacity), outgoing_(options.send_capacity),
+
       budget_(SpinBudget::is_needed()) {
     for (std::uint32_t i = 0; i < places_.size(); ++i) unused_.push(i);
     waiting_.reserve(places_.size());

@@ -49,8 +49,7 @@ Bootloader::Bootloader(BootloaderSettings settings) : settings_(std::move(settin
     auto image = settings_.image.value_or(std::vector<std::uint8_t>{});
     if (!settings_.image && settings_.version != 0) image = program_image(settings_.product, settings_.version, 4096);
     if (image.size() > flash_.size())
-        throw
- std::invalid_argument("the image is longer than the flash of " + std::to_string(flash_.size()) + " bytes");
+        throw std::invalid_argument("the image is longer than the flash of " + std::to_string(flash_.size()) + " bytes");
     std::copy(image.begin(), image.end(), flash_.begin());
     used_ = image.size();
     examine();
@@ -85,9 +84,9 @@ void Bootloader::attach(Device& device) {
 void Bootloader::boot(Time now) noexcept {
     now_ = now;
     Program::boot(now);
-/// Examines the flash and sets header_, identification_ and error_.
+}
 
-/// What is in the flash: header_, identification_ and error_.
+/// Examines the flash and sets header_, identification_ and error_.
 void Bootloader::examine() noexcept {
     header_ = {};
     identification_ = 0;
@@ -102,9 +101,9 @@ void Bootloader::examine() noexcept {
     error_ = FlashError::none;
     header_ = h;
     identification_ = crc32({at, used_});
-/// Shows identity and version of what runs now in the object dictionary.
+}
 
-/// Identity and version of what runs now.
+/// Shows identity and version of what runs now in the object dictionary.
 void Bootloader::show() noexcept {
     auto& dictionary = device_->dictionary();
     dictionary.set(0x1018, 3, running_ ? header_.version : std::uint32_t{0});

@@ -56,8 +56,7 @@ Description axis_io_description(const AxisIoSettings& settings) {
     d.add(object::current, 0, integer16, read_only, 0, "Motor current").sent();
     d.add(object::missed_syncs, 0, unsigned8, read_write, 3, "SYNC periods until the motor is off");
     d.add(object::input_stops, 0, unsigned8, read_write, settings.input_stops ? 1 : 0, "Open input is a fault").limited(0, 1);
-    add_rpdo(d, 1, {.mapping = {map_entry(object::controlword, 0, 16), map_entry(object::set_point, 0, 16), map_entry(object::outputs, 0,
-             8)}});
+    add_rpdo(d, 1, {.mapping = {map_entry(object::controlword, 0, 16), map_entry(object::set_point, 0, 16), map_entry(object::outputs, 0, 8)}});
     add_tpdo(d, 1, {.transmission = 1, .mapping = {map_entry(object::statusword, 0, 16), map_entry(object::count, 0, 16),
                                                    map_entry(object::second_count, 0, 16), map_entry(object::inputs, 0, 8)}});
     add_tpdo(d, 2, {.cob = cob_invalid | 0x280, .plus_node_id = true, .mapping = {map_entry(object::current, 0, 16),

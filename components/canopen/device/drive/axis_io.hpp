@@ -9,35 +9,36 @@
 #include "canopen/device/program.hpp"
 
 namespace hal::canopen {
+
 /// An external influence on a plant.
-/// What can be done to a plant from outside.
 struct Influence {
     enum Kind : std::uint8_t { value, flag, tap };  ///< value and flag act continuously, a tap acts once
     const char *name, *doc, *unit;
     double initial;
     Kind kind;
 };
+
 /// The simulated machine behind the device. [realtime] unless marked.
-/// What the device is wired to. [realtime] unless marked.
 class Plant {
 public:
+    virtual ~Plant() = default;
     /// Advances by `time_ns` with the amplifier at `duty`, -1..1 of its supply; with `on` false the motor carries no current.
-    /// Moves on by `time_ns` with the amplifier at `duty`, -1 to 1 of its supply; `on` false: the motor carries no current.
     virtual void step(double duty, bool on, Time time_ns) noexcept = 0;
     virtual std::int64_t count() const noexcept = 0;         ///< of the encoder, four per line
     virtual std::int64_t second_count() const noexcept = 0;  ///< of the second encoder, four per line
     virtual bool input() const noexcept = 0;                 ///< the contact at the digital input is closed
     virtual double current() const noexcept = 0;             ///< A, in the motor
     virtual double position() const noexcept = 0;            ///< rad, true position of the motor or the arm
-    /// Returns the influences put() accepts, by index.
     virtual double second_position() const noexcept = 0;     ///< rad, true position of the screw's end or the pendulum
+    /// Returns the influences put() accepts, by index.
+    virtual std::span<const Influence> influences() const noexcept = 0;
     /// Sets influence `n`; a value that is not a number is ignored.
-    /// Influence `n` takes that value; what is no number is passed over.
     virtual void put(std::size_t n, double value) noexcept = 0;
 };
+
 /// Returns a plant, or nullptr for an unknown name. "axis": a motor, a screw and a slide, the second encoder at the end of the screw.
 /// "furuta": the pendulum rig, the second encoder on the pendulum, the contact under the base at the input. [setup]
-/// pendulum, the contact under the base at the input. Nothing when there is no plant of that name. [setup]
+
 std::unique_ptr<Plant> make_plant(std::string_view name);
 inline constexpr const char* plant_names = "axis, furuta";
 
