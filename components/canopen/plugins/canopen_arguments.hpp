@@ -36,7 +36,7 @@ struct ConfigurationArguments {
     bool by_index() const { return node_id != 0; }
 
     /// Reads the configuration; `path` becomes that of its file, empty without one. Reports every problem with its place in the file where the
-    /// host can show it. Throws hal::ArgumentError, or hal::Texts::refuse()'s exception when the problems are reported. [setup]
+    /// host can show it. Throws hal::ArgumentError, or the exception that ends the constructor once the problems are reported. [setup]
     config::MasterConfig read(std::string& path) const {
         const hal::Texts texts(component_);
         config::Reading  reading;

@@ -254,7 +254,7 @@ namespace {
 
 bool duration_of(const Options& options, const std::string& text, std::int64_t& to) {
     const auto ns = parse_duration_ns(text);
-    if (!ns || *ns <= 0) return fail(options, fmt::format("'{}' is not a duration; write 200ms or 1s", text)), false;
+    if (!ns || *ns <= 0) return fail(options, fmt::format("invalid duration '{}'; use 200ms or 1s", text)), false;
     return to = *ns, true;
 }
 
