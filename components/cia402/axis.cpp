@@ -7,15 +7,15 @@ namespace hal::canopen::cia402 {
 
 namespace {
 
-constexpr double farthest_count = 4e18;        // of an endless position
-constexpr unsigned mode_change_cycles = 3;     // as long a display on its way may be that from before
+constexpr double farthest_count = 4e18;        // of a position that does not wrap
+constexpr unsigned mode_change_cycles = 3;     // for so many cycles the display in flight may be the old one
 
 bool in_fault(State s) noexcept { return s == State::fault || s == State::fault_reaction_active; }
 bool by_position(Mode m) noexcept { return m == Mode::cyclic_position || m == Mode::interpolated_position; }
-/// Modes in which bit 8 means something.
+/// Returns true for modes with a halt bit (bit 8).
 bool can_halt(Mode m) noexcept { return m != Mode::cyclic_position && m != Mode::cyclic_velocity && m != Mode::cyclic_torque; }
 
-/// 1 falling to 0 while x goes from 0 to 1, without a corner.
+/// Falls smoothly from 1 to 0 while x goes from 0 to 1.
 double falling(double x) noexcept { return x >= 1.0 ? 0.0 : 1.0 - x * x * (3.0 - 2.0 * x); }
 
 }  // namespace
@@ -46,7 +46,7 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     return orders_;
 }
 
-/// Position, velocity and torque in user units; without a node they stay as they were.
+/// Updates position, velocity and torque in user units; without a node they keep their values.
 void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noexcept {
     in_ = in;
     const double dt = started_ ? static_cast<double>(now - last_) / static_cast<double>(one_second) : 0.0;
@@ -66,7 +66,7 @@ void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noe
     torque_ = rules.torque.sound() ? rules.torque.to_user(in.torque) : 0.0;
 }
 
-/// Whether the axis is wanted enabled.
+/// Decides whether the axis is to be enabled.
 void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
     const bool enable_edge = command.enable && !was_enable_;
     if ((command.reset && !was_reset_) || (enable_edge && rules.auto_reset)) {
@@ -94,21 +94,22 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
 }
 
 void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
-    if (!in_.operational) {  // nothing reaches it; when it is back it finds itself told to be off
+    if (!in_.operational) {  // nothing reaches the drive; when it returns, it is commanded off
         walk_.want(State::switch_on_disabled, Request::disable);
         enabled_ = false;
         orders_.controlword = command::disable_voltage;
-        told_off_ = true, told_off_at_ = now;
+        disable_sent_ = true, disable_sent_at_ = now;
         return;
     }
     const State before = walk_.state(), state = state_of(in_.statusword);
-    const bool late = told_off_ && now - told_off_at_ < rules.limits.step;  // it does only now what it was told before this enabling
+    // The drive may still be executing the disable command from before this enabling.
+    const bool late = disable_sent_ && now - disable_sent_at_ < rules.limits.step;
     if (enabled_ && wanted_ && state != State::operation_enabled && (in_fault(state) || !late)) {
         fail(in_fault(state) ? Cause::drive_fault : Cause::left, Request::run);
         failure_.state = state, failure_.before = before;
     }
-    if (state != State::operation_enabled) told_off_ = false;
-    else if (!wanted_) told_off_ = true, told_off_at_ = now;
+    if (state != State::operation_enabled) disable_sent_ = false;
+    else if (!wanted_) disable_sent_ = true, disable_sent_at_ = now;
     const bool powered = state == State::operation_enabled || state == State::quick_stop_active;
     if (wanted_) walk_.want(State::operation_enabled, Request::enable);
     else if (powered && command.quick_stop) walk_.want(State::quick_stop_active, Request::quick_stop);
@@ -120,11 +121,11 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
     if (walk_.failure() && !failure_) failure_ = walk_.failure(), wanted_ = false;
     if (state == State::fault && !failure_ && !walk_.resetting() && !wanted_) fail(Cause::drive_fault, Request::enable);
     if (failure_.cause == Cause::drive_fault && failure_.error_code == 0 && in_fault(state))
-        failure_.error_code = in_.error_code;  // it came later than the statusword
+        failure_.error_code = in_.error_code;  // received later than the statusword
     enabled_ = wanted_ && walk_.reached();
 }
 
-/// The mode follows what is asked for; whether the drive shows it.
+/// Commands the mode and checks that the drive displays it.
 void Axis::select_mode(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const bool homing = home_ == Home::entering || home_ == Home::running;
     const Mode wanted = homing ? Mode::homing : command.mode != Mode::none ? command.mode : in_.mode;
@@ -134,7 +135,7 @@ void Axis::select_mode(const AxisCommand& command, const AxisRules& rules, Time 
     if (mode_shown_ || !enabled_) {
         mode_since_ = now;
     } else if (now - mode_since_ >= rules.limits.step && !failure_) {
-        fail(Cause::mode_refused, Request::mode);
+        fail(Cause::mode_rejected, Request::mode);
         failure_.after = now - mode_since_;
     }
 }
@@ -178,7 +179,7 @@ void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) no
     }
 }
 
-/// csp and ip: the command as it is, once it was joined to where the axis stands.
+/// Follows the position command in csp and ip, after blending out its distance from the axis at enabling.
 void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const double asked = command.position;
     if (!rules.position.sound()) return fail(Cause::bad_factor, rules.position.ratio(), 0.0);
@@ -186,7 +187,7 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
     if (!following_) {
         const double away = position_ - asked;
         if (rules.max_step > 0.0 && std::fabs(away) > rules.max_step) {
-            fail(Cause::step_refused, std::fabs(away), rules.max_step);
+            fail(Cause::step_rejected, std::fabs(away), rules.max_step);
             failure_.request = Request::enable, failure_.step = Step::enable_operation;
             return;
         }
@@ -194,7 +195,7 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
         offset_ = rules.max_step > 0.0 || rules.blend <= 0 ? 0.0 : away;
         joined_at_ = now;
     } else if (rules.max_step > 0.0 && std::fabs(asked - joined_) > rules.max_step) {
-        return fail(Cause::step_refused, std::fabs(asked - joined_), rules.max_step);
+        return fail(Cause::step_rejected, std::fabs(asked - joined_), rules.max_step);
     }
     joined_ = asked;
     if (offset_ != 0.0) {
@@ -212,7 +213,7 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
         fail(Cause::following_error, error, rules.max_following_error);
 }
 
-/// What belongs to the mode: targets and the upper bits of the controlword.
+/// Sets the targets and the upper bits of the controlword that belong to the mode.
 void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const Mode mode = orders_.mode;
     const bool halted = command.halt || !active_;
@@ -232,7 +233,7 @@ void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) no
         set_points_.clear();
         target_reached_ = (in_.statusword & status::target_reached) != 0;
     }
-    const bool later = enabled_ && !active_;  // in the middle of a change of mode, or homing
+    const bool later = enabled_ && !active_;  // during a mode change or homing
     const bool goes = command.go && !was_go_ && mode == Mode::profile_position && !later;
     if (!later || !command.go) was_go_ = command.go;
     if (goes) {

@@ -24,49 +24,49 @@ namespace {
 std::string quoted(const char* text) { return std::string("\"") + text + "\""; }
 double seconds(Time t) { return static_cast<double>(t) / static_cast<double>(one_second); }
 
-constexpr Mode any_other{-128};  // in sentences made beforehand: a mode without a name
+constexpr Mode any_other{-128};  // in preformatted messages: a mode without a name
 
-/// A mode as people write it, or its number.
+/// Returns the abbreviation of a mode, or its number.
 std::string name(Mode mode) {
     if (mode == Mode::none) return "none";
     if (mode == any_other) return "another";
     return *abbreviation(mode) != '-' ? std::string(abbreviation(mode)) : std::to_string(static_cast<int>(mode));
 }
 
-std::string state_words(State state) { return state == State::unknown ? "no state of CiA 402" : quoted(word(state)); }
+std::string state_words(State state) { return state == State::unknown ? "an undefined state" : quoted(to_string(state)); }
 
-std::string after(Step step) { return step == Step::wait ? "" : " after " + quoted(word(step)); }
+std::string after(Step step) { return step == Step::wait ? "" : " after " + quoted(to_string(step)); }
 
 std::string error_words(std::uint16_t code) {
     if (code == 0) return "";
     return print(", error 0x%04X: ", code) + error_word(code);
 }
 
-/// What the other bits of the statusword say about it.
+/// Returns a hint derived from the other bits of the statusword.
 std::string hint(const Failure& f) {
-    if (f.statusword == 0) return "; was a statusword received at all?";
+    if (f.statusword == 0) return "; check that the statusword is received";
     if (f.cause != Cause::stays || f.state == State::unknown) return "";
-    if ((f.statusword & status::remote) == 0) return "; remote is 0: the drive obeys its own panel";
+    if ((f.statusword & status::remote) == 0) return "; remote is 0: the drive is under local control";
     if ((f.statusword & status::voltage_enabled) == 0 && f.request == Request::enable)
-        return "; voltage-enabled is 0: has its power stage supply?";
+        return "; voltage-enabled is 0: check the supply of the power stage";
     return "";
 }
 
 }  // namespace
 
-const char* word(Request request) noexcept {
+const char* to_string(Request request) noexcept {
     constexpr const char* words[] = {"enable", "run", "disable", "quick stop", "reset", "mode", "home", "go"};
     return words[static_cast<unsigned>(request)];
 }
 
-const char* word(Step step) noexcept {
+const char* to_string(Step step) noexcept {
     constexpr const char* words[] = {"wait", "shutdown", "switch on", "enable operation", "disable operation", "disable voltage",
                                      "quick stop", "fault reset"};
     return words[static_cast<unsigned>(step)];
 }
 
 std::string sentence(const Failure& f) {
-    const std::string asked = std::string(word(f.request)) + ": ";
+    const std::string asked = std::string(to_string(f.request)) + ": ";
     switch (f.cause) {
     case Cause::none: return "";
     case Cause::stays:
@@ -74,20 +74,20 @@ std::string sentence(const Failure& f) {
     case Cause::drive_fault:
         return asked + (f.step != Step::wait || f.request == Request::run ? "drive went into fault" + after(f.step) : "drive is in fault");
     case Cause::left:
-        return asked + "drive left " + quoted(word(f.before)) + " for " + state_words(f.state) + " without being told";
-    case Cause::lost: return asked + "drive lost: its node is not operational any more";
-    case Cause::mode_refused: return asked + "drive does not take mode " + name(f.mode) + ", it shows " + name(f.shown);
+        return asked + "drive left " + quoted(to_string(f.before)) + " for " + state_words(f.state) + " without a command";
+    case Cause::lost: return asked + "drive lost: node no longer operational";
+    case Cause::mode_rejected: return asked + "drive does not accept mode " + name(f.mode) + ", displays " + name(f.shown);
     case Cause::following_error: return asked + "following error above max-following-error";
-    case Cause::step_refused:
+    case Cause::step_rejected:
         return asked + (f.step == Step::wait ? "position-cmd steps farther than max-step"
                                              : "position-cmd is farther from position-fb than max-step");
     case Cause::bad_command: return asked + "the command is not a number, or too large";
     case Cause::bad_factor: return asked + "a scale is 0 or not a number";
-    case Cause::homing_error: return asked + "drive reports " + quoted(word(homing_of(f.statusword)));
-    case Cause::homing_late: return asked + "not attained in time";
+    case Cause::homing_error: return asked + "drive reports " + quoted(to_string(homing_of(f.statusword)));
+    case Cause::homing_timeout: return asked + "home position not attained";
     case Cause::set_point:
         return asked + ((f.statusword & status::set_point_acknowledge) == 0 ? "drive does not acknowledge the set-point"
-                                                                            : "drive does not take its acknowledge back");
+                                                                            : "drive does not clear its acknowledge");
     case Cause::not_enabled: return asked + "the axis is not enabled";
     }
     return asked + "failed";
@@ -95,9 +95,10 @@ std::string sentence(const Failure& f) {
 
 std::string text(const Failure& f) {
     std::string all = sentence(f);
-    if (f.cause == Cause::stays || f.cause == Cause::mode_refused || f.cause == Cause::homing_late || f.cause == Cause::set_point)
+    if (f.cause == Cause::stays || f.cause == Cause::mode_rejected || f.cause == Cause::set_point)
         all += print(" for %.2f s", seconds(f.after));
-    if (f.cause == Cause::following_error || f.cause == Cause::step_refused) return all + print(" (%g, limit %g)", f.value, f.limit);
+    if (f.cause == Cause::homing_timeout) all += print(" within %.2f s", seconds(f.after));
+    if (f.cause == Cause::following_error || f.cause == Cause::step_rejected) return all + print(" (%g, limit %g)", f.value, f.limit);
     if (f.cause == Cause::bad_command || f.cause == Cause::bad_factor) return all + print(" (%g)", f.value);
     if (f.cause == Cause::none || f.cause == Cause::lost || f.cause == Cause::not_enabled) return all;
     return all + print(" (statusword 0x%04X", f.statusword) + error_words(f.error_code) + ")" + hint(f);
@@ -109,42 +110,42 @@ std::uint8_t known(Mode mode) noexcept {
     return static_cast<std::uint8_t>(mode == Mode::none || *abbreviation(mode) != '-' ? mode : any_other);
 }
 
-/// All that changes the sentence, as one number.
+/// Returns everything that selects the message as one number.
 std::uint32_t key_of(const Failure& f) noexcept {
     unsigned a = 0, b = 0;
     switch (f.cause) {
     case Cause::stays: a = static_cast<unsigned>(f.step), b = static_cast<unsigned>(f.state); break;
     case Cause::drive_fault: a = static_cast<unsigned>(f.step), b = f.error_code != 0; break;
     case Cause::left: a = static_cast<unsigned>(f.before), b = static_cast<unsigned>(f.state); break;
-    case Cause::mode_refused: a = known(f.mode), b = known(f.shown); break;
+    case Cause::mode_rejected: a = known(f.mode), b = known(f.shown); break;
     case Cause::homing_error: a = static_cast<unsigned>(homing_of(f.statusword)); break;
     case Cause::set_point: a = f.statusword >> 12 & 1; break;
-    case Cause::step_refused: a = f.step != Step::wait; break;
+    case Cause::step_rejected: a = f.step != Step::wait; break;
     default: break;
     }
     return static_cast<std::uint32_t>(f.cause) << 24 | static_cast<std::uint32_t>(f.request) << 16 | a << 8 | b;
 }
 
-/// Where the number stands, and what was done.
+/// Returns the message with a placeholder for its number and with the reaction of the axis.
 std::string reason(const Failure& f) {
     const char* number = " (statusword {x})";
     switch (f.cause) {
     case Cause::lost:
     case Cause::not_enabled: number = ""; break;
     case Cause::stays:
-    case Cause::mode_refused:
-    case Cause::homing_late:
+    case Cause::mode_rejected:
     case Cause::set_point: number = " for {} s"; break;
+    case Cause::homing_timeout: number = " within {} s"; break;
     case Cause::drive_fault:
         if (f.error_code != 0) number = " (error code {x})";
         break;
     case Cause::following_error:
-    case Cause::step_refused:
+    case Cause::step_rejected:
     case Cause::bad_command:
     case Cause::bad_factor: number = ": {}"; break;
     default: break;
     }
-    return sentence(f) + number + (f.request == Request::run ? "; it was stopped" : "; it is off");
+    return sentence(f) + number + (f.request == Request::run ? "; axis stopped" : "; axis off");
 }
 
 }  // namespace
@@ -159,7 +160,7 @@ Sentences::Sentences() {
     constexpr unsigned states_and_none = static_cast<unsigned>(State::unknown) + 1, steps = static_cast<unsigned>(Step::fault_reset) + 1;
     for (unsigned r = 0; r <= static_cast<unsigned>(Request::go); ++r) {
         const auto request = static_cast<Request>(r);
-        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor, Cause::homing_late,
+        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor, Cause::homing_timeout,
                                   Cause::not_enabled})
             add(cause, request);
         for (unsigned step = 0; step < steps; ++step) {
@@ -174,7 +175,7 @@ Sentences::Sentences() {
         }
     }
     for (const Step step : {Step::wait, Step::enable_operation})
-        add(Cause::step_refused, step == Step::wait ? Request::run : Request::enable).step = step;
+        add(Cause::step_rejected, step == Step::wait ? Request::run : Request::enable).step = step;
     for (unsigned state = 0; state < states_and_none; ++state) {
         Failure& f = add(Cause::left, Request::run);
         f.before = State::operation_enabled, f.state = static_cast<State>(state);
@@ -183,7 +184,7 @@ Sentences::Sentences() {
     for (const ModeRow& row : modes) all_modes.push_back(row.mode);
     for (const Mode asked : all_modes)
         for (const Mode shown : all_modes) {
-            Failure& f = add(Cause::mode_refused, Request::mode);
+            Failure& f = add(Cause::mode_rejected, Request::mode);
             f.mode = asked, f.shown = shown;
         }
     for (unsigned bits = 0; bits < 2; ++bits) {
@@ -203,14 +204,14 @@ const char* Sentences::find(const Failure& f) const noexcept {
 double Sentences::number(const Failure& f) noexcept {
     switch (f.cause) {
     case Cause::stays:
-    case Cause::mode_refused:
-    case Cause::homing_late:
+    case Cause::mode_rejected:
+    case Cause::homing_timeout:
     case Cause::set_point: return seconds(f.after);
     case Cause::drive_fault: return f.error_code != 0 ? f.error_code : f.statusword;
     case Cause::lost:
     case Cause::not_enabled: return std::numeric_limits<double>::quiet_NaN();
     case Cause::following_error:
-    case Cause::step_refused:
+    case Cause::step_rejected:
     case Cause::bad_command:
     case Cause::bad_factor: return f.value;
     default: return f.statusword;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Why an axis does not do what was asked: kept as numbers in the cycle, worded outside.
+// Why an axis does not follow its commands: numbers in the cycle, messages outside.
 #pragma once
 
 #include <cstdint>
@@ -10,62 +10,67 @@
 
 namespace hal::canopen::cia402 {
 
-/// What the master asks for.
+/// The command that failed.
 enum class Request : std::uint8_t { enable, run, disable, quick_stop, reset, mode, home, go };
-const char* word(Request) noexcept;
+/// Returns the name of a request, as in "quick stop". [any]
+const char* to_string(Request) noexcept;
 
-/// What a controlword commands.
+/// The transition that a controlword commands.
 enum class Step : std::uint8_t {
-    wait,  ///< for the drive to go on by itself
+    wait,  ///< for an automatic transition of the drive
     shutdown, switch_on, enable_operation, disable_operation, disable_voltage, quick_stop, fault_reset,
 };
-const char* word(Step) noexcept;
+/// Returns the name of a step, as in "enable operation". [any]
+const char* to_string(Step) noexcept;
 
-/// Published as pin `fault-code` of component cia402: never renumber.
+/// Cause of a failure, published as pin `fault-code` of component cia402: never renumber.
 enum class Cause : std::uint8_t {
     none = 0,
-    stays = 1,            ///< a step of the walk was not taken
+    stays = 1,            ///< the drive did not make a state transition
     drive_fault = 2,      ///< the drive is in fault
-    left = 3,             ///< the drive left operation enabled without being told
-    lost = 4,             ///< its node is not operational any more
-    mode_refused = 5,     ///< the mode display does not follow
+    left = 3,             ///< the drive left operation enabled without a command
+    lost = 4,             ///< the node is no longer operational
+    mode_rejected = 5,     ///< the drive does not display the commanded mode
     following_error = 6,
-    step_refused = 7,     ///< position-cmd steps too far
-    bad_command = 8,      ///< not a number, or beyond all counts
+    step_rejected = 7,     ///< the step of position-cmd is too large
+    bad_command = 8,      ///< not a number, or beyond the range of the counts
     bad_factor = 9,       ///< a factor is 0 or not a number
-    homing_error = 10,    ///< the drive reports it
-    homing_late = 11,
+    homing_error = 10,    ///< reported by the drive
+    homing_timeout = 11,
     set_point = 12,       ///< pp: not acknowledged
-    not_enabled = 13,     ///< asked to move without
+    not_enabled = 13,     ///< commanded to move while not enabled
 };
 inline constexpr unsigned causes = 14;
 
+/// A failure, as stored in the cycle.
 struct Failure {
     Cause cause = Cause::none;
     Request request = Request::enable;
     Step step = Step::wait;
-    State state = State::unknown;           ///< of the drive, then
-    State before = State::unknown;          ///< left: what it should have stayed in
-    Mode mode = Mode::none, shown = Mode::none;  ///< asked for, and the display
+    State state = State::unknown;           ///< of the drive at the time
+    State before = State::unknown;          ///< left: the state it left
+    Mode mode = Mode::none, shown = Mode::none;  ///< commanded, and displayed
     std::uint16_t statusword = 0;
-    std::uint16_t error_code = 0;           ///< 603Fh; 0: not known
-    Time after = 0;                         ///< how long was waited
+    std::uint16_t error_code = 0;           ///< 603Fh; 0: unknown
+    Time after = 0;                         ///< time waited, ns
     double value = 0.0, limit = 0.0;        ///< user units
 
     explicit operator bool() const noexcept { return cause != Cause::none; }
 };
 
-/// What failed, as a sentence without the numbers that change. [setup]
+/// Returns the message without the numbers that change. [setup]
 std::string sentence(const Failure&);
-/// With all numbers and what they hint at. [setup]
+/// Returns the message with all numbers, and a hint. [setup]
 std::string text(const Failure&);
 
-/// Every sentence there is, made beforehand, for a cycle that reports failures to hal.faults/1: {} or {x} in it is where the number goes.
+/// All messages, formatted in advance for a cycle that raises faults by hal.faults/1: "{}" or "{x}" stands for the number.
 class Sentences {
 public:
-    Sentences();  // [setup]
-    /// Good as long as this. [realtime]
+    /// Formats all messages. [setup]
+    Sentences();
+    /// Returns the message of a failure, valid as long as this object. [realtime]
     const char* find(const Failure&) const noexcept;
+    /// Returns the number to raise with it. [realtime]
     static double number(const Failure&) noexcept;
 
 private:

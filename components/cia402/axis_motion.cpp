@@ -4,7 +4,7 @@
 namespace hal::canopen::cia402 {
 
 namespace {
-constexpr unsigned settling_cycles = 3;  // a statusword on its way may still be that from before the set-point
+constexpr unsigned settling_cycles = 3;  // a statusword in flight may date from before the set-point
 }
 
 bool SetPoints::push(const SetPoint& p) noexcept {
@@ -38,12 +38,12 @@ std::uint16_t SetPoints::step(std::uint16_t statusword, Time now, Time limit, st
             first_ = (first_ + 1) % room, --count_;
             enter(Phase::shown, now);
         } else if (reached) {
-            check(statusword, now, limit);  // it stands and has no room for the next
+            check(statusword, now, limit);  // at standstill without space for the next
         } else {
             since_ = now;
         }
         break;
-    case Phase::shown: enter(Phase::raised, now); break;  // the target was there a cycle before the edge
+    case Phase::shown: enter(Phase::raised, now); break;  // the target was sent a cycle before the edge
     case Phase::raised:
         if (acknowledged) enter(Phase::settling, now);
         else check(statusword, now, limit);
@@ -77,12 +77,12 @@ HomingRun::Result HomingRun::step(std::uint16_t statusword, bool halted, Time no
     last_ = now;
     if (phase_ == Phase::old_result) {
         const bool old = error_seen_ ? error : attained || shown == Homing::attained_but_moving;
-        if (!old || now - since_ >= settle) phase_ = Phase::running;  // it stayed: the drive was done at once, or failed at once
+        if (!old || now - since_ >= settle) phase_ = Phase::running;  // unchanged: the drive was done, or failed, at once
         else return Result::running;
     }
     if (error) return fail(Cause::homing_error, statusword, now - since_);
     if (attained) return Result::attained;
-    if (limit > 0 && now - since_ >= limit) return fail(Cause::homing_late, statusword, now - since_);
+    if (limit > 0 && now - since_ >= limit) return fail(Cause::homing_timeout, statusword, now - since_);
     return Result::running;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The two modes in which master and drive shake hands by bits: set-points of profile position, and homing.
+// The two modes with a handshake between master and drive: set-points of profile position, and homing.
 #pragma once
 
 #include <array>
@@ -8,27 +8,29 @@
 
 namespace hal::canopen::cia402 {
 
+/// A set-point of profile position.
 struct SetPoint {
     std::int32_t target = 0;
-    bool relative = false;   ///< to the last set-point
-    bool immediate = false;  ///< in place of what the drive does now; else it is done after that
+    bool relative = false;   ///< to the previous set-point
+    bool immediate = false;  ///< replaces the current move; otherwise it follows after it
     bool blend = false;      ///< the drive does not stop in between (change on set-point)
 };
 
-/// Profile position: hands set-points to the drive one by one, as fast as it takes them.
+/// Profile position: passes set-points to the drive one by one, as fast as it takes them.
 class SetPoints {
 public:
     static constexpr std::size_t room = 16;
 
-    /// False: there is no room. An immediate one takes the place of all that wait. [realtime]
+    /// Queues a set-point; an immediate one replaces all queued ones. Returns false when the queue is full. [realtime]
     bool push(const SetPoint&) noexcept;
     void clear() noexcept { count_ = 0, phase_ = Phase::idle, failure_ = {}; }
-    /// Once per cycle: bits 4, 5, 6 and 9 of the controlword, and the target that belongs to them. [realtime]
+    /// Runs one cycle. Returns bits 4, 5, 6 and 9 of the controlword and sets the target that belongs to them. `limit`: timeout of an
+    /// acknowledge, ns. [realtime]
     std::uint16_t step(std::uint16_t statusword, Time now, Time limit, std::int32_t& target) noexcept;
     std::size_t waiting() const noexcept { return count_; }
-    /// All is handed over, and the drive reached the last. [realtime]
+    /// Returns true when all set-points are passed to the drive and it has reached the last. [realtime]
     bool done() const noexcept { return done_; }
-    /// The handshake broke; clear() ends it.
+    /// Returns the failure of the handshake; cleared by clear().
     const Failure& failure() const noexcept { return failure_; }
 
 private:
@@ -46,13 +48,13 @@ private:
     Failure failure_;
 };
 
-/// Homing: starts it, and knows an old "attained" or "error" from that of this run.
+/// Homing: starts it, and distinguishes a stale "attained" or "error" from the result of this run.
 class HomingRun {
 public:
     enum class Result : std::uint8_t { running, attained, failed };
     void begin() noexcept { phase_ = Phase::fresh, failure_ = {}; }
-    /// Once per cycle, in mode hm. `settle`: as long an old result may stay; `limit`: for all of it, 0: none. Bit 4 of the controlword
-    /// is to be set while it runs. A halt stops the clock. [realtime]
+    /// Runs one cycle in mode hm; bit 4 of the controlword must be set meanwhile. `settle`: how long a stale result may persist; `limit`:
+    /// timeout of the whole run, 0 for none, both in ns. A halt stops the clock. [realtime]
     Result step(std::uint16_t statusword, bool halted, Time now, Time settle, Time limit) noexcept;
     const Failure& failure() const noexcept { return failure_; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Between the drive's units and the user's.
+// Conversion between drive units and user units.
 #pragma once
 
 #include <cmath>
@@ -8,14 +8,15 @@
 
 namespace hal::canopen::cia402 {
 
-/// Drive units per user unit, as two numbers, because a gear of 7:3 is no decimal. Negative: the other direction.
+/// Drive units per user unit as a fraction, because a ratio such as 7:3 has no exact decimal. Negative: reversed direction.
 struct Factor {
     double numerator = 1.0, denominator = 1.0;
 
+    /// Returns true when the ratio is usable: not 0, not NaN, 1e-15..1e15. [any]
     bool sound() const noexcept { return std::fabs(ratio()) >= 1e-15 && std::fabs(ratio()) <= 1e15; }
     double ratio() const noexcept { return numerator / denominator; }
     double to_user(double drive) const noexcept { return drive / ratio(); }
-    /// Rounded, and limited to what an integer of type T holds; what is not a number is 0. [any]
+    /// Converts, rounds and clamps to the range of T; NaN becomes 0. [any]
     template <class T>
     T to_drive(double user) const noexcept {
         using Limits = std::numeric_limits<T>;
@@ -24,24 +25,25 @@ struct Factor {
         if (std::isnan(exact)) return T{};
         return exact >= high ? Limits::max() : exact > low ? static_cast<T>(exact) : Limits::min();
     }
-    /// As to_drive, without direction. [any]
+    /// Converts like to_drive(), without sign. [any]
     std::uint32_t amount(double user) const noexcept { return Factor{std::fabs(ratio()), 1.0}.to_drive<std::uint32_t>(std::fabs(user)); }
 };
 
-/// A position counter of the drive that wraps, continued without end.
+/// Extends a position counter of the drive that wraps.
 class Counter {
 public:
-    /// The counter says `raw`, of which `bits` count (1–32). It went less than half its range since the last call. [realtime]
+    /// Takes the reading `raw`, of which `bits` (1..32) are valid. It must have moved by less than half its range since the last call.
+    /// [realtime]
     void follow(std::int32_t raw, unsigned bits) noexcept {
         if (!known_) return put(raw);
         count_ += low_bits(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(count_), bits);
     }
-    /// From now on it is what the drive says. [realtime]
+    /// Restarts at a reading. [realtime]
     void put(std::int32_t raw) noexcept { count_ = raw, known_ = true; }
     std::int64_t count() const noexcept { return count_; }
     bool known() const noexcept { return known_; }
 
-    /// An endless count as the drive's counter would show it. [any]
+    /// Returns a count as the drive's counter shows it. [any]
     static std::int32_t low_bits(std::uint32_t count, unsigned bits) noexcept {
         const unsigned unused = bits == 0 || bits > 32 ? 0 : 32 - bits;
         return static_cast<std::int32_t>(count << unused) >> unused;

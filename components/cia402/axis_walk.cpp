@@ -7,7 +7,7 @@ namespace hal::canopen::cia402 {
 
 namespace {
 
-/// The wanted states, in the order of the columns below.
+/// The commanded states, in the order of the columns below.
 constexpr State columns[] = {State::switch_on_disabled, State::ready_to_switch_on, State::switched_on, State::operation_enabled,
                              State::quick_stop_active};
 constexpr unsigned column_of(State wanted) noexcept {
@@ -22,8 +22,8 @@ struct Way {
 };
 constexpr Way there(Step held) { return {held, true}; }
 
-/// What to command in a state (row, as they are numbered) to come to the wanted one (column). From operation enabled the way off is
-/// the gentle one, by the ramps of the drive; the way through fault is none: only a reset leads out.
+/// The command in a state (row, in the order of State) that leads to the commanded one (column). Leaving operation enabled uses the ramps
+/// of the drive; no command leads through fault: only a reset leaves it.
 constexpr Way ways[9][5] = {
     // off                          ready to switch on         switched on                operation enabled          quick stop
     {there(Step::disable_voltage), {Step::wait}, {Step::wait}, {Step::wait}, there(Step::quick_stop)},
@@ -87,7 +87,7 @@ std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Tim
     if (forced_ && !way.there) way.step = Step::disable_voltage;
     edge_low_ = false;  // a cycle with bit 7 low makes the edge
     reached_ = way.there && !resetting_;
-    if (failure_ && !off) return command::disable_voltage;  // gave up; whoever asked decides
+    if (failure_ && !off) return command::disable_voltage;  // gave up; the caller decides
 
     if (fresh_ || state_ != before || way.step != step_) {
         since_ = now, fresh_ = false;
@@ -99,7 +99,7 @@ std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Tim
     const bool brakes = step_ == Step::disable_operation || state_ == State::quick_stop_active || state_ == State::fault_reaction_active;
     const Time waited = now - since_;
     if (waited < (brakes ? limits.stop : limits.step)) return controlword(step_);
-    const bool optional = state_ == State::quick_stop_active;  // 605Ah can make the drive stay there, and transition 16 need not exist
+    const bool optional = state_ == State::quick_stop_active;  // 605Ah may keep the drive there, and transition 16 is optional
     if (!optional && !failure_) fail(Cause::stays, statusword, error_code, waited);
     if (resetting_) resetting_ = false, fresh_ = true;
     if (off || optional) forced_ = true, fresh_ = true;

@@ -1,32 +1,34 @@
 // SPDX-License-Identifier: MIT
-// The drive's state machine seen from the master: a state is wanted, and the statusword shows the way there, a transition per cycle.
+// The drive's state machine seen from the master: steps it to a commanded state, one transition per cycle.
 #pragma once
 
 #include "axis_failure.hpp"
 
 namespace hal::canopen::cia402 {
 
+/// Walks the state machine. All functions are called by one thread.
 class Walk {
 public:
-    /// Where to go: switch on disabled, ready to switch on, switched on, operation enabled or quick stop active. Asking for what is
-    /// wanted already changes nothing; else the clock of the step starts anew and the failure is forgotten. [realtime]
+    /// Commands a state: switch on disabled, ready to switch on, switched on, operation enabled or quick stop active. Repeating the command
+    /// has no effect; a new one restarts the timeout and clears the failure. [realtime]
     void want(State wanted, Request request) noexcept;
     State wanted() const noexcept { return wanted_; }
-    /// A rising edge of fault reset is given while the drive is in fault. [realtime]
+    /// Sends a rising edge of fault reset while the drive is in fault. [realtime]
     void reset_fault() noexcept;
 
     struct Limits {
-        Time step = 2 * one_second;   ///< for a transition
-        Time stop = 10 * one_second;  ///< for one before which the drive brakes: disable operation, quick stop
+        Time step = 2 * one_second;   ///< timeout of a transition, ns
+        Time stop = 10 * one_second;  ///< timeout of a transition with braking (disable operation, quick stop), ns
     };
-    /// Once per cycle: bits 0–3 and 7 of the controlword. [realtime]
+    /// Runs one cycle at `now` (ns). Returns bits 0..3 and 7 of the controlword. [realtime]
     std::uint16_t step(std::uint16_t statusword, std::uint16_t error_code, Time now, const Limits&) noexcept;
 
     State state() const noexcept { return state_; }
     bool resetting() const noexcept { return resetting_; }
-    /// The drive is where it should be. When it should be off, also in fault or still starting: no power reaches the motor.
+    /// Returns true when the drive is in the commanded state. For switch on disabled, fault and not ready count, too: the motor has no
+    /// power.
     bool reached() const noexcept { return reached_; }
-    /// Why it does not go on; it has stopped trying, unless it is to be off.
+    /// Returns why it does not proceed. It has stopped trying, unless the commanded state is off.
     const Failure& failure() const noexcept { return failure_; }
 
 private:
@@ -34,11 +36,11 @@ private:
 
     State wanted_ = State::switch_on_disabled, state_ = State::unknown;
     Request request_ = Request::disable;
-    Step step_ = Step::wait, led_ = Step::wait;  // commanded now; the last that was no waiting
+    Step step_ = Step::wait, led_ = Step::wait;  // commanded now; the last other than wait
     Failure failure_;
     Time since_ = 0;
     bool fresh_ = true, reached_ = false, resetting_ = false, edge_low_ = false;
-    bool forced_ = false;  // the gentle way took too long: its voltage is disabled
+    bool forced_ = false;  // braking took too long: the voltage is disabled
 };
 
 }  // namespace hal::canopen::cia402

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The numbers of CiA 402, the drive profile: objects, bits, states, modes, and words for them. CANopen drives,
-// CANopen masters and EtherCAT share it.
+// The constants of CiA 402, the drive profile (IEC 61800-7-201): objects, bits, states, modes, and their names. CANopen drives, CANopen
+// masters and EtherCAT share it. All functions are pure and may be called in any thread.
 #pragma once
 
 #include <array>
@@ -12,17 +12,20 @@ namespace hal::canopen::cia402 {
 using Time = std::int64_t;
 inline constexpr Time one_second = 1'000'000'000;
 
-/// Axes of one node. Axis n, from 0, has its objects 0x800·n and its PDOs 64·n further up.
+/// Axes of one node. The objects of axis n, counted from 0, are at +0x800·n, its PDOs at +64·n.
 inline constexpr unsigned most_axes = 8;
+/// Returns the object of an axis that corresponds to `index` of the first one. [any]
 constexpr std::uint16_t of_axis(std::uint16_t index, unsigned axis) noexcept { return static_cast<std::uint16_t>(index + 0x800 * axis); }
+/// Returns the PDO number of an axis that corresponds to `number` of the first one. [any]
 constexpr unsigned pdo_of_axis(unsigned number, unsigned axis) noexcept { return number + 64 * axis; }
-/// The axis of an object 6000h–9FFFh, and the object it would be of the first axis. [any]
+/// Returns the axis of an object 6000h..9FFFh. [any]
 constexpr unsigned axis_of(std::uint16_t index) noexcept { return index < 0x6000 ? 0 : (index - 0x6000U) / 0x800; }
+/// Returns the object of the first axis that corresponds to `index` of any axis. [any]
 constexpr std::uint16_t of_first_axis(std::uint16_t index) noexcept {
     return index < 0x6000 ? index : static_cast<std::uint16_t>(0x6000 + (index - 0x6000U) % 0x800);
 }
 
-/// Low word of 1000h and of 67FFh; bits of its high word.
+/// Low word of 1000h and of 67FFh, and bits of its high word.
 inline constexpr std::uint32_t profile_number = 402, servo_drive = 0x00020000, frequency_converter = 0x00010000, stepper = 0x00040000;
 
 /// Objects of the first axis.
@@ -55,7 +58,7 @@ inline constexpr std::uint16_t
     drive_type = 0x67ff;
 }  // namespace object
 
-/// Bits of the controlword 6040h.
+/// Bits of the controlword (6040h).
 namespace control {
 inline constexpr std::uint16_t switch_on = 0x0001, enable_voltage = 0x0002, not_quick_stop = 0x0004, enable_operation = 0x0008,
                                fault_reset = 0x0080, halt = 0x0100;
@@ -73,7 +76,7 @@ inline constexpr std::uint16_t shutdown = 0x0006, switch_on = 0x0007, enable_ope
                                disable_voltage = 0x0000, quick_stop = 0x0002, fault_reset = 0x0080;
 }
 
-/// Bits of the statusword 6041h.
+/// Bits of the statusword (6041h).
 namespace status {
 inline constexpr std::uint16_t ready_to_switch_on = 0x0001, switched_on = 0x0002, operation_enabled = 0x0004, fault = 0x0008,
                                voltage_enabled = 0x0010, not_quick_stop = 0x0020, switch_on_disabled = 0x0040, warning = 0x0080,
@@ -85,11 +88,13 @@ inline constexpr std::uint16_t set_point_acknowledge = 0x1000, speed_is_zero = 0
 inline constexpr std::uint16_t following_error = 0x2000, max_slippage = 0x2000, homing_error = 0x2000;
 }  // namespace status
 
+/// States of the drive's state machine.
 enum class State : std::uint8_t {
     not_ready_to_switch_on, switch_on_disabled, ready_to_switch_on, switched_on, operation_enabled, quick_stop_active,
     fault_reaction_active, fault,
-    unknown,  ///< bits that mean no state
+    unknown,  ///< bits of the statusword that are not a state
 };
+/// Coding of a state in the statusword.
 struct StateRow {
     State state;
     std::uint16_t mask, value;  ///< statusword & mask == value
@@ -105,14 +110,14 @@ inline constexpr std::array<StateRow, 8> states{{
     {State::fault_reaction_active, 0x004f, 0x000f, "fault reaction active"},
     {State::fault, 0x004f, 0x0008, "fault"},
 }};
-/// [any]
+/// Returns the state coded in a statusword, unknown for undefined bits. [any]
 constexpr State state_of(std::uint16_t statusword) noexcept {
     for (const auto& row : states)
         if ((statusword & row.mask) == row.value) return row.state;
     return State::unknown;
 }
-/// [any]
-constexpr const char* word(State state) noexcept {
+/// Returns the name of a state, as in "switched on". [any]
+constexpr const char* to_string(State state) noexcept {
     for (const auto& row : states)
         if (row.state == state) return row.word;
     return "unknown";
@@ -123,6 +128,7 @@ enum class Mode : std::int8_t {
     none = 0, profile_position = 1, velocity = 2, profile_velocity = 3, profile_torque = 4, homing = 6, interpolated_position = 7,
     cyclic_position = 8, cyclic_velocity = 9, cyclic_torque = 10,
 };
+/// Names of a mode.
 struct ModeRow {
     Mode mode;
     const char *abbreviation, *word;
@@ -138,33 +144,33 @@ inline constexpr std::array<ModeRow, 9> modes{{
     {Mode::cyclic_velocity, "csv", "cyclic synchronous velocity"},
     {Mode::cyclic_torque, "cst", "cyclic synchronous torque"},
 }};
-/// "profile position", …; "no mode" for others. [any]
-constexpr const char* word(Mode mode) noexcept {
+/// Returns the name of a mode, as in "profile position"; "no mode" for unknown ones. [any]
+constexpr const char* to_string(Mode mode) noexcept {
     for (const auto& row : modes)
         if (row.mode == mode) return row.word;
     return "no mode";
 }
-/// "pp", …; "-" for others. [any]
+/// Returns the abbreviation of a mode, as in "pp"; "-" for unknown ones. [any]
 constexpr const char* abbreviation(Mode mode) noexcept {
     for (const auto& row : modes)
         if (row.mode == mode) return row.abbreviation;
     return "-";
 }
-/// Its bit in 6502h; 0 for no mode. [any]
+/// Returns the bit of a mode in 6502h; 0 for none. [any]
 constexpr std::uint32_t bit_of(Mode mode) noexcept {
     const int number = static_cast<int>(mode);
     return number < 1 || number > 32 ? 0 : std::uint32_t{1} << (number - 1);
 }
 
-/// What 6007h, 605Ah–605Eh hold.
+/// Values of 6007h and of 605Ah..605Eh.
 enum class AbortConnection : std::int16_t { none = 0, fault = 1, disable_voltage = 2, quick_stop = 3 };
 enum class Stop : std::int16_t { disable = 0, slow_down = 1, quick_stop = 2, current_limit = 3, voltage_limit = 4 };
-/// 605Ah: 5–8 are 1–4 and the drive stays in quick stop active.
+/// Values of 605Ah from 5 on are those from 1 on, and the drive stays in quick stop active.
 inline constexpr std::int16_t stay_in_quick_stop = 5;
 
-/// Bits 13, 12 and 10 of the statusword in hm.
+/// Homing status, bits 13, 12 and 10 of the statusword in mode hm.
 enum class Homing : std::uint8_t { running, interrupted, attained_but_moving, done, error_moving, error_stopped };
-/// [any]
+/// Returns the homing status coded in a statusword. [any]
 constexpr Homing homing_of(std::uint16_t statusword) noexcept {
     const bool error = (statusword & status::homing_error) != 0, attained = (statusword & status::homing_attained) != 0,
                reached = (statusword & status::target_reached) != 0;
@@ -172,14 +178,14 @@ constexpr Homing homing_of(std::uint16_t statusword) noexcept {
     if (attained) return reached ? Homing::done : Homing::attained_but_moving;
     return reached ? Homing::interrupted : Homing::running;
 }
-/// [any]
-constexpr const char* word(Homing homing) noexcept {
+/// Returns the name of a homing status. [any]
+constexpr const char* to_string(Homing homing) noexcept {
     constexpr const char* words[] = {"running", "interrupted or not started", "attained, still moving", "done", "error, still moving",
                                      "error, stopped"};
     return words[static_cast<unsigned>(homing)];
 }
 
-/// Homing methods 1–37 in words; "reserved" for 15, 16, 31, 32, 36, "manufacturer specific" for negative ones. [any]
+/// Returns a description of homing methods 1..37; "reserved" for 15, 16, 31, 32, 36, "manufacturer specific" for negative ones. [any]
 constexpr const char* homing_method_word(int method) noexcept {
     constexpr const char* words[] = {
         "none",
@@ -206,10 +212,10 @@ constexpr const char* homing_method_word(int method) noexcept {
     return method <= 37 ? words[method] : "reserved";
 }
 
-/// Values of 6086h: how pp and pv speed up and slow down. 1 (sin² ramps) and 2 (jerk-free ramps) are not known here.
+/// Values of 6086h, the ramps of pp and pv. 1 (sin² ramps) and 2 (jerk-free ramps) are unsupported.
 inline constexpr std::int16_t linear_ramps = 0, jerk_limited = 3;
 
-/// Error codes 603Fh of drives; they are EMCY codes, too.
+/// Error codes of drives (603Fh, and in EMCYs).
 namespace error {
 inline constexpr std::uint16_t over_current = 0x2310, over_voltage = 0x3210, under_voltage = 0x3220, over_temperature = 0x4310,
                                motor_blocked = 0x7121, position_sensor = 0x7305, heartbeat = 0x8130, over_speed = 0x8480,
@@ -219,13 +225,13 @@ inline constexpr std::uint16_t over_current = 0x2310, over_voltage = 0x3210, und
 /// Bits of 60FDh, and of 60FEh:1.
 namespace input {
 inline constexpr std::uint32_t negative_limit = 0x1, positive_limit = 0x2, home = 0x4, interlock = 0x8;
-inline constexpr std::uint32_t probe_1 = 0x10000, probe_2 = 0x20000;  // of ours
+inline constexpr std::uint32_t probe_1 = 0x10000, probe_2 = 0x20000;  // of the simulated drive
 }
 namespace output {
 inline constexpr std::uint32_t set_brake = 0x1;
 }
 
-/// Bits of 60B8h and 60B9h of probe 1; those of probe 2 are 8 places further up.
+/// Bits of 60B8h and 60B9h for probe 1; those of probe 2 are 8 places further up.
 namespace probe {
 inline constexpr std::uint16_t enable = 0x0001, continuous = 0x0002, index_pulse = 0x0004, positive_edge = 0x0010, negative_edge = 0x0020;
 inline constexpr std::uint16_t enabled = 0x0001, positive_stored = 0x0002, negative_stored = 0x0004, updated = 0x0040;  // it toggles

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From an address to a driver: the one list of them.
+// The table from CAN address to driver.
 #include <algorithm>
 #include <charconv>
 #include <optional>
@@ -28,7 +28,7 @@ constexpr link::Driver<Opened, Options, Description> drivers[] = {
 
 using link::quoted;
 
-/// 500000, 500k, 1M, unlimited.
+/// Parses 500000, 500k, 1M, unlimited.
 std::optional<std::uint32_t> rate(std::string_view text) {
     if (text == "unlimited") return unlimited;
     double value = 0;
@@ -47,18 +47,18 @@ std::optional<std::uint32_t> number(std::string_view text) {
     return value;
 }
 
-/// What is wrong with `key=value`, or nothing.
+/// Applies an option. Returns the problem, or "".
 std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
     const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
     const auto to_rate = [&](std::uint32_t& to) -> std::string {
         const auto r = rate(value);
-        if (!r) return std::string(key) + " is " + quoted(value) + "; write bits per second, as in 500000, 500k or 1M";
+        if (!r) return "invalid " + std::string(key) + " " + quoted(value) + "; write bits per second, as in 500000, 500k or 1M";
         to = *r;
         return {};
     };
     const auto to_number = [&](auto& to, std::uint32_t most) -> std::string {
         const auto n = number(value);
-        if (!n || *n > most) return std::string(key) + " is " + quoted(value) + "; write a whole number up to " + std::to_string(most);
+        if (!n || *n > most) return "invalid " + std::string(key) + " " + quoted(value) + "; write a number 0.." + std::to_string(most);
         to = *n;
         return {};
     };
@@ -73,7 +73,7 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     if (key == "sendqueue") return to_number(o.send_capacity, 65536);
     if (key == "receivequeue") return to_number(o.receive_capacity, 65536);
     return std::string(link::no_option) + quoted(key) +
-           "; there are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue";
+           "; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue";
 }
 
 }  // namespace

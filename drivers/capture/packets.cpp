@@ -32,7 +32,7 @@ private:
     std::string_view all_;
 };
 
-std::string cut_off(std::size_t at) { return "damaged or cut off at byte " + std::to_string(at); }
+std::string cut_off(std::size_t at) { return "damaged or truncated at byte " + std::to_string(at); }
 
 std::string parse_pcapng(std::string_view all, const Take& take) {
     struct Interface {
@@ -43,7 +43,7 @@ std::string parse_pcapng(std::string_view all, const Take& take) {
     Bytes in(all);
     for (std::size_t at = 0; at < all.size();) {
         if (all.size() - at < 12) return cut_off(at);
-        if (in.number(at, 4) == section) {  // reads the same both ways round
+        if (in.number(at, 4) == section) {  // the same in both byte orders
             in.swapped = false;
             in.swapped = in.number(at + 8, 4) != byte_order;
             if (in.number(at + 8, 4) != byte_order) return cut_off(at);
@@ -72,7 +72,7 @@ std::string parse_pcapng(std::string_view all, const Take& take) {
             const auto ticks = std::uint64_t{in.number(at + 12, 4)} << 32 | in.number(at + 16, 4);
             const auto tick = interfaces[number].tick_ns;
             const double rough = static_cast<double>(ticks) * tick;
-            const bool whole = tick == 1.0 || tick == 1000.0;  // exact where a double is not
+            const bool whole = tick == 1.0 || tick == 1000.0;  // exact integers, where a double is not
             const auto exact = static_cast<std::int64_t>(ticks * (tick == 1.0 ? 1U : 1000U));
             const auto time = rough >= 9e18 ? 0 : whole ? exact : static_cast<std::int64_t>(rough);
             take({static_cast<std::uint16_t>(interfaces[number].link), time, in.part(at + 28, held), in.number(at + 24, 4)});
@@ -111,14 +111,14 @@ bool is_capture(std::string_view file) {
 }
 
 std::string each_packet(std::string_view file, const Take& take) {
-    if (!is_capture(file)) return "it is neither pcapng nor pcap";
+    if (!is_capture(file)) return "neither pcapng nor pcap";
     return Bytes(file).number(0, 4) == section ? parse_pcapng(file, take) : parse_pcap(file, take);
 }
 
 std::optional<std::string> read_file(const std::string& name, std::string& problem) {
     struct stat about{};
     if (::stat(name.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {  // opening a FIFO would block
-        problem = "it is not a regular file";
+        problem = "not a regular file";
         return std::nullopt;
     }
     std::ifstream in(name, std::ios::binary);
@@ -127,11 +127,11 @@ std::optional<std::string> read_file(const std::string& name, std::string& probl
     while (in && (in.read(part, sizeof part), in.gcount() > 0)) {
         text.append(part, static_cast<std::size_t>(in.gcount()));
         if (text.size() <= largest_file) continue;
-        problem = "it is larger than 1 GiB; cut it with `editcap` or `split`";
+        problem = "larger than 1 GiB; split it with editcap or split";
         return std::nullopt;
     }
     if (in.is_open() && !in.bad()) return text;
-    problem = "it cannot be read: " + std::string(std::strerror(errno));
+    problem = "cannot read it: " + std::string(std::strerror(errno));
     return std::nullopt;
 }
 

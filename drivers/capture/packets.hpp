@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The two containers of captures, pcapng and pcap, whatever their packets are. [setup]
+// The container formats of captures, pcapng and pcap, independent of the packets in them. [setup]
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,26 @@ namespace hal::replay {
 
 inline constexpr std::uint16_t link_ethernet = 1, link_can = 227, link_cooked = 113;  ///< LINKTYPE_* of the tcpdump group's registry
 
+/// A packet of a capture.
 struct Packet {
     std::uint16_t link = 0;
     std::int64_t time_ns = 0;
-    std::string_view bytes;     ///< those the capture holds
-    std::size_t length = 0;     ///< it had, on the wire
+    std::string_view bytes;     ///< as captured
+    std::size_t length = 0;     ///< on the wire
 };
 
-/// Whether the first bytes are those of such a file. [any]
+/// Returns true when the first bytes are those of a capture. [any]
 bool is_capture(std::string_view file);
-/// Calls `take` for each packet of a capture, in the file's order. What is wrong (what is cut off or damaged ends it), or nothing.
+/// Calls `take` for each packet in the order of the file, up to the first damaged or truncated one. Returns the problem, or "".
 std::string each_packet(std::string_view file, const std::function<void(const Packet&)>& take);
 
-/// A whole file, up to a GiB; nothing, and `problem`, when it cannot be had.
+/// Reads a whole file of at most 1 GiB. On failure returns nullopt and sets `problem`.
 std::optional<std::string> read_file(const std::string& name, std::string& problem);
 
 /// Writes a pcapng file with one interface and times in nanoseconds.
 class PacketWriter {
 public:
-    /// error() of the file tells whether it could be made.
+    /// Creates the file; error() is 0 on success.
     PacketWriter(const std::string& file, std::uint16_t link, std::string_view interface);
     PacketWriter(const PacketWriter&) = delete;
     PacketWriter& operator=(const PacketWriter&) = delete;

@@ -9,7 +9,7 @@ namespace hal::ethernet {
 
 namespace {
 
-/// The handles of this process by the address of their line, which the driver of the port writes.
+/// The handles of this process by the address of their line, as written by the driver of the port.
 struct Registry {
     std::mutex mutex;
     std::map<std::string, std::shared_ptr<DisciplineHandle>, std::less<>> handles;
@@ -27,6 +27,9 @@ std::vector<can::DeliveryTime> DisciplineHandle::delivery_times(unsigned slot) c
     return found == times_.end() ? std::vector<can::DeliveryTime>{} : found->second;
 }
 
+//   1. user counts itself           2. user reads the discipline        3. user uses it, and counts itself out
+//   4. set() stores the new one     5. set() waits for a count of 0
+// All are sequentially consistent: a user that reads the old one in 2 is counted before 4, so 5 waits for its 3.
 void DisciplineHandle::set(Discipline* discipline, SlotTimes times) {
     {
         const std::lock_guard lock(times_mutex_);

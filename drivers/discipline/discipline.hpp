@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Between a discipline, which decides when frames may leave on an Ethernet segment (TDMA), and the other users of that segment, which hand it
-// their frames. Whoever runs a discipline offers it for its port; whoever opens a port on the same line obtains a handle:
+// The seam between a discipline, which decides when frames may leave on an Ethernet segment (TDMA), and the other users of that segment,
+// which pass their frames to it. The component that runs a discipline offers it for its port; a link that opens a port on the same line
+// obtains a handle:
 //
 //     offer_discipline(*port, &station, times);                   // [setup] the component tdma
 //     std::shared_ptr<DisciplineHandle> h = discipline_of(*port); // [setup] a cane: link
@@ -24,35 +25,35 @@ namespace hal::ethernet {
 class Discipline {
 public:
     virtual ~Discipline() = default;
-    /// Queues a frame for slot `slot` (RTnet's slot id; 0 the default one), `priority` 0 first … 31 last. It leaves in the slot's next
-    /// turn; `full`: that turn belongs to frames as urgent already, and the caller keeps this one. [realtime] the thread of the discipline's
-    /// transmit function. `finisher` as of Launch
+    /// Queues a frame for slot `slot` (RTnet's slot ID; 0 is the default one), `priority` 0 (highest) to 31. It leaves in the slot's next
+    /// turn. On `full` that turn is taken by frames of the same or a higher priority, and the caller keeps the frame. `finisher` is that of
+    /// Launch. [realtime] the thread of the discipline's transmit function
     virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority, Finisher* finisher = nullptr) noexcept = 0;
-    /// Payload bytes that a frame in this slot may have; 0: there is no such slot. [any]
+    /// Returns the payload bytes that a frame in this slot may have; 0: no such slot. [any]
     virtual std::size_t room(unsigned slot) const noexcept = 0;
-    /// The station may send: synchronous and calibrated. [any]
+    /// Returns true when the station may send: synchronised and calibrated. [any]
     virtual bool ready() const noexcept = 0;
-    virtual const Address& address() const noexcept = 0;  ///< [any]
+    virtual const Address& address() const noexcept = 0;  ///< Returns the address of the station. [any]
 
-    /// Whether a station may have sent a frame that arrived at that time.
+    /// Whether the station could have sent a frame that arrived at that time.
     enum class Origin : std::uint8_t {
         plausible,
-        stranger,     ///< an address that the configuration excludes
-        out_of_slot,  ///< not in a slot of that station
+        unknown_station,  ///< an address that is not in the configuration
+        out_of_slot,      ///< not in a slot of that station
     };
-    /// `length` of the whole frame. [realtime] the thread of the discipline
+    /// Checks a received frame of `length` bytes. [realtime] the thread of the discipline
     virtual Origin origin(const Address& /*from*/, std::int64_t /*arrived_ns*/, std::size_t /*length*/) const noexcept {
         return Origin::plausible;
     }
 };
 
-/// The delivery times by way of each slot, where the schedule is known beforehand.
+/// The delivery times through each slot, where the schedule is known in advance.
 using SlotTimes = std::map<unsigned, std::vector<can::DeliveryTime>>;
 
-/// A user's access to the discipline of a line. The discipline may be withdrawn and another one offered while the user is at work.
+/// Access of a user to the discipline of a line. The discipline may be withdrawn, and another one offered, at any time.
 class DisciplineHandle {
 public:
-    /// Calls `use` with the discipline, which stays until that returns; returns false, and does nothing, when there is none. [realtime]
+    /// Calls `use` with the discipline, which stays until that returns. Returns false, without a call, when none is offered. [realtime]
     template <class Use>
     bool with(Use use) noexcept {
         users_.fetch_add(1);
@@ -61,11 +62,12 @@ public:
         users_.fetch_sub(1);
         return now != nullptr;
     }
-    /// Returns how long values take by way of that slot; empty: not known. [setup]
+    /// Returns the delivery times through a slot; empty: unknown. [setup]
     std::vector<can::DeliveryTime> delivery_times(unsigned slot) const;
-    /// Replaces the discipline; nullptr withdraws it. Waits until nobody uses the previous one. [setup]
+    /// Replaces the discipline; nullptr withdraws it. Waits until the previous one is unused. [setup]
     void set(Discipline* discipline, SlotTimes times = {});
-    bool holds(const Discipline* discipline) const noexcept { return discipline_.load() == discipline; }  ///< [any]
+    /// Returns true when it is the current one. [any]
+    bool holds(const Discipline* discipline) const noexcept { return discipline_.load() == discipline; }
 
 private:
     std::atomic<Discipline*> discipline_{nullptr};  // written by set(), read by users
@@ -74,10 +76,10 @@ private:
     SlotTimes times_;  // of the discipline that is offered
 };
 
-/// Offers a discipline to the users of the line behind the port, in this process. Returns false when the line has one already. It must be
-/// withdrawn before it is destroyed. [setup]
+/// Offers a discipline to the users of the line behind the port, in this process. Returns false when the line already has one. Withdraw it
+/// before destroying it. [setup]
 bool offer_discipline(const Port&, Discipline*, SlotTimes times = {});
-/// Withdraws it from its line; waits until nobody uses it. [setup]
+/// Withdraws a discipline from its line; waits until it is unused. [setup]
 void withdraw_discipline(Discipline*);
 /// Returns the handle to the discipline of the line behind the port, or nullptr when none is offered. [setup]
 std::shared_ptr<DisciplineHandle> discipline_of(const Port&);

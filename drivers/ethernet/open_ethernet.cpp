@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From an address to a driver of an Ethernet segment: the one list of them.
+// The table from Ethernet address to driver.
 #include <algorithm>
 #include <charconv>
 
@@ -26,20 +26,20 @@ std::string to_number(std::string_view key, std::string_view value, T& to, long 
     long number = 0;
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
     if (wrong != std::errc{} || end != value.data() + value.size() || number < least || number > most)
-        return std::string(key) + " is " + quoted(value) + "; write a whole number from " + std::to_string(least) + " to " +
+        return "invalid " + std::string(key) + " " + quoted(value) + "; write a number " + std::to_string(least) + ".." +
                std::to_string(most);
     to = static_cast<T>(number);
     return {};
 }
 
-/// 150us, 1ms, 20000ns.
+/// Parses 150us, 1ms, 20000ns.
 std::string to_duration(std::string_view key, std::string_view value, std::int64_t& to) {
     double number = 0;
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
     const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
     number *= unit == "ns" ? 1.0 : unit == "us" ? 1e3 : unit == "ms" ? 1e6 : -1.0;
     if (wrong != std::errc{} || !(number >= 0.0 && number <= 1e9))
-        return std::string(key) + " is " + quoted(value) + "; write a time up to a second with its unit, as in 150us";
+        return "invalid " + std::string(key) + " " + quoted(value) + "; write a time up to 1 s with its unit, as in 150us";
     to = static_cast<std::int64_t>(number);
     return {};
 }
@@ -47,12 +47,12 @@ std::string to_duration(std::string_view key, std::string_view value, std::int64
 std::string to_policy(std::string_view value, Policy& to) {
     constexpr std::string_view words[] = {"hybrid", "block", "spin"};
     const auto* const found = std::find(std::begin(words), std::end(words), value);
-    if (found == std::end(words)) return "policy is " + quoted(value) + "; write hybrid, block or spin";
+    if (found == std::end(words)) return "invalid policy " + quoted(value) + "; write hybrid, block or spin";
     to = static_cast<Policy>(found - std::begin(words));
     return {};
 }
 
-/// What is wrong with `key=value`, or nothing.
+/// Applies an option. Returns the problem, or "".
 std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
     const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
     if (key == "policy") return to_policy(value, o.policy);
@@ -70,12 +70,12 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     if (key == "mac") {
         const auto address = parse_address(value);
         if (!address || ((*address)[0] & 1) != 0 || *address == Address{})
-            return "mac is " + quoted(value) + "; write the address of one station, as in 02:00:00:00:00:07";
+            return "invalid mac " + quoted(value) + "; write a unicast address, as in 02:00:00:00:00:07";
         o.address = *address;
         return {};
     }
     return std::string(link::no_option) + quoted(key) +
-           "; there are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, forward, noise, sendqueue, receivequeue";
+           "; options are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, forward, noise, sendqueue, receivequeue";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `DRIVER:PLACE?key=value&key=value`, taken apart for both kinds of bus. [setup]
+// Parsing of `DRIVER:PLACE?key=value&key=value`, for both kinds of bus. [setup]
 #pragma once
 
 #include <algorithm>
@@ -11,29 +11,31 @@
 
 namespace hal::link {
 
+/// Returns the text in single quotes.
 inline std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
 
-/// How `apply` below begins what it says of a key that it does not know.
-inline constexpr std::string_view no_option = "there is no option ";
+/// Prefix of the problem that `apply` below returns for an unknown key.
+inline constexpr std::string_view no_option = "unknown option ";
 
-/// `key`, `key=0` or `key=1`; what is wrong with it, or nothing.
+/// Parses `key`, `key=0` or `key=1`. Returns the problem, or "".
 inline std::string to_flag(std::string_view key, std::string_view value, bool has_value, bool& flag) {
-    if (has_value && value != "0" && value != "1") return std::string(key) + " is " + quoted(value) + "; write 0 or 1";
+    if (has_value && value != "0" && value != "1") return "invalid " + std::string(key) + " " + quoted(value) + "; write 0 or 1";
     flag = !has_value || value == "1";
     return {};
 }
 
-/// One way to a bus. Options that are the driver's own stay behind the place, for the driver itself to read.
+/// A driver. Its own options stay behind the place, for the driver itself to parse.
 template <class Opened, class Options, class Description>
 struct Driver {
     std::string_view name;
     Opened (*open)(const std::string& place, const Options&);
     Description (*describe)(const std::string& place);
     bool (*is_own_option)(std::string_view key) = nullptr;
-    std::string (*own_options)() = nullptr;  ///< their names, for people
-    std::string_view without = {};           ///< those of all drivers that mean nothing to this one, with a blank between two
+    std::string (*own_options)() = nullptr;  ///< their names, for a message
+    std::string_view without = {};           ///< common options it does not support, separated by blanks
 
-    bool lacks(std::string_view key) const {
+    /// Returns true for a common option that the driver does not support.
+    bool ignores(std::string_view key) const {
         const auto at = without.find(key);
         if (key.empty() || at == without.npos) return false;
         const auto end = at + key.size();
@@ -41,14 +43,14 @@ struct Driver {
     }
 };
 
-/// Opens by the driver that the address names. `apply(key, value, has_value, options)` says what is wrong with an option, or nothing;
-/// `help` completes "'x' is no address of ".
+/// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies an option and returns the problem, or
+/// ""; `help` completes "'x' is not the address of ".
 template <class Opened, class Options, class Description, class Apply>
 Opened open_address(std::string_view address, Options options, std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
                     std::string_view help) {
     const auto colon = address.find(':');
     const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) { return d.name == address.substr(0, colon); });
-    if (colon == address.npos || driver == drivers.end()) return {nullptr, quoted(address) + " is no address of " + std::string(help)};
+    if (colon == address.npos || driver == drivers.end()) return {nullptr, quoted(address) + " is not the address of " + std::string(help)};
 
     const auto  place = address.substr(colon + 1);
     const auto  question = std::min(place.find('?'), place.size());
@@ -68,9 +70,9 @@ Opened open_address(std::string_view address, Options options, std::span<const D
         }
         std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
         if (problem.starts_with(no_option) && driver->own_options != nullptr)
-            problem += ", and of " + std::string(driver->name) + ": " + driver->own_options();
-        if (problem.empty() && driver->lacks(key))
-            problem = "the option " + quoted(key) + " means nothing to " + std::string(driver->name) + "; take it out";
+            problem += ", and for " + std::string(driver->name) + ": " + driver->own_options();
+        if (problem.empty() && driver->ignores(key))
+            problem = std::string(driver->name) + " does not support the option " + quoted(key) + "; remove it";
         if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
     }
     try {
@@ -82,7 +84,7 @@ Opened open_address(std::string_view address, Options options, std::span<const D
     }
 }
 
-/// Describes what the driver would open, without opening it. A driver's own options stay behind the place.
+/// Describes what the driver would open, without opening it. The driver's own options stay behind the place.
 template <class Opened, class Options, class Description>
 Description describe_address(std::string_view address, std::span<const Driver<Opened, Options, Description>> drivers) {
     const auto colon = address.find(':');

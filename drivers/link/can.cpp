@@ -29,13 +29,13 @@ bool Frame::same(const Frame& other) const noexcept {
            std::memcmp(data.data(), other.data.data(), bytes().size()) == 0;
 }
 
-const char* word(State state) noexcept {
+const char* to_string(State state) noexcept {
     constexpr const char* words[] = {"active", "warning", "passive", "bus off", "down"};
     return words[static_cast<std::size_t>(state)];
 }
 
-const char* word(Sent sent) noexcept {
-    constexpr const char* words[] = {"queued", "full", "bus off", "down", "refused"};
+const char* to_string(Sent sent) noexcept {
+    constexpr const char* words[] = {"queued", "full", "bus off", "down", "rejected"};
     return words[static_cast<std::size_t>(sent)];
 }
 
@@ -43,7 +43,8 @@ std::string to_string(const Rejected& r) {
     char address[18];
     std::snprintf(address, sizeof address, "%02x:%02x:%02x:%02x:%02x:%02x", static_cast<unsigned>(r.from >> 40 & 0xff),
                   static_cast<unsigned>(r.from >> 32 & 0xff), static_cast<unsigned>(r.from >> 24 & 0xff),
-                  static_cast<unsigned>(r.from >> 16 & 0xff), static_cast<unsigned>(r.from >> 8 & 0xff), static_cast<unsigned>(r.from & 0xff));
+                  static_cast<unsigned>(r.from >> 16 & 0xff), static_cast<unsigned>(r.from >> 8 & 0xff),
+                                        static_cast<unsigned>(r.from & 0xff));
     const std::string who = address;
     char command[40];
     std::snprintf(command, sizeof command, "%s (%03Xh)",
@@ -51,12 +52,13 @@ std::string to_string(const Rejected& r) {
     std::string sentence;
     switch (r.why) {
     case Rejected::Why::not_the_master:
-        sentence = std::string("rejected ") + command + " from " + who + ": it is not the master; to allow it: also=" + who + " in the link";
+        sentence = std::string("rejected ") + command + " from " + who + ": not the master; to allow it: also=" + who + " in the link";
         break;
     case Rejected::Why::out_of_slot: sentence = std::string("rejected ") + command + " from " + who + ": not in a slot of that station"; break;
-    case Rejected::Why::stranger: sentence = "rejected frame from " + who + ": the schedule has no station of that address"; break;
+    case Rejected::Why::unknown_station: sentence = "rejected frame from " + who + ": unknown station"; break;
+
     case Rejected::Why::unsigned_frame: sentence = "rejected frame from " + who + ": not signed (key=)"; break;
-    case Rejected::Why::wrong_tag: sentence = "rejected frame from " + who + ": signed with another key, or changed"; break;
+    case Rejected::Why::wrong_tag: sentence = "rejected frame from " + who + ": signed with another key, or modified"; break;
     case Rejected::Why::replayed: sentence = "rejected frame from " + who + ": replayed, or its clock was set back"; break;
     }
     if (r.count > 1) sentence += "; " + std::to_string(r.count) + " frames since the last report";

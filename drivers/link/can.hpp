@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The seam to every CAN bus: frames, send, receive, filters, state of the controller, statistics. An address picks the driver.
-// Nothing above this header knows which bus it talks to; nothing in it knows which protocol the frames carry.
+// Code above this header does not know the kind of bus; this header does not know the protocol of the frames.
 //
 //     auto opened = hal::can::open("can:can0");               // [setup]
 //     if (!opened) throw std::runtime_error(opened.problem);  // one sentence: what, why, what to type
@@ -8,7 +8,7 @@
 //     hal::can::Frame frame;                                  // in the cycle; now_ns is the start of the cycle
 //     while (link.receive(frame, now_ns)) take(frame);
 //     link.send({0x181, {1, 2, 3}}, now_ns);
-//     link.flush(now_ns);                                     // what the cycle sent leaves with one system call
+//     link.flush(now_ns);                                     // the frames of the cycle leave with one system call
 #pragma once
 
 #include <array>
@@ -26,24 +26,25 @@ namespace hal::can {
 
 #pragma GCC visibility push(default)
 
-/// "I have no cycle": as `now_ns`, for threads that do not know the runtime's time. The link takes the newest time it was told.
+/// Value of `now_ns` for threads without a cycle, which do not know the runtime's time. The link uses the newest time it knows.
 inline constexpr std::int64_t unclocked = INT64_MIN;
 
-/// One frame, classic or FD. The fields may hold nonsense when they come from a user: `valid()` says, and send() refuses what is not.
+/// One frame, classic or FD. Frames made by a user may be invalid: valid() checks them, and send() rejects invalid ones.
 struct Frame {
     std::uint32_t id = 0;      ///< 11 bits, or 29 when `extended`; no flags inside
-    std::uint8_t length = 0;   ///< bytes of data: 0..8; FD: 0..8, 12, 16, 20, 24, 32, 48, 64. Of a remote frame: the length asked for
+    std::uint8_t length = 0;   ///< bytes of data: 0..8; FD: 0..8, 12, 16, 20, 24, 32, 48, 64. Remote frame: the requested length
     bool extended = false;     ///< 29-bit identifier
-    bool remote = false;       ///< a request without data; classic only
+    bool remote = false;       ///< remote frame: a request without data; classic only
     bool fd = false;           ///< CAN FD
     bool bit_rate_switch = false;  ///< FD: data phase at the data rate
     bool error_state = false;      ///< FD: the sender is error passive
-    bool error = false;        ///< not a frame but an event of the controller: see ErrorClass; `id` holds its bits. Only on request
-    bool own = false;          ///< received: one of this link's own, now on the bus. Only on request
-    std::int64_t time_ns = 0;  ///< received: when its last bit was seen, on the clock of `now_ns`
+    bool error = false;        ///< error frame: an event of the controller; `id` holds bits of ErrorClass. Only with Options::error_frames
+    bool own = false;          ///< received: sent by this link itself. Only with Options::own_frames
+    std::int64_t time_ns = 0;  ///< received: time of its last bit in ns, on the clock of `now_ns`
     alignas(8) std::array<std::uint8_t, 64> data{};
 
     Frame() = default;
+    /// Makes a data frame; extended when the identifier is above 7FFh, FD when there are more than 8 bytes. [any]
     Frame(std::uint32_t identifier, std::initializer_list<std::uint8_t> bytes) noexcept
         : Frame(identifier, std::span(bytes.begin(), bytes.size())) {}
     Frame(std::uint32_t identifier, std::span<const std::uint8_t> bytes) noexcept : id(identifier), extended(identifier > 0x7ff) {
@@ -51,26 +52,28 @@ struct Frame {
         fd = length > 8;
         if (length != 0) std::memcpy(data.data(), bytes.data(), length);
     }
+    /// Makes a remote frame. [any]
     static Frame request(std::uint32_t identifier, std::uint8_t wanted) noexcept {
         Frame f;
         f.id = identifier, f.extended = identifier > 0x7ff, f.remote = true, f.length = wanted;
         return f;
     }
+    /// Returns the data; empty for a remote frame. [any]
     std::span<const std::uint8_t> bytes() const noexcept {
         return {data.data(), remote ? std::size_t{0} : length < 64 ? length : std::size_t{64}};
     }
 
-    /// What a controller could put on a bus. [any]
+    /// Returns true for a frame that a controller can send (ISO 11898-1). [any]
     bool valid() const noexcept;
-    /// Equal as the bus sees it: time and origin do not count. [any]
+    /// Returns true when the frames are equal on the bus; times and flags of origin are ignored. [any]
     bool same(const Frame& other) const noexcept;
 };
 
-/// Bits of `Frame::id` of an error frame; the same numbers as the kernel's.
+/// Bits of `Frame::id` of an error frame; the values are those of the Linux kernel.
 enum ErrorClass : std::uint32_t {
     error_send_timeout = 0x001,
     error_lost_arbitration = 0x002,
-    error_controller = 0x004,  ///< data[1]: what; data[6], data[7]: send and receive error counters
+    error_controller = 0x004,  ///< data[1]: details; data[6], data[7]: transmit and receive error counters
     error_protocol = 0x008,
     error_transceiver = 0x010,
     error_no_acknowledge = 0x020,
@@ -79,11 +82,11 @@ enum ErrorClass : std::uint32_t {
     error_restarted = 0x100,
 };
 
-/// FD lengths: code 0..15 to bytes, and bytes to the smallest code that holds them. [any]
+/// Convert between FD length codes 0..15 and bytes; the code is the smallest that holds the bytes. [any]
 std::uint8_t length_of_code(unsigned code) noexcept;
 std::uint8_t code_of_length(std::size_t length) noexcept;
 
-/// Passes frames of one kind whose (id & mask) == (this id & mask). A link without filters passes everything.
+/// A filter that passes frames of one kind with (frame id & mask) == (id & mask). A link without filters passes everything.
 struct Filter {
     std::uint32_t id = 0;
     std::uint32_t mask = 0;
@@ -91,103 +94,107 @@ struct Filter {
     bool matches(const Frame& f) const noexcept { return f.extended == extended && ((f.id ^ id) & mask) == 0; }
 };
 
+/// State of the controller (ISO 11898-1 fault confinement).
 enum class State : std::uint8_t {
-    active,   ///< in order
+    active,   ///< error active
     warning,  ///< an error counter reached 96
     passive,  ///< an error counter reached 128: the node no longer destroys the frames of others
-    bus_off,  ///< the send error counter passed 255: the node no longer takes part
-    down,     ///< the interface is down, unplugged, or the peer has gone; the driver keeps trying to come back
+    bus_off,  ///< the transmit error counter exceeded 255: the node is off the bus
+    down,     ///< the interface is down, unplugged, or the peer is lost; the driver keeps trying to recover
 };
-/// "active", "warning", "passive", "bus off", "down". [any]
-const char* word(State) noexcept;
+/// Returns "active", "warning", "passive", "bus off" or "down". [any]
+const char* to_string(State) noexcept;
 
+/// Result of send().
 enum class Sent : std::uint8_t {
-    queued,   ///< it will be sent in its turn
-    full,     ///< no room: the bus takes less than is sent; the frame is dropped and counted
+    queued,   ///< will be sent in its turn
+    full,     ///< dropped and counted: the transmit queue is full
     bus_off,  ///< dropped and counted: bus off
-    down,     ///< dropped and counted: no bus
-    refused,  ///< dropped and counted: not a valid frame, or FD on a bus without, or the link only listens
+    down,     ///< dropped and counted: bus down
+    rejected,  ///< dropped and counted: invalid frame, FD frame on a classic bus, or listen-only link
 };
-const char* word(Sent) noexcept;
+/// Returns "queued", "full", "bus off", "down" or "rejected". [any]
+const char* to_string(Sent) noexcept;
 
-/// Counts since open.
+/// Statistics of a link; counts start at open().
 struct Statistics {
     State state = State::active;
-    std::uint8_t send_errors = 0;     ///< TEC; 255 also when more
-    std::uint8_t receive_errors = 0;  ///< REC
-    std::uint64_t sent = 0;           ///< frames given to the bus (where the driver learns it: acknowledged)
-    std::uint64_t sent_bytes = 0;     ///< their data
+    std::uint8_t send_errors = 0;     ///< transmit error counter, at most 255
+    std::uint8_t receive_errors = 0;  ///< receive error counter
+    std::uint64_t sent = 0;           ///< frames sent (acknowledged, where the driver knows)
+    std::uint64_t sent_bytes = 0;     ///< data bytes of these frames
     std::uint64_t received = 0;
     std::uint64_t received_bytes = 0;
-    std::uint64_t lost = 0;       ///< frames of others that did not find room here, or were lost on the way, as far as can be known
-    std::uint64_t lost_on_wire = 0;  ///< of them: those that left their sender and did not come (where frames have numbers)
-    std::uint64_t rejected = 0;   ///< frames of others that their sender may not send (where the driver knows senders)
-    std::uint64_t dropped = 0;    ///< own frames that were not queued or were thrown away
+    std::uint64_t lost = 0;       ///< frames of others lost here or in transit, as far as known
+    std::uint64_t lost_on_wire = 0;  ///< of these: lost in transit (where frames have sequence numbers)
+    std::uint64_t rejected = 0;   ///< frames of others whose sender is not allowed to send them (where the driver knows senders)
+    std::uint64_t dropped = 0;    ///< own frames not queued, or discarded
     std::uint64_t errors = 0;     ///< error frames, malformed datagrams or lines
     std::uint64_t bus_offs = 0;
-    std::uint64_t restarts = 0;   ///< back after bus off or after the interface was away
+    std::uint64_t restarts = 0;   ///< recoveries from bus off or from a lost interface
     std::uint32_t queued = 0;     ///< own frames waiting
-    double load = 0.0;            ///< share of the bus's time in use, 0..1, over the last tenth of a second; 0 when no bit rate is known
+    double load = 0.0;            ///< bus load 0..1 over the last 0.1 s; 0 without a known bit rate
 };
 
-/// As a bit rate of a bus in memory: frames take no time and arrive in the call that sends them.
+/// Bit rate of a bus in memory without timing: frames arrive in the call that sends them.
 inline constexpr std::uint32_t unlimited = UINT32_MAX;
 
+/// Options of open(); options in the address take precedence.
 struct Options {
-    std::uint32_t bit_rate = 0;   ///< bit/s; 0: as the bus is set up, or the driver's default; `sim:` also takes `unlimited`
+    std::uint32_t bit_rate = 0;   ///< bit/s; 0: as the bus is set up, or the driver's default; `sim:` also accepts `unlimited`
     std::uint32_t data_rate = 0;  ///< bit/s of the FD data phase
     bool fd = false;              ///< CAN FD frames are sent and received
-    bool own_frames = false;      ///< own frames come back when they were on the bus, with `own` set
+    bool own_frames = false;      ///< own frames are received once sent, with `own` set
     bool error_frames = false;    ///< error frames are received
     bool listen_only = false;
-    bool stamps = false;          ///< SocketCAN: the kernel's time of each frame, and a count of those it dropped; each frame costs more
-    std::uint32_t restart_ms = 100;  ///< wait after bus off before the link returns by itself; 0: only by restart()
-    std::size_t send_capacity = 512;
-    std::size_t receive_capacity = 2048;
+    bool stamps = false;          ///< SocketCAN: kernel timestamps, and a count of frames the kernel dropped; costs time per frame
+    std::uint32_t restart_ms = 100;  ///< delay of the automatic restart after bus off, ms; 0: only by restart()
+    std::size_t send_capacity = 512;     ///< frames
+    std::size_t receive_capacity = 2048; ///< frames
 };
 
-/// Frames of a sender that it may not send, and that were not passed on.
+/// Frames that their sender is not allowed to send, and that were not passed on.
 struct Rejected {
-    enum class Why : std::uint8_t { not_the_master, stranger, out_of_slot, unsigned_frame, wrong_tag, replayed };
+    enum class Why : std::uint8_t { not_the_master, unknown_station, out_of_slot, unsigned_frame, wrong_tag, replayed };
     Why why = Why::not_the_master;
-    std::uint32_t id = 0;    ///< of the first; where it could be read
+    std::uint32_t id = 0;    ///< of the first frame, where readable
     std::uint64_t from = 0;  ///< address of the sender, 48 bits
-    std::uint32_t count = 0; ///< of this sender since the last report
+    std::uint32_t count = 0; ///< frames of this sender since the last report
 };
-/// A sentence for a log. [setup]
+/// Returns a log message. [setup]
 std::string to_string(const Rejected&);
 
-/// What a link is and what it is capable of. Valid as long as the link.
+/// Description of a link and its capabilities. Valid as long as the link.
 struct Description {
-    std::string address;    ///< as it was opened, completed
+    std::string address;    ///< as opened, with defaults filled in
     std::string transport;  ///< "SocketCAN", "bus in memory", …
-    std::uint32_t bit_rate = 0, data_rate = 0;  ///< 0: not known
+    std::uint32_t bit_rate = 0, data_rate = 0;  ///< bit/s; 0: unknown
     bool fd = false;
     bool simulated = false;       ///< true: no hardware, time is the runtime's
-    bool in_memory = false;       ///< a bus in memory: it takes its bit rate from who opens it first
-    bool has_bit_rate = true;     ///< frames share the time of one bus; false: Ethernet carries them
-    bool has_stamps = false;      ///< Options::stamps gives received frames the time of the kernel or of the bus
-    bool fd_on_request = false;   ///< a device without CAN FD rejects Options::fd: only set it when the user asks for it
+    bool in_memory = false;       ///< a bus in memory: its first user sets the bit rate
+    bool has_bit_rate = true;     ///< frames share the time of one bus; false: carried in Ethernet frames
+    bool has_stamps = false;      ///< Options::stamps gives received frames the timestamp of the kernel or of the bus
+    bool fd_on_request = false;   ///< Options::fd fails on a device without CAN FD: set it only when the user requests it
     std::string interface{};      ///< of the kernel, "can0"; empty: none
     std::string segment{};        ///< address of the Ethernet segment that carries the frames; empty: none
     std::string file{};           ///< of a capture; empty: none
 };
 
-/// How long values take between this station and another, where that is known beforehand. Cycles are this station's, counted from the one in
-/// which a value is written or read here.
+/// Time that values take between this station and another one, where known in advance. Cycles are those of this station, counted from the
+/// one in which a value is written or read here.
 struct DeliveryTime {
-    std::string station;          ///< the other one
-    std::int64_t there_ns = 0;    ///< from the beginning of the cycle that writes a value to the moment when the other one takes it
-    std::int64_t back_ns = 0;     ///< from the change of an input there, just after it was read, to the cycle that has it
+    std::string station;          ///< the other station
+    std::int64_t there_ns = 0;    ///< from the start of the cycle that writes a value to its use by the other station
+    std::int64_t back_ns = 0;     ///< worst case from the change of an input there to the cycle that receives it
     std::uint32_t there_cycles = 0, back_cycles = 0;
-    std::uint32_t round_trip = 0; ///< cycles from a value here to an input there that follows it, and back
+    std::uint32_t round_trip = 0; ///< cycles from a value here to an input there that depends on it, and back
 };
 
 class Simulation;  // link/simulation.hpp
 
 /// One user's end of a bus. Opened and destroyed in setup. One thread at a time sends and flushes, one thread at a time
-/// receives; they may be two. Whoever needs more opens the address again: that is another node on the same bus.
-/// Nothing here waits, locks or allocates, except what is marked [setup].
+/// receives; they may be different threads. For more users open the address again: that is another node on the same bus.
+/// No function waits, locks or allocates, except those marked [setup].
 class Link {
 public:
     virtual ~Link() = default;
@@ -195,50 +202,50 @@ public:
     Link(const Link&) = delete;
     Link& operator=(const Link&) = delete;
 
-    /// Queues a frame. It leaves at flush(), at the latest when the queue has no more room. [realtime] sender
+    /// Queues a frame. It leaves at flush(), or earlier if the queue is full. [realtime] sender
     virtual Sent send(const Frame&, std::int64_t now_ns) noexcept = 0;
-    /// Hands what is queued to the bus, as far as it takes it; the rest stays for the next call. Once a cycle. [realtime] sender
+    /// Sends queued frames as far as the bus takes them; the rest stays for the next call. Call it once per cycle. [realtime] sender
     virtual void flush(std::int64_t now_ns) noexcept = 0;
-    /// The next frames in order of their time, up to the room given; how many. 0: none by now. [realtime] receiver
-    virtual std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept = 0;
-    /// The next frame; false: none by now. [realtime] receiver
+    /// Receives the next frames in order of time. Returns how many; 0: none by now. [realtime] receiver
+    virtual std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept = 0;
+    /// Receives the next frame. Returns false: none by now. [realtime] receiver
     bool receive(Frame& frame, std::int64_t now_ns) noexcept { return receive(std::span(&frame, 1), now_ns) == 1; }
 
-    /// [any] Numbers that are each right, though not all of the same instant.
+    /// Returns the statistics; each value is exact, but they are not of the same instant. [any]
     virtual Statistics statistics() const noexcept = 0;
-    /// [any]
+    /// Returns the state of the controller. [any]
     virtual State state() const noexcept = 0;
-    /// [realtime] sender. Ends a bus-off now instead of after `restart_ms`.
+    /// Ends bus off now instead of after `restart_ms`. [realtime] sender
     virtual void restart() noexcept {}
 
-    /// [setup] Replaces all filters; empty: everything passes. False when there are more than the driver can hold.
+    /// Replaces all filters; empty passes everything. Returns false when the driver supports fewer. [setup]
     virtual bool set_filters(std::span<const Filter>) = 0;
-    /// [setup]
+    /// Returns the description of the link. [setup]
     virtual const Description& description() const noexcept = 0;
-    /// [setup] Returns how long values take to each other station; empty: not known.
+    /// Returns the delivery times to each other station; empty: unknown. [setup]
     virtual std::vector<DeliveryTime> delivery_times() const { return {}; }
-    /// [setup] Waits until receive() has something to give or the time is over. For threads without a cycle. True: there is something.
+    /// Waits at most `at_most_ns` until receive() has a frame. Returns true when it has. For threads without a cycle. [setup]
     virtual bool wait(std::int64_t at_most_ns) = 0;
-    /// [any] A descriptor that polls readable when something may have come, or -1.
+    /// Returns a descriptor that polls readable when a frame may have arrived, or -1. [any]
     virtual int descriptor() const noexcept { return -1; }
-    /// [setup] What can be disturbed on a bus in memory; nullptr on all others.
+    /// Returns the fault injection of a bus in memory; nullptr on all others. [setup]
     virtual Simulation* simulation() noexcept { return nullptr; }
-    /// [realtime] receiver. What was rejected since the last call; at most one sender a second. False: nothing.
+    /// Takes a report of frames rejected since the last call, at most one sender per second. Returns false: none. [realtime] receiver
     virtual bool rejected(Rejected&) noexcept { return false; }
 };
 
-/// A link, or why there is none: a sentence with place, cause and what to type.
+/// A link, or in `problem` a sentence with place, cause and what to type.
 struct Opened {
     std::unique_ptr<Link> link;
     std::string problem;
     explicit operator bool() const noexcept { return link != nullptr; }
 };
 
-/// [setup] Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&key=value`. Keys are those of Options (`bitrate=500000` or `500k`,
-/// `datarate=2M`, `fd`, `listen`, `restart=MS`) and win over them. Drivers: can, sim, udp, slcan, cane, replay.
+/// Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&key=value`. Keys are those of Options (`bitrate=500000` or `500k`,
+/// `datarate=2M`, `fd`, `listen`, `restart=MS`) and take precedence over them. Drivers: can, sim, udp, slcan, cane, replay. [setup]
 Opened open(std::string_view address, const Options& options = {});
-/// [setup] Describes the link that open() would return, as far as the address itself determines it; opens nothing. An unknown driver has an
-/// empty `transport`.
+/// Describes the link that open() would return, as far as the address determines it, without opening it. `transport` is empty for an
+/// unknown driver. [setup]
 Description describe(std::string_view address);
 
 #pragma GCC visibility pop

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames in files: candump's log (text) and pcapng (Wireshark). Reading and writing; all of it [setup].
+// Captures of CAN frames: candump logs (text) and pcapng (Wireshark), reading and writing. All of it [setup].
 #pragma once
 
 #include <cstdint>
@@ -14,29 +14,32 @@ namespace hal::can {
 
 #pragma GCC visibility push(default)
 
-/// `(1436509052.249713) can0 181#0102` without the end of line.
+/// Returns the frame as a line of a log, `(1436509052.249713) can0 181#0102`, without the end of line.
 std::string log_line(const Frame&, std::string_view channel);
-/// One such line; false when it is none. `time_ns` is the line's.
+/// Parses such a line. Returns false for an invalid one. `time_ns` becomes that of the line.
 bool parse_log_line(std::string_view line, Frame&);
 
-/// The frames of a capture, by their times; candump log, pcapng or pcap, told apart by the first bytes. Bounded: what is cut off or
-/// damaged ends the list, and `problem` says where; it is empty when all was read.
+/// The frames of a capture in order of time: candump log, pcapng or pcap, distinguished by the first bytes. A truncated or damaged part
+/// ends the list, and `problem` has its place; it is empty when all was read.
 struct Capture {
     std::vector<Frame> frames;
     std::string problem;
 };
+/// Parses the bytes of a capture.
 Capture parse_capture(std::string_view bytes);
+/// Reads a capture from a file.
 Capture read_capture(const std::string& file);
 
-/// Writes a capture; the ending of the file's name (.pcapng, else a candump log) chooses the format.
+/// Writes a capture: pcapng if the name ends in .pcapng, otherwise a candump log.
 class Recorder {
 public:
     virtual ~Recorder() = default;
-    /// False when the file could not be written.
+    /// Writes a frame. Returns false when the file cannot be written.
     virtual bool write(const Frame&) = 0;
+    /// Flushes the file. Returns false when it cannot be written.
     virtual bool flush() = 0;
 };
-/// Nothing, and `problem`, when the file cannot be made.
+/// Creates a recorder. On failure returns nullptr and sets `problem`.
 std::unique_ptr<Recorder> record(const std::string& file, std::string_view channel, std::string& problem);
 
 #pragma GCC visibility pop

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every driver counts, and how busy its bus is as seen from here.
+// The counters shared by all CAN drivers, and the bus load as seen from this link.
 #pragma once
 
 #include <atomic>
@@ -9,8 +9,8 @@
 
 namespace hal::can {
 
-/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load. [realtime],
-/// and read() [any].
+/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load.
+/// [realtime]
 class Counting {
 public:
     using Count = std::atomic<std::uint64_t>;
@@ -19,13 +19,16 @@ public:
     std::atomic<State> state{State::active};
     std::atomic<std::uint32_t> bit_rate{0}, data_rate{0};  ///< 0: unknown, and no load
 
+    /// Adds to a counter.
     static void add(Count& to, std::uint64_t value = 1) noexcept { to.fetch_add(value, std::memory_order_relaxed); }
 
+    /// Counts a sent frame. Sending thread.
     void count_sent(const Frame& f) noexcept {
         add(sent);
         add(sent_bytes, f.bytes().size());
         occupy(f);
     }
+    /// Counts a received frame. Receiving thread.
     void count_received(const Frame& f) noexcept {
         add(received);
         add(received_bytes, f.bytes().size());
@@ -40,6 +43,7 @@ public:
         load_.store(share < 1.0 ? share : 1.0, std::memory_order_relaxed);
         window_start_ = now_ns;
     }
+    /// Returns all counters; `queued` is the number of frames waiting. [any]
     Statistics read(std::size_t queued) const noexcept {
         const auto of = [](const auto& counter) { return counter.load(std::memory_order_relaxed); };
         Statistics s;

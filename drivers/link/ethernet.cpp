@@ -5,8 +5,8 @@
 
 namespace hal::ethernet {
 
-const char* word(Sent sent) noexcept {
-    constexpr const char* words[] = {"queued", "full", "late", "down", "refused"};
+const char* to_string(Sent sent) noexcept {
+    constexpr const char* words[] = {"queued", "full", "late", "down", "rejected"};
     return words[static_cast<std::size_t>(sent)];
 }
 
@@ -35,8 +35,5 @@ std::optional<Address> parse_address(std::string_view text) noexcept {
     return address;
 }
 
-//   1. user counts itself           2. user reads the discipline        3. user uses it, and counts itself out
-//   4. set() stores what is new     5. set() waits for a count of 0
-// All in one order: who has read the old one in 2 was counted before 4, so 5 waits for its 3.
 
 }  // namespace hal::ethernet

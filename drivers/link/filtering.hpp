@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the drivers that count and filter by themselves have in common.
+// Filters, for drivers that count and filter in this process.
 #pragma once
 
 #include <memory>
@@ -9,14 +9,15 @@
 
 namespace hal::can {
 
-/// The filters of one link: setup replaces them while the receiving thread looks at them.
+/// The filters of one link: setup replaces them while the receiving thread uses them.
 class Filters {
 public:
-    void set(std::span<const Filter> filters) {  // [setup]
+    /// Replaces the filters. [setup]
+    void set(std::span<const Filter> filters) {
         kept_.push_back(std::make_unique<std::vector<Filter>>(filters.begin(), filters.end()));
         now_.store(kept_.back().get(), std::memory_order_release);
     }
-    /// Whether any of them passes the frame; none: all pass. [realtime] receiver
+    /// Returns true when any filter passes the frame, or there are none. [realtime] receiver
     bool pass(const Frame& f) const noexcept {
         const auto* filters = now_.load(std::memory_order_acquire);
         if (filters == nullptr || filters->empty()) return true;
@@ -27,10 +28,10 @@ public:
 
 private:
     std::atomic<const std::vector<Filter>*>           now_{nullptr};
-    std::vector<std::unique_ptr<std::vector<Filter>>> kept_;  // a cycle may still look at an old one
+    std::vector<std::unique_ptr<std::vector<Filter>>> kept_;  // a cycle may still use an old one
 };
 
-/// A link with counters, filters and a description of its own.
+/// A link with its own counters, filters and description.
 class FilteringLink : public Link {
 public:
     State state() const noexcept override { return counting_.state.load(std::memory_order_relaxed); }

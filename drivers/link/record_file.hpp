@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file that grows record by record (lines, blocks of a capture) and always ends with a whole one, even on a full disk. [setup]
+// A file that grows by records (lines, blocks of a capture) and always ends with a complete one, even on a full disk. [setup]
 #pragma once
 
 #include <cerrno>
@@ -14,27 +14,28 @@
 
 namespace hal {
 
+/// The file.
 class RecordFile {
 public:
-    /// Makes the file or empties it; see error().
+    /// Creates or truncates the file; see error().
     explicit RecordFile(const std::string& path)
         : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)), error_(file_ < 0 ? errno : 0), owned_(true) {
         look();
     }
-    /// Writes to a descriptor that somebody else closes.
+    /// Writes to a descriptor owned by the caller.
     explicit RecordFile(int descriptor) : file_(descriptor) { look(); }
     ~RecordFile() { close(); }
     RecordFile(const RecordFile&) = delete;
     RecordFile& operator=(const RecordFile&) = delete;
 
-    /// Queues one record. False, with errno, when it or an earlier one could not be written.
+    /// Queues one record. Returns false, with errno set, when it or an earlier one could not be written.
     bool put(std::string_view record) {
         if (error_ != 0) return fail();
         waiting_ += record;
         ends_.push_back(waiting_.size());
         return waiting_.size() < most_waiting || flush();
     }
-    /// Writes what is queued. False, with errno, when the disk is full or the like: then the file has been cut after its last whole record.
+    /// Writes the queued records. Returns false, with errno set, on failure; the file then ends with its last complete record.
     bool flush() {
         if (error_ != 0) return fail();
         std::size_t done = 0;
@@ -59,7 +60,7 @@ public:
         ends_.clear();
         return error_ == 0 || fail();
     }
-    /// Flushes and closes. False when anything was lost.
+    /// Flushes and closes. Returns false when anything was lost.
     bool close() {
         flush();
         if (owned_ && file_ >= 0 && ::close(file_) != 0 && error_ == 0) error_ = errno;
@@ -68,7 +69,7 @@ public:
         return error_ == 0;
     }
     int error() const { return error_; }  ///< errno of the first failure, or 0
-    std::size_t records() const { return records_; }  ///< that are in the file
+    std::size_t records() const { return records_; }  ///< complete records in the file
 
 private:
     static constexpr std::size_t most_waiting = 65536;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What drivers need of the operating system: an owned descriptor, times, waiting for a descriptor.
+// Wrappers of the operating system for drivers: an owned descriptor, clocks, waiting for a descriptor.
 #pragma once
 
 #include <poll.h>
@@ -14,6 +14,7 @@
 
 namespace hal::link {
 
+/// Owns a file descriptor and closes it.
 class Descriptor {
 public:
     Descriptor() = default;
@@ -33,22 +34,25 @@ private:
     int fd_ = -1;
 };
 
+/// Returns the time of a clock in ns.
 inline std::int64_t clock_ns(clockid_t clock) noexcept {
     timespec t{};
     clock_gettime(clock, &t);
     return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
 }
+/// Returns the time of CLOCK_MONOTONIC in ns.
 inline std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); }
-/// To be added to a time of CLOCK_REALTIME.
+/// Returns the offset to add to a time of CLOCK_REALTIME.
 inline std::int64_t real_to_monotonic_ns() noexcept { return monotonic_ns() - clock_ns(CLOCK_REALTIME); }
 
-/// True: something can be read, or the other side has gone. [setup]
+/// Waits until the descriptor is readable, or its peer is gone. Returns false on timeout. [setup]
 inline bool readable_within(int fd, std::int64_t at_most_ns) noexcept {
     pollfd p{fd, POLLIN, 0};
     const timespec limit{at_most_ns > 0 ? at_most_ns / 1'000'000'000 : 0, at_most_ns > 0 ? at_most_ns % 1'000'000'000 : 0};
     return ppoll(&p, 1, &limit, nullptr) > 0;
 }
 
+/// Returns the text of an error number.
 inline std::string reason(int error = errno) { return std::strerror(error); }
 
 }  // namespace hal::link

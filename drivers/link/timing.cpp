@@ -11,7 +11,7 @@ constexpr unsigned classic_tail = 1 + 1 + 1 + 7 + intermission_bits;  // CRC del
 constexpr unsigned fd_tail = classic_tail - 1;                        // the CRC delimiter counts to the data phase
 constexpr unsigned crc_delimiter = 1;
 
-/// Takes the bits of a frame one by one: counts the stuff bits they need, and their CRC-15.
+/// Counts the stuff bits of a frame and computes its CRC-15, bit by bit.
 class Bitstream {
 public:
     void put(unsigned bit) noexcept {
@@ -25,7 +25,7 @@ public:
     void put(std::uint32_t value, unsigned width) noexcept {
         while (width-- > 0) put(value >> width & 1U);
     }
-    /// A stuff bit that is due is put now; before a fixed stuff bit it is not.
+    /// Inserts a stuff bit that is due, except before a fixed stuff bit.
     void stuff() noexcept {
         if (run_ != 5) return;
         last_ ^= 1U;
@@ -93,7 +93,7 @@ Bits worst_case_bits(unsigned length, bool extended, bool fd, bool bit_rate_swit
     length = length_of_code(code_of_length(length));
     const unsigned slow = extended ? 36 : 17;
     const unsigned stuffed = slow + 5 + 8 * length;
-    const unsigned all = (stuffed - 2) / 4, early = (slow - 2) / 4;  // none after the last bit of data, where a fixed one stands
+    const unsigned all = (stuffed - 2) / 4, early = (slow - 2) / 4;  // none after the last data bit, where a fixed one follows
     const unsigned fast = stuffed - slow + fixed_bits(length) + crc_delimiter;
     if (!bit_rate_switch) return {slow + all + fast + fd_tail, 0};
     return {slow + early + fd_tail, fast + all - early};

@@ -18,7 +18,7 @@ LinkMonitor::LinkMonitor(const char* thread_name, int every_ms, std::function<vo
     address.nl_family = AF_NETLINK;
     address.nl_groups = RTMGRP_LINK;
     const auto* where = reinterpret_cast<const sockaddr*>(&address);
-    if (events_ && ::bind(events_.get(), where, sizeof address) != 0) events_ = {};  // then it looks every `every_ms` only
+    if (events_ && ::bind(events_.get(), where, sizeof address) != 0) events_ = {};  // then it checks every `every_ms` only
     thread_ = std::thread([this, thread_name] {
         pthread_setname_np(pthread_self(), thread_name);
         run();
@@ -42,7 +42,7 @@ void LinkMonitor::run() {
         pollfd sources[] = {{wake_.get(), POLLIN, 0}, {events_.get(), POLLIN, 0}, {also_, POLLIN, 0}};
         ::poll(sources, 3, every_ms_);
         while (::read(wake_.get(), discarded, sizeof discarded) > 0) {}
-        while (::recv(events_.get(), discarded, sizeof discarded, 0) > 0) {}  // it only matters that something changed
+        while (::recv(events_.get(), discarded, sizeof discarded, 0) > 0) {}  // the content is irrelevant: a change was reported
         if (!ending_) look_();
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A thread that looks at network interfaces whenever the kernel reports a change of one, so that no cycle has to.
+// A thread that checks network interfaces whenever the kernel reports a change, so that no cycle has to.
 #pragma once
 
 #include <atomic>
@@ -12,15 +12,16 @@ namespace hal::link {
 
 class LinkMonitor {
 public:
-    /// Starts the thread. It calls `look` after every rtnetlink report about an interface, at least every `every_ms` (also where there is
-    /// no rtnetlink), after nudge(), and when `also`, a descriptor, is readable. [setup]
+    /// Starts the thread. It calls `look` after every rtnetlink report about an interface, at least every `every_ms` (also without
+    /// rtnetlink), after nudge(), and when the descriptor `also` is readable. [setup]
     LinkMonitor(const char* thread_name, int every_ms, std::function<void()> look, int also = -1);
-    /// Waits for the end of a call of `look`. [setup]
+    /// Stops the thread; waits for a call of `look` to end. [setup]
     ~LinkMonitor();
     LinkMonitor(const LinkMonitor&) = delete;
     LinkMonitor& operator=(const LinkMonitor&) = delete;
 
-    /// Look now. One write to an eventfd, which never waits. [realtime]
+    /// Triggers a check now. One write to an eventfd, which never waits. [realtime]
+
     void nudge() noexcept;
 
 private:

@@ -267,7 +267,8 @@ TEST(CaneLink, lost_doubled_and_garbled_frames_are_counted_and_never_passed_on) 
         x->send(message(0x181, {n}), static_cast<std::int64_t>(now));
         x->flush(static_cast<std::int64_t>(now));
         now += 1'000'000;
-        for (const auto& f : all_of(*y, static_cast<std::int64_t>(now))) EXPECT_TRUE(f.same(message(0x181, {n}))) << "only its padding was hit";
+        for (const auto& f : all_of(*y, static_cast<std::int64_t>(now))) EXPECT_TRUE(f.same(message(0x181,
+             {n}))) << "only its padding was hit";
     }
     segment.calm();
     segment.disturb({.fault = ethernet::Fault::loss, .every = 2});
@@ -406,16 +407,16 @@ TEST(CaneDescribe, names_the_segment_without_opening_it) {
     EXPECT_TRUE(can::describe("tok:en").transport.empty());
 }
 
-TEST(CaneOpen, says_what_is_wrong_and_what_to_type) {
-    EXPECT_EQ(can::open("cane:").problem, "cane:: the interface is missing; write cane:enp3s0, or cane:sim:bus0 for a segment in memory");
-    EXPECT_EQ(can::open("cane:sim:x?format=both").problem, "cane:sim:x?format=both: format is 'both'; write single or packed");
+TEST(CaneOpen, reports_what_is_wrong_and_what_to_type) {
+    EXPECT_EQ(can::open("cane:").problem, "cane:: missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory");
+    EXPECT_EQ(can::open("cane:sim:x?format=both").problem, "cane:sim:x?format=both: invalid format 'both'; write single or packed");
     EXPECT_EQ(can::open("cane:sim:x?slot=2").problem,
-              "cane:sim:x?slot=2: no TDMA on sim:x has slots; loadrt tdma for it first, or leave slot= out");
+              "cane:sim:x?slot=2: no TDMA runs on sim:x; loadrt tdma for it first, or remove slot=");
     EXPECT_EQ(can::open("cane:sim:x?node5=1").problem,
-              "cane:sim:x?node5=1: node5 is '1'; write the address of a station, as in 02:00:00:00:00:05");
+              "cane:sim:x?node5=1: invalid node5 '1'; write the address of a station, as in 02:00:00:00:00:05");
     EXPECT_EQ(can::open("cane:sim:x?node200=02:00:00:00:00:05").problem,
-              "cane:sim:x?node200=02:00:00:00:00:05: 'node200' names no node; write node5=02:00:00:00:00:05");
-    EXPECT_EQ(can::open("cane:sim:x?fd").problem, "cane:sim:x?fd: frames of CAN FD do not travel in 0x9023 frames; leave fd out");
+              "cane:sim:x?node200=02:00:00:00:00:05: invalid node 'node200'; write node5=02:00:00:00:00:05");
+    EXPECT_EQ(can::open("cane:sim:x?fd").problem, "cane:sim:x?fd: 0x9023 frames cannot carry CAN FD; remove fd");
 }
 
 }  // namespace

@@ -89,23 +89,23 @@ TEST_F(EthernetCapture, a_replay_keeps_the_distances_and_then_is_down) {
     EXPECT_EQ(port.statistics().sent_bytes, 60U);
 }
 
-TEST_F(EthernetCapture, what_is_cut_off_is_refused_with_the_place) {
+TEST_F(EthernetCapture, a_truncated_file_is_rejected_with_the_place) {
     write(file_, {{500 * ms, frame(0x9021, 1)}, {501 * ms, frame(0x9022, 2)}});
     const auto size = std::filesystem::file_size(file_);
     std::filesystem::resize_file(file_, size - 5);
     EXPECT_EQ(read_capture(file_).frames.size(), 1U);
-    EXPECT_EQ(open("replay:" + file_).problem, "replay:" + file_ + ": damaged or cut off at byte " + std::to_string(size - 92));
-    EXPECT_EQ(open("replay:/nosuch").problem, "replay:/nosuch: it cannot be read: No such file or directory");
-    EXPECT_EQ(open("replay:").problem, "replay:: the file is missing; write replay:capture.pcapng");
+    EXPECT_EQ(open("replay:" + file_).problem, "replay:" + file_ + ": damaged or truncated at byte " + std::to_string(size - 92));
+    EXPECT_EQ(open("replay:/nosuch").problem, "replay:/nosuch: cannot read it: No such file or directory");
+    EXPECT_EQ(open("replay:").problem, "replay:: missing file; write replay:capture.pcapng");
     std::filesystem::resize_file(file_, size - 92);
     std::filesystem::resize_file(file_, size - 184);
     EXPECT_EQ(open("replay:" + file_).problem,
-              "replay:" + file_ + ": there is no Ethernet frame in this file; record one with: tcpdump -i enp3s0 -w capture.pcap");
+              "replay:" + file_ + ": no Ethernet frames in this file; to record some: tcpdump -i enp3s0 -w capture.pcap");
     std::filesystem::resize_file(file_, 4);
-    EXPECT_EQ(read_capture(file_).problem, "it is neither pcapng nor pcap");
+    EXPECT_EQ(read_capture(file_).problem, "neither pcapng nor pcap");
 }
 
-TEST_F(EthernetCapture, parts_of_frames_are_left_out) {
+TEST_F(EthernetCapture, incomplete_frames_are_left_out) {
     write(file_, {{ms, frame(0x9021, 1)}, {ms, std::vector<std::uint8_t>(13)}, {ms, std::vector<std::uint8_t>(1515)}});
     const auto capture = read_capture(file_);
     EXPECT_EQ(capture.frames.size(), 1U);

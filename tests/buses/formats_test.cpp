@@ -160,12 +160,12 @@ TEST(Capture, both_formats_give_back_what_was_recorded) {
     }
 }
 
-TEST(Capture, what_is_damaged_is_refused_with_its_place) {
-    EXPECT_EQ(parse_capture("(1.0) can0 123#\nrubbish\n").problem, "line 2 is no frame; a line is `(1436509052.249713) can0 181#0102`");
+TEST(Capture, a_damaged_file_is_rejected_with_the_place) {
+    EXPECT_EQ(parse_capture("(1.0) can0 123#\nrubbish\n").problem, "line 2: invalid frame; expected `(1436509052.249713) can0 181#0102`");
     const std::string head("\x0a\x0d\x0d\x0a\x1c\0\0\0\x4d\x3c\x2b\x1a\x01\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff\x1c\0\0\0", 28);
     EXPECT_EQ(parse_capture(head).problem, "");
-    EXPECT_EQ(parse_capture(head + "more than nothing").problem, "damaged or cut off at byte 28");
-    EXPECT_EQ(open("replay:/nonexistent.log").problem, "replay:/nonexistent.log: it cannot be read: No such file or directory");
+    EXPECT_EQ(parse_capture(head + "more than nothing").problem, "damaged or truncated at byte 28");
+    EXPECT_EQ(open("replay:/nonexistent.log").problem, "replay:/nonexistent.log: cannot read it: No such file or directory");
 }
 
 }  // namespace

@@ -60,9 +60,9 @@ wait $drive
 echo drive ended
 """
 SENTENCES = [  # of `show fault`, with # for what differs
-    "canopen.0: node 2 (x) silent for # s (limit 1 s) at cycle #; its outputs were set to their safe values; see: show pin canopen.0",
-    "x: run: drive lost: its node is not operational any more at cycle #; it was stopped; see: show pin x",
-    "canopen.0: the bus is down: the interface is off or was taken away at cycle #; it is tried again by itself; see: show pin canopen.0",
+    "canopen.0: node 2 (x): no heartbeat for # s (timeout 1 s) at cycle #; outputs set to safe values; see: show pin canopen.0",
+    "x: run: drive lost: node no longer operational at cycle #; axis stopped; see: show pin x",
+    "canopen.0: bus down: the interface is off or was removed at cycle #; the master retries; see: show pin canopen.0",
 ]
 EXPECTED = ["it moves", "getp canopen.0.x.fault TRUE", "getp canopen.0.bus-off TRUE", "getp canopen.0.bus-off FALSE", "machine ended", "drive ended"]
 

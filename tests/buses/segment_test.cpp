@@ -74,7 +74,8 @@ TEST(Segment, a_slower_switch_keeps_a_frame_longer) {
     const auto got = all(*b, 2 * ms);
     ASSERT_EQ(got.size(), 1U);
     EXPECT_EQ(got[0].time_ns, ms + 2 * minimum_ns + 12'500);
-    EXPECT_EQ(open(net + "?forward=2us").problem, net + "?forward=2us: a frame takes 12500 ns in the switch already; open the segment with the "
+    EXPECT_EQ(open(net + "?forward=2us").problem,
+              net + "?forward=2us: a frame takes 12500 ns in the switch already; open the segment with the "
                                                         "same forward everywhere, or give it in the first place only");
     EXPECT_TRUE(open(net + "?forward=12500ns"));
 }
@@ -88,7 +89,7 @@ TEST(Segment, a_long_frame_takes_longer_and_a_faster_line_less) {
     EXPECT_EQ(got[0].time_ns, ms + 2 * 1538 * 8 + 2 * us);
     EXPECT_EQ(b->statistics().speed, 1000U);
     EXPECT_EQ(open(net + "?speed=100").problem,
-              net + "?speed=100: the segment runs at 1000 Mbit/s already; open it with the same speed everywhere, or give it in one place "
+              net + "?speed=100: the segment already runs at 1000 Mbit/s; use the same speed everywhere, or give it in one place "
                     "only");
 }
 
@@ -164,9 +165,9 @@ TEST(Segment, a_frame_later_than_its_guard_is_dropped_and_counted) {
 TEST(Segment, what_is_no_frame_is_refused) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net);
-    EXPECT_EQ(a->send(Bytes(13), {}, ms), Sent::refused);
-    EXPECT_EQ(a->send(Bytes(1515), {}, ms), Sent::refused);
-    EXPECT_EQ(a->send(Bytes(29), {.stamp_at = 22}, ms), Sent::refused);
+    EXPECT_EQ(a->send(Bytes(13), {}, ms), Sent::rejected);
+    EXPECT_EQ(a->send(Bytes(1515), {}, ms), Sent::rejected);
+    EXPECT_EQ(a->send(Bytes(29), {.stamp_at = 22}, ms), Sent::rejected);
     EXPECT_EQ(a->send(Bytes(14), {}, ms), Sent::queued);
     EXPECT_EQ(a->send(Bytes(1514), {}, ms), Sent::queued);
     EXPECT_EQ(a->send(Bytes(30), {.stamp_at = 22}, ms), Sent::queued);
@@ -376,20 +377,20 @@ TEST(Segment, serves_threads_of_one_process) {
     EXPECT_EQ(b->statistics().lost, 0U);
 }
 
-TEST(Ethernet, an_address_that_is_none_says_what_to_write) {
-    EXPECT_EQ(open("net0").problem, "'net0' is no address of an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
+TEST(Ethernet, open_reports_what_to_write_for_an_invalid_address) {
+    EXPECT_EQ(open("net0").problem, "'net0' is not the address of an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
                                     "sim:NAME for a segment in memory or replay:FILE");
-    EXPECT_EQ(open("sim:").problem, "sim:: the name of the segment is missing; write sim:net0");
-    EXPECT_EQ(open("sim:x/").problem, "sim:x/: the name of the station is missing; write sim:x/master");
-    EXPECT_EQ(open("sim:x?policy=fast").problem, "sim:x?policy=fast: policy is 'fast'; write hybrid, block or spin");
-    EXPECT_EQ(open("sim:x?spin=50").problem, "sim:x?spin=50: spin is '50'; write a time up to a second with its unit, as in 150us");
-    EXPECT_EQ(open("sim:x?priority=100").problem, "sim:x?priority=100: priority is '100'; write a whole number from 1 to 99");
+    EXPECT_EQ(open("sim:").problem, "sim:: missing name of the segment; write sim:net0");
+    EXPECT_EQ(open("sim:x/").problem, "sim:x/: missing name of the station; write sim:x/master");
+    EXPECT_EQ(open("sim:x?policy=fast").problem, "sim:x?policy=fast: invalid policy 'fast'; write hybrid, block or spin");
+    EXPECT_EQ(open("sim:x?spin=50").problem, "sim:x?spin=50: invalid spin '50'; write a time up to 1 s with its unit, as in 150us");
+    EXPECT_EQ(open("sim:x?priority=100").problem, "sim:x?priority=100: invalid priority '100'; write a number 1..99");
     EXPECT_EQ(open("sim:x?mac=03:00:00:00:00:01").problem,
-              "sim:x?mac=03:00:00:00:00:01: mac is '03:00:00:00:00:01'; write the address of one station, as in 02:00:00:00:00:07");
-    EXPECT_EQ(open("sim:x?fast").problem.substr(0, 37), "sim:x?fast: there is no option 'fast'");
+              "sim:x?mac=03:00:00:00:00:01: invalid mac '03:00:00:00:00:01'; write a unicast address, as in 02:00:00:00:00:07");
+    EXPECT_TRUE(open("sim:x?fast").problem.starts_with("sim:x?fast: unknown option 'fast'; options are policy, ")) << open("sim:x?fast").problem;
 }
 
-TEST(Ethernet, addresses_are_written_and_read) {
+TEST(Ethernet, addresses_are_formatted_and_parsed) {
     EXPECT_EQ(to_string(Address{2, 0xab, 0, 0xff, 9, 0x10}), "02:ab:00:ff:09:10");
     EXPECT_EQ(parse_address("02:AB:00:ff:09:10"), (Address{2, 0xab, 0, 0xff, 9, 0x10}));
     for (const char* wrong : {"", "02:ab:00:ff:09", "02:ab:00:ff:09:1", "02:ab:00:ff:09:1g", "02:ab:00:ff:09:100", "02.ab.00.ff.09.10"})
@@ -406,16 +407,16 @@ TEST(Ethernet, discipline_is_found_through_any_port_of_its_line) {
     const auto first = open("sim:disciplined/a?speed=1000"), second = open("sim:disciplined/a"), other = open("sim:disciplined/b");
     EXPECT_TRUE(offer_discipline(*first.port, &one));
     EXPECT_FALSE(offer_discipline(*second.port, &two));
-    const auto seat = discipline_of(*second.port);
-    ASSERT_NE(seat, nullptr);
-    EXPECT_TRUE(seat->holds(&one));
-    EXPECT_EQ(discipline_of(*first.port), seat);
+    const auto handle = discipline_of(*second.port);
+    ASSERT_NE(handle, nullptr);
+    EXPECT_TRUE(handle->holds(&one));
+    EXPECT_EQ(discipline_of(*first.port), handle);
     EXPECT_EQ(discipline_of(*other.port), nullptr);
     withdraw_discipline(&one);
     EXPECT_EQ(discipline_of(*first.port), nullptr);
-    EXPECT_FALSE(seat->with([](Discipline&) { FAIL(); }));
+    EXPECT_FALSE(handle->with([](Discipline&) { FAIL(); }));
     EXPECT_TRUE(offer_discipline(*second.port, &two));
-    EXPECT_TRUE(seat->holds(&two));  // who had the first has the second now
+    EXPECT_TRUE(handle->holds(&two));  // the handle of the first leads to the second
     withdraw_discipline(&two);
 }
 

@@ -331,30 +331,31 @@ TEST(Simbus, many_threads_lose_nothing) {
     }
 }
 
-TEST(Open, says_what_is_wrong_and_what_to_type) {
+TEST(Open, reports_what_is_wrong_and_what_to_type) {
     EXPECT_EQ(open("can0").problem,
-              "'can0' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+              "'can0' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
               "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE");
-    EXPECT_EQ(open("sim:").problem, "sim:: the name of the bus is missing; write sim:bus0");
-    EXPECT_EQ(open("sim:x?bitrate=fast").problem, "sim:x?bitrate=fast: bitrate is 'fast'; write bits per second, as in 500000, 500k or 1M");
+    EXPECT_EQ(open("sim:").problem, "sim:: missing name of the bus; write sim:bus0");
+    EXPECT_EQ(open("sim:x?bitrate=fast").problem,
+              "sim:x?bitrate=fast: invalid bitrate 'fast'; write bits per second, as in 500000, 500k or 1M");
     EXPECT_EQ(open("sim:x?rate=1").problem,
-              "sim:x?rate=1: there is no option 'rate'; there are"
+              "sim:x?rate=1: unknown option 'rate'; options are"
               " bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue");
     EXPECT_EQ(
         open("slcan:/dev/null?bitrate=300k").problem,
-        "slcan:/dev/null?bitrate=300k: a serial-line adapter cannot be told 300000 bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, "
-        "800k and 1M");
+        "slcan:/dev/null?bitrate=300k: unsupported bit rate 300000 of a serial-line adapter; use 10k, 20k, 50k, 100k, 125k, 250k, 500k, "
+        "800k or 1M");
     EXPECT_EQ(open("slcan:/dev/null?datarate=3M").problem,
-              "slcan:/dev/null?datarate=3M: a serial-line adapter cannot be told a data rate of 3000000 bit/s; it knows 2M and 5M");
-    EXPECT_EQ(open("slcan:/dev/null?own").problem, "slcan:/dev/null?own: the option 'own' means nothing to slcan; take it out");
-    EXPECT_EQ(open("replay:none.log?own=1&fd").problem, "replay:none.log?own=1&fd: the option 'own' means nothing to replay; take it out");
-    EXPECT_EQ(open("udp:?restart=5").problem, "udp:?restart=5: the option 'restart' means nothing to udp; take it out");
+              "slcan:/dev/null?datarate=3M: unsupported data rate 3000000 of a serial-line adapter; use 2M or 5M");
+    EXPECT_EQ(open("slcan:/dev/null?own").problem, "slcan:/dev/null?own: slcan does not support the option 'own'; remove it");
+    EXPECT_EQ(open("replay:none.log?own=1&fd").problem, "replay:none.log?own=1&fd: replay does not support the option 'own'; remove it");
+    EXPECT_EQ(open("udp:?restart=5").problem, "udp:?restart=5: udp does not support the option 'restart'; remove it");
     auto one = open("sim:rates?bitrate=250k");
     ASSERT_TRUE(one);
     EXPECT_EQ(one.link->description().bit_rate, 250'000U);
     EXPECT_EQ(open("sim:rates?bitrate=500k").problem,
-              "sim:rates?bitrate=500k: the bus runs at 250000 bit/s already; "
-              "open it with the same bitrate everywhere, or give it in one place only");
+              "sim:rates?bitrate=500k: the bus already runs at 250000 bit/s; "
+              "use the same bitrate everywhere, or give it in one place only");
     EXPECT_FALSE(open("can:no_such_interface_name"));
     EXPECT_FALSE(open("can:lo"));
 }

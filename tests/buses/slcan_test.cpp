@@ -106,7 +106,7 @@ TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_f
 TEST(Slcan, a_line_that_is_not_there_is_refused_with_what_to_look_at) {
     const auto opened = open("slcan:/dev/no-such-line");
     ASSERT_FALSE(opened);
-    EXPECT_EQ(opened.problem, "slcan:/dev/no-such-line: there is no such device; `ls /dev/serial/by-id` lists adapters that are plugged in");
+    EXPECT_EQ(opened.problem, "slcan:/dev/no-such-line: no such device; to list adapters: ls /dev/serial/by-id");
 }
 
 }  // namespace

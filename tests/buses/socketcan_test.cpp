@@ -41,7 +41,7 @@ protected:
             timespec pause{0, 10'000'000};
             nanosleep(&pause, nullptr);
         }
-        EXPECT_STREQ(word(link.state()), word(wanted));
+        EXPECT_STREQ(to_string(link.state()), to_string(wanted));
     }
     static void run(const std::string& command) { ASSERT_EQ(std::system(command.c_str()), 0) << command; }
 };
@@ -271,7 +271,7 @@ TEST_F(Socketcan, bus_off_is_told_nothing_is_sent_meanwhile_and_it_ends_when_the
 
 TEST_F(Socketcan, a_link_that_only_listens_says_nothing) {
     auto a = link("can:vcan0?listen"), b = link("can:vcan0");
-    EXPECT_EQ(a->send({0x1, {}}, unclocked), Sent::refused);
+    EXPECT_EQ(a->send({0x1, {}}, unclocked), Sent::rejected);
     b->send({0x2, {}}, unclocked), b->flush(unclocked);
     Frame f;
     ASSERT_TRUE(next(*a, f));
@@ -281,9 +281,9 @@ TEST_F(Socketcan, a_link_that_only_listens_says_nothing) {
 
 TEST_F(Socketcan, what_is_wrong_is_said_with_what_to_type) {
     EXPECT_EQ(open("can:can9").problem,
-              "can:can9: there is no interface can9; `ip -br link` lists those there are; a virtual one: sudo ip link add can9 type vcan "
+              "can:can9: no interface can9; to list them: ip -br link; to create a virtual one: sudo ip link add can9 type vcan "
               "&& sudo ip link set can9 up");
-    EXPECT_EQ(open("can:lo").problem, "can:lo: lo is not a CAN interface; `ip -br link show type can` lists those");
+    EXPECT_EQ(open("can:lo").problem, "can:lo: lo is not a CAN interface; to list them: ip -br link show type can");
     run("ip link add vcan9 type vcan");
     EXPECT_EQ(open("can:vcan9").problem, "can:vcan9: the interface is down; type: sudo ip link set vcan9 up");
     run("ip link set vcan9 mtu 16 up");

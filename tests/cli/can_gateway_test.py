@@ -105,7 +105,7 @@ class Gateway(Node):
         self.assertEqual('"Cell gateway"', client.ask("126 r 0x1008 0 vs"))
         for wrong in ("x", "1,2,3,4,5", "-1", "0x100000000", "1 2"):
             self.assertIn(f"invalid --identity '{wrong}'; write VENDOR,PRODUCT,REVISION,SERIAL", self.bad("can", "gateway", self.bus, f"--identity={wrong}"))
-        self.assertIn("--order-code has 300 bytes; at most 200 are possible", self.bad("can", "gateway", self.bus, "--order-code", "x" * 300))
+        self.assertIn("--order-code has 300 bytes; at most 200 are allowed", self.bad("can", "gateway", self.bus, "--order-code", "x" * 300))
 
     def one_shot(self, place, *words):
         return self.good("can", "gateway", "--connect", place, *words)
@@ -119,7 +119,7 @@ class Gateway(Node):
         wrong = ("gateway", "--connect", "gate")
         self.assertEqual("hal can gateway: 5 r 0x2fff 0 u8: object does not exist in the object dictionary (0x06020000)\n",
                          self.bad_can(*wrong, "5", "r", "0x2fff", "0", "u8"))
-        self.assertEqual("hal can gateway: r 0x1000 0 u32: no default node set (error 105); put the node before the command, or type: set node NODE\n",
+        self.assertEqual("hal can gateway: r 0x1000 0 u32: no default node set (error 105); write the node before the command, or type: set node NODE\n",
                          self.bad_can(*wrong, "r 0x1000 0 u32"))
         self.assertEqual("hal can gateway: [1] 5 start: sequence numbers are added here; type the command without one\n".replace("[1] 5 start:", "'[1] 5 start':"),
                          self.bad_can(*wrong, "[1] 5 start"))
@@ -153,13 +153,13 @@ class Gateway(Node):
 
     def test_wrong_words(self):
         self.gateway("--socket", "gate")
-        self.assertEqual("hal can gateway: another gateway listens on 'gate'; give this one its own: --socket PATH\n",
+        self.assertEqual("hal can gateway: another gateway listens on 'gate'; choose another socket: --socket PATH\n",
                          self.bad_can("gateway", self.bus, "--socket", "gate"))
         self.write("file", "")
-        self.assertEqual("hal can gateway: 'file' is there and no socket; give another: --socket PATH\n", self.bad_can("gateway", self.bus, "--socket", "file"))
-        self.assertEqual("hal can gateway: '0.0.0.0:6000' would let other machines command this bus; listen on 127.0.0.1 and forward it: ssh -L\n",
+        self.assertEqual("hal can gateway: 'file' exists and is not a socket; choose another: --socket PATH\n", self.bad_can("gateway", self.bus, "--socket", "file"))
+        self.assertEqual("hal can gateway: --listen '0.0.0.0:6000' would let other machines command this bus; listen on 127.0.0.1 and forward the port: ssh -L\n",
                          self.bad_can("gateway", self.bus, "--listen", "0.0.0.0:6000"))
-        self.assertEqual("hal can gateway: '6000' is no place to listen; write 127.0.0.1:6000\n", self.bad_can("gateway", self.bus, "--listen", "6000"))
+        self.assertEqual("hal can gateway: invalid --listen '6000'; write 127.0.0.1:6000\n", self.bad_can("gateway", self.bus, "--listen", "6000"))
 
 
 if __name__ == "__main__":

@@ -68,11 +68,11 @@ class Sdo(Node):
         self.assertEqual("1018:4 Identity object, Serial number = 0x00000001 (1)\n", self.read("serial-number", "--eds", "io.eds"))
         self.can("sdo", "write", self.bus, "5", "Write output 8-bit/Output block 1", "17", "--eds", "io.eds")
         self.assertEqual("6200:1 = 0x11 (17)\n", self.read("6200:1"))
-        self.assertEqual("hal can sdo read: 'serial-nomber' is no object of io.eds; did you mean 'serial-number'?\n",
+        self.assertEqual("hal can sdo read: unknown object 'serial-nomber' in io.eds; did you mean 'serial-number'?\n",
                          self.bad_can("sdo", "read", self.bus, "5", "serial-nomber", "--eds", "io.eds"))
         self.assertRegex(self.bad_can("sdo", "read", self.bus, "5", "event timer", "--eds", "io.eds"),
                          r"^hal can sdo read: 'event timer' is the name of \d+ objects \(1400:5, 1401:5, .*; write which, such as 1400:5\n$")
-        self.assertEqual("hal can sdo read: 'serial' is no object; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names\n",
+        self.assertEqual("hal can sdo read: invalid object 'serial'; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names\n",
                          self.bad_can("sdo", "read", self.bus, "5", "serial"))
 
     def test_for_programs(self):
@@ -87,15 +87,15 @@ class Sdo(Node):
 
     def test_aborts_say_what_to_do(self):
         sdo = ("sdo", "read", self.bus, "5")
-        self.assertEqual("hal can sdo read: node 5, 2FFF:0: object does not exist in the object dictionary (0x06020000); the device's EDS lists the objects it has\n",
+        self.assertEqual("hal can sdo read: node 5, 2FFF:0: object does not exist in the object dictionary (0x06020000); see the EDS of the device for its objects\n",
                          self.bad_can(*sdo, "2fff"))
-        self.assertEqual("hal can sdo read: node 5, 1018:9: sub-index does not exist (0x06090011); sub-index 0 of the object tells the highest one it has\n",
+        self.assertEqual("hal can sdo read: node 5, 1018:9: sub-index does not exist (0x06090011); sub-index 0 is the highest sub-index of the object\n",
                          self.bad_can(*sdo, "1018:9"))
-        self.assertEqual("hal can sdo write: node 5, 1000:0: attempt to write a read-only object (0x06010002); it can only be read\n",
+        self.assertEqual("hal can sdo write: node 5, 1000:0: attempt to write a read-only object (0x06010002); the object is read-only\n",
                          self.bad_can("sdo", "write", self.bus, "5", "1000", "1"))
-        self.assertIn("(0x06070012); the object has another width: say --type, such as u16 or i32\n",
+        self.assertIn("(0x06070012); the object has another length: add --type, such as u16 or i32\n",
                       self.bad_can("sdo", "write", self.bus, "5", "1017", "1", "--type", "u32"))
-        self.assertEqual(f"hal can sdo read: node 9 did not answer within 0.15 s (asked for 1000:0); the bus is active; hal can scan {self.bus} shows who is there\n",
+        self.assertEqual(f"hal can sdo read: node 9 did not respond within 0.15 s (object 1000:0); the bus is active; to list the nodes: hal can scan {self.bus}\n",
                          self.bad_can("sdo", "read", self.bus, "9", "1000", "--timeout", "50ms"))
 
     def test_wrong_words(self):
@@ -105,13 +105,13 @@ class Sdo(Node):
         self.assertEqual("hal can sdo write: '-1' does not fit into UNSIGNED16 (0..65535)\n", self.bad_can(*sdo, "-1", "--type", "u16"))
         self.assertEqual("hal can sdo write: '40000' does not fit into INTEGER16 (-32768..32767)\n",
                          self.bad_can("sdo", "write", self.bus, "5", "6411:1", "40000", "--type", "i16"))
-        self.assertIn("'u17' is no data type; there are bool, i8", self.bad_can(*sdo, "1", "--type", "u17"))
-        self.assertEqual("hal can sdo write: '200' is no node; write 1 to 127\n", self.bad_can("sdo", "write", self.bus, "200", "1017", "1"))
+        self.assertIn("invalid --type 'u17'; write one of: bool, i8", self.bad_can(*sdo, "1", "--type", "u17"))
+        self.assertEqual("hal can sdo write: invalid node '200'; write 1..127\n", self.bad_can("sdo", "write", self.bus, "200", "1017", "1"))
         self.assertEqual("hal can sdo write: cannot read 'none.bin': No such file or directory\n", self.bad_can(*sdo, "--from", "none.bin"))
-        self.assertEqual("hal can sdo write: the value is missing or too many; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE for the value\n",
+        self.assertEqual("hal can sdo write: expected one value; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE in place of VALUE\n",
                          self.bad_can(*sdo))
         self.assertEqual("hal can sdo write: --block and --segmented exclude each other\n", self.bad_can(*sdo, "1", "--block", "--segmented"))
-        self.assertEqual("hal can sdo read: 'node.log' is no device description; hal can eds check node.log says why\n",
+        self.assertEqual("hal can sdo read: 'node.log' is not a valid device description; for the problems type: hal can eds check node.log\n",
                          self.bad_can("sdo", "read", self.bus, "5", "1000", "--eds", "node.log"))
 
 
@@ -129,7 +129,7 @@ class ReadAll(Node):
         self.assertIn("1018:4 Identity object, Serial, number = 0x00000001 (1)\n", done.stdout)
         self.assertIn("1000:0 Device type = ", done.stdout)
         self.assertIn("2FF0:0 Not in the device: refused: object does not exist in the object dictionary (0x06020000)\n", done.stdout)
-        self.assertRegex(done.stderr, r"^\d+ objects of node 5 read, 1 refused, \d+ write-only\n$")
+        self.assertRegex(done.stderr, r"^\d+ objects of node 5 read, 1 rejected, \d+ write-only\n$")
         self.assertRegex(self.can("read-all", self.bus, "5", "--eds", "more.eds", "-o", "all.csv"), r"^all\.csv: \d+ objects of node 5 read, 1 refused")
         with open(self.folder / "all.csv", newline="") as file:
             rows = {(row["index"], row["sub"]): row for row in csv.DictReader(file)}
@@ -164,7 +164,7 @@ class Dcf(Node):
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.write("moves.dcf", text.replace("[6411sub1]\n", "[6411sub1]\nParameterValue=5\n"))
         done = self.run_program("can", "dcf", "write", self.bus, "5", "moves.dcf", "--check")
-        self.assertEqual("hal can dcf write: left out: 6411:1 Write analogue output 16-bit, Analogue output 1: it moves the device\n", done.stderr)
+        self.assertEqual("hal can dcf write: skipped: 6411:1 Write analogue output 16-bit, Analogue output 1: it moves the device\n", done.stderr)
         # its replacement knows nothing of it
         self.can("sdo", "write", self.bus, "5", "6207:1", "0", "--type", "u8")
         self.can("pdo", "map", self.bus, "5", "tpdo2", "6401:1", "6401:2", "--transmission", "255", "--inhibit", "0ms")
@@ -175,20 +175,20 @@ class Dcf(Node):
         done = self.dcf()
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.assertRegex(done.stdout, r"\nnode 5: 5 of \d+ settings differed and were written\n"
-                                      r"they last until its power goes; to store them: hal can sdo write \S+ 5 1010:1 0x65766173 --type u32\n$")
+                                      r"not stored: they are lost at power-off; to store them: hal can sdo write \S+ 5 1010:1 0x65766173 --type u32\n$")
         self.assertRegex(self.dcf("--check").stdout, r"^node 5: 0 of \d+ settings differ\n$")
         shown = {p["pdo"]: p for p in map(json.loads, self.can("pdo", "show", self.bus, "5", "--json").splitlines())}
         self.assertEqual((True, [(0x6401, 2, 16)]), (shown["TPDO2"]["on"], [(m["index"], m["sub"], m["bits"]) for m in shown["TPDO2"]["mapping"]]))
 
     def test_wrong_words(self):
-        self.assertEqual("hal can dcf read: which objects the node has is not known; add --eds FILE\n", self.bad_can("dcf", "read", self.bus, "5"))
-        self.assertEqual("hal can dcf read: two words are needed; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf\n",
+        self.assertEqual("hal can dcf read: missing --eds FILE: the description lists the objects of the node\n", self.bad_can("dcf", "read", self.bus, "5"))
+        self.assertEqual("hal can dcf read: expected ADDRESS NODE; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf\n",
                          self.bad_can("dcf", "read", self.bus, "--eds", "io.eds"))
-        self.assertEqual("hal can dcf write: three words are needed; type: hal can dcf write ADDRESS NODE FILE.dcf\n",
+        self.assertEqual("hal can dcf write: expected ADDRESS NODE FILE; type: hal can dcf write ADDRESS NODE FILE.dcf\n",
                          self.bad_can("dcf", "write", self.bus, "5"))
         self.assertEqual("hal can dcf write: cannot read 'none.dcf': No such file or directory\n",
                          self.bad_can("dcf", "write", self.bus, "5", "none.dcf"))
-        self.assertEqual("hal can dcf write: 'io.eds' has no settings: it has no ParameterValue that could be written; hal can dcf read makes such a file\n",
+        self.assertEqual("hal can dcf write: 'io.eds' has no settings: no ParameterValue to write; to create such a file: hal can dcf read\n",
                          self.bad_can("dcf", "write", self.bus, "5", "io.eds"))
         self.assertEqual(f"hal can dcf read: node 9 did not answer within 0.15 s (asked for 1005:0 COB-ID SYNC); the bus is active; "
                          f"hal can scan {self.bus} shows who is there\n",
@@ -209,7 +209,7 @@ class Pdo(Node):
 
     def test_map_and_switch(self):
         text = self.can("pdo", "map", self.bus, "5", "tpdo1", "6401:1", "6000:2/8", "--transmission", "3", "--inhibit", "5ms", "--event", "2s")
-        self.assertEqual("TPDO1        185  every 3 SYNCs, 5 ms apart or after 2000 ms\n                  6401:1/16\n                  6000:2/8\n", text)
+        self.assertEqual("TPDO1        185  every 3 SYNCs, inhibit time 5 ms or after 2000 ms\n                  6401:1/16\n                  6000:2/8\n", text)
         self.can("pdo", "disable", self.bus, "5", "tpdo1")
         self.assertFalse(self.shown()["TPDO1"]["on"])
         self.can("pdo", "enable", self.bus, "5", "tpdo1")
@@ -220,15 +220,15 @@ class Pdo(Node):
     def test_a_mapping_the_node_refuses_leaves_the_old_one(self):
         before = self.shown()["RPDO1"]
         self.assertEqual("hal can pdo map: node 5, 1600:2 (to map 6000:1/8): object cannot be mapped to a PDO (0x06040041); the device's EDS says which objects can be: "
-                         "PDOMapping=1\nhal can pdo map: RPDO1 is as it was before\n",
+                         "PDOMapping=1\nhal can pdo map: RPDO1 restored\n",
                          self.bad_can("pdo", "map", self.bus, "5", "rpdo1", "6200:1", "6000:1"))
         self.assertEqual(before, self.shown()["RPDO1"])
 
     def test_wrong_words(self):
-        self.assertEqual("hal can pdo map: these are 72 bits, and a PDO holds 64; map 8 bits less, or use a second PDO\n",
+        self.assertEqual("hal can pdo map: mapping too long: 72 bits, a PDO holds 64; map 8 bits less, or use a second PDO\n",
                          self.bad_can("pdo", "map", self.bus, "5", "tpdo1", "1000/32", "1018:1/32", "6000:1"))
-        self.assertEqual("hal can pdo disable: 'pdo1' is no PDO; write rpdo1 to rpdo512 or tpdo1 to tpdo512\n", self.bad_can("pdo", "disable", self.bus, "5", "pdo1"))
-        self.assertEqual(f"hal can pdo enable: node 5 has no TPDO77; hal can pdo show {self.bus} 5 shows those it has\n",
+        self.assertEqual("hal can pdo disable: invalid PDO 'pdo1'; write rpdo1 to rpdo512 or tpdo1 to tpdo512\n", self.bad_can("pdo", "disable", self.bus, "5", "pdo1"))
+        self.assertEqual(f"hal can pdo enable: node 5 has no TPDO77; to list its PDOs: hal can pdo show {self.bus} 5\n",
                          self.bad_can("pdo", "enable", self.bus, "5", "tpdo77"))
         self.assertEqual("hal can pdo map: RPDO1 has no inhibit time\n", self.bad_can("pdo", "map", self.bus, "5", "rpdo1", "--inhibit", "5ms"))
 
@@ -248,7 +248,7 @@ class Pdo(Node):
         self.assertEqual([{"time": 0.0, "pdo": "RPDO1", "values": {"6200:1": 17, "6200:2": 34}}, {"time": 0.5, "pdo": "TPDO1", "values": {"6000:1": 1, "6000:2": 2}},
                           {"time": 0.6, "pdo": "RPDO1", "values": {"6200:1": 17}}], seen)
         self.assertIn("short: 1 of 2 bytes", self.run_program("can", "pdo", "watch", "replay:c.log", "5", "--eds", "io.eds").stdout)
-        self.assertEqual("hal can pdo watch: a capture cannot be asked which PDOs the node has; add --eds FILE, an EDS or DCF with them\n",
+        self.assertEqual("hal can pdo watch: cannot read the PDOs of a node from a capture; add --eds FILE, an EDS or DCF that describes them\n",
                          self.bad_can("pdo", "watch", "replay:c.log", "5"))
 
 
@@ -260,26 +260,26 @@ class Lss(Node):
 
     def test_a_node_without_id_is_found_and_gets_one(self):
         identity = r"vendor (0x\w+), product (0x\w+), revision (0x\w+), serial (0x00000001)"
-        found = re.fullmatch(identity + ", now in configuration\n", self.can("lss", self.bus, "scan"))
+        found = re.fullmatch(identity + ", now in the configuration state\n", self.can("lss", self.bus, "scan"))
         self.assertTrue(found)
-        self.assertRegex(self.can("lss", self.bus, "inquire"), f"^{identity}, no node id\n$")
+        self.assertRegex(self.can("lss", self.bus, "inquire"), f"^{identity}, no node ID\n$")
         self.can("lss", self.bus, "node-id", "5")
         self.can("lss", self.bus, "store")
         self.can("lss", self.bus, "switch", "waiting")
         wait_until(lambda: Node.ready(self), "the node has its id")
-        self.assertEqual("hal can lss: no slave answered; so none is without node id, as far as they know LSS\n", self.bad_can("lss", self.bus, "identify"))
-        self.assertEqual("there is such a slave\n", self.can("lss", self.bus, "identify", *found.groups()))
+        self.assertEqual("hal can lss: no slave responded; no unconfigured slave that supports LSS\n", self.bad_can("lss", self.bus, "identify"))
+        self.assertEqual("slave identified\n", self.can("lss", self.bus, "identify", *found.groups()))
         self.can("lss", self.bus, "select", *found.groups())
-        self.assertIn(", node id 5\n", self.can("lss", self.bus, "inquire"))
+        self.assertIn(", node ID 5\n", self.can("lss", self.bus, "inquire"))
 
     def test_what_goes_wrong(self):
-        self.assertEqual("hal can lss: no slave answered; one slave has to be in configuration: see switch and select in: hal help can lss\n",
+        self.assertEqual("hal can lss: no slave responded; one slave must be in the configuration state: see switch and select in: hal help can lss\n",
                          self.bad_can("lss", self.bus, "node-id", "5"))
         self.can("lss", self.bus, "switch", "configuration")
-        self.assertEqual("hal can lss: '300k' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k\n", self.bad_can("lss", self.bus, "bit-rate", "300k"))
-        self.assertEqual("hal can lss: '128' is no node id; write 1 to 127, or none\n", self.bad_can("lss", self.bus, "node-id", "128"))
+        self.assertEqual("hal can lss: invalid bit rate '300k'; write 1M, 800k, 500k, 250k, 125k, 50k, 20k or 10k\n", self.bad_can("lss", self.bus, "bit-rate", "300k"))
+        self.assertEqual("hal can lss: invalid node ID '128'; write 1..127, or none\n", self.bad_can("lss", self.bus, "node-id", "128"))
         self.assertEqual("hal can lss: unknown command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
-        self.assertEqual("hal can lss: select takes other words; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
+        self.assertEqual("wrong arguments of hal can lss: select; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
         self.assertEqual("hal can lss: 'x' is no vendor id; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
 
 
@@ -299,13 +299,13 @@ class Watch(Node):
             (10.0, "705#05"), (10.1, "705#05"), (10.2, "705#05"), (10.3, "086#0000000000000000"), (11.2, "080#"))))
         text = self.good_on("nodes", "replay:seen.log")
         self.assertEqual("node  state                 heard  boot-ups  emergencies\n"
-                         "   5  operational          1.00 s         0  0; SILENT: its heartbeats came every 0.10 s\n"
+                         "   5  operational          1.00 s         0  0; OFFLINE: heartbeats were 0.10 s apart\n"
                          "   6  no heartbeat              -         0  1\n"
-                         "                                               no error any more, 0.9 s ago\n", text)
+                         "                                               error reset, 0.9 s ago\n", text)
 
     def test_changed_bytes_are_marked(self):
         (self.folder / "seen.log").write_text("(1.000000) can0 181#0102\n(1.010000) can0 181#0103\n(1.020000) can0 182#AA\n")
-        self.assertEqual("      id    frames      period  data, what changed marked\n     181         2     10.0 ms  01 03*\n"
+        self.assertEqual("      id    frames      period  data, changed bytes marked\n     181         2     10.0 ms  01 03*\n"
                          "     182         1           -  AA\n", self.good_on("sniff", "replay:seen.log"))
 
     def test_what_is_produced_and_generated(self):
@@ -318,7 +318,7 @@ class Watch(Node):
                 self.assertEqual(0, self.run_program("can", *words, "--every", "10ms", "--count", 3).returncode)
                 listener.communicate(timeout=2 * TIMEOUT)
                 self.assertEqual(lines, [line.split()[2] for line in (self.folder / "seen.log").read_text().splitlines()])
-        self.assertEqual("hal can produce: unknown 'synk'; did you mean 'sync'?\n", self.bad("can", "produce", self.bus, "synk"))
+        self.assertEqual("hal can produce: unknown kind 'synk'; did you mean 'sync'?\n", self.bad("can", "produce", self.bus, "synk"))
         self.assertIn("invalid --id '800'", self.bad("can", "generate", self.bus, "--id", "800"))
 
     def begin(self, command, *words):
@@ -345,7 +345,7 @@ class Flash(Node):
         node.stdout.readline()
         text = self.good("can", "flash", self.bus, 6, "new.bin")
         self.assertRegex(text, r"^node 6: stopping the program\nnode 6: erasing the flash\nnode 6: downloading \d+ bytes\nnode 6: starting the program\n"
-                               r"node 6: runs, software identification 0x[0-9A-F]{8}\n$")
+                               r"node 6: program running, software identification 0x[0-9A-F]{8}\n$")
         (self.folder / "bad.bin").write_bytes(b"not a program at all, and long enough")
         self.assertEqual("hal can flash: node 6, 1F50:1: data cannot be transferred or stored to the application (0x08000020); the device does not take "
                          "this image, and may have no usable program now: is it made for this device?\n", self.bad("can", "flash", self.bus, 6, "bad.bin"))

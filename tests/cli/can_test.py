@@ -86,7 +86,7 @@ class Dump(Can):
         self.write("c.log", CAPTURE)
         done = self.run_program("can", "dump", "replay:c.log?bitrate=500k")
         self.assertEqual(DUMPED, done.stdout)
-        self.assertRegex(done.stderr, r"listening on replay:c\.log \(capture, 500000 bit/s\); Ctrl-C ends it\n20 frames in \S+ s, bus load \S+ %, 0 errors, 0 lost\n$")
+        self.assertRegex(done.stderr, r"listening on replay:c\.log \(capture, 500000 bit/s\); press Ctrl-C to end\n20 frames in \S+ s, bus load \S+ %, 0 errors, 0 lost\n$")
 
     def test_json_is_a_line_each_and_statistics(self):
         self.write("c.log", CAPTURE)
@@ -105,15 +105,15 @@ class Dump(Can):
 
     def test_wrong_words(self):
         self.write("c.log", CAPTURE)
-        self.assertEqual("hal can dump: 'xyz' is no filter; write an identifier in hex, 181, or one with the bits that count, 180/780\n",
+        self.assertEqual("hal can dump: invalid filter 'xyz'; write an identifier in hex, 181, or one with a mask, 180/780\n",
                          self.bad_can("dump", "replay:c.log", "--filter", "xyz"))
-        self.assertEqual("hal can dump: 'bus' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+        self.assertEqual("hal can dump: 'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
                          "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE\n", self.bad_can("dump", "bus"))
         self.assertEqual("hal can dump: 'sim:arm' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to "
                          "one that they do: hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and "
                          "here udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))
-        self.assertIn("hal can dump: 'more' is no address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
-        self.assertEqual("hal can dump: --time: unknown form 'utc'; use relative, delta or absolute\n",
+        self.assertIn("hal can dump: 'more' is not the address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
+        self.assertEqual("hal can dump: invalid --time 'utc'; write relative, delta or absolute\n",
                          self.bad_can("dump", "replay:c.log", "--time", "utc"))
         self.assertEqual("hal: unknown command 'can dmp'; did you mean 'can dump'?\n", self.bad_can("dmp"))
         self.assertEqual("hal: unknown command 'can qqqqqqqq'; type: hal help can\n", self.bad_can("qqqqqqqq"))
@@ -151,7 +151,7 @@ class Dump(Can):
         done = self.run_program("can", "dump", "replay:c.log", "replay:second.log?bitrate=500k")
         rows = [line.split()[1] for line in done.stdout.splitlines()]
         self.assertEqual((20, 20), (rows.count("c.log"), rows.count("second.log")))
-        self.assertIn("listening on replay:c.log (capture), replay:second.log (capture, 500000 bit/s); Ctrl-C ends it\n", done.stderr)
+        self.assertIn("listening on replay:c.log (capture), replay:second.log (capture, 500000 bit/s); press Ctrl-C to end\n", done.stderr)
         self.assertRegex(done.stderr, r"\nc\.log: 20 frames in .*\nsecond\.log: 20 frames in ")
 
 
@@ -194,15 +194,15 @@ class Send(Can):
 
     def test_wrong_frames_are_named(self):
         for frame, text in (
-                ("123", "'123' is no frame: write IDENTIFIER#DATA, such as 123#1122AABB"),
-                ("12#00", "'12#00' is no frame: '12' is no identifier; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one"),
-                ("800#00", "'800#00' is no frame: '800' is no identifier; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one"),
-                ("123#1", "'123#1' is no frame: behind # stand up to 8 bytes of two hex digits, or R and the length asked for; FD is written ##"),
-                ("123##0" + "00" * 9, f"'123##0{'00' * 9}' is no frame: behind ## stand one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, "
+                ("123", "invalid frame '123': write IDENTIFIER#DATA, such as 123#1122AABB"),
+                ("12#00", "invalid frame '12#00': invalid identifier '12'; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one"),
+                ("800#00", "invalid frame '800#00': invalid identifier '800'; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one"),
+                ("123#1", "invalid frame '123#1': after #, write up to 8 bytes of two hex digits, or R and the requested length; CAN FD is written ##"),
+                ("123##0" + "00" * 9, f"invalid frame '123##0{'00' * 9}': behind ## stand one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, "
                                       "24, 32, 48 or 64 bytes")):
             self.assertEqual(f"hal can send: {text}\n", self.bad_can("send", self.bus, "080#", frame))
-        self.assertEqual("hal can send: the frame is missing; type: hal can send ADDRESS 123#1122AABB\n", self.bad_can("send", self.bus))
-        self.assertEqual("hal can send: --for and --count say when to end what --every repeats; add --every 10ms\n",
+        self.assertEqual("hal can send: missing frame; type: hal can send ADDRESS 123#1122AABB\n", self.bad_can("send", self.bus))
+        self.assertEqual("hal can send: --for and --count limit the repetition of --every; add --every 10ms\n",
                          self.bad_can("send", self.bus, "080#", "--for", "1s"))
 
     def test_nmt(self):
@@ -211,8 +211,8 @@ class Send(Can):
             self.good("can", "nmt", self.bus, *words)
         self.assertEqual(["0100", "8205", "807F"], [json.loads(line).get("data") for line in self.result(dump)[0].splitlines()[:3]])
         self.assertEqual("hal can nmt: unknown command 'strt'; did you mean 'start'?\n", self.bad_can("nmt", self.bus, "strt", "1"))
-        self.assertEqual("hal can nmt: '128' is no node; write 1 to 127, or all\n", self.bad_can("nmt", self.bus, "start", "128"))
-        self.assertEqual("hal can nmt: three words are needed; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all\n",
+        self.assertEqual("hal can nmt: invalid node '128'; write 1..127, or all\n", self.bad_can("nmt", self.bus, "start", "128"))
+        self.assertEqual("hal can nmt: expected ADDRESS NODE FILE; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all\n",
                          self.bad_can("nmt", self.bus, "start"))
 
 
@@ -230,14 +230,14 @@ class RecordAndReplay(Can):
     def test_wrong_words(self):
         self.write("c.log", CAPTURE)
         self.write("text.log", "nothing\n")
-        self.assertEqual("hal can record: 'c.txt' must end in .log (candump's form) or .pcapng (Wireshark)\n", self.bad_can("record", self.bus, "c.txt"))
-        self.assertEqual("hal can replay: --speed is a factor above 0: 1 as recorded, 2 twice as fast\n",
+        self.assertEqual("hal can record: unknown format of 'c.txt'; write a name that ends in .log (candump) or .pcapng (Wireshark)\n", self.bad_can("record", self.bus, "c.txt"))
+        self.assertEqual("hal can replay: invalid --speed; write a factor above 0: 1 as recorded, 2 twice as fast\n",
                          self.bad_can("replay", "c.log", self.bus, "--speed", "0"))
         self.assertEqual("hal can replay: --speed: 'fast' is not a number; see: hal help can replay\n",
                          self.bad_can("replay", "c.log", self.bus, "--speed", "fast"))
         self.assertIn("text.log", self.bad_can("replay", "text.log", self.bus))
         self.assertIn("none.log", self.bad_can("replay", "none.log", self.bus))
-        self.assertEqual("hal can replay: 'replay:c.log' is no bus; a capture cannot be sent to\n", self.bad_can("replay", "c.log", "replay:c.log"))
+        self.assertEqual("hal can replay: cannot send to 'replay:c.log': it is a capture\n", self.bad_can("replay", "c.log", "replay:c.log"))
 
 
 class Load(Can):
@@ -248,7 +248,7 @@ class Load(Can):
         rows = {line[:8].strip(): line for line in done.stdout.splitlines()}
         self.assertIn("TPDO1 of node 2", rows["182"])
         self.assertGreater(float(rows["all"].split()[-1]), 0)
-        self.assertIn("no percent without a bit rate: add ?bitrate=500k to the address", self.run_program("can", "load", "replay:c.log").stderr)
+        self.assertIn("load unknown without a bit rate; add ?bitrate=500k to the address", self.run_program("can", "load", "replay:c.log").stderr)
 
 
 class Scan(Can):
@@ -277,7 +277,7 @@ class Scan(Can):
                          "   5  pre-operational  0x00020192  0x11223344  0x00000002  0x00000003  -           402 drive\n", text)
 
     def test_nobody_there(self):
-        self.assertEqual("hal can scan: no node answered within 0.2 s; the bus is active, 0 frames of others were heard; are bit rate and wiring right?\n",
+        self.assertEqual("hal can scan: no node responded within 0.2 s; the bus is active, 0 frames of others received; check bit rate and wiring\n",
                          self.bad_can("scan", self.bus, "--for", "200ms"))
 
 
@@ -310,10 +310,10 @@ class Plan(Case):
                          "     101       7    125       3.500       3.250       3.000    92 %  B\n"
                          "     102       7    125       3.500       3.250       3.500   108 %  LATE C\n"
                          "3 messages at 125000 bit/s: load 97.1 % with all stuff bits\n", done.stdout)
-        self.assertEqual("plan.canopen:8: 102 (C) needs 3.500 ms and has 3.250 ms: 1.000 for 1 of its own before it + 3 x 1.000 for 100 "
+        self.assertEqual("plan.canopen:8: 102 (C) needs 3.500 ms, deadline 3.250 ms: 1.000 for 1 earlier instances of itself + 3 x 1.000 for 100 "
                          "+ 2 x 1.000 for 101 + 1.000 for itself - 3.500 since it was due\n"
-                         "  = help: with bitrate = 250k everything is in time\n"
-                         "  = help: with every period 10 % longer and the deadlines as they are, everything is in time\n", done.stderr)
+                         "  = help: with bitrate = 250k every message meets its deadline\n"
+                         "  = help: with every period 10 % longer and unchanged deadlines, every message meets its deadline\n", done.stderr)
 
     def test_good_plan(self):
         self.write("plan.canopen", PLAN.replace("125k", "250k"))
@@ -330,7 +330,7 @@ class Plan(Case):
         done = self.run_program("canopen", "plan", "arm.canopen")
         self.assertEqual(1, done.returncode)
         self.assertIn("17 frames with each SYNC of 1 ms take 1.895 ms at most: 189.5 %\n", done.stdout)
-        self.assertIn("  = help: the SYNC comes with each cycle of the thread, here taken as 1ms; for another period add: --cycle 2ms\n", done.stderr)
+        self.assertIn("  = help: the SYNC is sent every cycle of the thread, assumed to be 1ms; for another period add: --cycle 2ms\n", done.stderr)
 
     def test_a_bus_in_Ethernet_frames_has_another_plan(self):
         self.write("arm.canopen", AXES.replace("sim:arm", "cane:sim:arm") + "[node 1 x]\ntype = drive\n")

@@ -42,7 +42,7 @@ class Drive(Case):
         """A command that succeeds and leaves the axis in motion says so."""
         done = self.run_program("can", "drive", self.bus, "--node", 2, *words)
         self.assertEqual(0, done.returncode, done.stderr)
-        self.assertEqual(f"hal can drive: A: still moving, and not supervised any more; to stop it: hal can drive {self.bus} --node 2 A stop\n",
+        self.assertEqual(f"hal can drive: A: still moving, no longer supervised; to stop it: hal can drive {self.bus} --node 2 A stop\n",
                          done.stderr)
         return done.stdout
 
@@ -97,7 +97,7 @@ class OneShot(Drive):
         self.drive("A", "set", "home-offset", 500)
         self.assertRegex(self.drive("A", "home", 23), r"^A: homed, at ")
         self.assertRegex(self.drive("A", "go", 500), r"^A: at (49\d|50\d|510)\n$")
-        self.assertEqual("A: the drive knows no homing method 99; it has 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 17, 18, 19, 20, 21, 22, 23, "
+        self.assertEqual("A: the drive does not support homing method 99; it has 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 17, 18, 19, 20, 21, 22, 23, "
                          "24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37\n",
                          self.refused("A", "home", 99))
 
@@ -105,10 +105,10 @@ class OneShot(Drive):
         self.node("--set", "dc-link-0=10")
         self.assertRegex(self.refused("A", "on"),
                          r'^A: enable: drive stays in "switch on disabled" after "shutdown" for \d+\.\d\d s \(statusword 0x0260\); '
-                         r"voltage-enabled is 0: has its power stage supply\?\n$")
+                         r"voltage-enabled is 0: check the supply of the power stage\n$")
         self.assertEqual("B: node 2 has no such axis: object 6841 is missing\n", self.refused("B", "on"))
         self.assertRegex(self.bad("can", "drive", self.bus, "--node", 9, "--timeout", "50ms", "A", "on"),
-                         r"^hal can drive: node 9 did not answer within 0.15 s \(asked for 6041:0\); the bus is active; hal can scan udp:\S+ shows who is there\n$")
+                         r"^hal can drive: node 9 did not respond within 0.15 s \(object 6041:0\); the bus is active; to list the nodes: hal can scan udp:\S+\n$")
 
     def test_faults_and_reset(self):
         self.node("--set", "encoder-broken-0=1")
@@ -242,7 +242,7 @@ class EveryEnd(Drive):
         self.assertRegex(done.stdout, r"^A: on\nA: speed 500\nA: stopped and off, at -?\d+ \(end of input\)\n$")
         done = self.run_program("can", "drive", self.bus, "--node", 2, given="A on\nA speed 500\nquit\n")
         self.assertEqual((0, "A: on\nA: speed 500\n"), (done.returncode, done.stdout))
-        self.assertIn("A: still moving, and not supervised any more", done.stderr)
+        self.assertIn("A: still moving, no longer supervised", done.stderr)
         self.assertEqual("A: state operation enabled\n", self.drive("A", "state?"))
 
     def test_a_closed_terminal_stops_the_axis(self):
@@ -316,12 +316,12 @@ class EveryEnd(Drive):
     def test_every_command_ends_in_time(self):
         self.node("--motor", "endless:1")
         self.drive("A", "on")
-        self.assertRegex(self.refused("A", "go", 1e9, "within", "1s"), r"^A: not done within 1 s \(timeout\); the axis was stopped at \d+; for more "
+        self.assertRegex(self.refused("A", "go", 1e9, "within", "1s"), r"^A: not done within 1 s \(timeout\); axis stopped at \d+; for more "
                          r"time add: within 2s\nhal can drive: A: stopped and off, at \d+ \(after the failure\)\n$")
         self.drive("A", "on")
-        self.assertRegex(self.refused("--within", "1s", "A", "home", 17), r"^A: not done within 1 s \(timeout\); the axis was stopped at -?\d+; ")
+        self.assertRegex(self.refused("--within", "1s", "A", "home", 17), r"^A: not done within 1 s \(timeout\); axis stopped at -?\d+; ")
         self.assertEqual("A: state switch on disabled\n", self.drive("A", "state?"))
-        self.assertEqual("go within what? type: A go within 30s\n", self.refused("A", "go", 5, "within"))
+        self.assertEqual("go: missing time after within; type: A go within 30s\n", self.refused("A", "go", 5, "within"))
         self.assertEqual("invalid --supervise '1ms'; write 50ms to 65s, or off\n", self.refused("--supervise", "1ms", "A", "on"))
 
 
@@ -398,11 +398,11 @@ GB:5
 """)
         self.assertEqual(1, done.returncode)
         self.assertEqual("""A: is not on (drive is in "switch on disabled"); type: A on
-'ON:' has no axis; write ONA: to ONH:
+missing axis in 'ON:'; write ONA: to ONH:
 'I' is not an axis; write ONA: to ONH:
 ONA cannot be asked; type: ONA:
 APA cannot be set; type: APA?
-nothing is expected behind ONA:
+unexpected argument after ONA:
 GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
 GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
 GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
@@ -441,32 +441,32 @@ A
         self.assertEqual(1, done.returncode)
         self.assertEqual("""unknown command 'foo'; type: help
 unknown command 'st'; did you mean 'set'?
-'x' is no number; type: A go POSITION [relative] [nowait]
-A: 1e+12 is 1e+12 of the drive's counts; its positions go from -2147483648 to 2147483647
+invalid number 'x'; type: A go POSITION [relative] [nowait]
+position A: 1e+12 is 1e+12 counts, out of the range -2147483648..2147483647 of the drive
 type: A go POSITION [relative] [nowait]
-there is no value 'max-sped'; did you mean 'max-speed'?
-max-speed -1 is -1 in the drive's units, which go from 0 to 4294967295
-'fast' is no number; type: A set max-speed NUMBER
-'1/0' is no factor; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0
-there is no value 'speed-limit'; type: help
-csp wants a set-point every cycle; use component cia402 in a netlist
+unknown parameter 'max-sped'; did you mean 'max-speed'?
+max-speed -1 is -1 in drive units, out of the range 0..4294967295
+invalid number 'fast'; type: A set max-speed NUMBER
+invalid factor '1/0'; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0
+unknown parameter 'speed-limit'; type: help
+mode csp needs a set-point every cycle; use component cia402 in a netlist
 homing is a command: A home
-'xy' is no mode; write pp, pv, tq or vl
-'1.5' is no homing method; write 1 to 37, or what the drive's manual has below 0
-nothing is expected at 'now'; type: A on
-'I' is no axis; write A to H
-what shall axis A do? type: help
+invalid mode 'xy'; write pp, pv, tq or vl
+invalid homing method '1.5'; write 1..37, or a negative one of the drive's manual
+unexpected argument 'now'; type: A on
+invalid axis 'I'; write A to H
+missing command for axis A; type: help
 """, done.stderr.replace("hal can drive: ", ""))
 
     def test_command_line(self):
         def bad(*words):
             return self.bad("can", "drive", *words)
-        self.assertEqual("hal can drive: the address is missing; type: hal can drive can:can0 --node 2 A on\n", bad())
-        self.assertEqual(f"hal can drive: which node? type: hal can drive {self.bus} --node 2\n", bad(self.bus))
-        self.assertEqual("hal can drive: '200' is no node; write 1 to 127\n", bad(self.bus, "--node", 200))
-        self.assertEqual("hal can drive: 'Z' is no axis; write A to H\n", bad(self.bus, "--node", 2, "--axis", "Z", "on"))
+        self.assertEqual("hal can drive: missing address; type: hal can drive can:can0 --node 2 A on\n", bad())
+        self.assertEqual(f"hal can drive: missing --node; type: hal can drive {self.bus} --node 2\n", bad(self.bus))
+        self.assertEqual("hal can drive: invalid node '200'; write 1..127\n", bad(self.bus, "--node", 200))
+        self.assertEqual("hal can drive: invalid axis 'Z'; write A to H\n", bad(self.bus, "--node", 2, "--axis", "Z", "on"))
         self.assertEqual("hal can drive: unknown option '--nod'; see: hal help can drive\n", bad(self.bus, "--nod", 2))
-        self.assertEqual("hal can drive: something is missing behind --node\n", bad(self.bus, "--node"))
+        self.assertEqual("hal can drive: missing value of --node\n", bad(self.bus, "--node"))
         self.assertEqual("hal can drive: invalid duration 'soon'; use 200ms or 1s\n", bad(self.bus, "--node", 2, "--timeout", "soon"))
         self.assertIn("--node N", self.good("help", "can", "drive"))
         self.assertIn("hal can drive: 'bus:0'", bad("bus:0", "--node", 2, "A", "on"))

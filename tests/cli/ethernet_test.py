@@ -81,8 +81,8 @@ class Segment(Case):
         node = lambda *words: subprocess.run(["hal", "node", "axis-io", "--id", "1", *words], executable=str(HAL), env=self.environment, text=True,
                                              stdout=subprocess.PIPE, stderr=subprocess.PIPE).stderr
         self.assertIn("write --link cane:eth0 with --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
-        self.assertIn("--skew is of a station in a TDMA; add --tdma FILE, its schedule\n", node("--link", "cane:lo", "--skew", "200ppm"))
-        self.assertIn("there is no option 'slots'; there are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue, "
+        self.assertIn("--skew needs a TDMA schedule; add --tdma FILE\n", node("--link", "cane:lo", "--skew", "200ppm"))
+        self.assertIn("unknown option 'slots'; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue, "
                       "and of cane: format, order, slot, priority, learn, to, master, also, key, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
                       node("--link", "cane:lo?slots=3"))
         with_mac = self.folder / "mac.tdma"

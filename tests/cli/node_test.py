@@ -65,9 +65,9 @@ class Devices(Node):
         text = self.ended(io)
         first, *rest = text.splitlines()
         self.assertEqual(f"io, node 5 on {self.bus} (CAN over UDP multicast): CiA 401, 64 digital inputs, 64 outputs, 12 analogue inputs and 12 outputs; "
-                         "Ctrl-C ends it", re.sub(r"on \S+ \([^)]*\)", f"on {self.bus} (CAN over UDP multicast)", first))
+                         "press Ctrl-C to end", re.sub(r"on \S+ \([^)]*\)", f"on {self.bus} (CAN over UDP multicast)", first))
         self.assertRegex(rest[0], r"^ +0\.\d{3} s  pre-operational$")
-        self.assertRegex(text, r"\n\d+\.\d s: \d+ frames sent, \d+ received, 0 dropped, 0 lost on the wire, 0 lost here, 0 rejected; [1-9]\d* SDO transfers, 0 aborted; [1-9]\d* PDOs sent\n"
+        self.assertRegex(text, r"\n\d+\.\d s: \d+ frames sent, \d+ received, 0 dropped, 0 lost in transit, 0 lost here, 0 rejected; [1-9]\d* SDO transfers, 0 aborted; [1-9]\d* PDOs sent\n"
                                r"outputs 0{64}, at their error values\n$")
 
     def test_world_around_it_is_set_now_and_later(self):
@@ -118,7 +118,7 @@ class Devices(Node):
         self.expect(again, "program 2.1 runs")
 
     def test_a_flash_that_cannot_be_kept_is_said(self):
-        self.assertEqual("hal node bootloader: there is no folder for 'nowhere/flash.bin'; type: mkdir -p nowhere\n",
+        self.assertEqual("hal node bootloader: cannot create 'nowhere/flash.bin': missing folder; type: mkdir -p nowhere\n",
                          self.bad("node", "bootloader", "--link", self.bus, "--id", 4, "--flash", "nowhere/flash.bin"))
         (self.folder / "nowhere").mkdir()
         device = self.node("bootloader", "--id", 4, "--flash", "nowhere/flash.bin")
@@ -210,32 +210,32 @@ class Masters(Node):
 class WrongWords(Node):
     def test_each_says_what_to_type(self):
         cases = {
-            ("io",): "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node io",
-            ("io", "--link", self.bus): "which node-id shall it have? add --id 5; none for one that an LSS master gives",
-            ("io", "--link", self.bus, "--id", "128"): "'128' is no node-id; write 1 to 127, 0x50, or none for one that an LSS master gives",
-            ("io", "--link", "bus", "--id", "5"): "'bus' is no address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
+            ("io",): "missing --link; add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node io",
+            ("io", "--link", self.bus): "missing --id: use --id 5, or --id none to wait for an LSS master",
+            ("io", "--link", self.bus, "--id", "128"): "invalid --id '128'; write 1..127, 0x50, or none to wait for an LSS master",
+            ("io", "--link", "bus", "--id", "5"): "'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
                                                   "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE",
-            ("io", "--link", self.bus, "--id", "5", "--set", "in-64=1"): "there is no 'in-64' to set; there are in-0 … in-63, analog-in-0 … analog-in-11",
-            ("io", "--link", self.bus, "--id", "5", "--set", "in-6"): "'in-6' sets nothing; write NAME=VALUE, or NAME=VALUE@2s for later",
-            ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "nothing can be set of a bootloader",
-            ("bootloader", "--make-image", "2"): "'2' is no version; write 2.1",
+            ("io", "--link", self.bus, "--id", "5", "--set", "in-64=1"): "unknown value 'in-64' in --set; write one of: in-0 … in-63, analog-in-0 … analog-in-11",
+            ("io", "--link", self.bus, "--id", "5", "--set", "in-6"): "invalid --set 'in-6'; write NAME=VALUE, or NAME=VALUE@2s for later",
+            ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "invalid --set: a b has no settable valuesootloader",
+            ("bootloader", "--make-image", "2"): "invalid version '2'; write 2.1",
             ("drive", "--link", self.bus, "--id", "5", "--motor", "weight:3"):
-                "'weight:3' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of resolution, endless, inertia, viscous-friction, "
+                "invalid motor parameter 'weight:3'; write NAME:VALUE, as in inertia:1e-4; names: resolution, endless, inertia, viscous-friction, "
                 "coulomb-friction, rated-torque, peak-torque, rated-current, rated-voltage, highest-speed, start, negative-limit, positive-limit, "
                 "negative-stop, positive-stop, home-from, home-to, brake-torque",
-            ("jr3", "--record", "line.bin"): "for how long? add --for 2s; the calibration comes through in 1.02 s",
+            ("jr3", "--record", "line.bin"): "missing --for; add --for 2s, the calibration takes 1.02 s",
             ("jr3", "--link", self.bus, "--stream", "none.bin"): "cannot read 'none.bin': No such file or directory",
-            ("io", "--link", self.bus, "--id", "5", "--fault", "mute:every=0"): "'every=0' is no property of the fault mute; write every=3, from=5s or for=1s",
+            ("io", "--link", self.bus, "--id", "5", "--fault", "mute:every=0"): "invalid property 'every=0' of fault mute; write every=3, from=5s or for=1s",
         }
         for words, said in cases.items():
             self.assertEqual(f"hal node {words[0]}: {said}\n", self.bad("node", *words))
         self.assertIn("--axes: Value 9 not in range 1 to 8", self.bad("node", "drive", "--axes", "9"))
         self.assertEqual("hal: unknown command 'node drve'; did you mean 'node drive'?\n", self.bad("node", "drve"))
-        self.assertIn("there is no fault 'lat-sdo'; there are mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
+        self.assertIn("unknown fault 'lat-sdo'; use one of: mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
 
     def test_faults_are_listed(self):
         text = self.good("node", "faults")
-        self.assertIn("late-sdo        every SDO answer leaves late, by `time`; time=700ms\n", text)
+        self.assertIn("late-sdo        every SDO response is delayed by `time`; time=700ms\n", text)
         self.assertEqual(32, text.count("\n"))
 
 

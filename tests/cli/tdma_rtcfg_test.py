@@ -95,7 +95,7 @@ class Rtcfg(Segment):
         self.assertIn("TDMA: running, ", self.said("node"))
         nobody = self.at("x", HAL, "node", "axis-io", "--id", "1", "--link", "cane:wire0", "--tdma", "auto", "--station", "10.0.0.3", "--for", "50ms",
                          env=self.environment)
-        self.assertIn("no master on eth:wire0 had a schedule for 'ip 10.0.0.3'", nobody.stdout)
+        self.assertIn("no master on eth:wire0 sent a schedule for 'ip 10.0.0.3'", nobody.stdout)
         self.assertEqual(1, nobody.returncode)
 
 

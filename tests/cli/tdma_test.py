@@ -33,14 +33,14 @@ PLAN = """cycle 1000 us at 100 Mbit/s, guard 10 us: 3 stations, 3 slots
 |....'....a.........b.........c.....................................................................
 a master, b spare, c x
 
-load 2.4 % with every frame of its full length; a frame of 60 bytes takes 6.72 us on a line, 15.44 us from station to station
-spare looks 30 us after the beginning of the cycle and takes over 50 us after the sync that did not come
-outputs are safe 4 cycles after the last sync: 4000 us
-spare: an input of it becomes an output of it after 3000.00 us at worst, 2 cycles after it was read
-  read 30.00, sent 200.00 (slot 0), there 215.44; master's thread 1000.00, sent 1100.00, there 1115.44; written 2030.00
+load 2.4 % with frames of full length; a frame of 60 bytes takes 6.72 us on a line, 15.44 us from station to station
+spare checks 30 us after the start of the cycle and takes over 50 us after a missing sync
+outputs are set to safe values 4 cycles after the last sync: 4000 us
+spare: worst-case latency from input to output 3000.00 us, 2 cycles after the input is read
+  read 30.00, sent 200.00 (slot 0), received 215.44; master's thread 1000.00, sent 1100.00, received 1115.44; written 2030.00
   2030.00 - 30.00 + 1000.00 for an input that changed just after it was read = 3000.00 us
-x: an input of it becomes an output of it after 4000.00 us at worst, 3 cycles after it was read
-  read 0.00, sent 1300.00 (slot 0), there 1315.44; master's thread 2000.00, sent 2100.00, there 2115.44; written 3000.00
+x: worst-case latency from input to output 4000.00 us, 3 cycles after the input is read
+  read 0.00, sent 1300.00 (slot 0), received 1315.44; master's thread 2000.00, sent 2100.00, received 2115.44; written 3000.00
   3000.00 - 0.00 + 1000.00 for an input that changed just after it was read = 4000.00 us
 """
 
@@ -77,11 +77,11 @@ class Tdma(Case):
         drawn = xml.etree.ElementTree.parse(self.folder / "cell.svg").getroot()
         texts = [t.text for t in drawn.iter("{http://www.w3.org/2000/svg}text")]
         for wanted in ("master", "spare", "x", "300, 1 of 2 cycles",
-                       "The line is 2.4 % full; an input of x is an output of it after 4000 us at worst"):
+                       "Line load 2.4 %; worst-case latency from input to output of x: 4000 us"):
             self.assertIn(wanted, texts)
         self.assertEqual("hal tdma plan: cannot write 'none/cell.svg': No such file or directory\n",
                          self.bad("tdma", "plan", "cell.tdma", "--svg", "none/cell.svg"))
-        self.assertEqual("hal tdma plan: --json and --svg are two answers; write one of them\n",
+        self.assertEqual("hal tdma plan: --json and --svg exclude each other\n",
                          self.bad("tdma", "plan", "cell.tdma", "--json", "--svg", "cell.svg"))
 
     def test_ping(self):
@@ -124,8 +124,8 @@ class Tdma(Case):
 
     def test_a_recording_reports_missing_samples(self):
         for words, problem in (("", "missing file=; write file=seen.pcapng"),
-                               ("file=none/seen.pcapng", "none/seen.pcapng cannot be written: No such file or directory"),
-                               ("file=seen.pcapng link=sim:", "sim:: the name of the segment is missing; write sim:net0")):
+                               ("file=none/seen.pcapng", "cannot write none/seen.pcapng: No such file or directory"),
+                               ("file=seen.pcapng link=sim:", "sim:: missing name of the segment; write sim:net0")):
             self.write("record.hal", f"loadrt segment_record {words}\nstart\n")
             self.assertIn(f"error: 'segment-record.0' (segment_record) cannot start: {problem} [start-failed]\n", self.bad("sim", "record.hal"))
 

@@ -150,7 +150,7 @@ def run(what, network, link):
         check(f"{what}: the error is gone", wait_for(lambda: int(pin("first.emcy"), 0) == 0))
         second.node.nmt.stop_heartbeat()
         check(f"{what}: silence is a fault", wait_for(lambda: int(pin("second.retries"), 0) > 0))
-        check(f"{what}: the fault is reported", "node 11 (second) silent for" in (text := shell("show", "fault")), text)
+        check(f"{what}: the fault is reported", "node 11 (second): no heartbeat for" in (text := shell("show", "fault")), text)
         check(f"{what}: and the device is brought back", wait_for(lambda: pin("second.operational") == "TRUE"))
         first.node.nmt.state = "PRE-OPERATIONAL"
         check(f"{what}: who leaves operational is brought back",

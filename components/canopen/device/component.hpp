@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the components canopen_drive, canopen_io, canopen_jr3 and canopen_bootloader have in common: a Node in a thread's cycle.
+// Base of the simulated devices that are HAL components: runs a Node in the cycle of a thread.
 #pragma once
 
 #include <deque>
@@ -11,7 +11,7 @@
 
 namespace hal::canopen {
 
-/// The names in `faults=late-sdo,mute`. Throws when there is none of that name. [setup]
+/// Returns the faults named in `faults=late-sdo,mute`. Throws std::invalid_argument for an unknown name. [setup]
 inline std::vector<const FaultRow*> chosen_faults(std::string_view text) {
     std::vector<const FaultRow*> rows;
     while (!text.empty()) {
@@ -27,34 +27,35 @@ inline std::vector<const FaultRow*> chosen_faults(std::string_view text) {
     return rows;
 }
 
-/// Load arguments and pins every simulated node has. Derived: make() its program, move() values between pins and program.
+/// Declares the load arguments and pins of every simulated node. A derived class provides program(), and copies values between its pins and
+/// the program before and after turn().
 class NodeComponent : public hal::Component {
 public:
     NodeComponent(const hal_host* host, std::int64_t default_id)
         : Component(host),
-          address_(*this, "link", "sim:can0", "the bus, as in sim:arm, can:can0 or udp:239.74.163.2:43113"),
-          id_(*this, "id", default_id, "node-id; a list has one for each instance", {.per_instance = true, .min = 1, .max = 127}),
-          serial_(*this, "serial", 1, "serial number in 1018h:4; a list has one for each instance",
+          address_(*this, "link", "sim:can0", "bus address, as in sim:arm, can:can0 or udp:239.74.163.2:43113"),
+          id_(*this, "id", default_id, "node ID; a list has one per instance", {.per_instance = true, .min = 1, .max = 127}),
+          serial_(*this, "serial", 1, "serial number in 1018h:4; a list has one per instance",
                   {.per_instance = true, .min = 0, .max = 0xffffffffLL}),
-          heartbeat_(*this, "heartbeat", 0, "ms between heartbeats until a master says otherwise; 0: none", {.min = 0, .max = 65535}),
-          itself_(*this, "start_by_itself", 0, "1: operational after boot-up without a master", {.min = 0, .max = 1}),
-          faults_(*this, "faults", "", "faults that get pins, as in late-sdo,mute; hal node faults lists them"),
+          heartbeat_(*this, "heartbeat", 0, "initial heartbeat period (1017h) in ms; 0: off", {.min = 0, .max = 65535}),
+          itself_(*this, "start_by_itself", 0, "1: enter operational after boot-up without a master", {.min = 0, .max = 1}),
+          faults_(*this, "faults", "", "faults to create pins for, as in late-sdo,mute; to list them: hal node faults"),
           fault_rows_(chosen_faults(faults_.get())) {
         for (const auto* row : fault_rows_) {
             const std::string name = std::string("fault-") + row->name;
             every_.emplace_back(*this, name.c_str(), (std::string("0: off; 1: every ") + row->what + "; n: every n-th").c_str());
             if (row->time == 0) continue;
-            const std::string doc = std::string("`time` of the fault ") + row->name;
+            const std::string doc = std::string("time of the fault ") + row->name;
             const PinOptions<double> usual{.initial = static_cast<double>(row->time) / 1e6, .unit = "ms"};
             times_.emplace_back(*this, (name + "-ms").c_str(), doc.c_str(), usual);
         }
     }
 
-    hal::In<bool> power{*this, "power", "false: the device has no power", {.initial = true}};
-    hal::Out<bool> online{*this, "online", "it is powered and operational"};
+    hal::In<bool> power{*this, "power", "true: the device is powered", {.initial = true}};
+    hal::Out<bool> online{*this, "online", "the device is powered and operational"};
     hal::Out<std::uint32_t> state{*this, "state", "NMT state: 0 initialising or off, 4 stopped, 5 operational, 127 pre-operational"};
     hal::Out<std::uint32_t> error_register{*this, "error-register", "object 1001h"};
-    hal::Out<bool> bus_off{*this, "bus-off", "its controller is bus off"};
+    hal::Out<bool> bus_off{*this, "bus-off", "the CAN controller of the device is bus off"};
 
     void start() {
         auto opened = can::open(address_.get());
@@ -65,14 +66,14 @@ public:
     void stop() noexcept { node_.reset(); }
 
 protected:
-    /// [setup] Made by the derived component before start() ends.
+    /// Returns the program, created by the derived component before its start() ends. [setup]
     virtual Program& program() = 0;
 
     std::uint32_t serial() const noexcept { return static_cast<std::uint32_t>(serial_); }
     std::uint16_t heartbeat() const noexcept { return static_cast<std::uint16_t>(heartbeat_); }
     Node& node() noexcept { return *node_; }
 
-    /// One cycle of the device: to be called between reading the pins and writing them. [realtime]
+    /// Runs one cycle of the device. Call it after reading the input pins and before writing the output pins. [realtime]
     void turn(hal::Cycle cycle) noexcept {
         std::size_t timed = 0;
         for (std::size_t n = 0; n < fault_rows_.size(); ++n) {
@@ -100,7 +101,7 @@ private:
     hal::TextArgument faults_;
     const std::vector<const FaultRow*> fault_rows_;
     std::deque<hal::In<std::uint32_t>> every_;
-    std::deque<hal::In<double>> times_;  // those of faults that have one, in their order
+    std::deque<hal::In<double>> times_;  // of the faults that have a time, in their order
     std::unique_ptr<Node> node_;
 };
 

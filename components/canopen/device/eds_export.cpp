@@ -10,7 +10,7 @@ namespace {
 
 struct Name {
     std::uint16_t first, last;
-    const char* name;  ///< "#" stands for the place in the row, from 1
+    const char* name;  ///< "#" is replaced by the position in the range, from 1
 };
 constexpr Name names[] = {
     {0x1003, 0x1003, "Pre-defined error field"},
@@ -97,7 +97,7 @@ eds::Entry entry_of(const EntryDescription& e) {
     return out;
 }
 
-/// CiA 301 calls these records although their values may be of one type.
+/// CiA 301 defines these as records although their values may have the same type.
 bool record_by_rule(std::uint16_t index) { return index == 0x1018 || (index >= 0x1200 && index <= 0x1bff); }
 
 eds::Object object_of(const Description& d, std::span<const EntryDescription* const> entries) {

@@ -10,38 +10,38 @@ namespace hal::canopen {
 namespace {
 
 constexpr FaultRow rows[] = {
-    {Fault::mute, "mute", "frame it sends is lost", 0},
-    {Fault::deaf, "deaf", "frame that comes is not heard", 0},
-    {Fault::twice, "twice", "frame it sends comes twice", 0},
-    {Fault::late_sdo, "late-sdo", "SDO answer leaves late, by `time`", 700 * millisecond},
-    {Fault::late_pdo, "late-pdo", "PDO leaves late, by `time`", 2 * millisecond},
+    {Fault::mute, "mute", "sent frame is lost", 0},
+    {Fault::deaf, "deaf", "received frame is ignored", 0},
+    {Fault::twice, "twice", "sent frame is duplicated", 0},
+    {Fault::late_sdo, "late-sdo", "SDO response is delayed by `time`", 700 * millisecond},
+    {Fault::late_pdo, "late-pdo", "PDO is delayed by `time`", 2 * millisecond},
     {Fault::no_boot_up, "no-boot-up", "boot-up message is not sent", 0},
-    {Fault::boot_storm, "boot-storm", "`time` it says that it booted, and did not", 100 * millisecond},
-    {Fault::reboot, "reboot", "`time` it loses its power for a moment", 2 * second},
-    {Fault::no_heartbeat, "no-heartbeat", "heartbeat or guarding answer is not sent", 0},
-    {Fault::wrong_state, "wrong-state", "heartbeat says stopped", 0},
-    {Fault::guard_toggle, "guard-toggle", "guarding answer has a wrong toggle bit", 0},
-    {Fault::no_sdo, "no-sdo", "SDO answer is not sent", 0},
-    {Fault::abort, "abort", "SDO request is aborted: general error", 0},
-    {Fault::stale_abort, "stale-abort", "SDO answer comes behind an abort of the request before", 0},
+    {Fault::boot_storm, "boot-storm", "`time` a boot-up message is sent without a restart", 100 * millisecond},
+    {Fault::reboot, "reboot", "`time` the device restarts as after a loss of power", 2 * second},
+    {Fault::no_heartbeat, "no-heartbeat", "heartbeat or guarding response is not sent", 0},
+    {Fault::wrong_state, "wrong-state", "heartbeat reports the state stopped", 0},
+    {Fault::guard_toggle, "guard-toggle", "guarding response has a wrong toggle bit", 0},
+    {Fault::no_sdo, "no-sdo", "SDO response is not sent", 0},
+    {Fault::abort, "abort", "SDO request is aborted with a general error", 0},
+    {Fault::stale_abort, "stale-abort", "SDO response is preceded by an abort of the previous request", 0},
     {Fault::toggle, "toggle", "SDO segment has a wrong toggle bit", 0},
     {Fault::block_gap, "block-gap", "segment of a block upload is lost", 0},
     {Fault::block_crc, "block-crc", "block transfer ends with a wrong CRC", 0},
-    {Fault::short_pdo, "short-pdo", "PDO has a byte less", 0},
-    {Fault::long_pdo, "long-pdo", "PDO has a byte more", 0},
-    {Fault::wrong_type, "wrong-type", "reading of the device type (1000h) is wrong", 0},
-    {Fault::wrong_vendor, "wrong-vendor", "reading of the vendor-ID (1018h:1) is wrong", 0},
-    {Fault::wrong_product, "wrong-product", "reading of the product code (1018h:2) is wrong", 0},
-    {Fault::wrong_revision, "wrong-revision", "reading of the revision number (1018h:3) is wrong", 0},
-    {Fault::wrong_serial, "wrong-serial", "reading of the serial number (1018h:4) is wrong", 0},
-    {Fault::wrong_software, "wrong-software", "reading of the software identification (1F56h:1) is wrong", 0},
-    {Fault::babble, "babble", "`time` it sends a frame of the highest priority", 200 * microsecond},
-    {Fault::emcy_storm, "emcy-storm", "`time` it sends an emergency", 10 * millisecond},
+    {Fault::short_pdo, "short-pdo", "PDO is one byte short", 0},
+    {Fault::long_pdo, "long-pdo", "PDO is one byte long", 0},
+    {Fault::wrong_type, "wrong-type", "read of the device type (1000h) returns a wrong value", 0},
+    {Fault::wrong_vendor, "wrong-vendor", "read of the vendor ID (1018h:1) returns a wrong value", 0},
+    {Fault::wrong_product, "wrong-product", "read of the product code (1018h:2) returns a wrong value", 0},
+    {Fault::wrong_revision, "wrong-revision", "read of the revision number (1018h:3) returns a wrong value", 0},
+    {Fault::wrong_serial, "wrong-serial", "read of the serial number (1018h:4) returns a wrong value", 0},
+    {Fault::wrong_software, "wrong-software", "read of the software identification (1F56h:1) returns a wrong value", 0},
+    {Fault::babble, "babble", "`time` a frame of the highest priority is sent", 200 * microsecond},
+    {Fault::emcy_storm, "emcy-storm", "`time` an emergency is sent", 10 * millisecond},
     {Fault::no_srdo, "no-srdo", "SRDO is not sent", 0},
     {Fault::srdo_half, "srdo-half", "SRDO is sent without its second frame", 0},
-    {Fault::srdo_wrong, "srdo-wrong", "SRDO has a wrong bit in its second frame", 0},
+    {Fault::srdo_wrong, "srdo-wrong", "SRDO is sent with a wrong bit in its second frame", 0},
     {Fault::srdo_order, "srdo-order", "SRDO is sent with its second frame first", 0},
-    {Fault::late_srdo, "late-srdo", "SRDO's second frame leaves late, by `time`", 30 * millisecond},
+    {Fault::late_srdo, "late-srdo", "second frame of an SRDO is delayed by `time`", 30 * millisecond},
 };
 static_assert([] {
     for (std::size_t n = 0; n < std::size(rows); ++n)
@@ -88,7 +88,7 @@ bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std
     };
     const auto name = next_part();
     const auto* row = find_fault(name);
-    if (row == nullptr) return problem = "there is no fault '" + std::string(name) + "'; there are " + names(), false;
+    if (row == nullptr) return problem = "unknown fault '" + std::string(name) + "'; use one of: " + names(), false;
     fault = row->fault;
     setting = {.every = 1};
     Time lasting = 0;
@@ -108,7 +108,7 @@ bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std
             good = parse_time(value, lasting) && lasting != 0;
         }
         if (good) continue;
-        problem = "'" + std::string(part) + "' is no property of the fault " + row->name + "; write every=3, " +
+        problem = "invalid property '" + std::string(part) + "' of fault " + row->name + "; write every=3, " +
                   (row->time != 0 ? "time=20ms, " : "") + "from=5s or for=1s";
         return false;
     }
@@ -116,7 +116,7 @@ bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std
     return true;
 }
 
-Faults::Faults(std::size_t held) : held_(std::make_unique<Held[]>(held)), held_room_(held) {}
+Faults::Faults(std::size_t held) : held_(std::make_unique<Held[]>(held)), held_capacity_(held) {}
 
 void Faults::find_any() noexcept {
     any_ = std::any_of(settings_.begin(), settings_.end(), [](const FaultSetting& s) { return s.every != 0; });
@@ -151,7 +151,7 @@ bool Faults::periodic(Fault fault) noexcept {
     if (next == 0) next = now_ + time(fault) * settings_[index(fault)].every;
     if (now_ < next) return false;
     next += time(fault) * settings_[index(fault)].every;
-    if (next <= now_ - 32 * time(fault)) next = now_ + time(fault);  // a turn that comes late does not make up for all
+    if (next <= now_ - 32 * time(fault)) next = now_ + time(fault);  // a late turn does not catch up on every event
     return ++hits_[index(fault)], true;
 }
 
@@ -161,7 +161,7 @@ bool Faults::swallows(const Frame& f, std::uint8_t node, Time now) noexcept {
     if (f.id != 0x600U + node || f.extended || f.length != 8) return false;
     const auto command = f.data[0], kind = static_cast<std::uint8_t>(command >> 5);
     if (command == 0x80) return block_ = Block::none, false;
-    if (block_ == Block::receiving) return false;  // these bytes are data, until the device says that it has all
+    if (block_ == Block::receiving) return false;  // these bytes are data until the device acknowledges the block
     if (command == 0xa3) return block_ = Block::sending, last_sequence_ = 0, false;
     if (command == 0xa2) {
         if (block_ == Block::sending && last_sequence_ != 0 && f.data[1] == last_sequence_) block_ = Block::ending;
@@ -189,7 +189,7 @@ void Faults::identity(Frame& f) noexcept {
     if (wrong) f.data[4] ^= 0xff;
 }
 
-/// What becomes of an answer of the SDO server. False: it is not sent.
+/// Alters a response of the SDO server. Returns false when it must not be sent.
 bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
     const auto tell_abort = [&](Frame& to, const std::array<std::uint8_t, 3>& about, Abort why) {
         to.data[0] = 0x80;
@@ -197,7 +197,7 @@ bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
         store(to.data.data() + 4, static_cast<std::uint32_t>(why));
     };
     if (hit(Fault::no_sdo)) return false;
-    if (block_ == Block::sending) {  // all that comes now are segments
+    if (block_ == Block::sending) {  // only segments follow
         if ((f.data[0] & 0x80) != 0) last_sequence_ = f.data[0] & 0x7f;
         return !hit(Fault::block_gap);
     }
@@ -230,11 +230,11 @@ bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
 }
 
 void Faults::hold(const Frame& f, Time due, FrameQueue& bus) noexcept {
-    if (held_count_ == held_room_) return void(bus.push(f));
+    if (held_count_ == held_capacity_) return void(bus.push(f));
     held_[held_count_++] = {f, due};
 }
 
-/// What becomes of a frame of an SRDO, the first one (odd) or the second. False: it is not sent now.
+/// Alters a frame of an SRDO, the first (odd identifier) or the second. Returns false when it must not be sent now.
 bool Faults::safety(Frame& f, Time& late, FrameQueue& bus) noexcept {
     if (f.id % 2 == 1) {
         skips_srdo_ = hit(Fault::no_srdo), swaps_srdo_ = hit(Fault::srdo_order);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a device can do wrong on the wire, on purpose, so that a master can be tested. A Node puts it between its device and the link.
-// Everything repeats: the same frames at the same times meet the same faults.
+// Faults of a device on the bus, injected to test a master. A Node puts them between its device and the link.
+// They are deterministic: the same frames at the same times meet the same faults.
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 #include "canopen/protocol/numbers.hpp"
 
 namespace hal::canopen {
+/// Kinds of faults, in the order of fault_rows().
 
 enum class Fault : std::uint8_t {
     mute, deaf, twice, late_sdo, late_pdo, no_boot_up, boot_storm, reboot, no_heartbeat, wrong_state, guard_toggle, no_sdo, abort,
@@ -20,41 +21,49 @@ enum class Fault : std::uint8_t {
     wrong_software, babble, emcy_storm, no_srdo, srdo_half, srdo_wrong, srdo_order, late_srdo,
 };
 
-/// The one list of them.
+/// Describes a kind of fault.
 struct FaultRow {
     Fault fault;
-    const char* name;  ///< as it is typed
-    const char* what;  ///< "every n-th …" of these is hit
-    Time time;         ///< what `time` is when nobody says; 0: it has none
+    const char* name;  ///< name in `--fault` and `faults=`
+    const char* what;  ///< the event that is affected, to read after "every n-th"
+    Time time;         ///< default of `time` in ns; 0: the fault has no time
 };
+/// Returns all kinds of faults. [any]
 std::span<const FaultRow> fault_rows() noexcept;
-/// nullptr when there is none of that name. [any]
+/// Returns the row of a name, or nullptr when it is unknown. [any]
 const FaultRow* find_fault(std::string_view name) noexcept;
 
+/// When a fault is active and how often it hits.
 struct FaultSetting {
-    std::uint32_t every = 0;  ///< 0: off; 1: each; n: every n-th of those it is about
-    Time time = 0;            ///< how late, how often; 0: the row's
-    Time from = 0, until = INT64_MAX;  ///< counted from the first turn
+    std::uint32_t every = 0;  ///< 0: off; 1: every event; n: every n-th event
+    Time time = 0;            ///< delay or period in ns; 0: the default of the row
+    Time from = 0, until = INT64_MAX;  ///< active from..until in ns after the first turn
 };
 
-/// Reads `late-sdo`, `late-sdo:time=20ms`, `mute:from=5s:for=1s`, `twice:every=3`. False, and `problem`: what to type. [setup]
+/// Parses `late-sdo`, `late-sdo:time=20ms`, `mute:from=5s:for=1s`, `twice:every=3`. Returns false and sets `problem` to what is wrong
+/// and what to type. [setup]
 bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std::string& problem);
 
+/// Applies faults to the frames of one device. `node` is its node ID, `now` the time in ns.
 class Faults {
 public:
-    explicit Faults(std::size_t held = 512);  // [setup]
+    /// Allocates space for `held` delayed frames. [setup]
+    explicit Faults(std::size_t held = 512);
 
+    /// Switches a fault on or off. [realtime]
     void set(Fault fault, const FaultSetting& setting) noexcept { settings_[index(fault)] = setting, find_any(); }
     const FaultSetting& setting(Fault fault) const noexcept { return settings_[index(fault)]; }
+    /// Returns how many events a fault has hit. [realtime]
     std::uint64_t hits(Fault fault) const noexcept { return hits_[index(fault)]; }
-    /// Nothing is set and nothing is held back: frames may pass by. [realtime]
+    /// Returns true when no fault is set and no frame is delayed, so frames need not pass here. [realtime]
     bool idle() const noexcept { return !any_ && held_count_ == 0; }
 
-    /// A frame came; true: the device shall not see it. [realtime]
+    /// Counts a received frame and returns true when the device must not see it. [realtime]
     bool swallows(const Frame&, std::uint8_t node, Time now) noexcept;
-    /// A frame of the device goes out; what becomes of it is put into `bus`, which has room for 4. [realtime]
+    /// Puts a frame sent by the device, altered or not at all, into `bus`, which needs space for 4 frames. [realtime]
     void send(Frame, std::uint8_t node, FrameQueue& bus, Time now) noexcept;
-    /// Frames held back that are due, and frames that no device sends. True: the device shall restart now. [realtime]
+    /// Puts delayed frames that are due, and frames the device never sent, into `bus`. Returns true when the device must restart.
+    /// [realtime]
     bool poll(std::uint8_t node, FrameQueue& bus, Time now) noexcept;
 
 private:
@@ -78,16 +87,16 @@ private:
     std::array<FaultSetting, kinds> settings_{};
     std::array<std::uint64_t, kinds> seen_{}, hits_{};
     std::array<Time, kinds> next_{};
-    std::unique_ptr<Held[]> held_;  // in order of their coming, not of when they are due
-    const std::size_t held_room_;
+    std::unique_ptr<Held[]> held_;  // in order of arrival, not of due time
+    const std::size_t held_capacity_;
     std::size_t held_count_ = 0;
     bool any_ = false, started_ = false;
     Time began_ = 0, now_ = 0;
-    // The transfer under way, as far as its frames cannot be told apart without.
+    // The SDO transfer in progress, to distinguish frames that look alike.
     enum class Block : std::uint8_t { none, receiving, sending, ending } block_ = Block::none;
     std::uint8_t last_sequence_ = 0;
     std::array<std::uint8_t, 3> request_{}, previous_{};
-    Frame first_of_srdo_{};  // waits until its second frame went
+    Frame first_of_srdo_{};  // sent after the second frame
     bool skips_srdo_ = false, swaps_srdo_ = false;
 };
 

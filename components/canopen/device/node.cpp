@@ -6,7 +6,7 @@
 namespace hal::canopen {
 
 namespace {
-constexpr unsigned most_batches = 16;  // of 64 frames: a flooded bus must not keep a cycle
+constexpr unsigned most_batches = 16;  // of 64 frames: a flooded bus must not delay a cycle without limit
 }
 
 void add_storage(Description& d) {
@@ -31,7 +31,7 @@ Node::Node(Program& program, std::unique_ptr<can::Link> link, const DeviceSettin
 void Node::watch_bus(Time now) noexcept {
     const auto state = link_->state();
     const bool off = state == can::State::bus_off || state == can::State::down;
-    if (!watched_) bus_off_ = off, watched_ = true;  // a bus that was never there is no error of this device
+    if (!watched_) bus_off_ = off, watched_ = true;  // a bus that was down from the start is not an error of this device
     if (off == bus_off_) return;
     bus_off_ = off;
     if (off) device_.bus_off(now);
@@ -69,7 +69,7 @@ void Node::turn(Time now, std::int64_t link_now) noexcept {
 void Node::send(Time now, std::int64_t link_now) noexcept {
     const auto emptied = [&](FrameQueue& queue) {
         for (const Frame* f; (f = queue.front()) != nullptr; queue.drop())
-            if (link_->send(*f, link_now) == can::Sent::full) return false;  // on a bus that is off or down they are lost, as on a wire
+            if (link_->send(*f, link_now) == can::Sent::full) return false;  // frames for a bus that is off or down are lost
         return true;
     };
     auto& out = device_.out();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Program at work: its device on a link. A process turns it in a loop, a component in its cycle.
+// A Program running as a device on a link. A process turns it in a loop, a component once per cycle.
 //
 //     Lamp lamp;
 //     Node node(lamp, std::move(can::open("udp:239.74.163.2:43113").link), {.node_id = 5});   // [setup]
@@ -13,19 +13,19 @@
 #include "program.hpp"
 
 namespace hal::canopen {
+/// Runs a Program on a link, with faults injected between the two. All functions are called by one thread.
 
 class Node {
 public:
-    /// The program outlives the node. Throws std::invalid_argument when the description does not hold together: the first of
-    /// Dictionary::problems(). [setup]
+    /// Creates the device of the program, which must outlive the node. Throws std::invalid_argument with the first of
+    /// Dictionary::problems() when the description is inconsistent. [setup]
     Node(Program&, std::unique_ptr<can::Link>, const DeviceSettings&);
 
-    /// Everything that is due at `now`: the first turn boots; frames are taken, the program steps, what it has to say is sent. All by
-    /// one thread. [realtime]
+    /// Does everything due at `now` (ns): boots on the first turn, handles received frames, steps the program, sends frames. [realtime]
     void turn(Time now) noexcept { turn(now, now); }
-    /// The same for a link that is told another time than the device, such as can::unclocked. [realtime]
+    /// The same for a link with a time base of its own, such as can::unclocked. [realtime]
     void turn(Time now, std::int64_t link_now) noexcept;
-    /// Without power the device is silent, and forgets what was not stored. [realtime]
+    /// Switches the power. Without power the device receives and sends nothing and loses what it has not stored. [realtime]
     void power(bool on) noexcept { powered_ = on; }
 
     Device& device() noexcept { return device_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a user writes to make a CANopen device: which objects it has, and what it does.
+// The interface for writing a CANopen device: its objects and its behaviour.
 //
 //     struct Lamp : hal::canopen::Program {
 //         Description description() const override {
@@ -13,7 +13,7 @@
 //         std::uint8_t brightness = 0;
 //     };
 //
-// A Node (node.hpp) runs it on a link. Events tells it of SYNC, states and errors, Handler of values that are read and written.
+// A Node (node.hpp) runs it on a link. Events notifies it of SYNC, states and errors, Handler of values that are read and written.
 #pragma once
 
 #include <memory>
@@ -25,36 +25,40 @@
 
 namespace hal::canopen {
 
+/// The application of a device. All functions are called by the thread that turns the Node, except where noted.
 class Program : public Events, public Handler {
 public:
-    /// All its objects. Asked once, before the device is made. [setup]
+    /// Returns all objects of the device. Called once, before the device is created. [setup]
     virtual Description description() const = 0;
-    /// The device is made and not started: the place for Dictionary::bind(), watch() and pointers to entries. [setup]
+    /// Binds variables and entries of the object dictionary: Dictionary::bind(), watch(). Called after the device is created and before it
+    /// starts; an override calls this one first. [setup]
     virtual void attach(Device& device) { device_ = &device; }
-    /// Makes the device; another form is for a program that has something which holds one. [setup]
+    /// Creates the device. Override it in a program that owns a Device through another class. [setup]
     virtual Device& make(const DeviceSettings& settings) {
         own_ = std::make_unique<Device>(description(), settings, *this);
         return *own_;
     }
-    /// Power comes on for the first time. [realtime]
+    /// Handles the first power-on, with the time in ns. [realtime]
     virtual void boot(Time now) noexcept { device_->start(now); }
-    /// Once per turn, after the frames that came were taken and before what is due is sent. [realtime]
+    /// Advances the application to `now` (ns). Called once per turn, after received frames are handled and before frames are sent.
+    /// [realtime]
     virtual void step(Time now) noexcept { (void)now; }
 
-    /// The world around the device, by name: "in-3", "fx". False: there is no such thing. Between two turns, from their thread. [any]
+    /// Sets a value of the simulated environment by name, such as "in-3" or "fx". Returns false for an unknown name. Call it between turns,
+    /// from the thread that turns the node. [any]
     virtual bool set(std::string_view name, double value) { return (void)name, (void)value, false; }
-    /// The names set() knows. [setup]
+    /// Returns the names set() accepts. [setup]
     virtual std::vector<std::string> settable() const { return {}; }
-    /// One line on what the device is doing, for people; empty: nothing to say. [any, not real time]
+    /// Returns one line on what the device is doing, for a person to read; may be empty. [any, not real time]
     virtual std::string summary() const { return {}; }
-    /// The part of it whose changes are worth a line each. [any, not real time]
+    /// Returns the part of summary() whose changes are worth a log line each. [any, not real time]
     virtual std::string news() const { return summary(); }
 
-    /// Operational. [realtime]
+    /// Returns true in the NMT state operational. [realtime]
     bool online() const noexcept { return device_ != nullptr && device_->state() == NmtState::operational; }
 
 protected:
-    /// reading(), writing() and written() are called for that object. [setup]
+    /// Subscribes to reading(), writing() and written() of all sub-indices of `index`. [setup]
     void watch(std::uint16_t index) { device_->dictionary().handle(index, *this); }
     Device* device_ = nullptr;
 
@@ -62,10 +66,10 @@ private:
     std::unique_ptr<Device> own_;
 };
 
-/// The identity of the devices of this project; none of them has a vendor-ID given by CiA.
+/// Vendor ID of the devices of this project; it is not assigned by CiA.
 inline constexpr std::uint32_t example_vendor = 0x48414c;
 
-/// Objects 1010h and 1011h, all sub-indices, and 1020h, which tells whether what was stored is what the master wants. [setup]
+/// Adds objects 1010h and 1011h with all sub-indices and 1020h, by which a master verifies the stored configuration (CiA 301). [setup]
 void add_storage(Description&);
 
 }  // namespace hal::canopen

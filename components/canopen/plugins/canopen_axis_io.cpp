@@ -11,30 +11,32 @@ using namespace hal::canopen;
 struct CanopenAxisIo final : NodeComponent {
     explicit CanopenAxisIo(const hal_host* host) : NodeComponent(host, 2) {
         auto made = make_plant(plant.get());
-        if (!made) throw std::invalid_argument("there is no plant '" + std::string(plant.get()) + "'; there are " + plant_names);
+        if (!made) throw std::invalid_argument("plant=" + std::string(plant.get()) + ": unknown plant; use one of: " + plant_names);
         for (const auto& row : made->influences()) {
             const hal::PinOptions<double> number{.initial = row.initial, .unit = row.unit};
             switch (row.kind) {
             case Influence::value: values_.emplace_back(*this, row.name, row.doc, number); break;
             case Influence::tap: taps_.emplace_back(*this, row.name, row.doc, number); break;
-            case Influence::flag: flags_.emplace_back(*this, row.name, row.doc, hal::PinOptions<bool>{.initial = row.initial != 0.0}); break;
+            case Influence::flag: flags_.emplace_back(*this, row.name, row.doc,
+                                                      hal::PinOptions<bool>{.initial = row.initial != 0.0}); break;
             }
         }
     }
 
-    hal::TextArgument plant{*this, "plant", "axis", "what it drives: axis, a slide on a screw, or furuta, the pendulum rig"};
-    hal::Argument input_stops{*this, "input_stops", 0, "1: an open input is a fault from the beginning; object 2111h", {.min = 0, .max = 1}};
+    hal::TextArgument plant{*this, "plant", "axis", "simulated plant: axis (a slide on a screw) or furuta (the pendulum rig)"};
+    hal::Argument input_stops{*this, "input_stops", 0, "initial value of object 2111h; 1: an open input is a fault", {.min = 0, .max = 1}};
 
-    hal::Function run{*this, "update", &CanopenAxisIo::update, "takes what is on the bus, moves the plant, sends what is due"};
+    hal::Function run{*this, "update", &CanopenAxisIo::update, "receives frames, advances the plant, sends frames"};
 
-    hal::In<bool> encoder_broken{*this, "encoder-broken", "true: the encoder is cut off"};
-    hal::Out<double> position{*this, "position", "where the motor's shaft, or the arm, really is", {.unit = "rad", .finite = true}};
-    hal::Out<double> second_position{*this, "second-position", "where the screw's end, or the pendulum, really is", {.unit = "rad", .finite = true}};
-    hal::Out<double> pwm{*this, "pwm", "of the amplifier, -1 to 1", {.finite = true}};
-    hal::Out<double> current{*this, "current", "in the motor", {.unit = "A", .finite = true}};
-    hal::Out<bool> enabled{*this, "enabled", "it is on: the motor follows the set-point"};
-    hal::Out<bool> fault{*this, "fault", "it is in fault"};
-    hal::Out<std::uint32_t> axis_state{*this, "axis-state", "0 stopped, 1 ready, 2 on, 3 fault"};
+    hal::In<bool> encoder_broken{*this, "encoder-broken", "true: the encoder cable is cut"};
+    hal::Out<double> position{*this, "position", "true position of the motor shaft, or of the arm", {.unit = "rad", .finite = true}};
+    hal::Out<double> second_position{*this, "second-position", "true position of the screw's end, or of the pendulum", {.unit = "rad",
+                                     .finite = true}};
+    hal::Out<double> pwm{*this, "pwm", "duty cycle of the amplifier, -1..1", {.finite = true}};
+    hal::Out<double> current{*this, "current", "motor current", {.unit = "A", .finite = true}};
+    hal::Out<bool> enabled{*this, "enabled", "the amplifier is on: the motor follows the set-point"};
+    hal::Out<bool> fault{*this, "fault", "the axis is in fault"};
+    hal::Out<std::uint32_t> axis_state{*this, "axis-state", "state of the axis: 0 stopped, 1 ready, 2 on, 3 fault"};
     hal::Out<std::uint32_t> error_code{*this, "error-code", "603Fh"};
     hal::Outs<bool> out{*this, "out-#", 4, "terminal of output #", {.safe = false}};
 
@@ -70,7 +72,7 @@ private:
         program_ = std::make_unique<AxisIo>(AxisIoSettings{serial(), heartbeat(), input_stops != 0}, make_plant(plant.get()));
         return *program_;
     }
-    std::deque<hal::In<double>> values_;  // those of the plant's influences that are, in their order; so the next two
+    std::deque<hal::In<double>> values_;  // pins of the plant's influences of kind value, in their order; likewise taps_ and flags_
     std::deque<hal::Io<double>> taps_;
     std::deque<hal::In<bool>> flags_;
     std::unique_ptr<AxisIo> program_;
@@ -78,19 +80,18 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(CanopenAxisIo, "canopen_axis_io", "Simulated CANopen axis whose loop is closed over the bus", R"(
-The other end of a long loop: a node with a pulse-width amplifier, two encoder counters of 16 bits, four outputs and an input, for machines
-without one, and the plant behind it. The control is in the master's netlist: every SYNC the node samples both counters, and what it
-receives takes effect when it arrives. Its states are those of CiA 402 (controlword 6040h, statusword 6041h), so the component `cia402`
-with `mode` 4 and `counter-bits` 16 walks it through them; a motor that is not on carries no current.
+HAL_COMPONENT(CanopenAxisIo, "canopen_axis_io", "Simulated CANopen axis with its control loop closed over the bus", R"(
+The remote end of a control loop over the bus, for machines without the hardware: a node with a pulse-width amplifier, two 16-bit encoder
+counters, four outputs and an input, and the simulated plant behind it. The controller is in the master's netlist. The node samples both
+counters at every SYNC; received set-points take effect at once. Its states are those of CiA 402 (controlword 6040h, statusword 6041h), so
+the component `cia402` with `mode` 4 and `counter-bits` 16 controls them; a motor that is not on carries no current.
+RPDO 1 carries the controlword, 2100h PWM set-point (-32767..32767) and 2103h outputs; TPDO 1 the statusword, 2101h and 2102h (counts of
+both encoders) and 2104h inputs. 2105h is the current in mA. When `2110h` SYNC periods (1006h; usually 3) pass without a SYNC or a set-point,
+the motor is switched off with fault 8700h. Fault 7305h is a broken encoder; with 2111h = 1 an open input is fault 9000h.
 
-RPDO 1 carries controlword, 2100h PWM set-point (-32767 to 32767) and 2103h outputs; TPDO 1 statusword, 2101h and 2102h, the counts of both
-encoders, and 2104h inputs. 2105h is the current in mA. When `2110h` SYNC periods (1006h; usually 3) pass without a SYNC or a set-point the
-motor goes off, fault 8700h; fault 7305h is a broken encoder, and with 2111h at 1 an open input is fault 9000h.
-
-`plant=axis` is a slide on a screw of 5 mm pitch, `plant=furuta` the Furuta pendulum with the arm at the first encoder, the pendulum at the
-second and the contact under the base at the input. On a `sim:` bus an answer leaves in the cycle of `update` that saw the question.
-`hal node axis-io` is the same as a process, `hal node axis-io --eds` prints its EDS.
+`plant=axis` is a slide on a screw of 5 mm pitch. `plant=furuta` is the Furuta pendulum, with the arm on the first encoder, the pendulum on
+the second and the contact under the base at the input. On a `sim:` bus the node answers in the cycle of `update` that receives the request.
+`hal node axis-io` runs the same device as a process; `hal node axis-io --eds` prints its EDS.
 
     loadrt canopen_axis_io link=cane:sim:rig id=2 plant=furuta
     addf canopen-axis-io.0.update servo

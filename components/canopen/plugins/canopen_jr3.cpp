@@ -11,7 +11,7 @@ using namespace hal::canopen;
 struct CanopenJr3 final : NodeComponent {
     explicit CanopenJr3(const hal_host* host) : NodeComponent(host, 0x50) {}
 
-    hal::Function run{*this, "update", &CanopenJr3::update, "moves the sensor's bit stream on, decodes it, takes what is on the bus, sends what is due"};
+    hal::Function run{*this, "update", &CanopenJr3::update, "advances and decodes the bit stream of the sensor, receives and sends frames"};
 
     hal::In<double> fx{*this, "fx", "force on the sensor in x", {.unit = "N"}};
     hal::In<double> fy{*this, "fy", "force on the sensor in y", {.unit = "N"}};
@@ -19,16 +19,16 @@ struct CanopenJr3 final : NodeComponent {
     hal::In<double> mx{*this, "mx", "torque on the sensor about x", {.unit = "N*m"}};
     hal::In<double> my{*this, "my", "torque on the sensor about y", {.unit = "N*m"}};
     hal::In<double> mz{*this, "mz", "torque on the sensor about z", {.unit = "N*m"}};
-    hal::In<double> supply{*this, "supply", "supply voltage as a part of full scale; the node complains below 0.7 and above 0.8", {.initial = 0.75}};
-    hal::In<bool> cable{*this, "cable", "false: the sensor's cable is off", {.initial = true}};
-    hal::Param<std::uint32_t> noise{*this, "noise", "counts by which a raw reading may be off; 16384 counts are full scale"};
+    hal::In<double> supply{*this, "supply", "supply voltage as a fraction of full scale; valid range 0.7..0.8", {.initial = 0.75}};
+    hal::In<bool> cable{*this, "cable", "false: the sensor cable is disconnected", {.initial = true}};
+    hal::Param<std::uint32_t> noise{*this, "noise", "amplitude of the noise on raw readings in counts; full scale is 16384"};
 
-    hal::Outs<double> measured{*this, "measured-#", 6, "what the node makes of channel # of Fx Fy Fz Mx My Mz, in N and N*m"};
-    hal::Out<bool> overload{*this, "overload", "a channel is beyond its limit (2103h)"};
-    hal::Out<bool> calibrated{*this, "calibrated", "the calibration memory came through the stream; takes a second"};
+    hal::Outs<double> measured{*this, "measured-#", 6, "channel # of Fx Fy Fz Mx My Mz as the node measures it, in N and N*m"};
+    hal::Out<bool> overload{*this, "overload", "a channel exceeds its limit (2103h)"};
+    hal::Out<bool> calibrated{*this, "calibrated", "the node has received the calibration memory over the stream, which takes 1 s"};
     hal::Out<bool> led{*this, "led", "status LED: off stopped, blinking pre-operational, on operational"};
-    hal::Out<std::uint32_t> packets{*this, "packets", "packets of the stream decoded"};
-    hal::Out<std::uint32_t> errors{*this, "errors", "places where the stream did not fit"};
+    hal::Out<std::uint32_t> packets{*this, "packets", "decoded packets of the stream"};
+    hal::Out<std::uint32_t> errors{*this, "errors", "framing errors in the stream"};
 
     void update(hal::Cycle cycle) noexcept {
         jr3::Six wrench{fx, fy, fz, mx, my, mz};
@@ -61,13 +61,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanopenJr3, "canopen_jr3", "Simulated CANopen force/torque node with a JR3 sensor", R"(
-A six-axis force/torque sensor and the node that puts it on a CAN bus. The sensor sends its raw readings, its supply voltage and its
-calibration memory as a stream of 20-bit packets at 2.2 MHz; the node finds the packets, decouples the readings with the 6 by 6 matrix
-of the calibration and serves forces and torques as CiA 404 has them.
+A six-axis force/torque sensor and the node that connects it to a CAN bus. The sensor sends its raw readings, its supply voltage and its
+calibration memory as a stream of 20-bit packets at 2.2 MHz. The node decodes the packets, decouples the readings with the 6 by 6 matrix
+of the calibration and serves forces and torques as objects of CiA 404.
 
-TPDO 1 and 2 carry the forces in 0.01 N, TPDO 3 and 4 the torques in 0.001 N*m, three INTEGER16 each, then a byte of status and a
-counter of samples. 2 and 4 are sent at each SYNC; 1 and 3, when a value changes, are closed until a master writes their COB-ID without
-bit 31 to 1800h:1 and 1802h:1.
+TPDO 1 and 2 carry the forces in 0.01 N, TPDO 3 and 4 the torques in 0.001 N*m: three INTEGER16 each, then a status byte and a sample
+counter. TPDO 2 and 4 are sent at each SYNC. TPDO 1 and 3 are sent when a value changes; they are disabled until a master writes their
+COB-ID without bit 31 to 1800h:1 and 1802h:1.
 
     loadrt canopen_jr3 link=sim:arm id=0x50
     addf canopen-jr3.0.update servo

@@ -10,16 +10,16 @@ struct CanopenSafeIo final : NodeComponent {
     explicit CanopenSafeIo(const hal_host* host) : NodeComponent(host, 3) {}
 
     hal::Function run{*this, "update", &CanopenSafeIo::update,
-                      "takes what is on the bus, answers it, and moves values between pins and objects"};
+                      "receives and sends frames, copies values between pins and objects"};
 
     hal::Ins<bool> in{*this, "in-#", 8, "terminal of safety input #"};
-    hal::Outs<bool> out{*this, "out-#", 8, "terminal of safety output #; off unless the last SRDO is believed", {.safe = false}};
-    hal::In<bool> acknowledge{*this, "acknowledge", "rising edge: a fault is seen to, outputs follow the next good SRDO"};
-    hal::In<bool> fail_safe{*this, "fail-safe", "rising edge: sends the global fail-safe command"};
+    hal::Outs<bool> out{*this, "out-#", 8, "terminal of safety output #; off unless the last SRDO is valid", {.safe = false}};
+    hal::In<bool> acknowledge{*this, "acknowledge", "rising edge: acknowledges a fault; outputs follow the next valid SRDO"};
+    hal::In<bool> fail_safe{*this, "fail-safe", "rising edge: sends the global fail-safe command (GFC)"};
     hal::Out<std::uint32_t> fault{*this, "fault",
-                                  "why the outputs are off: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, 5 not inverted, "
+                                  "cause of the outputs being off: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, 5 not inverted, "
                                   "6 global fail-safe command, 7 own objects do not match"};
-    hal::Out<bool> configured{*this, "configured", "the signatures of its SRDOs are right and 13FEh says so"};
+    hal::Out<bool> configured{*this, "configured", "the SRDO configuration is valid (13FEh): its signatures match"};
 
     void update(hal::Cycle cycle) noexcept {
         for (unsigned n = 0; n < 8; ++n) io_->set_input(n, in[n]);
@@ -45,14 +45,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanopenSafeIo, "canopen_safe_io", "Simulated CANopen safety I/O node (EN 50325-5)", R"(
-Eight safety inputs, which SRDO 1 sends, and eight safety outputs, which SRDO 2 receives, after EN 50325-5 (CiA 304). It is the protocol
-for trying out a machine, not a certified device: nobody's safety may rest on it.
+Eight safety inputs, sent by SRDO 1, and eight safety outputs, received by SRDO 2, after EN 50325-5 (CiA 304). It implements the protocol
+for testing a machine and is not a certified safety device: do not rely on it for anyone's safety.
 
-Both SRDOs work when a master has configured them (`tsrdo1` and `rsrdo2` of its configuration). An input that changes is sent at once,
-else every refresh time. Outputs are off from any fault on: an SRDO that is late, incomplete, out of order, not inverted, or a global
-fail-safe command. They stay off until `acknowledge` rises or the node is started anew. The faults no-srdo, srdo-half, srdo-wrong,
-srdo-order and late-srdo (load argument `faults=`) spoil what it sends.
-
+Both SRDOs are active once a master has configured them (`tsrdo1` and `rsrdo2` of its configuration). A changed input is sent at once,
+otherwise every refresh time. Any fault switches the outputs off: an SRDO that is late, incomplete, out of order or not inverted, or a
+global fail-safe command. They stay off until a rising edge of `acknowledge`, or until the node is started again. The faults no-srdo, srdo-half,
+srdo-wrong, srdo-order and late-srdo (load argument `faults=`) corrupt the SRDOs it sends.
     loadrt canopen_safe_io link=sim:cell id=7 faults=srdo-wrong
     addf canopen-safe-io.0.update servo
     start

@@ -12,72 +12,84 @@ using namespace hal::canopen::cia402;
 struct Cia402 : hal::Component {
     using Component::Component;
 
-    // What the user asks for.
-    hal::In<bool> enable{*this, "enable", "a rising edge switches the axis on, FALSE off; after a fault it takes another edge"};
-    hal::In<bool> reset{*this, "reset", "a rising edge forgets a fault, and resets that of the drive"};
-    hal::In<bool> quick_stop{*this, "quick-stop", "TRUE: brakes by the drive's quick stop and goes off; then enable needs another edge"};
-    hal::In<bool> halt{*this, "halt", "TRUE: stands still, enabled"};
-    hal::In<std::int32_t> mode{*this, "mode", "of operation: see the table; 0: as the drive has it", {.initial = 8}};
-    hal::In<double> position_cmd{*this, "position-cmd", "csp, ip: where to be; pp: the set-point that `go` gives"};
-    hal::In<double> velocity_cmd{*this, "velocity-cmd", "csv, pv, vl: how fast; csp: given ahead", {.unit = "1/s"}};
-    hal::In<double> torque_cmd{*this, "torque-cmd", "cst, tq: how much; csp, csv: given ahead"};
-    hal::In<bool> home{*this, "home", "a rising edge starts homing; FALSE ends it before its time"};
-    hal::In<bool> go{*this, "go", "pp: a rising edge makes position-cmd a new set-point; up to 16 wait for room in the drive"};
-    hal::In<bool> relative{*this, "relative", "pp: the set-point counts from the last one"};
-    hal::In<bool> immediate{*this, "immediate", "pp: the set-point takes the place of what the drive does now"};
-    hal::In<bool> blend{*this, "blend", "pp: the drive need not stop at this set-point when there is another"};
-    hal::In<double> max_velocity{*this, "max-velocity", "to profile-velocity: of moves that the drive plans", {.unit = "1/s"}};
-    hal::In<double> max_acceleration{*this, "max-acceleration", "to profile-acceleration", {.unit = "1/s^2"}};
-    hal::In<double> max_deceleration{*this, "max-deceleration", "to profile-deceleration; 0: as max-acceleration", {.unit = "1/s^2"}};
+    // Commands of the user.
+    hal::In<bool> enable{*this, "enable", "a rising edge enables the axis, FALSE disables it; after a fault another edge is needed"};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears the fault of the axis and of the drive"};
+    hal::In<bool> quick_stop{*this, "quick-stop",
+                             "TRUE: brakes with the drive's quick stop and disables the axis; then enable needs another edge"};
+    hal::In<bool> halt{*this, "halt", "TRUE: brakes to standstill and stays enabled"};
+    hal::In<std::int32_t> mode{*this, "mode", "mode of operation, see the table; 0: keep the mode of the drive", {.initial = 8}};
+    hal::In<double> position_cmd{*this, "position-cmd", "csp, ip: commanded position; pp: target of the next set-point"};
+    hal::In<double> velocity_cmd{*this, "velocity-cmd", "csv, pv, vl: commanded velocity; csp: feed-forward", {.unit = "1/s"}};
+    hal::In<double> torque_cmd{*this, "torque-cmd", "cst, tq: commanded torque; csp, csv: feed-forward"};
+    hal::In<bool> home{*this, "home", "a rising edge starts homing; FALSE aborts it"};
+    hal::In<bool> go{*this, "go", "pp: a rising edge makes position-cmd a new set-point; up to 16 are queued until the drive takes them"};
+    hal::In<bool> relative{*this, "relative", "pp: the set-point is relative to the previous one"};
+    hal::In<bool> immediate{*this, "immediate", "pp: the set-point replaces the current move at once"};
+    hal::In<bool> blend{*this, "blend", "pp: the drive passes this set-point without stopping if another follows"};
+    hal::In<double> max_velocity{*this, "max-velocity", "profile velocity (profile-velocity) of moves planned by the drive",
+                                 {.unit = "1/s"}};
+    hal::In<double> max_acceleration{*this, "max-acceleration", "acceleration (profile-acceleration) of moves planned by the drive",
+                                     {.unit = "1/s^2"}};
+    hal::In<double> max_deceleration{*this, "max-deceleration",
+                                     "deceleration (profile-deceleration) of these moves; 0: same as max-acceleration", {.unit = "1/s^2"}};
 
-    hal::Param<double> position_scale{*this, "position-scale", "counts per unit; negative: the other direction", {.initial = 1.0}};
-    hal::Param<double> position_divisor{*this, "position-scale-divisor", "by which position-scale is divided", {.initial = 1.0}};
-    hal::Param<double> velocity_scale{*this, "velocity-scale", "the drive's velocity per unit/s; 0: as position-scale"};
-    hal::Param<double> velocity_divisor{*this, "velocity-scale-divisor", "by which velocity-scale is divided", {.initial = 1.0}};
-    hal::Param<double> acceleration_scale{*this, "acceleration-scale", "the drive's acceleration per unit/s^2; 0: as the velocity"};
-    hal::Param<double> acceleration_divisor{*this, "acceleration-scale-divisor", "divides acceleration-scale", {.initial = 1.0}};
-    hal::Param<double> torque_scale{*this, "torque-scale", "thousandths of the rated torque per unit", {.initial = 1000.0}};
-    hal::Param<double> vl_scale{*this, "vl-scale", "mode vl: its unit, r/min, per unit/s", {.initial = 60.0}};
-    hal::Param<std::uint32_t> counter_bits{*this, "counter-bits", "of position-actual-value that count", {.initial = 32}};
-    hal::Param<double> max_step{*this, "max-step", "farthest position-cmd may go in a cycle; beyond it is a fault; 0: not watched"};
-    hal::Param<double> blend_time{*this, "blend-time", "max-step 0: in that time a position-cmd that is elsewhere at enabling is joined",
+    hal::Param<double> position_scale{*this, "position-scale", "counts per unit; negative: reversed", {.initial = 1.0}};
+    hal::Param<double> position_divisor{*this, "position-scale-divisor", "divisor of position-scale", {.initial = 1.0}};
+    hal::Param<double> velocity_scale{*this, "velocity-scale", "velocity units of the drive per unit/s; 0: same as position-scale"};
+    hal::Param<double> velocity_divisor{*this, "velocity-scale-divisor", "divisor of velocity-scale", {.initial = 1.0}};
+    hal::Param<double> acceleration_scale{*this, "acceleration-scale",
+                                          "acceleration units of the drive per unit/s^2; 0: same as the velocity"};
+    hal::Param<double> acceleration_divisor{*this, "acceleration-scale-divisor", "divisor of acceleration-scale", {.initial = 1.0}};
+    hal::Param<double> torque_scale{*this, "torque-scale", "thousandths of the rated torque per unit of torque", {.initial = 1000.0}};
+    hal::Param<double> vl_scale{*this, "vl-scale", "mode vl: r/min per unit/s", {.initial = 60.0}};
+    hal::Param<std::uint32_t> counter_bits{*this, "counter-bits", "valid bits of position-actual-value", {.initial = 32}};
+    hal::Param<double> max_step{*this, "max-step", "largest step of position-cmd in one cycle, a larger one is a fault; 0: not checked"};
+    hal::Param<double> blend_time{*this, "blend-time",
+                                  "with max-step 0: time to blend out the distance between position-cmd and position-fb at enabling",
                                   {.initial = 0.5, .unit = "s"}};
-    hal::Param<double> max_error{*this, "max-following-error", "csp, ip: beyond it is a fault; 0: not watched"};
-    hal::Param<double> step_timeout{*this, "step-timeout", "for a transition, a mode, an acknowledge", {.initial = 2.0, .unit = "s"}};
-    hal::Param<double> stop_timeout{*this, "stop-timeout", "to come to rest; then its voltage is disabled", {.initial = 10.0, .unit = "s"}};
-    hal::Param<double> homing_timeout{*this, "homing-timeout", "longest for homing; 0: no limit", {.unit = "s"}};
-    hal::Param<bool> auto_reset{*this, "auto-reset", "TRUE: a rising edge of enable is one of reset, too"};
+    hal::Param<double> max_error{*this, "max-following-error", "csp, ip: largest following error, a larger one is a fault; 0: not checked"};
+    hal::Param<double> step_timeout{*this, "step-timeout", "timeout of a state transition, a mode change, a set-point acknowledge",
+                                    {.initial = 2.0, .unit = "s"}};
+    hal::Param<double> stop_timeout{*this, "stop-timeout", "timeout of braking to standstill; then the voltage is disabled",
+                                    {.initial = 10.0, .unit = "s"}};
+    hal::Param<double> homing_timeout{*this, "homing-timeout", "timeout of homing; 0: none", {.unit = "s"}};
+    hal::Param<bool> auto_reset{*this, "auto-reset", "TRUE: a rising edge of enable also acts as one of reset"};
 
-    // What it tells the user.
-    hal::Out<bool> enabled{*this, "enabled", "operation enabled, as asked for", {.safe = false}};
-    hal::Out<bool> active{*this, "active", "commands are followed; while FALSE let position-cmd follow position-fb", {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: the axis went off or refused, until reset; see fault-code and `show fault`"};
-    hal::Out<std::uint32_t> fault_code{*this, "fault-code", "why; see the table"};
-    hal::Out<std::uint32_t> failed_step{*this, "failed-step", "which step the drive did not take; see the table"};
-    hal::Out<std::uint32_t> state{*this, "state", "of the drive; see the table"};
-    hal::Out<double> position_fb{*this, "position-fb", "measured; goes on where the drive's counter wraps", {.finite = true}};
-    hal::Out<double> velocity_fb{*this, "velocity-fb", "measured, or from the position", {.unit = "1/s", .finite = true}};
-    hal::Out<double> torque_fb{*this, "torque-fb", "measured", {.finite = true}};
-    hal::Out<double> following_error{*this, "following-error", "csp, ip: position told - position-fb", {.finite = true}};
-    hal::Out<bool> target_reached{*this, "target-reached", "pp: all set-points are done; else as the drive says"};
-    hal::Out<std::uint32_t> set_points{*this, "set-points", "pp: that wait for room in the drive"};
-    hal::Out<bool> homed{*this, "homed", "since its node was last there"};
-    hal::Out<bool> homing{*this, "homing", "homing is under way"};
-    hal::Out<std::int32_t> mode_fb{*this, "mode-fb", "the mode the drive shows"};
+    // Status for the user.
+    hal::Out<bool> enabled{*this, "enabled", "the drive is in operation enabled, as commanded", {.safe = false}};
+    hal::Out<bool> active{*this, "active", "the drive follows the commands; while FALSE, let position-cmd track position-fb",
+                          {.safe = false}};
+    hal::Out<bool> fault{*this, "fault", "TRUE: the axis was disabled or rejected a command, until reset; see fault-code and `show fault`"};
+    hal::Out<std::uint32_t> fault_code{*this, "fault-code", "cause of the fault, see the table"};
+    hal::Out<std::uint32_t> failed_step{*this, "failed-step", "state transition the drive did not make, see the table"};
+    hal::Out<std::uint32_t> state{*this, "state", "state of the drive, see the table"};
+    hal::Out<double> position_fb{*this, "position-fb", "measured position, extended beyond the range of the drive's counter",
+                                 {.finite = true}};
+    hal::Out<double> velocity_fb{*this, "velocity-fb", "measured velocity, or the derivative of the position", {.unit = "1/s",
+                                 .finite = true}};
+    hal::Out<double> torque_fb{*this, "torque-fb", "measured torque", {.finite = true}};
+    hal::Out<double> following_error{*this, "following-error", "csp, ip: position sent to the drive - position-fb", {.finite = true}};
+    hal::Out<bool> target_reached{*this, "target-reached", "pp: all set-points are reached; other modes: target reached bit of the drive"};
+    hal::Out<std::uint32_t> set_points{*this, "set-points", "pp: set-points queued until the drive takes them"};
+    hal::Out<bool> homed{*this, "homed", "homed since the node was last lost"};
+    hal::Out<bool> homing{*this, "homing", "homing in progress"};
+    hal::Out<std::int32_t> mode_fb{*this, "mode-fb", "mode displayed by the drive"};
     hal::Out<bool> warning{*this, "warning", "statusword bit 7"};
-    hal::Out<bool> remote{*this, "remote", "statusword bit 9: the drive obeys the bus"};
-    hal::Out<bool> voltage{*this, "voltage-enabled", "statusword bit 4: its power stage is supplied"};
+    hal::Out<bool> remote{*this, "remote", "statusword bit 9: the drive is controlled over the bus"};
+    hal::Out<bool> voltage{*this, "voltage-enabled", "statusword bit 4: the power stage has voltage"};
     hal::Out<bool> limited{*this, "internal-limit", "statusword bit 11"};
 
     // The drive's side, named as CiA 402 names the objects.
-    hal::In<bool> operational{*this, "operational", "its node is there: net it with that pin of the bus", {.initial = true}};
+    hal::In<bool> operational{*this, "operational", "the node is operational; connect it to the `operational` pin of the bus component",
+                              {.initial = true}};
     hal::In<std::uint32_t> statusword{*this, "statusword", "6041h"};
-    hal::In<std::int32_t> mode_display{*this, "modes-of-operation-display", "6061h; unlinked: changes of mode are not watched"};
+    hal::In<std::int32_t> mode_display{*this, "modes-of-operation-display", "6061h; unlinked: mode changes are not checked"};
     hal::In<std::int32_t> position{*this, "position-actual-value", "6064h"};
-    hal::In<std::int32_t> velocity{*this, "velocity-actual-value", "606Ch; may stay unlinked"};
-    hal::In<std::int32_t> vl_velocity{*this, "vl-velocity-actual-value", "6044h; velocity-fb of mode vl when linked"};
+    hal::In<std::int32_t> velocity{*this, "velocity-actual-value", "606Ch; optional"};
+    hal::In<std::int32_t> vl_velocity{*this, "vl-velocity-actual-value", "6044h; if linked, source of velocity-fb in mode vl"};
     hal::In<std::int32_t> torque{*this, "torque-actual-value", "6077h"};
-    hal::In<std::uint32_t> error_code{*this, "error-code", "603Fh, or the emcy pin of its node; may stay unlinked"};
+    hal::In<std::uint32_t> error_code{*this, "error-code", "603Fh, or the emcy pin of the node; optional"};
     hal::Out<std::uint32_t> controlword{*this, "controlword", "6040h", {.safe = 0U}};
     hal::Out<std::int32_t> mode_out{*this, "modes-of-operation", "6060h"};
     hal::Out<std::int32_t> target_position{*this, "target-position", "607Ah"};
@@ -91,8 +103,8 @@ struct Cia402 : hal::Component {
     hal::Out<std::uint32_t> profile_acceleration{*this, "profile-acceleration", "6083h"};
     hal::Out<std::uint32_t> profile_deceleration{*this, "profile-deceleration", "6084h"};
 
-    hal::Function read{*this, "read-all", &Cia402::read_all, "from the drive's side to the feedback; after the bus receives"};
-    hal::Function write{*this, "write-all", &Cia402::write_all, "from the commands to the drive's side; before the bus sends"};
+    hal::Function read{*this, "read-all", &Cia402::read_all, "updates the feedback from the drive; after the bus receives"};
+    hal::Function write{*this, "write-all", &Cia402::write_all, "updates the drive from the commands; before the bus sends"};
 
     void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
@@ -198,27 +210,29 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Cia402, "cia402", "One axis of a CiA 402 drive: states, modes, homing, units, supervision", R"(
-The master's side of a servo drive on any bus: the pins of its process data on one side, an axis in units of the user on the other. It
-keeps a copy of the drive's state machine and walks it to where it should be, a transition per cycle.
+The master's side of a servo drive on any bus: the process data of the drive on one side, an axis in user units on the other. It tracks
+the state machine of the drive and steps it towards the commanded state, one transition per cycle.
 
-* `enable` walks to *operation enabled*. When a step is not taken within `step-timeout`, the axis is in fault and `show fault` says which:
-  `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes by the ramp of the drive and switches off; TRUE
-  again before it has done so enables it anew.
-* While it is not enabled, the position told to the drive is the measured one, so it does not jump when it is. `position-cmd` should follow
-  `position-fb` while `active` is FALSE. What it is away then is refused when it is more than `max-step`, and removed over `blend-time`
-  when that is 0.
-* A fault (see the table) brakes by quick stop, switches off, and stays until a rising edge of `reset`. After it, after `quick-stop`
-  and after the node was lost, `enable` needs another rising edge. Before the node was there, it waits.
-* `mode` may change at any time; the command is followed when the drive shows the new mode.
-* `halt` brakes by the ramp of the drive in modes 1 to 7. In the cyclic ones the target stays where it is, or is 0, at once: bring the
-  command to rest first.
-* `home` selects mode hm, starts homing with what the drive's objects 6098h, 6099h and 609Ah say, waits, and returns to `mode`.
-  Then `position-fb` is what the drive counts.
-* `position-fb` = counts * `position-scale-divisor` / `position-scale`, without end though the drive's counter wraps.
+* `enable` steps the drive to *operation enabled*. If the drive does not make a transition within `step-timeout`, the axis is in fault and
+  `show fault` names the transition: `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes on the drive's
+  ramp and disables the axis; TRUE before that has finished enables it again.
+* While the axis is not enabled, the position sent to the drive is the measured one, so the axis does not jump when it is enabled. Let
+  `position-cmd` track `position-fb` while `active` is FALSE. If the two differ at enabling by more than `max-step`, enabling is rejected;
+  with `max-step` 0, the difference is blended out over `blend-time`.
+* A fault (see the table) brakes with quick stop, disables the axis and stays until a rising edge of `reset`. After a fault, after
+  `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up, `enable` waits until the node is operational.
+* `mode` may change at any time; the command is followed once the drive displays the new mode.
+* `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or drops to 0, at once: bring the command to
+  rest first.
+* `home` selects mode hm, starts homing as configured in the drive's objects 6098h, 6099h and 609Ah, waits for its end, and returns to
+  `mode`. Then `position-fb` is the position counted by the drive.
+* `position-fb` = counts * `position-scale-divisor` / `position-scale`; it does not wrap with the drive's counter.
 
-`read-all` belongs behind the function that receives, `write-all` before the one that sends; what commands the axis stands between.
+Call `read-all` after the function that receives from the bus and `write-all` before the one that sends, with the controller of the axis
+between the two.
 
-| mode | | follows |
+
+| mode | name | follows |
 | --- | --- | --- |
 | 1 | pp, profile position | `position-cmd` at each rising edge of `go` |
 | 2 | vl, velocity | `velocity-cmd` |
@@ -226,35 +240,35 @@ keeps a copy of the drive's state machine and walks it to where it should be, a 
 | 4 | tq, profile torque | `torque-cmd` |
 | 6 | hm, homing | `home` |
 | 7 | ip, interpolated position | `position-cmd` |
-| 8 | csp, cyclic synchronous position | `position-cmd`; `velocity-cmd` and `torque-cmd` ahead |
-| 9 | csv, cyclic synchronous velocity | `velocity-cmd`; `torque-cmd` ahead |
+| 8 | csp, cyclic synchronous position | `position-cmd`; `velocity-cmd` and `torque-cmd` as feed-forward |
+| 9 | csv, cyclic synchronous velocity | `velocity-cmd`; `torque-cmd` as feed-forward |
 | 10 | cst, cyclic synchronous torque | `torque-cmd` |
 
-| fault-code | |
+| fault-code | cause |
 | --- | --- |
 | 0 | none |
-| 1 | the drive did not take a step: `failed-step` |
+| 1 | the drive did not make a state transition: `failed-step` |
 | 2 | the drive is in fault: `error-code` |
-| 3 | it left *operation enabled* without being told |
-| 4 | its node is not operational any more |
-| 5 | it does not show the mode asked for |
+| 3 | the drive left *operation enabled* without a command |
+| 4 | the node is no longer operational |
+| 5 | the drive does not display the commanded mode |
 | 6 | following error above `max-following-error` |
 | 7 | `position-cmd` stepped farther than `max-step`, or was that far from `position-fb` at enabling |
 | 8 | a command is not a number, or too large |
 | 9 | a scale is 0 or not a number |
 | 10 | the drive reports a homing error |
 | 11 | homing took longer than `homing-timeout` |
-| 12 | pp: a set-point was not acknowledged |
+| 12 | pp: the drive did not acknowledge a set-point |
 | 13 | `home` or `go` without `enabled` |
 
 `failed-step`: 0 wait, 1 shutdown, 2 switch on, 3 enable operation, 4 disable operation, 5 disable voltage, 6 quick stop, 7 fault reset.
 `state`: 0 not ready to switch on, 1 switch on disabled, 2 ready to switch on, 3 switched on, 4 operation enabled, 5 quick stop active,
 6 fault reaction active, 7 fault, 8 none of these.
 
-For those who know LinuxCNC's component of that name: `pos-cmd`, `pos-fb`, `velocity-cmd`, `opmode`, `opmode-display`,
+Coming from LinuxCNC's component of the same name: `pos-cmd`, `pos-fb`, `velocity-cmd`, `opmode`, `opmode-display`,
 `drv-actual-position`, `drv-target-position`, `pos-scale` and `stat-*` are `position-cmd`, `position-fb`, `velocity-cmd`,
 `modes-of-operation`, `modes-of-operation-display`, `position-actual-value`, `target-position`, `position-scale`, and `state` with the
-pins beside it; `csp-mode` is `mode` 8 or 9.
+related pins; `csp-mode` is `mode` 8 or 9.
 
     loadrt cia402 names=x
     addf x.read-all servo

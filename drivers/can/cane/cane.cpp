@@ -20,10 +20,10 @@ namespace hal::can::cane {
 
 namespace {
 
-constexpr unsigned most_messages = 255;  // of one packed frame: its count is a byte
+constexpr unsigned most_messages = 255;  // per packed frame: the count is one byte
 constexpr std::size_t most_payload = ethernet::largest_frame - ethernet::header_bytes;
 
-/// What share of the line this link's frames take, both ways. The sending and the receiving thread add; the receiving one closes windows.
+/// Share of the line used by the frames of this link in both directions. Both threads add to it; the receiving one closes the windows.
 class Load {
 public:
     void add(std::size_t frame_bytes) noexcept { bytes_.fetch_add(ethernet::wire_bytes(frame_bytes), std::memory_order_relaxed); }
@@ -79,7 +79,7 @@ public:
             Counting::add(counting_.dropped);
             return why;
         };
-        if (!frame.valid() || frame.fd || options_.listen_only) return drop(Sent::refused);
+        if (!frame.valid() || frame.fd || options_.listen_only) return drop(Sent::rejected);
         guard_.sent(frame, now_ns != unclocked || simulated_ ? now_ns : link::monotonic_ns());
         if (is_replaced(frame)) return Sent::queued;
         auto& queue = is_service(frame) ? service_data_ : process_data_;
@@ -106,7 +106,7 @@ public:
     Statistics statistics() const noexcept override {
         auto s = counting_.read(process_data_.size() + service_data_.size());
         const auto line = port_->statistics();
-        // What found no room here is a gap in the sequence, too.
+        // Messages dropped here are gaps in the sequence, too.
         s.lost_on_wire = s.lost - std::min(s.lost, line.lost);
         s.lost = s.lost_on_wire + line.lost;
         s.errors += line.errors;
@@ -122,7 +122,7 @@ public:
     bool wait(std::int64_t at_most_ns) override {
         if (next_ != filled_) return true;
         if (!simulated_) return port_->wait(link::monotonic_ns() + at_most_ns);
-        constexpr std::int64_t step_ns = 100'000;  // nobody wakes a waiter of a segment in memory
+        constexpr std::int64_t step_ns = 100'000;  // a segment in memory does not wake a waiting thread
         for (; !refill(ethernet::unclocked); at_most_ns -= step_ns) {
             if (at_most_ns <= 0) return false;
             const timespec pause{0, static_cast<long>(std::min(step_ns, at_most_ns))};
@@ -132,11 +132,11 @@ public:
     }
 
 private:
-    /// SDO, heartbeat, boot-up and LSS wait for process data, SYNC, NMT and EMCY: those have a cycle to keep.
+    /// Returns true for SDO, heartbeat, boot-up and LSS, which wait for messages with a deadline: process data, SYNC, NMT and EMCY.
     static bool is_service(const Frame& f) noexcept { return f.id >= 0x580; }
-    /// Of SYNC and the PDOs of the predefined connection set the newest counts.
+    /// Returns true for SYNC and the PDOs of the predefined connection set, of which only the newest is valid.
     static bool is_state(const Frame& f) noexcept { return !f.extended && !f.remote && (f.id == 0x080 || (f.id >= 0x180 && f.id < 0x580)); }
-    /// It took the place of an older one that found no room in the last cycle: what is late must not make everything behind it late, too.
+    /// Replaces an older message still waiting from the last cycle, so that one delay does not accumulate. Returns true when it did.
     bool is_replaced(const Frame& frame) noexcept {
         if (held_ == 0 || !is_state(frame)) return false;
         for (std::size_t n = 0; n < held_; ++n) {
@@ -149,7 +149,7 @@ private:
         return false;
     }
 
-    /// Room for payload, as it is now; 0: nothing can leave.
+    /// Returns the payload bytes a frame may have now; 0: nothing can leave.
     std::size_t room() const noexcept {
         if (!discipline_) return most_payload;
         std::size_t room = 0;
@@ -171,7 +171,7 @@ private:
 
     void address_to(const ethernet::Address& to) noexcept { std::copy(to.begin(), to.end(), frame_.begin()); }
 
-    /// The frame in `frame_`, of that length. `full`: keep what it carries for the next time.
+    /// Sends the frame in `frame_`. On `full` the caller keeps its messages for the next call.
     ethernet::Sent launch(std::size_t length, bool service, std::int64_t now_ns) noexcept {
         ethernet::Finisher* const finisher = settings_.format == Format::packed ? seal_.get() : nullptr;
         if (!is_up()) return ethernet::Sent::down;
@@ -185,7 +185,7 @@ private:
         if (sent == ethernet::Sent::queued) load_.add(length);
         return sent;
     }
-    /// Takes the first `count` messages out of a queue, as sent or as lost.
+    /// Removes the first `count` messages of a queue and counts them as sent or lost.
     void done(link::Ring<Frame>& queue, std::size_t count, ethernet::Sent sent) noexcept {
         if (sent == ethernet::Sent::queued)
             for (std::size_t n = 0; n < count; ++n) counting_.count_sent(*queue.at(n));
@@ -199,14 +199,14 @@ private:
                 const auto to = f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
                 address_to(to.value_or(ethernet::broadcast));
                 const auto bytes = put_single(*f, settings_.order, std::span(frame_).subspan(ethernet::header_bytes, room()));
-                const auto sent = bytes == 0 ? ethernet::Sent::refused
+                const auto sent = bytes == 0 ? ethernet::Sent::rejected
                                              : launch(ethernet::header_bytes + bytes, queue == &service_data_, now_ns);
                 if (sent == ethernet::Sent::full) return;
                 done(*queue, 1, sent);
             }
     }
 
-    /// As many messages as there are and fit, process data first. The frame goes to one station when all of them do.
+    /// Packs as many messages as fit, process data first. The frame goes to one station if all of them do.
     void flush_packed(std::int64_t now_ns) noexcept {
         while (process_data_.front() != nullptr || service_data_.front() != nullptr) {
             const auto payload = room();
@@ -230,7 +230,7 @@ private:
                     bytes += more;
                     ++counts[q];
                 }
-            auto sent = ethernet::Sent::refused;  // not even one fits
+            auto sent = ethernet::Sent::rejected;  // not even one fits
             if (first) {
                 counts[process_data_.front() != nullptr ? 0 : 1] = 1;
             } else {
@@ -248,10 +248,10 @@ private:
         }
     }
 
-    /// Takes the next frame that has messages for us. False: there is none.
+    /// Opens the next frame with messages for this link. Returns false when there is none.
     bool refill(std::int64_t now_ns) noexcept {
         next_ = filled_ = 0;
-        constexpr unsigned most_frames = 256;  // of one call: a babbling station must not keep a cycle
+        constexpr unsigned most_frames = 256;  // per call: a babbling station must not delay the cycle without limit
         for (unsigned n = 0; n < most_frames; ++n) {
             const auto arrival = port_->receive(now_ns);
             if (!arrival) break;
@@ -271,13 +271,13 @@ private:
         ethernet::Address to, from;
         std::copy_n(whole.begin(), 6, to.begin());
         std::copy_n(whole.begin() + 6, 6, from.begin());
-        if ((from[0] & 1) != 0) return Counting::add(counting_.errors);  // no station has the address of a group
+        if ((from[0] & 1) != 0) return Counting::add(counting_.errors);  // a multicast source address is invalid
         load_.add(whole.size());
         using Origin = ethernet::Discipline::Origin;
         Origin origin = Origin::plausible;
         if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { origin = d.origin(from, arrival.time_ns, whole.size()); });
-        if (origin == Origin::stranger) return reject(Rejected::Why::stranger, 0, from, arrival.time_ns);
-        /// A frame that commands must be the master's, and in its slot.
+        if (origin == Origin::unknown_station) return reject(Rejected::Why::unknown_station, 0, from, arrival.time_ns);
+        /// Returns false for a command that is not from the master, or not in its slot.
         const auto is_allowed = [&](const Frame& f) {
             if (Guard::negotiates(f)) guard_.release();
             if (!Guard::commands(f)) return true;
@@ -329,12 +329,12 @@ private:
     Nodes nodes_;
     std::atomic<bool> line_up_{true};  // written by the receiving thread
 
-    link::Ring<Frame> process_data_, service_data_;  // the sending thread's, as the next four
-    std::size_t held_ = 0;                     // at the front of the first: what the last flush() left
+    link::Ring<Frame> process_data_, service_data_;  // used by the sending thread, as the next four
+    std::size_t held_ = 0;                     // at the front of process_data_: left by the last flush()
     std::shared_ptr<Seal> seal_;
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};
 
-    Streams streams_;  // from here on: the receiving thread's
+    Streams streams_;  // from here on: used by the receiving thread
     Guard guard_;
     Rejections rejections_;
     Replays replays_;
@@ -356,13 +356,13 @@ Description describe(const std::string& place) {
 Opened open(const std::string& place, const Options& options) {
     Settings settings;
     if (auto problem = parse(place, settings); !problem.empty()) return {nullptr, std::move(problem)};
-    if (options.fd) return {nullptr, "frames of CAN FD do not travel in 0x9023 frames; leave fd out"};
+    if (options.fd) return {nullptr, "0x9023 frames cannot carry CAN FD; remove fd"};
     ethernet::Options how;
     how.types = {ether_type};
     how.receive_capacity = std::clamp<std::size_t>(options.receive_capacity / 8, 64, 1024);
     const std::string segment = settings.segment + settings.segment_options;
     auto opened = ethernet::open(segment, how);
-    if (!opened) {  // the caller says the address that was written
+    if (!opened) {  // the caller adds the address as written
         if (opened.problem.starts_with(segment + ": ")) opened.problem.erase(0, segment.size() + 2);
         return {nullptr, std::move(opened.problem)};
     }
@@ -370,14 +370,14 @@ Opened open(const std::string& place, const Options& options) {
     if (settings.slot) {
         discipline = ethernet::discipline_of(*opened.port);
         if (!discipline)
-            return {nullptr, "no TDMA on " + settings.segment + " has slots; loadrt tdma for it first, or leave slot= out"};
+            return {nullptr, "no TDMA runs on " + settings.segment + "; loadrt tdma for it first, or remove slot="};
         std::size_t room = 0;
         discipline->with([&](const ethernet::Discipline& d) { room = d.room(*settings.slot); });
         if (room < packed_header + longest_message + (settings.key ? counter_bytes + tag_bytes : 0))
-            return {nullptr, "the TDMA on " + settings.segment + " has no slot " + std::to_string(*settings.slot) +
-                                 " of at least " + (settings.key ? "60" : "46") + " bytes; give it one, or name another"};
+            return {nullptr, "TDMA on " + settings.segment + " has no slot " + std::to_string(*settings.slot) + " of at least " +
+                     (settings.key ? "60" : "46") + " bytes; add one to the schedule, or change slot="};
     }
-    // Another one for each link of this machine, and on a segment in memory the same ones in every run.
+    // Different for each link of this machine, and repeatable on a segment in memory.
     static std::atomic<std::uint16_t> opened_before{0};
     auto session = ++opened_before;
     if (!opened.port->description().simulated) session = static_cast<std::uint16_t>(session ^ link::clock_ns(CLOCK_REALTIME) / 1'000'000);

@@ -8,12 +8,12 @@
 
 namespace hal::can::cane {
 
-/// Whether `key` belongs to this driver rather than to every CAN link. [setup]
+/// Returns true when `key` is an option of this driver and not of every CAN link. [setup]
 bool is_own_option(std::string_view key);
-/// "format, order, …". [setup]
+/// Returns the names of its own options: "format, order, …". [setup]
 std::string own_options();
 
-/// `cane:IF?key=value`: CAN messages in Ethernet frames. `place` has the driver's own options behind it. [setup]
+/// Opens `cane:IF?key=value`: CAN messages in Ethernet frames. `place` includes the driver's own options. [setup]
 Opened open(const std::string& place, const Options&);
 /// Describes what open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& place);

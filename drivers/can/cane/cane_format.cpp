@@ -8,7 +8,7 @@ namespace hal::can::cane {
 
 namespace {
 
-// Beside the identifier, as in the 32-bit identifiers of SocketCAN and RTCAN.
+// Flags beside the identifier, as in the 32-bit identifiers of SocketCAN and RTCAN.
 constexpr std::uint32_t extended_bit = 0x8000'0000, remote_bit = 0x4000'0000, error_bit = 0x2000'0000, id_bits = 0x1fff'ffff;
 constexpr unsigned remote_flag = 1U << 11, long_form = 15;
 
@@ -37,7 +37,7 @@ unsigned get16(const std::uint8_t* from) noexcept { return from[0] | unsigned{fr
 
 std::uint32_t word_of(const Frame& f) noexcept { return f.id | (f.extended ? extended_bit : 0) | (f.remote ? remote_bit : 0); }
 
-/// The fields of a frame from its 32-bit word and its length. False: there is no such frame.
+/// Decodes identifier, flags and length. Returns false when they are invalid.
 bool fill(std::uint32_t word, unsigned length, Frame& f) noexcept {
     f = {};
     f.id = word & id_bits, f.extended = (word & extended_bit) != 0, f.remote = (word & remote_bit) != 0;
@@ -45,7 +45,7 @@ bool fill(std::uint32_t word, unsigned length, Frame& f) noexcept {
     return length <= 8 && (word & error_bit) == 0 && f.valid();
 }
 
-/// Where a message ends, or nullptr: it does not end within the bytes, or is none. `f` has everything but the data.
+/// Returns the end of a message, or nullptr when it is truncated or invalid. Sets all of `f` but the data.
 const std::uint8_t* head(const std::uint8_t* at, const std::uint8_t* end, Frame& f, Wrong& wrong) noexcept {
     wrong = Wrong::cut;
     if (end - at < 2) return nullptr;

@@ -29,17 +29,17 @@ std::optional<unsigned> number(std::string_view text, unsigned least, unsigned m
 }
 
 std::string is(std::string_view key, std::string_view value, std::string_view write) {
-    return std::string(key) + " is '" + std::string(value) + "'; write " + std::string(write);
+    return "invalid " + std::string(key) + " '" + std::string(value) + "'; write " + std::string(write);
 }
 
-/// Reads the key of a segment: 32 hexadecimal digits in a file of their own that nobody else may read.
+/// Reads the key of a segment: 32 hexadecimal digits in a file that only its owner may read.
 std::string read_key(const std::string& file, std::optional<Key>& key) {
     struct stat about{};
-    if (::stat(file.c_str(), &about) != 0) return "the key file '" + file + "' cannot be read: " + std::strerror(errno);
-    if ((about.st_mode & 077) != 0) return "the key file '" + file + "' may be read by others; type: chmod 600 " + file;
+    if (::stat(file.c_str(), &about) != 0) return "cannot read key file '" + file + "': " + std::strerror(errno);
+    if ((about.st_mode & 077) != 0) return "key file '" + file + "' is readable by others; type: chmod 600 " + file;
     std::ifstream in(file);
     std::string text, more;
-    if (!S_ISREG(about.st_mode) || !(in >> text)) return "the key file '" + file + "' cannot be read, or is empty";
+    if (!S_ISREG(about.st_mode) || !(in >> text)) return "cannot read key file '" + file + "', or it is empty";
     std::array<std::uint8_t, 16> bytes{};
     bool good = text.size() == 32 && !(in >> more);
     for (std::size_t n = 0; good && n < 16; ++n) {
@@ -47,7 +47,7 @@ std::string read_key(const std::string& file, std::optional<Key>& key) {
         good = wrong == std::errc{} && end == text.data() + 2 * n + 2;
     }
     if (!good)
-        return "the key file '" + file + "' must hold 32 hexadecimal digits and nothing else; make one: (umask 077; openssl rand -hex 16 > " + file +
+        return "invalid key file '" + file + "': expected 32 hexadecimal digits; to create one: (umask 077; openssl rand -hex 16 > " + file +
                ")";
     key.emplace();
     for (unsigned n = 0; n < 16; ++n) (*key)[n / 8] |= std::uint64_t{bytes[n]} << 8 * (n % 8);
@@ -81,7 +81,7 @@ std::string apply(std::string_view key, std::string_view value, Settings& s, boo
         return {};
     }
     const auto id = number(key.substr(4), 1, 127);
-    if (!id) return "'" + std::string(key) + "' names no node; write node5=02:00:00:00:00:05";
+    if (!id) return "invalid node '" + std::string(key) + "'; write node5=02:00:00:00:00:05";
     if (!address || ((*address)[0] & 1) != 0) return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
     s.nodes.emplace_back(*id, *address);
     return {};
@@ -101,7 +101,7 @@ bool is_own_option(std::string_view key) { return is_in(own_keys, key) || is_in(
 std::string parse(std::string_view place, Settings& s, bool reads_key) {
     const auto question = std::min(place.find('?'), place.size());
     s.segment = place.substr(0, question);
-    if (s.segment.empty()) return "the interface is missing; write cane:enp3s0, or cane:sim:bus0 for a segment in memory";
+    if (s.segment.empty()) return "missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory";
     if (s.segment.find(':') == std::string::npos) s.segment.insert(0, "eth:");
     auto rest = place.substr(std::min(question + 1, place.size()));
     while (!rest.empty()) {
@@ -116,7 +116,7 @@ std::string parse(std::string_view place, Settings& s, bool reads_key) {
             return problem;
         }
     }
-    if (s.key && s.format == Format::single) return "key= signs packed frames only; leave format=single out";
+    if (s.key && s.format == Format::single) return "key= signs packed frames only; remove format=single";
     return {};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What stands in an address `cane:PLACE?key=value`.
+// The settings in an address `cane:PLACE?key=value`.
 #pragma once
 
 #include <optional>
@@ -11,22 +11,23 @@
 
 namespace hal::can::cane {
 
+/// The settings of a link.
 struct Settings {
     std::string segment;              ///< address of the Ethernet segment, without options
     std::string segment_options;      ///< "?mac=…", or empty
     Format format = Format::packed;
     Order order = Order::big;
-    std::optional<unsigned> slot;     ///< of the discipline on the segment; nothing: frames leave at once
-    unsigned priority = 8;            ///< of process data in the slot; SDO, heartbeats and LSS are behind it
+    std::optional<unsigned> slot;     ///< slot of the discipline on the segment; none: frames leave at once
+    unsigned priority = 8;            ///< priority of process data in the slot; SDO, heartbeats and LSS have the next lower one
     bool learns = true;
     bool produced_to_master = false;
     std::vector<std::pair<unsigned, ethernet::Address>> nodes;
-    std::optional<ethernet::Address> master;  ///< who alone may command; nothing: it is learnt
-    std::vector<ethernet::Address> also;      ///< who may, too
-    std::optional<Key> key;                   ///< all frames are signed with it
+    std::optional<ethernet::Address> master;  ///< the only station that may command; none: learnt
+    std::vector<ethernet::Address> also;      ///< further stations that may command
+    std::optional<Key> key;                   ///< signs all frames
 };
 
-/// Reads it; returns what is wrong, or nothing. The segment is set in any case. `read_key`: also reads the file of `key=`. [setup]
+/// Parses `place` and sets the segment in any case. Returns the problem, or "". With `read_key` it also reads the file of `key=`. [setup]
 std::string parse(std::string_view place, Settings&, bool read_key = true);
 
 }  // namespace hal::can::cane

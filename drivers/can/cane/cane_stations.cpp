@@ -20,7 +20,7 @@ Address address(std::uint64_t n) noexcept {
     return a;
 }
 
-/// Function codes of the predefined connection set, without the node-id.
+/// Function codes of the predefined connection set, without the node ID.
 enum : std::uint32_t { nmt = 0x000, emcy_or_sync = 0x080, time = 0x100, sdo_answer = 0x580, sdo_request = 0x600, heartbeat = 0x700 };
 constexpr bool is_tpdo(std::uint32_t code) noexcept { return code == 0x180 || code == 0x280 || code == 0x380 || code == 0x480; }
 constexpr bool is_rpdo(std::uint32_t code) noexcept { return code == 0x200 || code == 0x300 || code == 0x400 || code == 0x500; }

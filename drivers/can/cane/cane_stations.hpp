@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who is on the segment: where each node-id lives, and which frames of whom have come already. No memory is taken after construction.
+// The stations of the segment: where each node ID is, and which frames have been received already. Nothing is allocated after construction.
 #pragma once
 
 #include <array>
@@ -13,18 +13,18 @@ namespace hal::can::cane {
 
 using ethernet::Address;
 
-/// Node-id to address. Written and read by the receiving thread (learn), read by the sending one (where): entries are single atomic words.
+/// Maps node IDs to addresses. Written and read by the receiving thread (learn), read by the sending one (where): entries are atomic words.
 class Nodes {
 public:
-    static constexpr std::int64_t moved_after_ns = 1'000'000'000;  ///< silence after which a node may be at another address
+    static constexpr std::int64_t moved_after_ns = 1'000'000'000;  ///< time without a message after which a node may have moved
 
-    /// It stays there, whatever comes. [setup]
+    /// Fixes the address of a node. [setup]
     void fix(unsigned id, const Address&) noexcept;
-    /// A message with this identifier came from there. False: its node-id is heard from two addresses at the same time; it is reached by
-    /// broadcast until one is silent for `moved_after_ns`. [realtime] receiver
+    /// Learns from a message with this identifier. Returns false when its node ID is received from two addresses at the same time; it is
+    /// reached by broadcast until one of them has sent nothing for `moved_after_ns`. [realtime] receiver
     bool learn(std::uint32_t id, const Address& from, std::int64_t now_ns) noexcept;
-    /// Where a message with this 11-bit identifier is wanted, by the predefined connection set (CiA 301, 7.3.3); nothing: by everybody, or
-    /// nobody knows. `produced_to_master`: what nodes produce (TPDO, EMCY, heartbeat) goes to the NMT master alone. [realtime] sender
+    /// Returns the destination of a message with this 11-bit identifier by the predefined connection set (CiA 301, 7.3.3); nullopt: all, or
+    /// unknown. With `produced_to_master`, messages produced by nodes (TPDO, EMCY, heartbeat) go to the NMT master only. [realtime] sender
     std::optional<Address> where(std::uint32_t id, bool produced_to_master) const noexcept;
 
 private:
@@ -33,27 +33,27 @@ private:
 
     struct Place {
         std::atomic<std::uint64_t> is{0};
-        std::int64_t heard_ns = 0, other_ns = 0;  // the receiver's: when from there, when from elsewhere
+        std::int64_t heard_ns = 0, other_ns = 0;  // receiver: last message from there, and from elsewhere
     };
     bool learn(Place&, const Address&, std::int64_t now_ns) noexcept;
 
     std::array<Place, 128> places_;
-    std::array<std::atomic<std::uint64_t>, 128> asked_{};  ///< by whom the node's SDO server was asked last
+    std::array<std::atomic<std::uint64_t>, 128> asked_{};  ///< the last client of the node's SDO server
 };
 
-/// Which packed frames came already, by sender and session.
+/// Detects duplicate and lost packed frames, by sender and session.
 class Streams {
 public:
     struct Verdict {
-        bool fresh = true;       ///< false: a copy, or overtaken by a later one
+        bool fresh = true;       ///< false: a duplicate, or out of order
         std::uint32_t lost = 0;  ///< frames missing before it
     };
-    /// [realtime] receiver
+    /// Takes a received frame. [realtime] receiver
     Verdict take(const Address& from, bool to_all, Stamp, std::int64_t now_ns) noexcept;
 
 private:
-    static constexpr unsigned most = 128;      ///< sessions, one or two of a sender; the one silent for longest makes room
-    static constexpr unsigned stale_most = 8;  ///< old ones in a row: it is the memory here that is wrong
+    static constexpr unsigned most = 128;      ///< sessions, one or two per sender; the least recently used is replaced
+    static constexpr unsigned stale_most = 8;  ///< consecutive stale frames after which the sequence restarts
     struct Sender {
         std::uint64_t key = 0;
         std::int64_t heard_ns = INT64_MIN;
@@ -66,12 +66,12 @@ private:
     std::array<Sender, most> senders_;
 };
 
-/// Counts the frames to each destination. Frames leave from more than one thread.
+/// Counts the frames to each destination. Frames leave from several threads.
 class Sequences {
 public:
-    std::uint16_t next(const Address& to) noexcept;  ///< [realtime] any thread
-    void take_back(const Address& to) noexcept;      ///< the last one was not used. [realtime] any thread
-    void clear() noexcept;                           ///< [setup]
+    std::uint16_t next(const Address& to) noexcept;  ///< Returns the next number. [realtime] any thread
+    void take_back(const Address& to) noexcept;      ///< Returns an unused number. [realtime] any thread
+    void clear() noexcept;                           ///< Resets all numbers. [setup]
 
 private:
     static constexpr std::uint64_t nobody = ~0ULL;
@@ -80,7 +80,7 @@ private:
         std::atomic<std::uint16_t> count{0};
     };
     std::atomic<std::uint16_t>& of(const Address& to) noexcept;
-    std::array<Counter, 256> counters_;  // broadcast, 127 nodes, and some that moved; the last is of all for whom there is no place
+    std::array<Counter, 256> counters_;  // broadcast, 127 nodes, and some that moved; the last one is shared by the rest
 };
 
 }  // namespace hal::can::cane

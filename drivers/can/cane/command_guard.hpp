@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Who may command: NMT, SYNC, TIME and set-points (RPDO 1 to 4 of the predefined connection set) are taken from one station, the master's.
-// Others are rejected while it is alive. No memory is taken after construction; all of it belongs to the receiving thread, except sent().
+// Access control for commands: NMT, SYNC, TIME and set-points (RPDO 1 to 4 of the predefined connection set) are accepted from one station,
+// the master; others are rejected while it is alive. Nothing is allocated after construction. Used by the receiving thread, except sent().
 #pragma once
 
 #include <atomic>
@@ -11,26 +11,27 @@
 
 namespace hal::can::cane {
 
+/// Accepts commands from the master only.
 class Guard {
 public:
-    static constexpr std::int64_t alive_ns = 1'000'000'000;  ///< a master that commanded nothing for that long may be another
+    static constexpr std::int64_t alive_ns = 1'000'000'000;  ///< timeout after which another station may become the master
 
-    void fix(const ethernet::Address& master) { master_ = master, known_ = fixed_ = true; }  // [setup]
-    void allow(const ethernet::Address& other) { allowed_.push_back(other); }                // [setup]
-    /// Nothing is learnt: without fix() anybody may command. [setup]
+    void fix(const ethernet::Address& master) { master_ = master, known_ = fixed_ = true; }  ///< Sets the master. [setup]
+    void allow(const ethernet::Address& other) { allowed_.push_back(other); }                ///< Also accepts commands of `other`. [setup]
+    /// Switches learning on or off; without learning and fix(), commands of any station are accepted. [setup]
     void learn(bool on) { learns_ = on; }
 
-    /// [any]
+    /// Returns true for a command. [any]
     static bool commands(const Frame& f) noexcept {
         if (f.extended || f.remote) return false;
         const std::uint32_t code = f.id & 0x780, node = f.id & 0x7f;
         const bool is_rpdo = node != 0 && (code == 0x200 || code == 0x300 || code == 0x400 || code == 0x500);
         return f.id == 0x000 || f.id == 0x080 || f.id == 0x100 || is_rpdo;
     }
-    /// A flying master asks for the network (CiA 302-2: 071h to 076h): whoever is next may command at once.
+    /// Returns true for the negotiation of flying masters (CiA 302-2: 071h to 076h): the next master may command at once. [any]
     static bool negotiates(const Frame& f) noexcept { return !f.extended && f.id >= 0x071 && f.id <= 0x076; }
 
-    /// May this station command? It is the master from now on when nobody else is. [realtime] receiver
+    /// Returns whether the station may command; with no master alive, it becomes the master. [realtime] receiver
     bool may_command(const ethernet::Address& from, std::int64_t now_ns) noexcept {
         for (const auto& other : allowed_)
             if (other == from) return true;
@@ -42,12 +43,12 @@ public:
         known_ = true, master_ = from, heard_ns_ = now_ns;
         return true;
     }
-    /// [realtime] receiver
+    /// Forgets a learnt master. [realtime] receiver
     void release() noexcept {
         if (!fixed_) known_ = false;
         own_ns_.store(INT64_MIN, std::memory_order_relaxed);
     }
-    /// This link sends a command itself. [realtime] sender
+    /// Notes a command sent by this link itself. [realtime] sender
     void sent(const Frame& f, std::int64_t now_ns) noexcept {
         if (commands(f)) own_ns_.store(now_ns, std::memory_order_relaxed);
     }
@@ -60,10 +61,10 @@ private:
     std::atomic<std::int64_t> own_ns_{INT64_MIN};
 };
 
-/// Rejected frames, a report a second: what is rejected meanwhile is counted.
+/// Rejected frames, reported at most once a second; those in between are counted.
 class Rejections {
 public:
-    /// [realtime] receiver
+    /// Adds a rejected frame. [realtime] receiver
     void add(Rejected::Why why, std::uint32_t id, const ethernet::Address& from, std::int64_t now_ns) noexcept {
         std::uint64_t number = 0;
         for (const auto byte : from) number = number << 8 | byte;
@@ -71,22 +72,23 @@ public:
         ++waiting_.count;
         now_ns_ = now_ns;
     }
+    /// Takes a report that is due; false: none. [realtime] receiver
     bool take(Rejected& out) noexcept {
-        if (waiting_.count == 0 || (told_ && now_ns_ - told_ns_ < 1'000'000'000)) return false;
-        out = waiting_, waiting_ = {}, told_ = true, told_ns_ = now_ns_;
+        if (waiting_.count == 0 || (reported_ && now_ns_ - reported_ns_ < 1'000'000'000)) return false;
+        out = waiting_, waiting_ = {}, reported_ = true, reported_ns_ = now_ns_;
         return true;
     }
 
 private:
     Rejected waiting_;
-    bool told_ = false;
-    std::int64_t now_ns_ = 0, told_ns_ = 0;
+    bool reported_ = false;
+    std::int64_t now_ns_ = 0, reported_ns_ = 0;
 };
 
-/// The newest counter of each sender of signed frames.
+/// Detects replayed frames by the newest counter of each sender of signed frames.
 class Replays {
 public:
-    /// False: it came before. Of a frame whose tag is right. [realtime] receiver
+    /// Returns false for a replayed frame. Call it after its tag is verified. [realtime] receiver
     bool fresh(const ethernet::Address& from, std::uint64_t counter) noexcept {
         Sender* s = nullptr;
         for (auto& candidate : senders_)

@@ -12,7 +12,7 @@ namespace hal::can::cane {
 
 namespace {
 
-/// Grows with every frame of this process, and from one start to the next, as long as nobody sets the clock back.
+/// Grows with every frame of this process, and from one start to the next unless the clock is set back.
 std::uint64_t next_counter(bool simulated) noexcept {
     static std::atomic<std::uint64_t> last{0};
     const auto clock = simulated ? std::uint64_t{0} : static_cast<std::uint64_t>(link::clock_ns(CLOCK_REALTIME));
@@ -40,7 +40,7 @@ void Seal::stayed(std::span<const std::uint8_t> frame) noexcept { sequences_of(f
 std::shared_ptr<Seal> Seal::take(const std::optional<Key>& key, bool simulated) {
     static std::mutex mutex;
     static std::vector<std::shared_ptr<Seal>> all;
-    constexpr long kept = 64;  // a frame waits for its time for a few cycles at most: the one given back longest ago has none any more
+    constexpr long kept = 64;  // frames wait for a few cycles at most, so the seal returned first has none waiting
     const std::lock_guard lock(mutex);
     const auto is_free = [](const auto& s) { return s.use_count() == 1; };
     const auto oldest = std::find_if(all.begin(), all.end(), is_free);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a packed frame gets when it leaves: its number, its check sequence, and, with a key, its counter and its tag. So a frame that waited
-// for its slot and was dropped takes no number, and whoever finds a gap knows that the wire lost something.
+// Completes a packed frame when it leaves: sequence number, check sequence and, with a key, counter and tag. A frame dropped while waiting
+// for its slot takes no number, so a gap at the receiver means a loss on the segment.
 #pragma once
 
 #include <atomic>
@@ -16,13 +16,13 @@ public:
     void leaves(std::span<std::uint8_t> frame) noexcept override;
     void stayed(std::span<const std::uint8_t> frame) noexcept override;
 
-    /// One for a link. Frames may still wait for their time when the link is gone, so that it stays, and serves another link later. [setup]
+    /// Returns a seal for a link. It stays after the link is closed, because frames may still wait, and serves another link later. [setup]
     static std::shared_ptr<Seal> take(const std::optional<Key>& key, bool simulated);
 
 private:
     Sequences& sequences_of(std::span<const std::uint8_t> frame) noexcept { return is_service(frame) ? service_ : process_; }
 
-    Sequences process_, service_;  // frames of services alone leave later, and are counted apart
+    Sequences process_, service_;  // frames of only services leave later and are counted separately
     std::optional<Key> key_;
     bool simulated_ = false;
 };

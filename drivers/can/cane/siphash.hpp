@@ -12,7 +12,7 @@ namespace hal::can::cane {
 
 using Key = std::array<std::uint64_t, 2>;
 
-/// [any]
+/// Returns the tag of `bytes`. [any]
 inline std::uint64_t siphash(const Key& key, std::span<const std::uint8_t> bytes) noexcept {
     std::uint64_t a = key[0] ^ 0x736f6d6570736575, b = key[1] ^ 0x646f72616e646f6d, c = key[0] ^ 0x6c7967656e657261,
                   d = key[1] ^ 0x7465646279746573;

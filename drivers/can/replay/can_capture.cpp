@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Captures of a CAN bus: link type 227 (CAN frames, identifier big-endian) or 113 (the same behind a 16-byte header of any interface).
+// Captures of a CAN bus: link type 227 (CAN frames, identifier big-endian) or 113 (the same after a 16-byte header of the interface).
 #include "link/capture.hpp"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 using namespace hal::replay;
 
-/// One packet; false when it is no CAN frame.
+/// Parses one packet. Returns false when it is not a CAN frame.
 bool parse_packet(std::string_view packet, unsigned link, Frame& f) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(packet[i]); };
     f = {};
@@ -94,7 +94,7 @@ Capture parse_capture(std::string_view bytes) {
             Frame f;
             if (parse_log_line(line, f)) capture.frames.push_back(f);
             else if (line.find_first_not_of(" \t\r") != line.npos && capture.problem.empty())
-                capture.problem = "line " + std::to_string(number) + " is no frame; a line is `(1436509052.249713) can0 181#0102`";
+                capture.problem = "line " + std::to_string(number) + ": invalid frame; expected `(1436509052.249713) can0 181#0102`";
         }
     }
     std::stable_sort(capture.frames.begin(), capture.frames.end(), [](const Frame& a, const Frame& b) { return a.time_ns < b.time_ns; });
@@ -113,7 +113,7 @@ template <class Made>
 std::unique_ptr<Recorder> made(const std::string& file, std::string_view channel, std::string& problem) {
     auto recorder = std::make_unique<Made>(file, channel);
     if (recorder->error() == 0) return recorder;
-    problem = file + " cannot be written: " + std::strerror(recorder->error());
+    problem = "cannot write " + file + ": " + std::strerror(recorder->error());
     return nullptr;
 }
 

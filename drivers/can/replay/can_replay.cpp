@@ -24,7 +24,7 @@ public:
         description_.bit_rate = counting_.bit_rate, description_.data_rate = counting_.data_rate, description_.fd = options.fd;
     }
     Sent send(const Frame& frame, std::int64_t) noexcept override {
-        if (!frame.valid() || options_.listen_only) return Counting::add(counting_.dropped), Sent::refused;
+        if (!frame.valid() || options_.listen_only) return Counting::add(counting_.dropped), Sent::rejected;
         counting_.count_sent(frame);
         return Sent::queued;
     }
@@ -57,7 +57,7 @@ public:
 private:
     const Options options_;
     const std::vector<Frame> frames_;
-    std::size_t next_ = 0;  // from here on: the receiving thread's
+    std::size_t next_ = 0;  // from here on: used by the receiving thread
     bool begun_ = false;
     std::int64_t shift_ = 0;
 };
@@ -69,10 +69,10 @@ Description describe(const std::string& file) {
 }
 
 Opened open(const std::string& file, const Options& options) {
-    if (file.empty()) return {nullptr, "the file is missing; write replay:capture.log or replay:capture.pcapng"};
+    if (file.empty()) return {nullptr, "missing file; write replay:capture.log or replay:capture.pcapng"};
     auto capture = read_capture(file);
     if (!capture.problem.empty()) return {nullptr, capture.problem};
-    if (capture.frames.empty()) return {nullptr, "there is no CAN frame in this file; it should be a candump log, pcapng or pcap"};
+    if (capture.frames.empty()) return {nullptr, "no CAN frames in this file; expected a candump log, pcapng or pcap"};
     return {std::make_unique<ReplayLink>(file, options, std::move(capture.frames)), {}};
 }
 

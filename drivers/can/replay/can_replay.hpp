@@ -5,7 +5,7 @@
 
 namespace hal::can::replay {
 
-/// `replay:FILE`: the frames of a capture at their times, the first when it is first asked for one. What is sent goes nowhere. [setup]
+/// Opens `replay:FILE`: the frames of a capture at their times, starting at the first receive(). Frames sent are discarded. [setup]
 Opened open(const std::string& file, const Options&);
 /// Describes what open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& file);

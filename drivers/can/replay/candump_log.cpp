@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// candump's log: `(SECONDS.FRACTION) CHANNEL ID#DATA`, remote frames `ID#R` or `ID#R4`, FD `ID##FLAGSDATA`; three digits of identifier
-// are a standard one, eight an extended one, or an error frame when bit 29 is set.
+// The candump log format: `(SECONDS.FRACTION) CHANNEL ID#DATA`, remote frames `ID#R` or `ID#R4`, FD `ID##FLAGSDATA`. Three digits are a
+// standard identifier, eight an extended one, or an error frame if bit 29 is set.
 #include <cstdio>
 
 #include "link/capture.hpp"
@@ -19,7 +19,7 @@ bool hex(std::string_view text, std::uint32_t& value) {
     return !text.empty();
 }
 
-/// Up to nine digits of the fraction count.
+/// Parses the fraction; digits after the ninth are ignored.
 bool time_of(std::string_view text, std::int64_t& ns) {
     std::int64_t whole = 0, fraction = 0, unit = 1'000'000'000;
     bool point = false, digits = false;
@@ -77,7 +77,7 @@ bool parse_frame(std::string_view text, Frame& f) {
 std::string log_line(const Frame& f, std::string_view channel) {
     char text[256];
     const auto time = f.time_ns > 0 ? f.time_ns : 0;
-    // Always six digits: canplayer takes whatever stands behind the point for microseconds.
+    // Always six digits: canplayer reads the digits after the point as microseconds.
     const long long seconds = time / 1'000'000'000, microseconds = time % 1'000'000'000 / 1000;
     int size = std::snprintf(text, sizeof text, "(%010lld.%06lld) ", seconds, microseconds);
     std::string line(text, static_cast<std::size_t>(size));

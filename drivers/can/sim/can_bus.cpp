@@ -37,10 +37,10 @@ std::shared_ptr<Bus> Bus::find(const std::string& name, const Options& options, 
     if (auto bus = known.lock()) {
         const auto wanted = options.bit_rate == unlimited ? 0 : options.bit_rate;
         if (options.bit_rate != 0 && wanted != bus->bit_rate)
-            problem = "the bus runs at " + (bus->bit_rate == 0 ? "no bit rate" : std::to_string(bus->bit_rate) + " bit/s") +
-                      " already; open it with the same bitrate everywhere, or give it in one place only";
+            problem = "the bus already runs at " + (bus->bit_rate == 0 ? "no bit rate" : std::to_string(bus->bit_rate) + " bit/s") +
+                      "; use the same bitrate everywhere, or give it in one place only";
         else if (options.fd && !bus->fd)
-            problem = "the bus was opened without CAN FD; write sim:" + name + "?fd at every place that opens it";
+            problem = "the bus was opened without CAN FD; write sim:" + name + "?fd everywhere";
         return problem.empty() ? bus : nullptr;
     }
     const auto rate = options.bit_rate != 0 ? options.bit_rate : 1'000'000U;
@@ -57,14 +57,14 @@ Bus::Hold::~Hold() { bus.pumping_.clear(std::memory_order_release); }
 
 void Bus::add(Node& node) {
     const Hold hold(*this);
-    int number = 0;  // the lowest that is free: the same program opens the same numbers
+    int number = 0;  // the lowest free number: a program always gets the same numbers
     while (std::any_of(nodes.begin(), nodes.end(), [&](const Node* n) { return n->number == number; })) ++number;
     node.number = number;
     nodes.insert(std::upper_bound(nodes.begin(), nodes.end(), &node, [](auto* a, auto* b) { return a->number < b->number; }), &node);
 }
 
 void Bus::remove(std::unique_ptr<Node> node) {
-    std::vector<std::unique_ptr<Node>> gone;  // freed after the bus is let go
+    std::vector<std::unique_ptr<Node>> gone;  // freed after the bus is released
     const Hold hold(*this);
     node->leaving = true;
     node->babble_period = 0;
@@ -93,7 +93,7 @@ void Bus::sent(std::int64_t now) noexcept {
     calls_.fetch_add(1, std::memory_order_seq_cst);
     for (;;) {
         const auto seen = calls_.load(std::memory_order_seq_cst);
-        if (pumping_.test_and_set(std::memory_order_seq_cst)) return;  // who works now looks again afterwards
+        if (pumping_.test_and_set(std::memory_order_seq_cst)) return;  // the thread that works now checks again afterwards
         work_untimed(now);
         pumping_.clear(std::memory_order_seq_cst);
         if (calls_.load(std::memory_order_seq_cst) == seen) return;
@@ -115,7 +115,7 @@ void Bus::recover(std::int64_t now) noexcept {
     }
 }
 
-/// When the next frame that is queued could start; INT64_MAX: none.
+/// Returns when the next queued frame can start; INT64_MAX: none.
 std::int64_t Bus::earliest() noexcept {
     std::int64_t first = INT64_MAX;
     for (Node* n : nodes) {
@@ -133,7 +133,7 @@ std::int64_t Bus::earliest() noexcept {
 void Bus::work(std::int64_t now) noexcept {
     if (window_start_ == INT64_MIN) {
         window_start_ = now;
-        if (earliest() == INT64_MIN) free_at_ = now - 1;  // sent before anyone told the time
+        if (earliest() == INT64_MIN) free_at_ = now - 1;  // sent before the bus knew a time
     }
     for (;;) {
         recover(now);
@@ -154,7 +154,7 @@ void Bus::work(std::int64_t now) noexcept {
 void Bus::work_untimed(std::int64_t now) noexcept {
     recover(now);
     for (Node* n : nodes) {
-        // What is queued now, not what is queued meanwhile: one node cannot keep the pump.
+        // Only frames queued now, so that one node cannot occupy the pump.
         for (auto left = n->outgoing.size(); left > 0; --left) {
             const Candidate c{n, n->outgoing.front(), false};
             auto time = std::max(c.frame->time_ns, now);
@@ -174,7 +174,7 @@ void Bus::work_untimed(std::int64_t now) noexcept {
 
 bool Bus::hears(const Node& n) const noexcept { return !n.off && !n.cut.load(std::memory_order_relaxed); }
 
-/// All frames ready at `start` compete; the winner is sent, disturbed or not.
+/// Arbitrates between all frames ready at `start`; the winner is sent, disturbed or not.
 void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
     Candidate winner;
     std::uint32_t best = UINT32_MAX;
@@ -191,7 +191,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
         if (n->cut.load(std::memory_order_relaxed)) {
             const Frame* f = n->outgoing.front();
             if (f == nullptr || f->time_ns > start) continue;
-            // Alone on its end of the wire: no acknowledgement. Once passive it stays so, and repeats for ever.
+            // Alone on the bus: no acknowledgement. Once passive it stays passive and repeats for ever.
             if (n->tec < 128) n->tec += 8;
             n->hold_until = n->tec < 128 ? start + duration_ns(frame_bits(*f), bit_rate, data_rate) + bits(error_frame_bits) : now;
             n->errors.fetch_add(1, std::memory_order_relaxed);
@@ -209,7 +209,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
     const Bits length = frame_bits(frame);
     const auto end = start + duration_ns({length.nominal - intermission_bits, length.data}, bit_rate, data_rate);
     const auto idle = start + duration_ns(length, bit_rate, data_rate);
-    if (acknowledging < 2) {  // the sender is the only one
+    if (acknowledging < 2) {  // only the sender
         if (sender.tec < 128) sender.tec += 8;
         occupy(start, sender.tec < 128 ? idle + bits(error_frame_bits) : std::max(now, idle));
         if (winner.babbling) sender.babble_at = free_at_ + sender.babble_period;
@@ -218,7 +218,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
         return event(sender, error_no_acknowledge, end);
     }
 
-    // Others with the same identifier do not notice that they lost. Equal frames merge; unequal ones destroy each other.
+    // Nodes with the same identifier do not detect lost arbitration. Equal frames merge; different ones destroy each other.
     bool collision = false;
     for (Node* n : nodes) {
         if (n == &sender || !hears(*n) || n->hold_until > start) continue;
@@ -248,7 +248,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
             else if (n->rec < 255) ++n->rec;
             n->errors.fetch_add(1, std::memory_order_relaxed);
             if (sending && n->tec > 255) failed(*n, noticed);
-            else if (n->tec >= 128 && sending) n->hold_until = free_at_ + bits(8);  // passive nodes let others go first
+            else if (n->tec >= 128 && sending) n->hold_until = free_at_ + bits(8);  // passive nodes suspend transmission
             publish(*n);
             event(*n, error_protocol, noticed);
         }
@@ -265,7 +265,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
         if (sender.tec > 255) failed(sender, end);
         return publish(sender);
     }
-    for (Node* n : nodes) {  // those whose equal frame went out with this one
+    for (Node* n : nodes) {  // those whose equal frame was merged with this one
         const Frame* f = n->outgoing.front();
         if (n != &sender && hears(*n) && n->hold_until <= start && f != nullptr && f->time_ns <= start && f->same(frame))
             done({n, f, false}, end);
@@ -273,7 +273,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
     done(winner, end);
 }
 
-/// The frame is on the bus and acknowledged.
+/// Handles a frame that was sent and acknowledged.
 void Bus::done(const Candidate& c, std::int64_t time) noexcept {
     Node& n = *c.node;
     n.sent.fetch_add(1, std::memory_order_relaxed);
@@ -344,7 +344,7 @@ void Bus::publish(Node& n) noexcept {
     n.counters.store(std::min(n.tec, 255U) << 16 | std::min(n.rec, 255U), std::memory_order_relaxed);
 }
 
-/// The first disturbance that hits this frame, which is asked about once however often it is repeated, except errors.
+/// Returns the first disturbance that hits this frame. Except for errors it is asked once, however often the frame is repeated.
 Bus::Active* Bus::struck(const Candidate& c, std::int64_t start) noexcept {
     Node& n = *c.node;
     Active* found = nullptr;

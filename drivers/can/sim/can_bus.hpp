@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A CAN bus in memory. Its time is the newest `now_ns` its users told it; what happened up to there is worked out by whichever of
-// them comes first ("the pump"). Frames that start strictly before now are sent, so that all who send at the same time take part
-// in the same arbitration, in whatever order their functions run.
+// A CAN bus in memory. Its time is the newest `now_ns` its users passed in; everything up to that time is processed by whichever of them
+// calls first ("the pump"). Frames that start strictly before now are sent, so that all nodes that send at the same time take part
+// in the same arbitration, whatever the order of their functions.
 //
-// Threads: every node has a queue to the bus and one from it, each with one writer and one reader. The bus itself belongs to who
-// holds `pumping_`. A cycle only tries to take it: when another thread is working, that thread does the work and the cycle goes on.
-//   1. thread A takes pumping_, works up to its now      2. thread B queues a frame, fails to take pumping_, goes on
-//   3. A gives pumping_ back                             4. the next call of any thread finds B's frame: it is late, not lost
-// On a bus without a bit rate (`unlimited`) A looks once more after 3, so that B's frame does not wait for a later call.
+// Threads: every node has a queue to the bus and one from it, each with one writer and one reader. The bus itself belongs to the thread
+// that holds `pumping_`. A cycle only tries to take it: if another thread is working, that thread does the work and the cycle proceeds.
+//   1. thread A takes pumping_, works up to its now      2. thread B queues a frame, fails to take pumping_, proceeds
+//   3. A releases pumping_                               4. the next call of any thread finds B's frame: it is late, not lost
+// On a bus without a bit rate (`unlimited`) A checks again after 3, so that B's frame does not wait for a later call.
 #pragma once
 
 #include <atomic>
@@ -23,7 +23,7 @@
 
 namespace hal::can::simbus {
 
-/// One end of the bus. Fields without a word belong to the pump.
+/// One end of the bus. Fields without a comment belong to the pump.
 struct Node {
     Node(const Options& options) : outgoing(options.send_capacity), incoming(options.receive_capacity) {}
 
@@ -36,7 +36,7 @@ struct Node {
 
     unsigned tec = 0, rec = 0;
     bool off = false;                     ///< bus off
-    bool leaving = false;                 ///< its link is gone
+    bool leaving = false;                 ///< its link is closed
     std::int64_t back_at = INT64_MAX;     ///< when bus off ends
     std::int64_t hold_until = INT64_MIN;  ///< does not start a frame before
     bool delayed = false, doubled = false, counted = false;  ///< of the frame at the front of `outgoing`
@@ -46,7 +46,7 @@ struct Node {
     std::atomic<bool> cut{false};            ///< written by anyone
     std::atomic<bool> wants_restart{false};  ///< written by the sending thread
     std::atomic<State> state{State::active};
-    std::atomic<std::uint32_t> counters{0};  ///< tec << 16 | rec, for who asks
+    std::atomic<std::uint32_t> counters{0};  ///< tec << 16 | rec, for readers in other threads
     std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, thrown_away{0}, errors{0}, bus_offs{0},
         restarts{0};
     std::atomic<std::uint64_t> dropped{0};  ///< written by the sending thread
@@ -56,21 +56,21 @@ class Bus {
 public:
     Bus(std::string name, std::uint32_t bit_rate, std::uint32_t data_rate, bool fd);
 
-    /// The bus of that name, made when there is none. Lives as long as one of its links. [setup]
+    /// Returns the bus of that name, created if necessary. It lives as long as one of its links. [setup]
     static std::shared_ptr<Bus> find(const std::string& name, const Options&, std::string& problem);
 
     void add(Node&);     ///< [setup]
-    /// What it has queued is still sent, as by a controller whose program ended. [setup]
+    /// Removes a node; its queued frames are still sent, as by a controller whose program ended. [setup]
     void remove(std::unique_ptr<Node>);
 
-    /// Works the bus out up to `now_ns`, unless another thread is doing so. [realtime]
+    /// Processes the bus up to `now_ns`, unless another thread is doing so. [realtime]
     void pump(std::int64_t now_ns) noexcept;
-    /// `now_ns`, or the newest time known to the bus. [any]
+    /// Returns `now_ns`, or for `unclocked` the newest time known to the bus. [any]
     std::int64_t time(std::int64_t now_ns) const noexcept { return now_ns == unclocked ? latest_.load(std::memory_order_relaxed) : now_ns; }
-    /// Frames were queued; on a bus without a bit rate they are delivered. [realtime]
+    /// Notes that frames were queued; on a bus without a bit rate it delivers them. [realtime]
     void sent(std::int64_t now_ns) noexcept;
 
-    /// Calls `change` while nobody pumps. [setup]
+    /// Calls `change` while no thread pumps. [setup]
     template <class Change>
     auto exclusively(Change&& change) {
         const Hold hold(*this);
@@ -89,7 +89,7 @@ public:
     const std::uint32_t bit_rate, data_rate;  ///< bit_rate 0: frames take no time
     const bool fd;
     double load() const noexcept { return load_.load(std::memory_order_relaxed); }
-    void publish(Node&) noexcept;  ///< counters and state that follow from them
+    void publish(Node&) noexcept;  ///< publishes counters and the state derived from them
 
 private:
     struct Hold {
@@ -121,7 +121,7 @@ private:
     std::vector<std::unique_ptr<Node>> leaving_;  ///< [setup]
     std::atomic_flag pumping_;
     std::atomic<std::int64_t> latest_{INT64_MIN};
-    std::atomic<std::uint64_t> calls_{0};  ///< of sent(): a pump that sees it change looks again
+    std::atomic<std::uint64_t> calls_{0};  ///< of sent(): a pump that sees it change checks again
     std::int64_t free_at_ = INT64_MIN;     ///< the bus is idle from here on
     std::atomic<std::int64_t> worked_until_{INT64_MIN};
     std::int64_t window_start_ = INT64_MIN, busy_ns_ = 0;

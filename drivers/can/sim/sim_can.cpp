@@ -34,7 +34,7 @@ public:
             node_.dropped.fetch_add(1, std::memory_order_relaxed);
             return why;
         };
-        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) return drop(Sent::refused);
+        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) return drop(Sent::rejected);
         if (state() == State::bus_off) return drop(Sent::bus_off);
         Frame queued = frame;
         queued.time_ns = bus_->time(now_ns);
@@ -88,7 +88,7 @@ public:
     }
     const Description& description() const noexcept override { return description_; }
     bool wait(std::int64_t at_most_ns) override {
-        // Nobody wakes a waiter: that would cost the cycles a system call each.
+        // Waiting threads are not woken: that would cost each cycle a system call.
         constexpr std::int64_t step_ns = 100'000;
         for (;;) {
             bus_->pump(unclocked);
@@ -160,7 +160,7 @@ Description describe(const std::string& name) {
 }
 
 Opened open(const std::string& name, const Options& options) {
-    if (name.empty()) return {nullptr, "the name of the bus is missing; write sim:bus0"};
+    if (name.empty()) return {nullptr, "missing name of the bus; write sim:bus0"};
     std::string problem;
     auto bus = Bus::find(name, options, problem);
     if (!bus) return {nullptr, problem};

@@ -21,7 +21,7 @@ namespace hal::can::slcan {
 
 namespace {
 
-/// The commands that open the channel.
+/// Returns the commands that open the channel.
 std::string greeting(const Options& o) {
     std::string text = "C\r";
     if (o.bit_rate != 0 && o.bit_rate != unlimited) text += std::string(rate_command(o.bit_rate)) + "\r";
@@ -29,30 +29,30 @@ std::string greeting(const Options& o) {
     return text + (o.listen_only ? "L\r" : "O\r");
 }
 
-/// The line, raw, and the channel opened; nothing and `problem` when it cannot be had.
+/// Opens the line in raw mode, and the channel. On failure returns none and sets `problem`.
 link::Descriptor open_line(const std::string& device, const Options& o, std::string& problem) {
     link::Descriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
     if (!fd) {
-        problem = errno == ENOENT   ? "there is no such device; `ls /dev/serial/by-id` lists adapters that are plugged in"
-                  : errno == EACCES ? "no permission; type: sudo usermod -aG dialout $USER, and log in again"
-                  : errno == EBUSY  ? "another program has the line; `fuser " + device + "` names it"
-                                    : "it cannot be opened: " + link::reason();
+        problem = errno == ENOENT   ? "no such device; to list adapters: ls /dev/serial/by-id"
+          : errno == EACCES ? "permission denied; type: sudo usermod -aG dialout $USER, and log in again"
+          : errno == EBUSY  ? "the line is in use by another program; to find it: fuser " + device
+                            : "cannot open: " + link::reason();
         return {};
     }
     termios t{};
     if (tcgetattr(fd.get(), &t) != 0) {
-        problem = "this is not a serial line; write slcan:/dev/ttyACM0";
+        problem = "not a serial line; write slcan:/dev/ttyACM0";
         return {};
     }
     cfmakeraw(&t);
     t.c_cflag |= CLOCAL | CREAD;
     t.c_cc[VMIN] = 0, t.c_cc[VTIME] = 0;
-    cfsetspeed(&t, B115200);  // adapters on USB do not care
+    cfsetspeed(&t, B115200);  // ignored by USB adapters
     tcsetattr(fd.get(), TCSANOW, &t);
     tcflush(fd.get(), TCIOFLUSH);
     const auto text = greeting(o);
     if (::write(fd.get(), text.data(), text.size()) < 0 && errno != EAGAIN) {
-        problem = "nothing can be written to it: " + link::reason();
+        problem = "cannot write: " + link::reason();
         return {};
     }
     return fd;
@@ -80,7 +80,7 @@ public:
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
         const auto drop = [this](Sent why) { return Counting::add(counting_.dropped), why; };
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::refused);
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::rejected);
         if (state() == State::down) return drop(Sent::down);
         if (outgoing_.push(frame)) return Sent::queued;
         flush(now_ns);
@@ -104,7 +104,7 @@ public:
             const auto written = ::write(line_.get(), text_, text_size_);
             if (written <= 0) {
                 if (written < 0 && errno != EAGAIN && errno != EINTR) lose();
-                return;  // the line is slower than what is sent: next time
+                return;  // the line is slower than the sender: continue in the next cycle
             }
             const auto done = static_cast<std::size_t>(written);
             std::copy(text_ + done, text_ + text_size_, text_);
@@ -117,11 +117,11 @@ public:
         std::size_t count = 0;
         for (int reads = 0; count < room.size();) {
             if (next_ == filled_) {
-                if (reads++ == 4) break;  // a line that never ends is left for the next cycle
+                if (reads++ == 4) break;  // continue with an endless line in the next cycle
                 const auto got = ::read(line_.get(), in_, sizeof in_);
                 next_ = filled_ = 0;
                 if (got <= 0) {
-                    // A pseudo-terminal without another end reads as an error, a serial adapter that was pulled out as the end of file.
+                    // A pseudo-terminal without a peer reads as an error, an unplugged serial adapter as end of file.
                     if (got == 0 ? hung_up() : errno != EAGAIN && errno != EINTR) lose();
                     break;
                 }
@@ -165,14 +165,14 @@ private:
         pollfd p{line_.get(), 0, 0};
         return ::poll(&p, 1, 0) > 0 && (p.revents & (POLLHUP | POLLERR)) != 0;
     }
-    /// What was to be sent is old when the line is back, and half a line would spoil the first new one. The sending thread's.
+    /// Discards queued frames, stale when the line returns, and a partial line, which would corrupt the next one. Sending thread.
     void forget() noexcept {
         text_size_ = 0;
         for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
     }
     void lose() noexcept { counting_.state.store(State::down, std::memory_order_relaxed); }
 
-    /// The watcher's thread: opens the device again when it has gone; the new line takes the number of the old one.
+    /// Reopens a lost device, in the watcher's thread; the new line takes the descriptor of the old one.
     void watch() {
         std::unique_lock lock(mutex_);
         while (!changed_.wait_for(lock, std::chrono::milliseconds(500), [this] { return ending_; })) {
@@ -191,9 +191,9 @@ private:
     const link::Descriptor line_;
     link::Ring<Frame> outgoing_;  // written and read by the sending thread
 
-    char text_[4096]{};  // the sending thread's: lines that are not yet written
+    char text_[4096]{};  // sending thread: lines not written yet
     std::size_t text_size_ = 0;
-    char in_[4096]{};  // from here on: the receiving thread's
+    char in_[4096]{};  // from here on: used by the receiving thread
     std::size_t next_ = 0, filled_ = 0;
     std::int64_t arrived_ns_ = 0;
     Decoder decoder_;
@@ -211,13 +211,12 @@ Description describe(const std::string& device) {
 }
 
 Opened open(const std::string& device, const Options& options) {
-    if (device.empty()) return {nullptr, "the device is missing; write slcan:/dev/ttyACM0"};
+    if (device.empty()) return {nullptr, "missing device; write slcan:/dev/ttyACM0"};
     if (options.bit_rate != 0 && options.bit_rate != unlimited && rate_command(options.bit_rate) == nullptr)
-        return {nullptr, "a serial-line adapter cannot be told " + std::to_string(options.bit_rate) +
-                             " bit/s; it knows 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M"};
+        return {nullptr, "unsupported bit rate " + std::to_string(options.bit_rate) +
+                             " of a serial-line adapter; use 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k or 1M"};
     if (options.data_rate != 0 && options.data_rate != 2'000'000 && options.data_rate != 5'000'000)
-        return {nullptr, "a serial-line adapter cannot be told a data rate of " + std::to_string(options.data_rate) +
-                             " bit/s; it knows 2M and 5M"};
+        return {nullptr, "unsupported data rate " + std::to_string(options.data_rate) + " of a serial-line adapter; use 2M or 5M"};
     std::string problem;
     link::Descriptor line = open_line(device, options, problem);
     if (!line) return {nullptr, problem};

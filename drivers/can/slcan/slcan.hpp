@@ -5,7 +5,7 @@
 
 namespace hal::can::slcan {
 
-/// `slcan:DEVICE`: an adapter on a serial line, or whoever is at the other end of a pseudo-terminal. [setup]
+/// Opens `slcan:DEVICE`: an adapter on a serial line, or the peer of a pseudo-terminal. [setup]
 Opened open(const std::string& device, const Options&);
 /// Describes what open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& device);

@@ -7,7 +7,7 @@ namespace {
 
 constexpr char digits[] = "0123456789ABCDEF";
 
-/// Hexadecimal, all of it; false when there is another character.
+/// Parses hexadecimal digits. Returns false for any other character.
 bool number(std::string_view text, std::uint32_t& value) noexcept {
     value = 0;
     for (const char c : text) {
@@ -53,14 +53,14 @@ Decoder::Found Decoder::take(char c) noexcept {
 
 Decoder::Found Decoder::line(std::string_view text) noexcept {
     if (text.empty()) return Found::nothing;
-    if (text[0] == 'z' || text[0] == 'Z') {  // an adapter's "sent" may stand in front of what follows
+    if (text[0] == 'z' || text[0] == 'Z') {  // an adapter's "sent" may precede a frame on the same line
         text.remove_prefix(1);
         if (text.empty()) return Found::nothing;
     }
     const char letter = text[0];
     if (letter == 'F' && text.size() == 3) return number(text.substr(1), status_) ? Found::status : Found::error;
     const std::string_view letters = "tTrRdDbB";
-    if (letters.find(letter) == letters.npos) return Found::nothing;  // a command or its answer
+    if (letters.find(letter) == letters.npos) return Found::nothing;  // a command or its response
     Frame& f = frame_;
     f = {};
     f.extended = letter < 'a';
@@ -75,7 +75,7 @@ Decoder::Found Decoder::line(std::string_view text) noexcept {
     f.length = length_of_code(code);
     auto data = text.substr(width + 2);
     const std::size_t wanted = f.bytes().size() * 2;
-    if (data.size() != wanted && data.size() != wanted + 4 && data.size() != wanted + 8) return Found::error;  // may end in a time stamp
+    if (data.size() != wanted && data.size() != wanted + 4 && data.size() != wanted + 8) return Found::error;  // optionally with a timestamp
     for (std::size_t i = 0; i < wanted; i += 2) {
         std::uint32_t byte = 0;
         if (!number(data.substr(i, 2), byte)) return Found::error;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames as lines of ASCII: Lawicel's format, with the letters d D b B for CAN FD.
+// Frames as lines of ASCII: Lawicel's protocol, with the letters d D b B for CAN FD.
 #pragma once
 
 #include <array>
@@ -14,17 +14,17 @@ namespace hal::can::slcan {
 inline constexpr std::size_t longest_line = 1 + 8 + 1 + 128 + 8 + 1;  // letter, identifier, length, data, time stamp, end
 using Line = std::array<char, longest_line>;
 
-/// A valid frame with its end of line; how many characters. [realtime]
+/// Encodes a valid frame with its end of line. Returns the number of characters. [realtime]
 std::size_t encode(const Frame&, Line&) noexcept;
 
-/// Takes the characters of a line as they come. [realtime]
+/// Decodes the characters of the line one by one. [realtime]
 class Decoder {
 public:
     enum class Found : std::uint8_t {
-        nothing,  ///< within a line, or a line that says nothing of interest
+        nothing,  ///< within a line, or a line without a frame or status
         frame,
-        status,   ///< the answer to F; see status()
-        error,    ///< the other side refused something, or the line made no sense
+        status,   ///< the response to F; see status()
+        error,    ///< the adapter rejected a command, or the line is invalid
     };
     Found take(char) noexcept;
     const Frame& frame() const noexcept { return frame_; }
@@ -39,7 +39,7 @@ private:
     unsigned status_ = 0;
 };
 
-/// "S6" for 500 kbit/s …; nullptr: the format has no word for this rate.
+/// Returns "S6" for 500 kbit/s …, or nullptr for an unsupported rate.
 const char* rate_command(std::uint32_t bit_rate) noexcept;
 
 }  // namespace hal::can::slcan

@@ -34,7 +34,7 @@ struct Request {
     }
 };
 
-/// Sends a request and gives the first answer; empty: none, `errno` says why.
+/// Sends a request and returns the first response; empty with `errno` set on failure.
 std::vector<char> answer(Request& request) {
     const link::Descriptor socket(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE));
     if (!socket || ::send(socket.get(), &request, request.header.nlmsg_len, 0) < 0) return {};
@@ -111,7 +111,8 @@ Interface ask(const std::string& name) {
     return found;
 }
 
-ControllerMonitor::ControllerMonitor(std::string name, Counting& counting, int index, std::uint32_t restart_ms, std::function<bool(int)> reopen)
+ControllerMonitor::ControllerMonitor(std::string name, Counting& counting, int index, std::uint32_t restart_ms,
+                                     std::function<bool(int)> reopen)
     : name_(std::move(name)), counting_(counting), index_(index), restart_ms_(restart_ms), reopen_(std::move(reopen)) {
     monitor_.emplace("can-monitor", 500, [this] { look(); });
 }
@@ -127,7 +128,7 @@ void ControllerMonitor::look() {
     counting_.bit_rate.store(now.bit_rate != 0 ? now.bit_rate : counting_.bit_rate.load());
     counting_.data_rate.store(now.data_rate != 0 ? now.data_rate : counting_.data_rate.load());
     if (now.has_counters) counting_.send_errors.store(now.send_errors), counting_.receive_errors.store(now.receive_errors);
-    State state = before;  // what an interface without a state of its own is in is told by error frames, meanwhile too
+    State state = before;  // for an interface without a state, error frames report it
     if (now.has_state) counting_.state.store(state = now.state);
     else if (before != State::down || !counting_.state.compare_exchange_strong(state, State::active)) state = counting_.state.load();
     else state = State::active;
@@ -139,7 +140,7 @@ void ControllerMonitor::look() {
     if ((due || wants_restart.exchange(false)) && restart_controller(now.index)) off_since_ns_ = 0;
 }
 
-/// Needs CAP_NET_ADMIN; without it the interface's own restart-ms has to do it.
+/// Restarts the controller. Needs CAP_NET_ADMIN; without it the interface's own restart-ms does it.
 bool ControllerMonitor::restart_controller(int index) {
     Request request;
     request.header.nlmsg_len = NLMSG_LENGTH(sizeof(ifinfomsg));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Watches one interface from a thread of its own, so that no cycle has to: up or down, gone and back, its bit rate, the state of its
-// controller. All of it comes by rtnetlink.
+// Monitors one interface in a thread of its own, so that no cycle has to: up or down, lost and returned, bit rate, state of the
+// controller. All of it is reported by rtnetlink.
 #pragma once
 
 #include <atomic>
@@ -16,7 +16,7 @@ namespace hal::can::socketcan {
 
 /// An interface as the kernel describes it.
 struct Interface {
-    int index = 0;  ///< 0: there is none of that name
+    int index = 0;  ///< 0: no such interface
     bool is_can = false, up = false;
     unsigned mtu = 0;
     std::string kind;  ///< "vcan", "can", "vxcan", …
@@ -27,15 +27,15 @@ struct Interface {
     std::uint8_t send_errors = 0, receive_errors = 0;
 };
 
-/// Asks the kernel. [setup]
+/// Queries the kernel. [setup]
 Interface ask(const std::string& name);
 
 class ControllerMonitor {
 public:
-    /// `reopen` is called in the monitor's thread when an interface of that name has come back under another number. [setup]
+    /// Starts the thread. It calls `reopen` when an interface of that name has returned under another number. [setup]
     ControllerMonitor(std::string name, Counting&, int index, std::uint32_t restart_ms, std::function<bool(int index)> reopen);
 
-    /// Look now. [realtime]: one write to an eventfd, which never waits.
+    /// Checks now. One write to an eventfd, which never waits. [realtime]
     void nudge() noexcept { monitor_->nudge(); }
     std::atomic<bool> wants_restart{false};
 

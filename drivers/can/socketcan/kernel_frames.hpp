@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Between our frames and the kernel's.
+// Conversion between frames of this library and of the kernel.
 #pragma once
 
 #include <linux/can.h>
@@ -14,7 +14,7 @@ namespace hal::can::socketcan {
 static_assert(error_send_timeout == CAN_ERR_TX_TIMEOUT && error_controller == CAN_ERR_CRTL && error_bus_off == CAN_ERR_BUSOFF &&
               error_no_acknowledge == CAN_ERR_ACK && error_restarted == CAN_ERR_RESTARTED && error_bus == CAN_ERR_BUSERROR);
 
-/// The kernel's form of a valid frame; how many bytes of it to write. [realtime]
+/// Converts a valid frame. Returns the number of bytes to write. [realtime]
 inline std::size_t to_kernel(const Frame& f, canfd_frame& out) noexcept {
     out = {};
     out.can_id = f.id | (f.extended ? CAN_EFF_FLAG : 0U) | (f.remote ? CAN_RTR_FLAG : 0U);
@@ -29,7 +29,7 @@ inline std::size_t to_kernel(const Frame& f, canfd_frame& out) noexcept {
     return f.fd ? CANFD_MTU : CAN_MTU;
 }
 
-/// False: `size` is not that of a frame. [realtime]
+/// Converts a frame of the kernel. Returns false when `size` is not that of a frame. [realtime]
 inline bool from_kernel(const canfd_frame& in, std::size_t size, Frame& f) noexcept {
     if (size != CAN_MTU && size != CANFD_MTU) return false;
     f.fd = size == CANFD_MTU;

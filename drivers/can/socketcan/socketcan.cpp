@@ -26,35 +26,35 @@ namespace {
 
 constexpr std::size_t batch = 32;  // frames per system call
 constexpr std::size_t most_filters = CAN_RAW_FILTER_MAX;
-constexpr timeval patience{0, 20'000};  // of a receive that waits; the kernel adds up to a tick of its timer, 1 to 10 ms
-constexpr std::int64_t patience_ns = patience.tv_usec * 1000LL;
+constexpr timeval receive_timeout{0, 20'000};  // of a waiting receive; the kernel adds up to a tick of its timer, 1 to 10 ms
+constexpr std::int64_t receive_timeout_ns = receive_timeout.tv_usec * 1000LL;
 
 template <class T>
 bool set(int fd, int level, int name, const T& value) {
     return setsockopt(fd, level, name, &value, sizeof value) == 0;
 }
 
-/// A raw socket with all options, bound; nothing and `problem` when it cannot be had.
+/// Opens a raw socket with all options and binds it. On failure returns none and sets `problem`.
 link::Descriptor make_socket(int index, const Options& o, const std::vector<can_filter>& filters, std::string& problem) {
     link::Descriptor fd(::socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
     if (!fd) {
         const int error = errno;
         if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT)
-            problem = "this machine's kernel has no SocketCAN; type: sudo modprobe can-raw, or use a bus without it: "
-                      "sim:NAME, udp:239.74.163.2:43113, slcan:DEVICE";
+            problem = "this kernel has no SocketCAN; type: sudo modprobe can-raw, or use a bus without it: sim:NAME, "
+          "udp:239.74.163.2:43113, slcan:DEVICE";
         else if (error == EPERM || error == EACCES)
-            problem = "no permission for a raw CAN socket; in a container: start it with the host's network";
+            problem = "permission denied for a raw CAN socket; start the container with the host's network";
         else
-            problem = "no raw CAN socket: " + link::reason(error);
+            problem = "cannot open a raw CAN socket: " + link::reason(error);
         return {};
     }
     const int yes = 1;
     if (o.fd && !set(fd.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, yes)) {
-        problem = "this machine's kernel does not know CAN FD; leave out fd";
+        problem = "this kernel does not support CAN FD; remove fd";
         return {};
     }
     const can_err_mask_t errors = CAN_ERR_MASK & ~static_cast<can_err_mask_t>(CAN_ERR_LOSTARB);
-    set(fd.get(), SOL_CAN_RAW, CAN_RAW_ERR_FILTER, errors);  // the state of the controller comes this way
+    set(fd.get(), SOL_CAN_RAW, CAN_RAW_ERR_FILTER, errors);  // they report the state of the controller
     if (o.own_frames) set(fd.get(), SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, yes);
     set(fd.get(), SOL_CAN_RAW, CAN_RAW_FILTER, can_filter{});
     if (!filters.empty())
@@ -63,14 +63,14 @@ link::Descriptor make_socket(int index, const Options& o, const std::vector<can_
         set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
         set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
     }
-    set(fd.get(), SOL_SOCKET, SO_RCVTIMEO, patience);
+    set(fd.get(), SOL_SOCKET, SO_RCVTIMEO, receive_timeout);
     const int room = static_cast<int>(std::min<std::size_t>(o.receive_capacity, 65536) * 1024);  // the kernel's cost of a frame
     if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
     sockaddr_can address{};
     address.can_family = AF_CAN;
     address.can_ifindex = index;
     if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-        problem = "the interface cannot be used: " + link::reason();
+        problem = "cannot bind to the interface: " + link::reason();
         return {};
     }
     return fd;
@@ -105,7 +105,7 @@ public:
             Counting::add(counting_.dropped);
             return why;
         };
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::refused);
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::rejected);
         const State state = counting_.state.load(std::memory_order_relaxed);
         if (state == State::down) return drop(Sent::down);
         if (state == State::bus_off) return drop(Sent::bus_off);
@@ -115,7 +115,7 @@ public:
     }
 
     void flush(std::int64_t) noexcept override {
-        // What was queued before the interface went must not come out when it is back.
+        // Frames queued before the interface was lost must not be sent when it returns.
         if (state() == State::down)
             for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
         for (bool again = true;;) {
@@ -131,21 +131,21 @@ public:
             for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
             if (sent > 0) outgoing_.pop(static_cast<std::size_t>(sent));
             if (sent == static_cast<int>(count)) continue;
-            if (sent > 0) continue;  // the next try tells why
+            if (sent > 0) continue;  // the next attempt reports the error
             if (error == EINTR) continue;
-            if (error == ENOBUFS || error == EAGAIN) return;  // the interface's queue is full: next time
+            if (error == ENOBUFS || error == EAGAIN) return;  // the queue of the interface is full: continue in the next cycle
             if (error == ENETDOWN || error == ENXIO || error == ENODEV) {
-                if (std::exchange(again, false)) continue;  // the first may be the late report of what is over
+                if (std::exchange(again, false)) continue;  // the first may be a stale error
                 return lose_interface();
             }
-            outgoing_.pop();  // the kernel takes everything but this frame
+            outgoing_.pop();  // the kernel rejects this frame only
             Counting::add(counting_.dropped);
         }
     }
 
     std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
         if (std::exchange(waited_, false)) refilled_at_ = now_ns;
-        else if (now_ns != unclocked && now_ns == drained_at_) return 0;  // a cycle asks the kernel once when that was enough
+        else if (now_ns != unclocked && now_ns == drained_at_) return 0;  // one system call per cycle unless the batch was full
         std::size_t count = 0;
         while (count < room.size()) {
             if (next_ == filled_ && ((count != 0 && last_batch_short_) || !refill(now_ns))) break;
@@ -174,23 +174,23 @@ public:
         return setsockopt(socket_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, kernel.data(), size) == 0;
     }
     const Description& description() const noexcept override { return description_; }
-    /// What has come is received by the call that waits for it: poll and receive would be two, and as dear as the rest of a transfer. That
-    /// call's time-out is coarse, so the end of the time is waited for by poll.
+    /// Receives in the call that waits: poll and receive would be two calls, at the cost of the rest of a transfer. The timeout of that
+    /// call is coarse, so the end of the wait is left to poll.
     bool wait(std::int64_t at_most_ns) override {
         if (next_ != filled_) return true;
-        for (std::int64_t until = 0; at_most_ns >= patience_ns;) {
-            // Asking for a second frame where frames come one by one costs a tenth of the first: only now and then, or when many came.
+        for (std::int64_t until = 0; at_most_ns >= receive_timeout_ns;) {
+            // A second receive costs a tenth of the first even where frames arrive one by one: only now and then, or after a burst.
             const bool many = several_ || ++waits_ % 32 == 0;
             const bool plain = !many && !options_.stamps && !options_.own_frames;
             if (const int got = plain ? take_one() : take_batch(MSG_WAITFORONE, many ? batch : 1, unclocked); got > 0) {
                 if (many) several_ = got > 1;
-                else last_batch_short_ = true;  // what may be behind it comes with the next wait
+                else last_batch_short_ = true;  // further frames are received by the next wait
                 return waited_ = true;
             }
             if (errno == EINTR) return false;
             if (errno != EAGAIN) return true;
             const auto now = link::monotonic_ns();
-            if (until == 0) until = now + at_most_ns - patience_ns;
+            if (until == 0) until = now + at_most_ns - receive_timeout_ns;
             at_most_ns = until - now;
         }
         return link::readable_within(socket_.get(), at_most_ns);
@@ -198,7 +198,7 @@ public:
     int descriptor() const noexcept override { return socket_.get(); }
 
 private:
-    /// Takes up to a batch from the kernel; false: nothing of interest came.
+    /// Receives up to one batch from the kernel. Returns false when there is nothing for the caller.
     bool refill(std::int64_t now_ns) noexcept {
         if (last_batch_short_ && now_ns != unclocked && now_ns == refilled_at_) {
             drained_at_ = now_ns;
@@ -211,7 +211,7 @@ private:
         return filled_ != 0;
     }
 
-    /// One system call: what it took from the kernel, or -1 and errno.
+    /// Does one system call. Returns the number of frames, or -1 with errno set.
     int take_batch(int flags, std::size_t most, std::int64_t now_ns) noexcept {
         for (; used_ > 0; --used_) in_[used_ - 1].msg_hdr.msg_controllen = options_.stamps ? sizeof control_[0] : 0;
         next_ = filled_ = 0;
@@ -232,7 +232,7 @@ private:
         return got;
     }
 
-    /// Waits for one frame, without the time of the kernel: half a microsecond cheaper than take_batch(). 1, or -1 and errno.
+    /// Waits for one frame without the kernel's timestamp, half a microsecond cheaper than take_batch(). Returns 1, or -1 with errno set.
     int take_one() noexcept {
         next_ = filled_ = 0;
         const auto got = ::recv(socket_.get(), &raw_[0], sizeof raw_[0], 0);
@@ -249,7 +249,7 @@ private:
         return 1;
     }
 
-    /// What is ready in out_, in one system call: how many were taken, or -1 and errno.
+    /// Sends the frames in out_ with one system call. Returns how many were taken, or -1 with errno set.
     int hand_over(std::size_t count) noexcept {
         constexpr int flags = MSG_DONTWAIT | MSG_NOSIGNAL;
         if (count > 1) return ::sendmmsg(socket_.get(), out_, static_cast<unsigned>(count), flags);
@@ -317,12 +317,12 @@ private:
         }
     }
 
-    /// The monitor says whether it is down: this may be the late report of what is over already.
+    /// Handles ENETDOWN: the monitor decides whether the interface is down, because the error may be stale.
     void lose_interface() noexcept {
         if (counting_.state.load(std::memory_order_relaxed) != State::down) monitor_.nudge();
     }
 
-    /// The monitor's thread: a new socket takes the place of the old one under the same number, which the cycle does not notice.
+    /// Replaces the socket by one for the returned interface under the same descriptor, in the monitor's thread; the cycle does not notice.
     bool reopen(int index) {
         const std::lock_guard lock(mutex_);
         std::string problem;
@@ -338,11 +338,11 @@ private:
     std::mutex mutex_;  // setup and the monitor: filters_
     std::vector<can_filter> filters_;
 
-    // The sending thread's.
+    // Used by the sending thread.
     mmsghdr out_[batch]{};
     iovec out_parts_[batch]{};
     canfd_frame out_raw_[batch]{};
-    // The receiving thread's.
+    // Used by the receiving thread.
     mmsghdr in_[batch]{};
     iovec parts_[batch]{};
     canfd_frame raw_[batch]{};
@@ -350,7 +350,7 @@ private:
     Frame buffer_[batch];
     std::size_t next_ = 0, filled_ = 0;
     std::int64_t drained_at_ = unclocked, refilled_at_ = unclocked;
-    std::size_t used_ = 0;  // how many of in_ the last batch wrote to
+    std::size_t used_ = 0;  // entries of in_ written by the last batch
     bool last_batch_short_ = false, waited_ = false, several_ = false;
     unsigned waits_ = 0;
     std::uint32_t lost_before_ = 0;
@@ -370,16 +370,16 @@ Description describe(const std::string& interface) {
 }
 
 Opened open(const std::string& name, const Options& options) {
-    if (name.empty() || name.size() >= IFNAMSIZ) return {nullptr, "this is no name of a network interface; write can:can0"};
+    if (name.empty() || name.size() >= IFNAMSIZ) return {nullptr, "invalid interface name; write can:can0"};
     std::string problem;
     const Interface interface = ask(name);
     if (interface.index == 0) {
         const link::Descriptor probe = make_socket(0, {}, {}, problem);
         if (!probe) return {nullptr, problem};
-        return {nullptr, "there is no interface " + name + "; `ip -br link` lists those there are; a virtual one: sudo ip link add " +
-                             name + " type vcan && sudo ip link set " + name + " up"};
+        return {nullptr, "no interface " + name + "; to list them: ip -br link; to create a virtual one: sudo ip link add " + name +
+                             " type vcan && sudo ip link set " + name + " up"};
     }
-    if (!interface.is_can) return {nullptr, name + " is not a CAN interface; `ip -br link show type can` lists those"};
+    if (!interface.is_can) return {nullptr, name + " is not a CAN interface; to list them: ip -br link show type can"};
     link::Descriptor socket = make_socket(interface.index, options, {}, problem);
     if (!socket) return {nullptr, problem};
     if (!interface.up) return {nullptr, "the interface is down; type: " + up_command(name, interface, options)};

@@ -5,7 +5,7 @@
 
 namespace hal::can::socketcan {
 
-/// `can:INTERFACE`: a network interface of the kernel that is a CAN bus. [setup]
+/// Opens `can:INTERFACE`: a CAN network interface of the kernel. [setup]
 Opened open(const std::string& interface, const Options&);
 /// Describes what open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& interface);

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t batch = 16;  // datagrams per system call
 
-/// Where the group is: IPv4 or IPv6, and on which interface (0: as the routes say).
+/// The group: IPv4 or IPv6, and its interface (0: by the routing table).
 struct Place {
     sockaddr_storage address{};
     socklen_t size = 0;
@@ -31,7 +31,7 @@ struct Place {
     bool is_six() const { return address.ss_family == AF_INET6; }
 };
 
-/// `GROUP`, `GROUP:PORT`, `[GROUP6]:PORT`, each with `%INTERFACE` after the group.
+/// Parses `GROUP`, `GROUP:PORT`, `[GROUP6]:PORT`, each with an optional `%INTERFACE` after the group.
 Place parse(std::string text, std::string& problem) {
     std::string port = "43113", group = "239.74.163.2", interface;
     if (!text.empty() && text[0] == '[') {
@@ -47,9 +47,9 @@ Place parse(std::string text, std::string& problem) {
     Place p;
     char* end = nullptr;
     const unsigned long number = std::strtoul(port.c_str(), &end, 10);
-    if (port.empty() || *end != '\0' || number == 0 || number > 65535) problem = "'" + port + "' is no port; write udp:239.74.163.2:43113";
+    if (port.empty() || *end != '\0' || number == 0 || number > 65535) problem = "invalid port '" + port + "'; write udp:239.74.163.2:43113";
     if (!interface.empty() && (p.interface = if_nametoindex(interface.c_str())) == 0)
-        problem = "there is no interface " + interface + "; `ip -br link` lists those there are";
+        problem = "no interface " + interface + "; to list them: ip -br link";
     auto& four = reinterpret_cast<sockaddr_in&>(p.address);
     auto& six = reinterpret_cast<sockaddr_in6&>(p.address);
     if (inet_pton(AF_INET, group.c_str(), &four.sin_addr) == 1 && IN_MULTICAST(ntohl(four.sin_addr.s_addr))) {
@@ -61,7 +61,7 @@ Place parse(std::string text, std::string& problem) {
         six.sin6_port = htons(static_cast<std::uint16_t>(number));
         p.size = sizeof six;
     } else if (problem.empty()) {
-        problem = "'" + group + "' is no multicast group; write udp:239.74.163.2:" + port + ", where stock tools meet";
+        problem = "invalid multicast group '" + group + "'; write udp:239.74.163.2:" + port + ", the default of stock tools";
     }
     p.text = "udp:" + (p.is_six() ? "[" + group + "]" : group) + (interface.empty() ? "" : "%" + interface) + ":" + port;
     return p;
@@ -92,17 +92,18 @@ link::Descriptor receiver(const Place& p, const Options& o, std::string& problem
         auto& four = reinterpret_cast<sockaddr_in&>(any);
         const ip_mreqn request{four.sin_addr, {INADDR_ANY}, static_cast<int>(p.interface)};
         joined = set(fd.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, request);
-        // The group, not any address: otherwise every group on this port arrives.
+        // Bind to the group: any address would receive every group on this port.
     }
-    if (!joined) problem = "the group cannot be joined: " + link::reason() + "; when no route leads there: sudo ip route add 224.0.0.0/4 dev lo";
+    if (!joined)
+        problem = "cannot join the group: " + link::reason() + "; without a route to it, type: sudo ip route add 224.0.0.0/4 dev lo";
     else if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&any), p.size) != 0)
-        problem = "the port cannot be used: " + link::reason() + "; another program may hold it alone: ss -ulp";
+        problem = "cannot bind to the port: " + link::reason() + "; to find another user of it: ss -ulp";
     return fd;
 }
 
 link::Descriptor sender(const Place& p, std::string& problem) {
     link::Descriptor fd(::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-    const int one = 1;  // as far as the next router, and to this machine
+    const int one = 1;  // hop limit 1, and loopback to this machine
     if (p.is_six()) {
         set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_HOPS, one);
         if (p.interface != 0) set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_IF, p.interface);
@@ -128,7 +129,7 @@ public:
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return Counting::add(counting_.dropped), Sent::refused;
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return Counting::add(counting_.dropped), Sent::rejected;
         if (outgoing_.push(frame)) return Sent::queued;
         flush(now_ns);
         return outgoing_.push(frame) ? Sent::queued : (Counting::add(counting_.dropped), Sent::full);
@@ -154,7 +155,7 @@ public:
                 if (errno == EINTR) continue;
                 const bool waits = errno == EAGAIN || errno == ENOBUFS || errno == ECONNREFUSED;
                 counting_.state.store(waits ? State::active : State::down, std::memory_order_relaxed);
-                return;  // next time
+                return;  // continue in the next cycle
             }
             counting_.state.store(State::active, std::memory_order_relaxed);
             for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
@@ -168,7 +169,7 @@ public:
         while (count < room.size()) {
             if (next_ == filled_ && !refill(now_ns)) {
                 if (was_short_ || ++useless == 4) break;
-                continue;  // a whole batch that was not for us
+                continue;  // the whole batch was filtered out
             }
             room[count++] = buffer_[next_++];
         }
@@ -181,7 +182,7 @@ public:
 
 private:
     bool refill(std::int64_t now_ns) noexcept {
-        if (now_ns != unclocked && was_short_ && now_ns == asked_at_) return false;  // a cycle asks the kernel once when that was enough
+        if (now_ns != unclocked && was_short_ && now_ns == asked_at_) return false;  // one system call per cycle unless the batch was full
         mmsghdr messages[batch]{};
         iovec parts[batch]{};
         sockaddr_storage from[batch];
@@ -247,8 +248,8 @@ private:
     link::Ring<Frame> outgoing_;  // written and read by the sending thread
     sockaddr_storage self_{};
 
-    Datagram out_buffers_[batch];                             // the sending thread's
-    std::array<std::uint8_t, 512> in_buffers_[batch];  // from here on: the receiving thread's
+    Datagram out_buffers_[batch];                             // used by the sending thread
+    std::array<std::uint8_t, 512> in_buffers_[batch];  // from here on: used by the receiving thread
     Frame buffer_[batch];
     std::size_t next_ = 0, filled_ = 0;
     std::int64_t asked_at_ = unclocked;

@@ -5,7 +5,7 @@
 
 namespace hal::can::canudp {
 
-/// `udp:GROUP:PORT`: frames as python-can's udp_multicast sends them. [setup]
+/// Opens `udp:GROUP:PORT`: frames in the format of python-can's udp_multicast. [setup]
 Opened open(const std::string& place, const Options&);
 /// Describes what open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& place);

@@ -36,10 +36,10 @@ private:
     std::size_t size_ = 0;
 };
 
-/// A value that is not a map or an array; of strings and binaries the bytes.
+/// A scalar value; for strings and binaries, their bytes.
 struct Value {
     enum Kind { nothing, boolean, integer, real, bytes } kind = nothing;
-    std::uint64_t number = 0;  ///< negative ones are huge
+    std::uint64_t number = 0;  ///< negative ones wrap to large ones
     std::span<const std::uint8_t> content;
 };
 

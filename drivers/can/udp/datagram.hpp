@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One frame as one msgpack map, exactly the one python-can reads and writes: eleven keys, none more, or its receiver gives up.
+// One frame as a msgpack map in the exact format of python-can: eleven keys and no more, or its receiver fails.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@ namespace hal::can::canudp {
 
 using Datagram = std::array<std::uint8_t, 256>;
 
-/// A valid frame into `out`; its size. [realtime]
+/// Encodes a valid frame. Returns the size. [realtime]
 std::size_t encode(const Frame&, std::int64_t real_time_ns, Datagram& out) noexcept;
-/// False, and the frame is rubbish, when it is not such a map of a valid frame. Any order of the keys, any width of the integers; keys
-/// that are not known are skipped. [realtime]
+/// Decodes a map with the keys in any order and integers of any width; unknown keys are skipped. Returns false, with an unspecified frame,
+/// for anything but a valid frame. [realtime]
 bool decode(std::span<const std::uint8_t> in, Frame&) noexcept;
 
 }  // namespace hal::can::canudp

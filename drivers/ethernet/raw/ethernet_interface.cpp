@@ -29,7 +29,7 @@ Interface ask(const std::string& name) {
         found.ethernet = request.ifr_hwaddr.sa_family == ARPHRD_ETHER || request.ifr_hwaddr.sa_family == ARPHRD_LOOPBACK;
         std::memcpy(found.address.data(), request.ifr_hwaddr.sa_data, found.address.size());
     }
-    // The kernel answers the first request with how many words of link modes it has, the second with the settings.
+    // The first request returns the number of link mode words, the second the settings.
     alignas(ethtool_link_settings) std::array<char, sizeof(ethtool_link_settings) + std::size_t{3} * 127 * sizeof(std::uint32_t)> room{};
     auto& link = reinterpret_cast<ethtool_link_settings&>(room);
     link.cmd = ETHTOOL_GLINKSETTINGS;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the kernel says of an interface.
+// The properties of a network interface.
 #pragma once
 
 #include <string>
@@ -9,16 +9,16 @@
 namespace hal::ethernet::rawether {
 
 struct Interface {
-    int index = 0;         ///< 0: there is none of that name
-    bool ethernet = false; ///< its frames have the header of Ethernet
+    int index = 0;         ///< 0: no such interface
+    bool ethernet = false; ///< its frames have an Ethernet header
     bool up = false;       ///< set up, and with a carrier
     std::uint32_t mtu = 0, speed = 0;
     Address address{};
 };
 
-/// [setup] Of this thread's network namespace.
+/// Queries the kernel, in the network namespace of this thread. [setup]
 Interface ask(const std::string& name);
-/// "eth0, lo": those there are. [setup]
+/// Returns the names of all interfaces: "eth0, lo". [setup]
 std::string interfaces();
 
 }  // namespace hal::ethernet::rawether

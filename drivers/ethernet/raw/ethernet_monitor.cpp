@@ -7,9 +7,9 @@ namespace hal::ethernet::rawether {
 
 namespace {
 
-constexpr int look_ms = 200;  // also when nothing was told: the kernel's counter of lost frames is asked for
+constexpr int look_ms = 200;  // polls the kernel's counter of lost frames
 
-/// A timer that never ends, but is readable (and says ECANCELED) when the clock was set (timerfd_create(2)).
+/// Opens a timer that never expires but becomes readable (with ECANCELED) when the clock was set (timerfd_create(2)).
 void arm(int timer) {
     itimerspec never{};
     never.it_value.tv_sec = link::clock_ns(CLOCK_REALTIME) / 1'000'000'000 + 1'000'000'000;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Watches one interface from a thread of its own, so that no cycle has to: carrier, MTU, speed, gone and back under another number,
-// what the kernel had to drop, steps of the clock that it stamps with.
+// Monitors one interface in a thread of its own, so that no cycle has to: carrier, MTU, speed, loss and return under another number,
+// frames dropped by the kernel, steps of the clock that stamps frames.
 #pragma once
 
 #include <atomic>
@@ -16,7 +16,7 @@ namespace hal::ethernet::rawether {
 
 class EthernetMonitor {
 public:
-    /// Both sockets are bound to `found`. [setup]
+    /// Starts the thread. Both sockets are bound to `found`. [setup]
     EthernetMonitor(std::string name, const Interface& found, Receiver&, Sender&, RealTime&);
 
     std::atomic<std::uint32_t> speed{0};

@@ -16,8 +16,8 @@ namespace hal::ethernet::rawether {
 
 namespace {
 
-constexpr std::int64_t wake_up_ns = 30'000;  // what waking a thread on another CPU costs
-constexpr std::int64_t nothing_new_ns = 10'000;  // before a frame's time: one that comes only then leaves behind it, even if it is due earlier
+constexpr std::int64_t wake_up_ns = 30'000;  // latency of waking a thread on another CPU
+constexpr std::int64_t nothing_new_ns = 10'000;  // before a frame's time; a frame queued later leaves after it, even if due earlier
 
 }  // namespace
 
@@ -30,6 +30,7 @@ bool SpinBudget::is_needed() {
 Pacer::Pacer(Sender& sender, const Options& options)
     : sender_(sender), spin_ns_(options.policy == Policy::block ? 0 : options.policy == Policy::spin ? INT64_MAX : options.spin_ns),
       places_(link::Ring<std::uint32_t>(options.send_capacity).capacity()), unused_(options.send_capacity), outgoing_(options.send_capacity),
+
       budget_(SpinBudget::is_needed()) {
     for (std::uint32_t i = 0; i < places_.size(); ++i) unused_.push(i);
     waiting_.reserve(places_.size());
@@ -55,12 +56,12 @@ void Pacer::prepare(const Options& options) {
         cpu_set_t cpus;
         CPU_ZERO(&cpus);
         CPU_SET(static_cast<std::size_t>(options.pacer_cpu), &cpus);
-        if (sched_setaffinity(0, sizeof cpus, &cpus) != 0) remark_ = "the pacer cannot run on CPU " + std::to_string(options.pacer_cpu);
+        if (sched_setaffinity(0, sizeof cpus, &cpus) != 0) remark_ = "cannot run the pacer on CPU " + std::to_string(options.pacer_cpu);
     }
     sched_param wanted{};
     wanted.sched_priority = options.pacer_priority;
     if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted) != 0)
-        remark_ = "the pacer runs without real-time priority: frames may leave late; `hal doctor` says how to grant it";
+        remark_ = "the pacer runs without real-time priority: frames may leave late; to grant it, see: hal doctor";
 }
 
 Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept {
@@ -76,7 +77,7 @@ Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std:
     Place& place = places_[number];
     std::memcpy(place.bytes.data(), frame.data(), place.length = frame.size());
     place.launch = launch;
-    outgoing_.push(number);  // as many places there as here
+    outgoing_.push(number);  // the queue is as large as the pool
     const auto wanted = spin_ns_ < launch.at_ns ? launch.at_ns - spin_ns_ : 0;
     if (wanted < asleep_until_.fetch_add(0, std::memory_order_acq_rel)) ring();
     return Sent::queued;
@@ -87,7 +88,7 @@ void Pacer::ring() noexcept {
     syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
 }
 
-/// Until the time or the bell.
+/// Sleeps until the time or the bell.
 void Pacer::sleep(std::int64_t until_ns) noexcept {
     const auto bell = bell_.load(std::memory_order_acquire);
     asleep_until_.exchange(until_ns, std::memory_order_acq_rel);
@@ -110,7 +111,7 @@ bool Pacer::collect() noexcept {
     return true;
 }
 
-/// Awake, for a while at most; false: look at everything again.
+/// Spins until the time, within the budget. Returns false to check everything again.
 bool Pacer::look_until(std::int64_t time_ns) noexcept {
     constexpr std::int64_t while_ns = 50'000;
     const auto began = link::monotonic_ns();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A thread that lets frames leave at their times. The sending thread puts them in a row of places, whose numbers go round:
-// sender -> `outgoing` -> pacer -> `unused` -> sender. It rings only when the pacer would sleep too long:
+// A thread that sends frames at their times. Frames are in a pool of buffers, whose numbers circulate:
+// sender -> `outgoing` -> pacer -> `unused` -> sender. The sender rings only when the pacer would sleep too long:
 //   1. sender: frame into `outgoing`       2. pacer: exchanges `asleep_until`
-//   3. sender: adds nothing to it          4. pacer: looks into `outgoing`
-// 2 and 3 are read-modify-writes of one variable, so one comes first: 3 then reads what 2 wrote, or 4 sees what 1 put in.
+//   3. sender: adds nothing to it          4. pacer: checks `outgoing`
+// 2 and 3 are read-modify-writes of one variable, so one comes first: 3 then reads what 2 wrote, or 4 sees what 1 queued.
 #pragma once
 
 #include <atomic>
@@ -22,9 +22,9 @@ public:
     Pacer(Sender&, const Options&);
     ~Pacer();
 
-    /// The frame leaves at its time; one whose time is nearer than a wake-up takes leaves from the calling thread. [realtime] sender
+    /// Sends a frame at its time; from the calling thread when that is nearer than a wake-up takes. [realtime] sender
     Sent send(std::span<const std::uint8_t> frame, const Launch&, std::int64_t now_ns) noexcept;
-    /// What the thread does not have, in a sentence; empty: nothing. [setup]
+    /// Returns what the thread could not obtain, as a sentence; empty: nothing. [setup]
     const std::string& remark() const noexcept { return remark_; }
 
 private:

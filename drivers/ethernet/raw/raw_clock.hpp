@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The kernel stamps frames on CLOCK_REALTIME, which people and NTP set; everything here runs on CLOCK_MONOTONIC. Both are slewed alike,
-// so their distance is constant until somebody steps the former.
+// The kernel stamps frames on CLOCK_REALTIME, which is set by people and NTP; the runtime uses CLOCK_MONOTONIC. Both are slewed alike,
+// so their offset is constant until the former is stepped.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@ class RealTime {
 public:
     RealTime() noexcept { measure(); }
 
-    /// Measures the distance anew; a change of less than a microsecond is the measurement's. [any]
+    /// Measures the offset; a change of less than 1 us is measurement error. [any]
     void measure() noexcept {
         std::int64_t narrowest = INT64_MAX, distance = 0;
         for (int i = 0; i < 5; ++i) {
@@ -29,7 +29,7 @@ public:
         distance_.store(distance, std::memory_order_relaxed);
     }
 
-    /// A stamp of a frame that came after `last_ns` and before `now_ns`. One that does not fit is of before or after a step. [realtime]
+    /// Converts the stamp of a frame received after `last_ns` and before `now_ns`, also across a step of the clock. [realtime]
     std::int64_t to_monotonic(std::int64_t stamp_ns, std::int64_t last_ns, std::int64_t now_ns) noexcept {
         constexpr std::int64_t disorder_ns = 100'000;  // queues of one interface are not emptied in order
         const auto fits = [&](std::int64_t t) { return t <= now_ns && t >= last_ns - disorder_ns; };
@@ -42,17 +42,17 @@ public:
     }
 
 private:
-    // Written by whoever measures, to the same value; read by all.
+    // Every thread that measures writes the same value; all read.
     std::atomic<std::int64_t> distance_{INT64_MIN / 2}, before_{INT64_MIN / 2};
 };
 
-/// How long a thread may look for something without sleeping. The kernel stops real-time threads that use more than 95 % of a CPU
-/// (kernel.sched_rt_runtime_us), for tens of milliseconds: this one stops itself before, for a tenth of one. Of one thread.
+/// Limits how long a thread spins. The kernel throttles real-time threads that use more than 95 % of a CPU (kernel.sched_rt_runtime_us) for
+/// tens of milliseconds: this one sleeps 0.1 ms before that happens. For one thread.
 class SpinBudget {
 public:
     explicit SpinBudget(bool bounded) noexcept : bounded_(bounded) {}
 
-    /// Looking went on from `from_ns` to `to_ns`; false: sleep rest_ns now. [realtime]
+    /// Accounts for spinning from `from_ns` to `to_ns`. Returns false when the thread must sleep rest_ns now. [realtime]
     bool spent(std::int64_t from_ns, std::int64_t to_ns) noexcept {
         if (!bounded_) return true;
         credit_ns_ += (to_ns - last_ns_) / 20 * 17 - (to_ns - from_ns);
@@ -61,7 +61,7 @@ public:
         return credit_ns_ > 0;
     }
     static constexpr std::int64_t rest_ns = 100'000;
-    /// What the kernel has set. [setup]
+    /// Returns true when the kernel throttles. [setup]
     static bool is_needed();
 
 private:
@@ -77,7 +77,7 @@ inline void pause_processor() noexcept {
     asm volatile("yield");
 #endif
 }
-/// [realtime], where sleeping is the work
+/// Sleeps until a time of CLOCK_MONOTONIC. [realtime], in a thread whose job it is to wait
 inline void sleep_until(std::int64_t time_ns) noexcept {
     const timespec t{time_ns / 1'000'000'000, time_ns % 1'000'000'000};
     clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);

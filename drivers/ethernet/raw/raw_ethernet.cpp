@@ -21,14 +21,14 @@ class RawPort final : public Port {
 public:
     explicit RawPort(const Options& options) : options_(options), sender_(clock_), budget_(SpinBudget::is_needed()) {}
 
-    /// What is wrong, or nothing. [setup]
+    /// Opens the port. Returns the problem, or "". [setup]
     std::string open(const std::string& name) {
         if (auto problem = receiver_.open(options_); !problem.empty()) return problem;
         if (auto problem = sender_.open(options_.transmit_stamps); !problem.empty()) return problem;
         const Interface found = ask(name);
-        if (found.index == 0) return "there is no interface '" + name + "' here; there are " + interfaces();
-        if (!found.ethernet) return name + " is no Ethernet interface; `ip -br link` lists those there are";
-        if (!receiver_.bind(found.index) || !sender_.bind(found.index)) return name + " cannot be used: " + link::reason();
+        if (found.index == 0) return "no interface '" + name + "'; interfaces are " + interfaces();
+        if (!found.ethernet) return name + " is not an Ethernet interface; to list them: ip -br link";
+        if (!receiver_.bind(found.index) || !sender_.bind(found.index)) return "cannot bind to " + name + ": " + link::reason();
         address_ = found.address;
         monitor_ = std::make_unique<EthernetMonitor>(name, found, receiver_, sender_, clock_);
         if (options_.pacer) pacer_ = std::make_unique<Pacer>(sender_, options_);
@@ -41,13 +41,13 @@ public:
 
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t) noexcept override {
         const auto longest = header_bytes + sender_.mtu.load(std::memory_order_relaxed);
-        if (!launch.fits(frame.size()) || frame.size() > longest) return sender_.drop(Sent::refused);
+        if (!launch.fits(frame.size()) || frame.size() > longest) return sender_.drop(Sent::rejected);
         if (!sender_.up.load(std::memory_order_relaxed)) return sender_.drop(Sent::down);
         if (launch.at_ns == 0) return sender_.leave(frame, launch);
-        // The caller's now is the start of its cycle; how near the time is counts from here.
+        // The caller's now is the start of its cycle; the remaining time counts from here.
         const auto now = link::monotonic_ns();
         if (now >= launch.at_ns) return sender_.leave(frame, launch);
-        if (pacer_) return frame.size() <= largest_frame ? pacer_->send(frame, launch, now) : sender_.drop(Sent::refused);
+        if (pacer_) return frame.size() <= largest_frame ? pacer_->send(frame, launch, now) : sender_.drop(Sent::rejected);
         if (launch.at_ns - now > options_.spin_ns) return sender_.drop(Sent::full);
         sender_.await(launch.at_ns);
         return sender_.leave(frame, launch);
@@ -101,7 +101,7 @@ private:
             const timespec limit{(until - now) / 1'000'000'000, (until - now) % 1'000'000'000};
             ::ppoll(&p, 1, &limit, nullptr);
             if (receiver_.ready()) return true;
-            if ((p.revents & POLLERR) != 0) {  // the interface went down: told once, and until it is taken
+            if ((p.revents & POLLERR) != 0) {  // the interface went down: reported once, until it is read
                 int error = 0;
                 socklen_t size = sizeof error;
                 (void)getsockopt(receiver_.descriptor(), SOL_SOCKET, SO_ERROR, &error, &size);
@@ -129,7 +129,7 @@ Description describe(const std::string& interface) {
 }
 
 Opened open(const std::string& interface, const Options& options) {
-    if (interface.empty()) return {nullptr, "the interface is missing; write eth:enp3s0; there are " + interfaces()};
+    if (interface.empty()) return {nullptr, "missing interface; write eth:enp3s0; interfaces are " + interfaces()};
     auto port = std::make_unique<RawPort>(options);
     auto problem = port->open(interface);
     if (!problem.empty()) return {nullptr, std::move(problem)};

@@ -5,7 +5,7 @@
 
 namespace hal::ethernet::rawether {
 
-/// `eth:INTERFACE`: raw frames on an interface of this machine. Needs CAP_NET_RAW. [setup]
+/// Opens `eth:INTERFACE`: raw frames on an interface of this machine. Needs CAP_NET_RAW. [setup]
 Opened open(const std::string& interface, const Options&);
 /// Describes what open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& interface);

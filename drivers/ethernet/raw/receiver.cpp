@@ -26,7 +26,7 @@ bool set(int fd, int level, int name, const T& value) {
     return setsockopt(fd, level, name, &value, sizeof value) == 0;
 }
 
-/// Passes frames that are for this station, of the types given.
+/// Builds a filter that passes frames for this station, of the given types.
 std::vector<sock_filter> filter(const std::vector<std::uint16_t>& types, bool promiscuous) {
     std::vector<sock_filter> code;
     const auto add = [&](std::uint16_t what, std::uint32_t value, std::size_t when_true = 0, std::size_t when_false = 0) {
@@ -56,21 +56,21 @@ Receiver::~Receiver() {
 }
 
 std::string Receiver::open(const Options& options) {
-    if (options.types.size() > 64) return "more than 64 Ethertypes on one port; open it once for each kind of user";
+    if (options.types.size() > 64) return "more than 64 Ethertypes on one port; open several ports";
     socket_ = link::Descriptor(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int refusal = socket_ ? 0 : errno;
     if (refusal == EPERM || refusal == EACCES)
-        return "raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant_command() + "; `hal doctor` shows what it has";
-    if (!socket_) return "the kernel has no packet sockets: " + link::reason(refusal);
+        return "raw Ethernet needs the capability CAP_NET_RAW; type: " + grant_command() + "; to see the capabilities: hal doctor";
+    if (!socket_) return "cannot open a packet socket: " + link::reason(refusal);
     protocol_ = options.types.size() == 1 ? options.types[0] : std::uint16_t{ETH_P_ALL};
     promiscuous_ = options.promiscuous;
     const int yes = 1, version = TPACKET_V2;
     set(socket_.get(), SOL_PACKET, PACKET_IGNORE_OUTGOING, yes);
-    // Stamps from where the frame enters the kernel rather than this socket.
+    // Timestamps from where the frame enters the kernel rather than this socket.
     set(socket_.get(), SOL_SOCKET, SO_TIMESTAMPING, int{SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE});
     auto code = filter(options.types, options.promiscuous);
     if (!set(socket_.get(), SOL_SOCKET, SO_ATTACH_FILTER, sock_fprog{static_cast<unsigned short>(code.size()), code.data()}))
-        return "the filter was refused: " + link::reason();
+        return "cannot attach the filter: " + link::reason();
     frames_ = std::bit_ceil(std::clamp<std::size_t>(options.receive_capacity, 32, 16384));
     tpacket_req ring{};
     ring.tp_frame_size = place_bytes;
@@ -78,9 +78,9 @@ std::string Receiver::open(const Options& options) {
     ring.tp_block_size = static_cast<unsigned>(std::min(block_bytes, frames_ * place_bytes));
     ring.tp_block_nr = static_cast<unsigned>(frames_ * place_bytes / ring.tp_block_size);
     if (!set(socket_.get(), SOL_PACKET, PACKET_VERSION, version) || !set(socket_.get(), SOL_PACKET, PACKET_RX_RING, ring))
-        return "the kernel gives no receive ring: " + link::reason() + "; a smaller one may do: ?receivequeue=64";
+        return "cannot create the receive ring: " + link::reason() + "; try a smaller one: ?receivequeue=64";
     void* memory = mmap(nullptr, frames_ * place_bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, socket_.get(), 0);
-    if (memory == MAP_FAILED) return "the receive ring cannot be reached: " + link::reason();
+    if (memory == MAP_FAILED) return "cannot map the receive ring: " + link::reason();
     memory_ = static_cast<std::uint8_t*>(memory);
     return {};
 }

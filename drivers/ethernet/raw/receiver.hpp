@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A packet socket whose frames the kernel writes into memory that it shares with us (TPACKET_V2): looking for one costs no system
-// call, and each carries the time at which the kernel got it.
+// A packet socket whose frames the kernel writes into shared memory (TPACKET_V2): polling it costs no system call, and each frame has
+// the time at which the kernel received it.
 #pragma once
 
 #include <atomic>
@@ -19,20 +19,20 @@ public:
     Receiver(const Receiver&) = delete;
     Receiver& operator=(const Receiver&) = delete;
 
-    /// Opens the socket; it receives nothing before bind(). What is wrong, or nothing. [setup]
+    /// Opens the socket; it receives nothing before bind(). Returns the problem, or "". [setup]
     std::string open(const Options&);
-    /// To the interface of that number, again after it was gone. `errno` says why not. [setup] monitor
+    /// Binds it to the interface of that number, also after the interface was lost. On failure `errno` is set. [setup] monitor
     bool bind(int index) noexcept;
 
-    /// The next frame; it stays until the next call of this or of ready(). [realtime] receiver
+    /// Returns the next frame, valid until the next call of this or of ready(). [realtime] receiver
     std::optional<Arrival> next(RealTime&) noexcept;
-    /// Whether there is one. [realtime] receiver
+    /// Returns whether there is one. [realtime] receiver
     bool ready() noexcept {
         release();
         return (status(next_).load(std::memory_order_acquire) & user_) != 0;
     }
     int descriptor() const noexcept { return socket_.get(); }
-    /// What the kernel found no room for since the last call. [setup] monitor
+    /// Returns how many frames the kernel dropped since the last call. [setup] monitor
     std::uint64_t lost() noexcept;
 
     std::atomic<std::uint64_t> received{0}, received_bytes{0}, errors{0};  ///< written by the receiver
@@ -45,10 +45,10 @@ private:
     link::Descriptor socket_;
     std::uint8_t* memory_ = nullptr;
     std::size_t frames_ = 0;
-    std::uint16_t protocol_ = 0;  ///< as the socket takes it: one type, or all with a filter
+    std::uint16_t protocol_ = 0;  ///< of the socket: one type, or all with a filter
     bool promiscuous_ = false;
-    std::size_t next_ = 0;        ///< this and the next two: the receiving thread's
-    bool held_ = false;           ///< the frame before `next_` is still looked at
+    std::size_t next_ = 0;        ///< this and the next two: used by the receiving thread
+    bool held_ = false;           ///< the frame before `next_` is still in use
     std::int64_t last_ns_ = INT64_MIN / 2;
 };
 

@@ -39,7 +39,7 @@ void Sender::await(std::int64_t time_ns) noexcept {
 
 Sent Sender::drop(Sent why) noexcept {
     (why == Sent::late ? late : dropped).fetch_add(1, std::memory_order_relaxed);
-    if (why == Sent::refused) errors.fetch_add(1, std::memory_order_relaxed);
+    if (why == Sent::rejected) errors.fetch_add(1, std::memory_order_relaxed);
     return why;
 }
 
@@ -51,7 +51,7 @@ Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) no
         std::memcpy(small.data(), frame.data(), length);
         frame = small;
     } else if (launch.stamp_at != 0 || launch.finisher != nullptr) {
-        if (frame.size() > large.size()) return drop(Sent::refused);
+        if (frame.size() > large.size()) return drop(Sent::rejected);
         std::memcpy(large.data(), frame.data(), frame.size());
         frame = {large.data(), frame.size()};
     }
@@ -71,12 +71,12 @@ Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) no
         if (::send(socket_.get(), frame.data(), frame.size(), MSG_DONTWAIT) >= 0) break;
         const int error = errno;
         if (error == EINTR) continue;
-        if (error == ENETDOWN && tries == 0) continue;  // one that the kernel kept from before
+        if (error == ENETDOWN && tries == 0) continue;  // a stale error
         if (launch.finisher != nullptr) launch.finisher->stayed({own, length});
         errors.fetch_add(1, std::memory_order_relaxed);
         dropped.fetch_add(1, std::memory_order_relaxed);
         if (error == ENETDOWN || error == ENXIO || error == ENODEV) return Sent::down;
-        return error == EMSGSIZE ? Sent::refused : Sent::full;
+        return error == EMSGSIZE ? Sent::rejected : Sent::full;
     }
     if (now != 0) last_ns_.store(now, std::memory_order_relaxed);
     sent.fetch_add(1, std::memory_order_relaxed);
@@ -90,7 +90,7 @@ Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) no
     return Sent::queued;
 }
 
-/// The kernel gives them back on the error queue, mostly before send() returns.
+/// Reads the transmit timestamps, which the kernel puts on the error queue, mostly before send() returns.
 void Sender::read_stamps() noexcept {
     for (int i = 0; i < 8; ++i) {
         alignas(cmsghdr) char control[256];

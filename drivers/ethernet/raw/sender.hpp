@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames to the interface, past its queueing discipline, so that nothing of ours waits behind something else.
+// Sends frames to the interface past its queueing discipline, so that they do not wait behind other traffic.
 #pragma once
 
 #include <atomic>
@@ -15,21 +15,21 @@ class Sender {
 public:
     explicit Sender(RealTime& clock) noexcept : clock_(clock) {}
 
-    /// What is wrong, or nothing. [setup]
+    /// Opens the socket. Returns the problem, or "". [setup]
     std::string open(bool transmit_stamps);
-    /// [setup] monitor
+    /// Binds it to an interface. [setup] monitor
     bool bind(int index) noexcept;
 
-    /// The frame leaves now, if it is not late; stamped, if it wants to be. Any thread; several at a time. [realtime]
+    /// Sends a frame now, unless it is late, with its stamp. Any thread; several at a time. [realtime]
     Sent leave(std::span<const std::uint8_t> frame, const Launch&) noexcept;
-    /// Looks at the clock until then. [realtime]
+    /// Spins until a time. [realtime]
     ///
-    /// After a pause what the kernel needs to send is no longer in the caches, and a frame leaves some microseconds late, more or less. So a few
-    /// microseconds before its time the kernel is given what it refuses behind most of that way: 13 bytes, less than an Ethernet header.
+    /// After a pause the kernel's send path is no longer in the caches, and a frame leaves some microseconds late. So a few microseconds
+    /// before the time the kernel is given a frame that it rejects at the end of most of that path: 13 bytes, less than an Ethernet header.
     void await(std::int64_t time_ns) noexcept;
-    /// A frame that this cannot send for another reason than those leave() finds. [realtime]
+    /// Counts a frame that cannot be sent for a reason other than those of leave(). [realtime]
     Sent drop(Sent why) noexcept;
-    /// Forgets an error that the kernel kept from when the interface was down. [setup] monitor
+    /// Clears an error that the kernel kept from when the interface was down. [setup] monitor
     void forget() noexcept;
 
     std::atomic<bool> up{false};            ///< written by the monitor

@@ -30,13 +30,13 @@ class ReplayPort final : public Port {
 public:
     ReplayPort(const std::string& file, const Options& options, std::vector<Captured> frames)
         : options_(options), frames_(std::move(frames)) {
-        // None that a segment in memory gives: who is in a recording of one must not be taken for this port.
+        // Not one of a segment in memory: a station of a recording must not have the address of this port.
         address_ = options.address != Address{} ? options.address : Address{2, 'R', 'E', 'P', 'L', 'Y'};
         description_ = replay::describe(file);
     }
     const Address& address() const noexcept override { return address_; }
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept override {
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) return add(dropped_), add(errors_), Sent::refused;
+        if (!launch.fits(frame.size()) || frame.size() > largest_frame) return add(dropped_), add(errors_), Sent::rejected;
         if (launch.is_late(time(now_ns))) return add(late_), Sent::late;
         add(sent_);
         sent_bytes_.fetch_add(std::max(frame.size(), smallest_frame), std::memory_order_relaxed);
@@ -78,7 +78,7 @@ private:
     using Count = std::atomic<std::uint64_t>;
     static void add(Count& counter) noexcept { counter.fetch_add(1, std::memory_order_relaxed); }
     static std::int64_t time(std::int64_t now_ns) noexcept { return now_ns != unclocked ? now_ns : link::monotonic_ns(); }
-    /// Of any station: a capture was taken with another address than this.
+    /// Passes frames to any station: the capture was taken with another address.
     bool is_wanted(const std::vector<std::uint8_t>& frame) const noexcept {
         const auto type = static_cast<std::uint16_t>(frame[12] << 8U | frame[13]);
         return options_.types.empty() || std::find(options_.types.begin(), options_.types.end(), type) != options_.types.end();
@@ -90,7 +90,7 @@ private:
     Description description_;
     Count sent_{0}, sent_bytes_{0}, received_{0}, received_bytes_{0}, dropped_{0}, late_{0}, errors_{0};
     std::atomic<bool> up_{true};
-    std::size_t next_ = 0;  // from here on: the receiving thread's
+    std::size_t next_ = 0;  // from here on: used by the receiving thread
     bool begun_ = false;
     std::int64_t shift_ = 0;
 };
@@ -122,7 +122,7 @@ Capture read_capture(const std::string& file) {
 std::unique_ptr<Recorder> record(const std::string& file, std::string_view interface, std::string& problem) {
     auto recorder = std::make_unique<PcapngRecorder>(file, interface);
     if (recorder->error() == 0) return recorder;
-    problem = file + " cannot be written: " + std::strerror(recorder->error());
+    problem = "cannot write " + file + ": " + std::strerror(recorder->error());
     return nullptr;
 }
 
@@ -133,11 +133,11 @@ Description describe(const std::string& file) {
 }
 
 Opened open(const std::string& file, const Options& options) {
-    if (file.empty()) return {nullptr, "the file is missing; write replay:capture.pcapng"};
+    if (file.empty()) return {nullptr, "missing file; write replay:capture.pcapng"};
     auto capture = read_capture(file);
     if (!capture.problem.empty()) return {nullptr, capture.problem};
     if (capture.frames.empty())
-        return {nullptr, "there is no Ethernet frame in this file; record one with: tcpdump -i enp3s0 -w capture.pcap"};
+        return {nullptr, "no Ethernet frames in this file; to record some: tcpdump -i enp3s0 -w capture.pcap"};
     return {std::make_unique<ReplayPort>(file, options, std::move(capture.frames)), {}};
 }
 

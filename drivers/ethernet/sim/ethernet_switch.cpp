@@ -12,7 +12,7 @@ namespace hal::ethernet::simbus {
 namespace {
 
 constexpr std::size_t most_events = 8192, most_disturbances = 64, most_stations = 256;
-constexpr std::size_t egress_bytes = 65536;  // a small switch's memory per line: what does not fit is lost
+constexpr std::size_t egress_bytes = 65536;  // memory of a small switch per line; frames beyond it are lost
 
 struct Registry {
     std::mutex mutex;
@@ -52,11 +52,11 @@ std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& opt
     auto& known = all.segments[name];
     if (auto segment = known.lock()) {
         if (options.speed != 0 && options.speed != segment->speed)
-            problem = "the segment runs at " + std::to_string(segment->speed) +
-                      " Mbit/s already; open it with the same speed everywhere, or give it in one place only";
+            problem = "the segment already runs at " + std::to_string(segment->speed) +
+                      " Mbit/s; use the same speed everywhere, or give it in one place only";
         else if (options.forward_ns >= 0 && options.forward_ns != segment->forward_ns)
-            problem = "a frame takes " + std::to_string(segment->forward_ns) +
-                      " ns in the switch already; open the segment with the same forward everywhere, or give it in the first place only";
+            problem = "the switch already has a delay of " + std::to_string(segment->forward_ns) +
+                      " ns; use the same forward everywhere, or give it in the first place only";
         return problem.empty() ? segment : nullptr;
     }
     auto segment = std::make_shared<Switch>(name, options);
@@ -77,15 +77,15 @@ Station* Switch::station(int number) noexcept {
 }
 
 bool Switch::add(User& user, const std::string& wanted, const Options& options, std::string& problem) {
-    std::vector<std::unique_ptr<User>> gone;  // freed after the segment is let go
+    std::vector<std::unique_ptr<User>> gone;  // freed after the segment is released
     std::vector<std::unique_ptr<Station>> empty;
     const Hold hold(*this);
     sweep(gone, empty);
     const auto same = [&](const auto& s) { return !wanted.empty() && s->name == wanted; };
     auto found = std::find_if(stations.begin(), stations.end(), same);
     if (found == stations.end()) {
-        if (stations.size() == most_stations) return problem = "the segment has " + std::to_string(most_stations) + " stations", false;
-        int number = 0;  // the lowest that is free: the same program opens the same numbers
+        if (stations.size() == most_stations) return problem = "too many stations: the segment already has " + std::to_string(most_stations), false;
+        int number = 0;  // the lowest free number: a program always gets the same numbers
         while (station(number) != nullptr) ++number;
         auto made = std::make_unique<Station>();
         made->name = wanted;
@@ -96,7 +96,7 @@ bool Switch::add(User& user, const std::string& wanted, const Options& options, 
         const auto after = [](int n, const auto& s) { return n < s->number; };
         found = stations.insert(std::upper_bound(stations.begin(), stations.end(), number, after), std::move(made));
     } else if (options.address != Address{} && options.address != (*found)->address) {
-        problem = "station " + wanted + " has the address " + to_string((*found)->address) + " already; give mac= in one place only";
+        problem = "station " + wanted + " already has the address " + to_string((*found)->address) + "; give mac= in one place only";
         return false;
     }
     user.station = found->get();
@@ -120,7 +120,7 @@ void Switch::remove(std::unique_ptr<User> user) {
     sweep(gone, empty);
 }
 
-/// Takes out the users that are gone and have nothing on its way, and the stations without users.
+/// Removes closed users without pending frames, and stations without users.
 void Switch::sweep(std::vector<std::unique_ptr<User>>& gone, std::vector<std::unique_ptr<Station>>& empty) {
     const auto busy = [&](const User* u) {
         return std::any_of(events_.begin(), events_.end(), [&](const Event& e) { return e.from == u; });
@@ -148,14 +148,14 @@ void Switch::pump(std::int64_t now) noexcept {
     pumping_.clear(std::memory_order_release);
 }
 
-/// Moves what was sent to the heaps, once anybody has told the time.
+/// Moves sent frames to the heaps, once a time is known.
 void Switch::collect(std::int64_t now) noexcept {
     if (now == unclocked) return;
     for (auto& s : stations)
         for (User* u : s->users)
             for (const std::uint32_t* place = nullptr; (place = u->outgoing.front()) != nullptr; u->outgoing.pop()) {
                 auto& at = u->places[*place].at_ns;
-                if (at == unclocked) at = now - 1;  // sent before that
+                if (at == unclocked) at = now - 1;  // sent before a time was known
                 u->waiting.push_back({at, u->sequence++, *place});
                 std::push_heap(u->waiting.begin(), u->waiting.end());
             }
@@ -189,7 +189,7 @@ void Switch::work(std::int64_t now) noexcept {
     worked_until_.store(now, std::memory_order_relaxed);
 }
 
-/// The frame that is first in turn leaves its station.
+/// Sends the first frame in turn from its station.
 void Switch::launch(Station& s, std::int64_t start) noexcept {
     User* from = nullptr;
     for (User* u : s.users)
@@ -224,13 +224,13 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
     }
     count(from->sent), count(from->sent_bytes, f.length);
     s.to_switch_free = start + wire_ns(f.length);
-    f.references = 1;  // until all its events are made
+    f.references = 1;  // until all its events are created
     Event e{s.to_switch_free + forward_ns, 0, from, place, -1, static_cast<std::uint32_t>(f.length), -1, 0};
     if (!disturbed(e, false)) add_event(e);
     release(e);
 }
 
-/// From the switch to the lines of those it is for.
+/// Forwards a frame from the switch to the lines of its receivers.
 void Switch::pass_on(const Event& e) noexcept {
     const Bytes& bytes = e.from->places[e.place].bytes;
     if (e.to >= 0) {
@@ -251,7 +251,7 @@ void Switch::pass_on(const Event& e) noexcept {
     }
 }
 
-/// Onto the line of one station, and to its users when its turn is over.
+/// Sends a frame on the line of one station, and delivers it to its users at the end.
 void Switch::deliver(const Event& e, Station& s) noexcept {
     const auto count = [](auto& counter, std::uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); };
     if (s.cut.load(std::memory_order_relaxed)) return;
@@ -283,7 +283,7 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
     }
 }
 
-/// What a disturbance makes of the frame: true when nothing of it goes on as it is. Those of one receiver are asked at its line,
+/// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of one receiver apply at its line,
 /// all others where the frame leaves.
 bool Switch::disturbed(Event& e, bool only_one) noexcept {
     const Bytes& bytes = e.from->places[e.place].bytes;
@@ -342,7 +342,7 @@ std::uint64_t Switch::draw() noexcept {  // splitmix64
     return z ^ z >> 31;
 }
 
-/// Normal with sigma 1, as the sum of twelve uniform numbers.
+/// Returns a normal random number with sigma 1, as the sum of twelve uniform ones.
 double Switch::noise() noexcept {
     double sum = -6.0;
     for (int i = 0; i < 3; ++i)

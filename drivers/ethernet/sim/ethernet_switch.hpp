@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // An Ethernet segment in memory: stations, each with a full-duplex line to one store-and-forward switch. Its time is the newest
-// `now_ns` its users told it; what happened up to there is worked out, in order of time, by whichever of them comes first ("the pump").
-// What starts strictly before now is done, so that the order in which functions run at one instant does not matter; things of one
-// instant happen in order of station, then user, then the order of sending.
+// `now_ns` its users passed in; everything up to that time is processed, in order of time, by whichever of them calls first ("the pump").
+// What starts strictly before now is done, so that the order in which functions run at one instant does not matter; simultaneous events
+// are ordered by station, then user, then the order of sending.
 //
-// Threads: a user has a row of places for its frames. Their numbers go round: sender -> `outgoing` -> pump -> `unused` -> sender; each
-// queue has one writer and one reader. What has arrived is copied to `incoming`, which the receiving thread reads. All else belongs to
-// who holds `pumping_`. A cycle only tries to take it: when another thread works, that one does the work and the cycle goes on.
-//   1. thread A takes pumping_, works up to its now       2. thread B queues a frame, fails to take pumping_, goes on
-//   3. A gives pumping_ back                              4. the next call of any thread finds B's frame: it is late, not lost
+// Threads: a user has a pool of buffers for its frames. Their numbers circulate: sender -> `outgoing` -> pump -> `unused` -> sender; each
+// queue has one writer and one reader. Arrived frames are copied to `incoming`, which the receiving thread reads. All else belongs to the
+// thread that holds `pumping_`. A cycle only tries to take it: if another thread is working, that one does the work and the cycle proceeds.
+//   1. thread A takes pumping_, works up to its now       2. thread B queues a frame, fails to take pumping_, proceeds
+//   3. A releases pumping_                                4. the next call of any thread finds B's frame: it is late, not lost
 #pragma once
 
 #include <atomic>
@@ -24,16 +24,16 @@ namespace hal::ethernet::simbus {
 
 using Bytes = std::array<std::uint8_t, largest_frame>;
 
-/// A frame of a user, from send() until the last line has it.
+/// A frame of a user, from send() until the last line has sent it.
 struct Outgoing {
     Bytes bytes;
     std::size_t length = 0;
     Launch launch;
     std::int64_t at_ns = 0;     ///< not before
-    unsigned references = 0;    ///< events that still need it; the pump's
+    unsigned references = 0;    ///< events that still need it; used by the pump
 };
 
-/// A frame on its way to a receiver. It may be taken out when its time has come; its stamp may be another.
+/// A frame in flight to a receiver, which may take it from `time_ns` on; its stamp may differ.
 struct Incoming {
     Bytes bytes;
     std::size_t length = 0;
@@ -42,7 +42,7 @@ struct Incoming {
 
 struct Station;
 
-/// One port. Fields without a word belong to the pump.
+/// One port. Fields without a comment belong to the pump.
 struct User {
     explicit User(const Options&);
 
@@ -60,23 +60,23 @@ struct User {
     std::uint64_t sequence = 0;
     std::vector<std::uint16_t> types;
     bool promiscuous = false;
-    bool leaving = false;          ///< its port is gone
+    bool leaving = false;          ///< its port is closed
     const std::int64_t noise_ns;
-    Station* station = nullptr;    ///< for its life
+    Station* station = nullptr;    ///< never changes
 
     std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, thrown_away{0}, late{0}, runts{0};
     std::atomic<std::int64_t> launch_error_ns{0};
-    std::atomic<std::uint64_t> dropped{0}, refused{0};  ///< written by the sending thread
+    std::atomic<std::uint64_t> dropped{0}, rejected{0};  ///< written by the sending thread
 };
 
-/// A line with its two directions. Fields without a word belong to the pump.
+/// A line with its two directions. Fields without a comment belong to the pump.
 struct Station {
-    std::string name;  ///< empty: of one user alone
+    std::string name;  ///< empty: of a single user
     int number = 0;
     Address address{};
     std::vector<User*> users;
     std::int64_t to_switch_free = INT64_MIN, from_switch_free = INT64_MIN;
-    std::unique_ptr<User> babbler;  ///< its places carry what is babbled
+    std::unique_ptr<User> babbler;  ///< its buffers hold the babbled frames
     Bytes babble{};
     std::size_t babble_length = 0;
     std::int64_t babble_period = 0, babble_at = 0;
@@ -88,20 +88,20 @@ class Switch {
 public:
     Switch(std::string name, const Options&);
 
-    /// The segment of that name, made when there is none. Lives as long as one of its ports. [setup]
+    /// Returns the segment of that name, created if necessary. It lives as long as one of its ports. [setup]
     static std::shared_ptr<Switch> find(const std::string& name, const Options&, std::string& problem);
 
-    /// False, and `problem` said, when the station exists with another address. [setup]
+    /// Adds a user. Returns false and sets `problem` when the station exists with another address. [setup]
     bool add(User&, const std::string& station, const Options&, std::string& problem);
-    /// What is due by now is still sent, as by a controller whose program ended. [setup]
+    /// Removes a user; frames due by now are still sent, as by a controller whose program ended. [setup]
     void remove(std::unique_ptr<User>);
 
-    /// Works the segment out up to `now_ns`, unless another thread is doing so. [realtime]
+    /// Processes the segment up to `now_ns`, unless another thread is doing so. [realtime]
     void pump(std::int64_t now_ns) noexcept;
-    /// `now_ns`, or the newest time known to the segment. [any]
+    /// Returns `now_ns`, or for `unclocked` the newest time known to the segment. [any]
     std::int64_t time(std::int64_t now_ns) const noexcept { return now_ns == unclocked ? latest_.load(std::memory_order_relaxed) : now_ns; }
 
-    /// Calls `change` while nobody pumps. [setup]
+    /// Calls `change` while no thread pumps. [setup]
     template <class Change>
     auto exclusively(Change&& change) {
         const Hold hold(*this);
@@ -127,16 +127,16 @@ private:
         ~Hold();
         Switch& held;
     };
-    /// A frame that the switch has whole and is to pass on.
+    /// A frame completely received by the switch, to be forwarded.
     struct Event {
         std::int64_t time_ns = 0;
         std::uint64_t sequence = 0;
         User* from = nullptr;
         std::uint32_t place = 0;
-        std::int32_t to = -1;         ///< this station alone
+        std::int32_t to = -1;         ///< to this station only; -1: all
         std::uint32_t length = 0;
-        std::int32_t garbled = -1;    ///< this byte is another one,
-        std::uint8_t mask = 0;        ///< with these bits turned
+        std::int32_t garbled = -1;    ///< index of a garbled byte,
+        std::uint8_t mask = 0;        ///< and its flipped bits
         bool operator<(const Event& o) const noexcept { return time_ns != o.time_ns ? time_ns > o.time_ns : sequence > o.sequence; }
     };
 

@@ -14,7 +14,7 @@ constexpr std::size_t most_disturbances = 64, babbled_places = 256;
 
 class SimulatedPort final : public Port, public Segment {
 public:
-    /// `user` is on the segment already.
+    /// `user` is already on the segment.
     SimulatedPort(std::shared_ptr<Switch> segment, std::unique_ptr<User> user, Description description)
         : switch_(std::move(segment)),
           owned_(std::move(user)),
@@ -28,7 +28,7 @@ public:
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept override {
         switch_->pump(now_ns);
         const auto now = switch_->time(now_ns);
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) return count(user_.refused), Sent::refused;
+        if (!launch.fits(frame.size()) || frame.size() > largest_frame) return count(user_.rejected), Sent::rejected;
         if (station_.cut.load(std::memory_order_relaxed)) return count(user_.dropped), Sent::down;
         if (launch.is_late(now)) return count(user_.late), Sent::late;
         const std::uint32_t* unused = user_.unused.front();
@@ -37,12 +37,12 @@ public:
         user_.unused.pop();
         Outgoing& f = user_.places[place];
         std::memcpy(f.bytes.data(), frame.data(), frame.size());
-        if (launch.finisher != nullptr) launch.finisher->leaves({f.bytes.data(), frame.size()});  // those of a station leave in their order
+        if (launch.finisher != nullptr) launch.finisher->leaves({f.bytes.data(), frame.size()});  // frames of a station leave in order
         f.length = std::max(frame.size(), smallest_frame);
         std::memset(f.bytes.data() + frame.size(), 0, f.length - frame.size());
         f.launch = launch;
         f.at_ns = std::max(launch.at_ns != 0 ? launch.at_ns : unclocked, now);
-        user_.outgoing.push(place);  // as many places there as here
+        user_.outgoing.push(place);  // the queue is as large as the pool
         return Sent::queued;
     }
 
@@ -69,9 +69,9 @@ public:
         s.sent = read(user_.sent), s.sent_bytes = read(user_.sent_bytes);
         s.received = read(user_.received), s.received_bytes = read(user_.received_bytes);
         s.lost = read(user_.lost);
-        s.dropped = read(user_.dropped) + read(user_.thrown_away) + read(user_.refused);
+        s.dropped = read(user_.dropped) + read(user_.thrown_away) + read(user_.rejected);
         s.late = read(user_.late);
-        s.errors = read(user_.runts) + read(user_.refused);
+        s.errors = read(user_.runts) + read(user_.rejected);
         s.downs = read(station_.downs);
         s.launch_error_ns = read(user_.launch_error_ns);
         return s;
@@ -141,7 +141,7 @@ private:
     User& user_;
     Station& station_;
     Description description_;
-    bool held_ = false;  ///< the receiving thread's: it looks at the oldest frame still
+    bool held_ = false;  ///< receiving thread: the oldest frame is still in use
 };
 
 }  // namespace
@@ -156,8 +156,8 @@ Opened open(const std::string& place, const Options& options) {
     const auto slash = place.find('/');
     const auto name = place.substr(0, slash);
     const auto station = slash == place.npos ? std::string{} : place.substr(slash + 1);
-    if (name.empty()) return {nullptr, "the name of the segment is missing; write sim:net0"};
-    if (slash != place.npos && station.empty()) return {nullptr, "the name of the station is missing; write sim:" + name + "/master"};
+    if (name.empty()) return {nullptr, "missing name of the segment; write sim:net0"};
+    if (slash != place.npos && station.empty()) return {nullptr, "missing name of the station; write sim:" + name + "/master"};
     std::string problem;
     auto segment = Switch::find(name, options, problem);
     if (!segment) return {nullptr, problem};

@@ -110,9 +110,9 @@ TEST_F(Raw, two_users_of_one_interface_do_not_hear_each_other) {
 
 TEST_F(Raw, the_mtu_of_the_interface_is_the_limit) {
     auto here = a(), there = b();
-    EXPECT_EQ(here->send(Bytes(13), {}, 0), Sent::refused);
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1501)), {}, 0), Sent::refused);
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(15)), {.stamp_at = 22}, 0), Sent::refused);
+    EXPECT_EQ(here->send(Bytes(13), {}, 0), Sent::rejected);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1501)), {}, 0), Sent::rejected);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(15)), {.stamp_at = 22}, 0), Sent::rejected);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {}, 0), Sent::queued);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {.stamp_at = 22}, 0), Sent::queued);
     EXPECT_EQ(firsts(*there, 2), "11");
@@ -121,7 +121,7 @@ TEST_F(Raw, the_mtu_of_the_interface_is_the_limit) {
     EXPECT_EQ(here->statistics().errors, 3U);
     ASSERT_TRUE(command("ip link set " + a_ + " mtu 500"));
     EXPECT_TRUE(eventually([&] { return here->statistics().mtu == 500; }));
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(501)), {}, 0), Sent::refused);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(501)), {}, 0), Sent::rejected);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(500, 2)), {}, 0), Sent::queued);
     EXPECT_EQ(firsts(*there, 1), "2");
 }
@@ -339,15 +339,15 @@ TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
     }
 }
 
-TEST_F(Raw, an_open_that_cannot_be_says_what_to_do) {
-    EXPECT_EQ(open("eth:nosuch0").problem.substr(0, 60), "eth:nosuch0: there is no interface 'nosuch0' here; there are");
+TEST_F(Raw, open_reports_what_to_do_on_failure) {
+    EXPECT_EQ(open("eth:nosuch0").problem.substr(0, 52), "eth:nosuch0: no interface 'nosuch0'; interfaces are ");
     EXPECT_NE(open("eth:nosuch0").problem.find(a_), std::string::npos);
-    EXPECT_EQ(open("eth:").problem.substr(0, 53), "eth:: the interface is missing; write eth:enp3s0; the");
+    EXPECT_EQ(open("eth:").problem.substr(0, 57), "eth:: missing interface; write eth:enp3s0; interfaces are");
     EXPECT_EQ(open("eth:" + a_, {.types = std::vector<std::uint16_t>(65)}).problem,
-              "eth:" + a_ + ": more than 64 Ethertypes on one port; open it once for each kind of user");
+              "eth:" + a_ + ": more than 64 Ethertypes on one port; open several ports");
 }
 
-TEST_F(Raw, without_the_capability_it_says_how_to_grant_it) {
+TEST_F(Raw, open_reports_how_to_grant_a_missing_capability) {
     std::string problem;
     std::thread([&] {  // capabilities are a thread's own
         __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
@@ -357,8 +357,8 @@ TEST_F(Raw, without_the_capability_it_says_how_to_grant_it) {
     }).join();
     const std::string grant = grant_command();
     EXPECT_TRUE(grant.starts_with("sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep /")) << grant;
-    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant +
-                           "; `hal doctor` shows what it has");
+    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; type: " + grant +
+                           "; to see the capabilities: hal doctor");
 }
 
 TEST(RawClock, a_stamp_that_does_not_fit_is_of_a_clock_that_was_set) {

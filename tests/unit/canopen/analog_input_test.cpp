@@ -30,7 +30,7 @@ struct Transmitter final : Program {
     }
     void step(Time now) noexcept override {
         for (unsigned n = 0; n < 2; ++n) inputs.sample(n, field[n], counts, 0, now);
-        if (inputs.changed(0)) inputs.said(0), device_->pdos().trigger(1);
+        if (inputs.changed(0)) inputs.mark_sent(0), device_->pdos().trigger(1);
     }
 };
 

@@ -168,7 +168,7 @@ TEST(Axis, Sees_that_the_drive_left_by_itself_or_failed) {
     p.drive.state = State::switched_on;
     p.drive.tell();
     p.cycle();
-    EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without being told (statusword 0x0233))", p.why());
+    EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without a command (statusword 0x0233))", p.why());
     Pair q;
     ASSERT_TRUE(q.enable());
     q.drive.state = State::fault_reaction_active;
@@ -206,7 +206,7 @@ TEST(Axis, Off_and_on_again_while_the_drive_is_slow_to_obey_is_no_failure) {
         EXPECT_EQ(State::operation_enabled, p.drive.state) << off;
         p.drive.state = State::switched_on, p.drive.tell();  // the order from before is not taken for the cause twice
         p.cycle(10);
-        EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without being told (statusword 0x0233))", p.why()) << off;
+        EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without a command (statusword 0x0233))", p.why()) << off;
     }
     Pair q;  // nor for that of a fault
     q.delay = 5;
@@ -226,7 +226,8 @@ TEST(Axis, Reset_that_does_not_help_is_a_failure) {
     p.cycle(2);
     p.command.reset = true;
     p.cycle(600);
-    EXPECT_EQ(R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))", p.why());
+    EXPECT_EQ(R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))",
+              p.why());
 }
 
 TEST(Axis, Node_lost_is_a_failure_and_takes_another_edge) {
@@ -240,7 +241,7 @@ TEST(Axis, Node_lost_is_a_failure_and_takes_another_edge) {
     ASSERT_TRUE(p.until([&] { return p.axis.enabled(); }));
     p.drive.out.operational = false;
     p.cycle();
-    EXPECT_EQ("run: drive lost: its node is not operational any more", p.why());
+    EXPECT_EQ("run: drive lost: node no longer operational", p.why());
     EXPECT_EQ(0, p.last.controlword);
     p.drive.out.operational = true;
     p.cycle(100);
@@ -284,7 +285,7 @@ TEST(Axis, Mode_is_followed_when_the_drive_shows_it) {
     EXPECT_TRUE(p.axis.enabled());
     EXPECT_EQ(0, p.last.target_torque);
     p.cycle(110);
-    EXPECT_EQ("mode: drive does not take mode cst, it shows csv for 0.50 s (statusword 0x0237)", p.why());
+    EXPECT_EQ("mode: drive does not accept mode cst, displays csv for 0.50 s (statusword 0x0237)", p.why());
 }
 
 TEST(Axis, Each_mode_has_its_target_and_its_bits) {
@@ -362,7 +363,7 @@ TEST(Axis, Set_points_wait_while_the_drive_has_no_room) {
     EXPECT_TRUE(s.push({.target = 99, .immediate = true}));
     EXPECT_EQ(1u, s.waiting());
     for (int i = 0; i < 8; ++i) s.step(full | status::target_reached, now += second, 2 * second, target);
-    EXPECT_EQ("go: drive does not take its acknowledge back for 2.00 s (statusword 0x1637)", text(s.failure()));
+    EXPECT_EQ("go: drive does not clear its acknowledge for 2.00 s (statusword 0x1637)", text(s.failure()));
 }
 
 struct HomingPair : Pair {
@@ -427,7 +428,7 @@ TEST(Axis, Homing_fails_in_words) {
     q.command.halt = false;
     EXPECT_FALSE(q.axis.failure()) << "a halt stops the clock";
     q.cycle(1100);
-    EXPECT_EQ("home: not attained in time for 3.00 s (statusword 0x0237)", q.why());
+    EXPECT_EQ("home: home position not attained within 3.00 s (statusword 0x0237)", q.why());
     HomingPair r;
     r.command.home = false;
     r.cycle(20);
@@ -464,19 +465,19 @@ TEST(AxisFailure, Every_sentence_of_the_cycle_is_there_beforehand) {
     Pair p;
     p.drive.stuck_in = State::switched_on;
     p.enable();
-    EXPECT_STREQ(R"(enable: drive stays in "switched on" after "enable operation" for {} s; it is off)", sentences.find(p.axis.failure()));
+    EXPECT_STREQ(R"(enable: drive stays in "switched on" after "enable operation" for {} s; axis off)", sentences.find(p.axis.failure()));
     EXPECT_DOUBLE_EQ(0.5, Sentences::number(p.axis.failure()));
     Failure odd;
-    odd.cause = Cause::mode_refused, odd.request = Request::mode, odd.mode = Mode::cyclic_position, odd.shown = static_cast<Mode>(-3);
-    EXPECT_STREQ("mode: drive does not take mode csp, it shows another for {} s; it is off", sentences.find(odd));
-    EXPECT_EQ("mode: drive does not take mode csp, it shows -3", sentence(odd));
+    odd.cause = Cause::mode_rejected, odd.request = Request::mode, odd.mode = Mode::cyclic_position, odd.shown = static_cast<Mode>(-3);
+    EXPECT_STREQ("mode: drive does not accept mode csp, displays another for {} s; axis off", sentences.find(odd));
+    EXPECT_EQ("mode: drive does not accept mode csp, displays -3", sentence(odd));
     odd.shown = Mode::none;
-    EXPECT_STREQ("mode: drive does not take mode csp, it shows none for {} s; it is off", sentences.find(odd));
+    EXPECT_STREQ("mode: drive does not accept mode csp, displays none for {} s; axis off", sentences.find(odd));
     for (unsigned cause = 1; cause < causes; ++cause) {
         Failure f;
         f.cause = static_cast<Cause>(cause);
-        f.request = f.cause == Cause::left || f.cause == Cause::step_refused ? Request::run
-                    : f.cause == Cause::mode_refused                          ? Request::mode
+        f.request = f.cause == Cause::left || f.cause == Cause::step_rejected ? Request::run
+                    : f.cause == Cause::mode_rejected                          ? Request::mode
                     : f.cause == Cause::homing_error                          ? Request::home
                     : f.cause == Cause::set_point                             ? Request::go
                                                                               : Request::enable;

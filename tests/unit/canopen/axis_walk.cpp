@@ -66,7 +66,7 @@ TEST(AxisWalk, Goes_from_every_state_to_every_wanted_one) {
     };
     for (const auto& row : rows) {
         const Ride ride = walk_from(row.from, row.to);
-        const std::string what = std::string(word(row.from)) + " to " + word(row.to);
+        const std::string what = std::string(to_string(row.from)) + " to " + to_string(row.to);
         EXPECT_TRUE(ride.reached) << what;
         EXPECT_EQ(row.way, ride.way) << what;
         EXPECT_EQ(row.words, ride.words) << what;
@@ -83,7 +83,7 @@ TEST(AxisWalk, Names_every_step_that_is_not_taken) {
         {not_ready_to_switch_on, operation_enabled, Request::enable,
          R"(enable: drive stays in "not ready to switch on" for 0.50 s (statusword 0x0210))"},
         {switch_on_disabled, operation_enabled, Request::enable,
-         R"(enable: drive stays in "switch on disabled" after "shutdown" for 0.50 s (statusword 0x0260); voltage-enabled is 0: has its power stage supply?)"},
+         R"(enable: drive stays in "switch on disabled" after "shutdown" for 0.50 s (statusword 0x0260); voltage-enabled is 0: check the supply of the power stage)"},
         {ready_to_switch_on, operation_enabled, Request::enable,
          R"(enable: drive stays in "ready to switch on" after "switch on" for 0.50 s (statusword 0x0231))"},
         {switched_on, operation_enabled, Request::enable,
@@ -106,18 +106,18 @@ TEST(AxisWalk, Says_what_the_other_bits_hint_at) {
     StandIn drive;
     drive.state = drive.stuck_in = switched_on;
     drive.cleared = status::remote;
-    EXPECT_EQ(R"(enable: drive stays in "switched on" after "enable operation" for 0.50 s (statusword 0x0033); remote is 0: the drive obeys its own panel)",
+    EXPECT_EQ(R"(enable: drive stays in "switched on" after "enable operation" for 0.50 s (statusword 0x0033); remote is 0: the drive is under local control)",
               text(walk(drive, operation_enabled).failure));
     StandIn silent;
     silent.state = silent.stuck_in = not_ready_to_switch_on;
     silent.cleared = 0xffff;
-    EXPECT_EQ(R"(enable: drive stays in "not ready to switch on" for 0.50 s (statusword 0x0000); was a statusword received at all?)",
+    EXPECT_EQ(R"(enable: drive stays in "not ready to switch on" for 0.50 s (statusword 0x0000); check that the statusword is received)",
               text(walk(silent, operation_enabled).failure));
     StandIn odd;
     odd.state = unknown;
     odd.extra = 0x0001;
     odd.cleared = 0x0030;
-    EXPECT_EQ(R"(enable: drive shows no state of CiA 402 for 0.50 s (statusword 0x0201))", text(walk(odd, operation_enabled).failure));
+    EXPECT_EQ(R"(enable: drive shows an undefined state for 0.50 s (statusword 0x0201))", text(walk(odd, operation_enabled).failure));
 }
 
 TEST(AxisWalk, Disables_the_voltage_when_the_ramp_takes_too_long) {
@@ -129,7 +129,8 @@ TEST(AxisWalk, Disables_the_voltage_when_the_ramp_takes_too_long) {
     Words words;
     drive.tell();
     for (Time now = 0; now < 1100 * millisecond; now += millisecond)  // it brakes for ever
-        if (const auto w = walk.step(drive.out.statusword, 0, now, {500 * millisecond, second}); words.empty() || words.back() != w) words.push_back(w);
+        if (const auto w = walk.step(drive.out.statusword, 0, now, {500 * millisecond,
+            second}); words.empty() || words.back() != w) words.push_back(w);
     EXPECT_EQ((Words{7, 0}), words);
     EXPECT_EQ(Cause::stays, walk.failure().cause);
     drive.step({.controlword = 0});
@@ -161,7 +162,8 @@ TEST(AxisWalk, Stops_at_a_fault_and_says_which_step_led_there) {
     drive.fail(error::position_sensor);
     drive.tell();
     EXPECT_EQ(0, walk.step(drive.out.statusword, drive.out.error_code, millisecond, {}));
-    EXPECT_EQ(R"(enable: drive went into fault after "enable operation" (statusword 0x0238, error 0x7305: incremental sensor 1))", text(walk.failure()));
+    EXPECT_EQ(R"(enable: drive went into fault after "enable operation" (statusword 0x0238, error 0x7305: incremental sensor 1))",
+              text(walk.failure()));
     walk.want(switch_on_disabled, Request::disable);
     walk.step(drive.out.statusword, drive.out.error_code, 2 * millisecond, {});
     EXPECT_TRUE(walk.reached());
@@ -190,7 +192,8 @@ TEST(AxisWalk, Resets_a_fault_by_an_edge) {
     drive.tell();
     walk.reset_fault();
     run(600);
-    EXPECT_EQ(R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))", text(walk.failure()));
+    EXPECT_EQ(R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))",
+              text(walk.failure()));
     EXPECT_FALSE(walk.resetting());
 }
 

@@ -9,6 +9,7 @@ namespace hal::canopen::test {
 namespace {
 
 constexpr std::uint8_t stop = 0, start = 1, clear = 3;
+constexpr std::uint32_t busy = 1;  // bit 0 of 1F57h
 
 struct BootloaderDevice : testing::Test {
     Bootloader device{BootloaderSettings{}};
@@ -33,7 +34,7 @@ struct BootloaderDevice : testing::Test {
     }
 };
 
-TEST_F(BootloaderDevice, runs_the_program_it_came_with) {
+TEST_F(BootloaderDevice, runs_its_initial_program_after_power_on) {
     EXPECT_TRUE(device.running());
     EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 3), 0x00010000U);
     EXPECT_EQ(software(), "1.0");
@@ -42,7 +43,7 @@ TEST_F(BootloaderDevice, runs_the_program_it_came_with) {
     EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1), 0U);
 }
 
-TEST_F(BootloaderDevice, takes_a_new_program_by_blocks_and_by_segments) {
+TEST_F(BootloaderDevice, accepts_a_new_program_by_block_and_by_segmented_transfer) {
     for (const auto mode : {SdoMode::block, SdoMode::segmented}) {
         const auto image = program_image(0x302, mode == SdoMode::block ? 0x00020001 : 0x00030000, 5000);
         stop_and_clear();
@@ -54,13 +55,13 @@ TEST_F(BootloaderDevice, takes_a_new_program_by_blocks_and_by_segments) {
         EXPECT_EQ(bench.read<std::uint32_t>(0x1f56, 1), crc32(image));
         bench.forget();
         ASSERT_EQ(control(start), Abort::none);
-        EXPECT_EQ(bench.sent(0x705).size(), 1U);  // it booted
+        EXPECT_EQ(bench.sent(0x705).size(), 1U);  // boot-up
         EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 3), mode == SdoMode::block ? 0x00020001U : 0x00030000U);
         EXPECT_EQ(software(), mode == SdoMode::block ? "2.1" : "3.0");
     }
 }
 
-TEST_F(BootloaderDevice, refuses_what_is_out_of_order) {
+TEST_F(BootloaderDevice, rejects_commands_out_of_order) {
     EXPECT_EQ(bench.write(0x1f50, 1, update), Abort::device_state);  // the program runs
     EXPECT_EQ(control(clear), Abort::device_state);
     EXPECT_EQ(control(7), Abort::value);
@@ -68,7 +69,7 @@ TEST_F(BootloaderDevice, refuses_what_is_out_of_order) {
     EXPECT_EQ(bench.write(0x1f50, 1, update), Abort::device_state);  // not cleared
     EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1), 4U << 1);
     ASSERT_EQ(control(clear), Abort::none);
-    EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1) & 1, 1U);  // takes 20 ms
+    EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1) & 1, 1U);  // for 20 ms
     EXPECT_EQ(bench.write(0x1f50, 1, update), Abort::device_state);
     bench.run(30 * millisecond);
     EXPECT_EQ(control(start), Abort::device_state);  // nothing to start
@@ -79,7 +80,7 @@ TEST_F(BootloaderDevice, refuses_what_is_out_of_order) {
     EXPECT_EQ(bench.read(0x1f50, 1, back), Abort::write_only);
 }
 
-TEST_F(BootloaderDevice, does_not_start_what_is_damaged_or_for_another_product) {
+TEST_F(BootloaderDevice, does_not_start_a_damaged_program_or_one_of_another_product) {
     auto damaged = update;
     damaged[100] ^= 1;
     const struct {
@@ -103,7 +104,31 @@ TEST_F(BootloaderDevice, does_not_start_what_is_damaged_or_for_another_product) 
     EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1), 6U << 1);
 }
 
-TEST_F(BootloaderDevice, survives_a_download_that_breaks_off) {
+/// The device resets only after it has sent the response to the command; requests received before the reset see it busy.
+TEST_F(BootloaderDevice, reports_busy_in_1F57h_between_a_stop_command_and_its_reset) {
+    const Frame stop_program(0x605, {0x2f, 0x51, 0x1f, 1, stop, 0, 0, 0}), read_status(0x605, {0x40, 0x57, 0x1f, 1, 0, 0, 0, 0});
+    bench.forget();
+    bench.send(stop_program);
+    bench.send(read_status);
+    bench.send(stop_program);
+    bench.now += 100 * microsecond;
+    bench.turn();
+    const auto responses = bench.sent(0x585);
+    ASSERT_EQ(responses.size(), 3U);
+    EXPECT_EQ(responses[0].data[0], 0x60);
+    EXPECT_EQ(load<std::uint32_t>(responses[1].data.data() + 4), busy);  // no error
+    EXPECT_EQ(responses[2].data[0], 0x80);
+    EXPECT_EQ(load<std::uint32_t>(responses[2].data.data() + 4), static_cast<std::uint32_t>(Abort::device_state));
+    EXPECT_TRUE(device.running());
+    EXPECT_TRUE(bench.sent(0x705).empty());
+
+    bench.run(2 * millisecond);
+    EXPECT_FALSE(device.running());
+    EXPECT_EQ(bench.sent(0x705).size(), 1U);  // the boot-up message of the boot loader
+    EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1), 0U);
+}
+
+TEST_F(BootloaderDevice, accepts_a_download_after_an_aborted_one) {
     stop_and_clear();
     SdoRequest r{.index = 0x1f50, .sub = 1, .mode = SdoMode::segmented, .data = update};
     bench.remote().sdo().submit(r);
@@ -119,7 +144,7 @@ TEST_F(BootloaderDevice, survives_a_download_that_breaks_off) {
     EXPECT_EQ(device.version(), 0x00020001U);
 }
 
-TEST(FlashFile, keeps_the_flash) {
+TEST(FlashFile, reads_back_what_was_written) {
     const auto path = (std::filesystem::path(testing::TempDir()) / "flash-file-test").string();
     std::filesystem::remove(path);
     std::optional<std::vector<std::uint8_t>> image;
@@ -129,7 +154,7 @@ TEST(FlashFile, keeps_the_flash) {
     EXPECT_EQ(write_flash(path, bytes), "");
     EXPECT_EQ(read_flash(path, 3, image), "");
     EXPECT_EQ(image, bytes);
-    EXPECT_EQ(read_flash(path, 2, image), "'" + path + "' is longer than the flash, which has 2 bytes");
+    EXPECT_EQ(read_flash(path, 2, image), "'" + path + "' is longer than the flash of 2 bytes");
     EXPECT_EQ(write_flash("/nowhere/flash", bytes), "cannot write '/nowhere/flash': No such file or directory");
     std::filesystem::remove(path);
     Bootloader empty(BootloaderSettings{.version = 0});

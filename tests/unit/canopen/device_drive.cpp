@@ -73,9 +73,9 @@ TEST(Motor, is_read_from_text) {
     EXPECT_EQ(motor.home_from, -5);
     EXPECT_EQ(parse_motor("endless:1", motor), "");
     EXPECT_EQ(motor.positive_limit, std::numeric_limits<double>::infinity());
-    const std::string rest = "' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of resolution, endless, inertia, ";
+    const std::string rest = "'; write NAME:VALUE, as in inertia:1e-4; names: resolution, endless, inertia, ";
     for (const std::string wrong : {"inertia", "inertia:", "inertia:x", "inertia:0", "inertia:nan", "resolution:1.5", "weight:3", ":1"})
-        EXPECT_TRUE(parse_motor(wrong, motor).starts_with("'" + wrong + rest)) << wrong;
+        EXPECT_TRUE(parse_motor(wrong, motor).starts_with("invalid motor parameter '" + wrong + rest)) << wrong;
 }
 
 }  // namespace

@@ -292,10 +292,10 @@ TEST(Faults, are_read_and_refused_with_what_to_type) {
     EXPECT_EQ(s.from, 2 * second);
     EXPECT_EQ(s.until, 2 * second + 500 * microsecond);
     const std::pair<const char*, const char*> wrong[] = {
-        {"mute:every=0", "'every=0' is no property of the fault mute; write every=3, from=5s or for=1s"},
-        {"mute:time=1ms", "'time=1ms' is no property of the fault mute; write every=3, from=5s or for=1s"},
-        {"late-sdo:time=1", "'time=1' is no property of the fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
-        {"late-sdo:late", "'late' is no property of the fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
+        {"mute:every=0", "invalid property 'every=0' of fault mute; write every=3, from=5s or for=1s"},
+        {"mute:time=1ms", "invalid property 'time=1ms' of fault mute; write every=3, from=5s or for=1s"},
+        {"late-sdo:time=1", "invalid property 'time=1' of fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
+        {"late-sdo:late", "invalid property 'late' of fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
     };
     for (const auto& [text, said] : wrong) {
         EXPECT_FALSE(parse_fault(text, fault, s, problem));
@@ -303,7 +303,7 @@ TEST(Faults, are_read_and_refused_with_what_to_type) {
     }
     EXPECT_FALSE(parse_fault("", fault, s, problem));
     EXPECT_EQ(problem,
-              "there is no fault ''; there are mute, deaf, twice, late-sdo, late-pdo, no-boot-up, boot-storm, reboot, no-heartbeat, "
+              "unknown fault ''; use one of: mute, deaf, twice, late-sdo, late-pdo, no-boot-up, boot-storm, reboot, no-heartbeat, "
               "wrong-state, guard-toggle, no-sdo, abort, stale-abort, toggle, block-gap, block-crc, short-pdo, long-pdo, wrong-type, "
               "wrong-vendor, wrong-product, wrong-revision, wrong-serial, wrong-software, babble, emcy-storm, "
               "no-srdo, srdo-half, srdo-wrong, srdo-order, late-srdo");

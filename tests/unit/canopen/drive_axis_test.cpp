@@ -67,7 +67,7 @@ struct AxisAndDrive : DriveBench {
     void enable(Mode mode) {
         command.mode = mode;
         command.enable = true;
-        EXPECT_TRUE(wait([&] { return axis.active(); }, 100)) << cia402::word(axis.state());
+        EXPECT_TRUE(wait([&] { return axis.active(); }, 100)) << cia402::to_string(axis.state());
         EXPECT_FALSE(axis.failure());
     }
 };

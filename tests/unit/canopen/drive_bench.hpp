@@ -75,7 +75,7 @@ struct DriveBench : testing::Test {
         control(command::shutdown, axis);
         control(command::switch_on, axis);
         control(command::enable_operation, axis);
-        ASSERT_EQ(state(axis), State::operation_enabled) << cia402::word(state(axis));
+        ASSERT_EQ(state(axis), State::operation_enabled) << cia402::to_string(state(axis));
     }
     std::vector<Emergency> emergencies() {
         std::vector<Emergency> result;
@@ -90,6 +90,6 @@ inline std::ostream& operator<<(std::ostream& out, Abort abort) { return out << 
 }  // namespace hal::canopen::test
 
 namespace hal::canopen::cia402 {
-inline std::ostream& operator<<(std::ostream& out, State state) { return out << word(state); }
-inline std::ostream& operator<<(std::ostream& out, Homing homing) { return out << word(homing); }
+inline std::ostream& operator<<(std::ostream& out, State state) { return out << to_string(state); }
+inline std::ostream& operator<<(std::ostream& out, Homing homing) { return out << to_string(homing); }
 }  // namespace hal::canopen::cia402

@@ -125,11 +125,11 @@ TEST_F(DriveCyclic, Limit_switch_holds_it_until_the_set_point_goes_back) {
         } else {
             drive_to(1);
         }
-        EXPECT_GE(position(), 5000) << cia402::word(mode);
-        EXPECT_LT(position(), 8000) << cia402::word(mode);
-        EXPECT_NEAR(velocity(), 0, 200) << cia402::word(mode);
-        EXPECT_TRUE(bit(status::internal_limit)) << cia402::word(mode);
-        EXPECT_EQ(state(), State::operation_enabled) << cia402::word(mode);
+        EXPECT_GE(position(), 5000) << cia402::to_string(mode);
+        EXPECT_LT(position(), 8000) << cia402::to_string(mode);
+        EXPECT_NEAR(velocity(), 0, 200) << cia402::to_string(mode);
+        EXPECT_TRUE(bit(status::internal_limit)) << cia402::to_string(mode);
+        EXPECT_EQ(state(), State::operation_enabled) << cia402::to_string(mode);
         if (mode == Mode::cyclic_position) {
             for (int n = 8000; n >= 3000; n -= 20) set(object::target_position, n), run(1);
             run(300);
@@ -138,7 +138,7 @@ TEST_F(DriveCyclic, Limit_switch_holds_it_until_the_set_point_goes_back) {
             set(object::target_velocity, -25000);
             set(object::target_torque, -25);
             run(800);
-            EXPECT_LT(position(), 4000) << cia402::word(mode);
+            EXPECT_LT(position(), 4000) << cia402::to_string(mode);
         }
     }
 }
@@ -155,8 +155,8 @@ TEST_F(DriveCyclic, Software_limit_holds_every_mode) {
             set(object::target_torque, 30);
             run(1);
         }
-        EXPECT_NEAR(position(), 3000, 60) << cia402::word(mode);
-        EXPECT_TRUE(bit(status::internal_limit)) << cia402::word(mode);
+        EXPECT_NEAR(position(), 3000, 60) << cia402::to_string(mode);
+        EXPECT_TRUE(bit(status::internal_limit)) << cia402::to_string(mode);
         EXPECT_EQ(state(), State::operation_enabled);
     }
 }

@@ -316,7 +316,7 @@ TEST_F(DriveState, Stale_target_does_not_move_it_when_it_is_enabled) {
         set(object::homing_method, 33);
         enable(mode);
         run(50);
-        EXPECT_NEAR(position(), 0, 1) << cia402::word(mode);
+        EXPECT_NEAR(position(), 0, 1) << cia402::to_string(mode);
     }
 }
 

@@ -198,8 +198,8 @@ TEST(Station, fills_a_slot_with_several_frames_in_order_of_priority) {
         m.station.send(some_frame(2, 60, 1), 0, 7);
         m.station.send(some_frame(2, 60, 2), 0, 7);
         m.station.send(some_frame(2, 60, 3), 0, 0);
-        EXPECT_EQ(ethernet::Sent::refused, m.station.send(some_frame(2, 215, 4), 0, 0)) << "longer than the slot";
-        EXPECT_EQ(ethernet::Sent::refused, m.station.send(some_frame(2, 60, 4), 5, 0)) << "there is no such slot";
+        EXPECT_EQ(ethernet::Sent::rejected, m.station.send(some_frame(2, 215, 4), 0, 0)) << "longer than the slot";
+        EXPECT_EQ(ethernet::Sent::rejected, m.station.send(some_frame(2, 60, 4), 5, 0)) << "there is no such slot";
     };
     bed.wire.watching = true;
     bed.run(10 * ms);

@@ -21,7 +21,7 @@ std::int64_t now_ns() {
 std::string out_of_reach(const can::Description& bus) {
     if (!bus.simulated || bus.transport == "capture") return {};
     return fmt::format(
-        "'{}' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to one that they do: "
+        "'{}' is a bus in memory, which other programs cannot open; while its machine runs, bridge it to one that they can: "
         "hal shell loadrt can_bridge a={} b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and here "
         "udp:239.74.163.2:43113",
         bus.address, bus.address);
@@ -29,7 +29,7 @@ std::string out_of_reach(const can::Description& bus) {
 
 namespace {
 
-/// Nothing after printing the reason.
+/// Opens a link; returns nullptr after printing the reason.
 std::unique_ptr<can::Link> open_link(const Options& options, const std::string& address, bool fd, std::span<const std::string> wanted) {
     std::vector<can::Filter> filters(wanted.size());
     std::string problem;
@@ -47,7 +47,7 @@ std::unique_ptr<can::Link> open_link(const Options& options, const std::string& 
     if (!opened) return fail(options, opened.problem), nullptr;
     if (const std::string why = out_of_reach(opened.link->description()); !why.empty()) return fail(options, why), nullptr;
     if (!opened.link->set_filters(filters))
-        return fail(options, "these are more filters than the driver holds; use a MASK: 180/780"), nullptr;
+        return fail(options, "too many filters for this driver; use a MASK: 180/780"), nullptr;
     return std::move(opened.link);
 }
 
@@ -74,7 +74,7 @@ void Bus::announce(const Options& options) const {
     };
     add(link->description());
     for (const auto& other : more) add(other->description());
-    write_all(STDERR_FILENO, fmt::format("{}: listening on {}; Ctrl-C ends it\n", options.program, text));
+    write_all(STDERR_FILENO, fmt::format("{}: listening on {}; press Ctrl-C to end\n", options.program, text));
 }
 
 void listen(Bus& bus, std::int64_t for_ns, const std::function<bool(std::span<const can::Frame>)>& take, std::int64_t slice_ns,
@@ -93,10 +93,10 @@ void listen(Bus& bus, std::int64_t for_ns, const std::function<bool(std::span<co
     }
 }
 
-bool send_patiently(Bus& bus, const can::Frame& frame) {
+bool send_with_timeout(Bus& bus, const can::Frame& frame) {
     can::Frame heard[16];
     for (int tries = 0;; ++tries) {
-        while (bus.link->receive(heard, can::unclocked) > 0) {}  // its answers and acknowledgements are for the link; we do not listen
+        while (bus.link->receive(heard, can::unclocked) > 0) {}  // discards received frames; the link needs them for acknowledgements
         const std::uint64_t waiting = bus.link->statistics().queued;
         if (waiting < 256 || tries == 1000 || bus.stop.requested()) return bus.link->send(frame, can::unclocked) == can::Sent::queued;
         bus.link->flush(can::unclocked);
@@ -114,8 +114,9 @@ int finish_sending(Bus& bus, const Options& options, std::uint64_t wanted) {
     }
     const can::Statistics s = bus.link->statistics();
     if (s.dropped == 0 && s.queued == 0) return 0;
-    return fail(options, fmt::format("{} of {} frames were not sent; the bus is {}{}", s.dropped + s.queued, wanted, can::word(s.state),
-                                     s.queued > 0 ? ": is another node there to acknowledge, at this bit rate?" : ""));
+    return fail(options, fmt::format("{} of {} frames not sent; the bus is {}{}", s.dropped + s.queued, wanted,
+                can::to_string(s.state),
+                                     s.queued > 0 ? "; check that another node acknowledges, at the same bit rate" : ""));
 }
 
 namespace {
@@ -137,12 +138,12 @@ bool identifier(std::string_view text, std::uint32_t& id, bool& extended) {
 bool parse_frame(std::string_view text, can::Frame& frame, std::string& problem) {
     const auto mark = text.find('#');
     std::string plain(text.substr(0, mark));
-    const std::string quoted = fmt::format("'{}' is no frame", text);
+    const std::string quoted = fmt::format("invalid frame '{}'", text);
     std::uint32_t id = 0;
     if (mark == text.npos) return problem = quoted + ": write IDENTIFIER#DATA, such as 123#1122AABB", false;
     if (!hex(plain, id) || (plain.size() != 3 && plain.size() != 8) || id > (plain.size() == 3 ? 0x7ffU : 0x1fffffffU))
         return problem =
-                   fmt::format("{}: '{}' is no identifier; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one",
+                   fmt::format("{}: invalid identifier '{}'; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one",
                                quoted, plain),
                false;
     for (const char c : text.substr(mark))
@@ -150,8 +151,8 @@ bool parse_frame(std::string_view text, can::Frame& frame, std::string& problem)
     if (can::parse_log_line("(0) x " + plain, frame)) return true;
     const bool fd = plain.find("##") != plain.npos;
     return problem =
-               quoted + (fd ? ": behind ## stand one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, 24, 32, 48 or 64 bytes"
-                            : ": behind # stand up to 8 bytes of two hex digits, or R and the length asked for; FD is written ##"),
+               quoted + (fd ? ": after ##, write one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, 24, 32, 48 or 64 bytes"
+                            : ": after #, write up to 8 bytes of two hex digits, or R and the requested length; CAN FD is written ##"),
            false;
 }
 
@@ -162,7 +163,7 @@ bool parse_filter(std::string_view text, can::Filter& filter, std::string& probl
         if (slash == text.npos) return filter.mask = filter.extended ? 0x1fffffff : 0x7ff, true;
         if (identifier(text.substr(slash + 1), filter.mask, wide)) return filter.extended = filter.extended || wide, true;
     }
-    return problem = fmt::format("'{}' is no filter; write an identifier in hex, 181, or one with the bits that count, 180/780", text),
+    return problem = fmt::format("invalid filter '{}'; write an identifier in hex, 181, or one with a mask, 180/780", text),
            false;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can dcf read` and `hal can dcf write`: the settings of a node into a file of CiA 306, and from there into the node or its
-// replacement. Only what differs is written, PDOs in the order CiA 301 demands, and it is read back.
+// `hal can dcf read` and `hal can dcf write`: saves the settings of a node as a DCF (CiA 306), and restores them to the node or its replacement.
+// Only differences are written, PDOs in the order required by CiA 301, and read back.
 #include "bus/can/dcf.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "bus/can/objects.hpp"
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 #include "canopen/master/boot/object_writes.hpp"
 #include "cli/output.hpp"
 
@@ -22,9 +22,9 @@ using canopen::SdoRequest;
 
 namespace {
 
-constexpr std::size_t most_bytes = 65536;  // of one object; more is a program, not a setting
+constexpr std::size_t most_bytes = 65536;  // of one object; a larger one is a program, not a setting
 
-/// Set-points and outputs of CiA 401 and 402: what is written there moves something.
+/// Set-points and outputs of CiA 401 and 402: a write moves the device.
 bool moves(std::uint16_t index) {
     if (index < 0x6000 || index >= 0xa000) return false;
     const unsigned first_axis = 0x6000 + (index - 0x6000U) % 0x800;
@@ -34,7 +34,7 @@ bool moves(std::uint16_t index) {
     return outputs || lines || std::find(std::begin(drive), std::end(drive), first_axis) != std::end(drive);
 }
 
-/// What is a setting, to be kept and put back: not what acts when it is written, nothing that moves, and no program.
+/// Returns true for a setting to save and restore: not an object that acts when written, moves the device, or is a program.
 bool is_setting(std::uint16_t index, const eds::Entry& entry) {
     constexpr std::uint32_t refused_by_scans = 1;  // ObjFlags
     const bool acts = index == 0x1003 || index == 0x1010 || index == 0x1011 || index == 0x1f82 || (index >= 0x1f50 && index <= 0x1f57);
@@ -44,7 +44,7 @@ bool is_setting(std::uint16_t index, const eds::Entry& entry) {
 
 enum class Read { value, refused, failed };
 
-Read read_object(Station& station, std::uint8_t node, std::uint16_t index, std::uint8_t sub, std::vector<std::uint8_t>& bytes,
+Read read_object(NodeClient& station, std::uint8_t node, std::uint16_t index, std::uint8_t sub, std::vector<std::uint8_t>& bytes,
                  SdoRequest& request) {
     bytes.resize(most_bytes);
     request = {.index = index, .sub = sub, .upload = true, .buffer = bytes};
@@ -68,13 +68,13 @@ void date(eds::DeviceDescription& description, const DcfReadOptions& options) {
 }  // namespace
 
 int run_can_dcf_read(const DcfReadOptions& options) {
-    if (options.words.size() != 2) return fail(options, "two words are needed; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf");
-    if (options.eds.empty()) return fail(options, "which objects the node has is not known; add --eds FILE");
+    if (options.words.size() != 2) return fail(options, "expected ADDRESS NODE; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf");
+    if (options.eds.empty()) return fail(options, "missing --eds FILE: the description lists the objects of the node");
     std::uint8_t node = 0;
     ObjectNames names;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
     eds::DeviceDescription description = *names.description();
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     std::size_t read = 0, refused = 0;
     std::vector<std::uint8_t> bytes;
@@ -88,13 +88,13 @@ int run_can_dcf_read(const DcfReadOptions& options) {
             case Read::failed: return station.fail_transfer(node, request, label);
             case Read::refused:
                 ++refused;
-                fail(options, fmt::format("left out: {}: {} (0x{:08X})", label, canopen::to_string(request.abort),
+                fail(options, fmt::format("skipped: {}: {} (0x{:08X})", label, canopen::to_string(request.abort),
                                           static_cast<std::uint32_t>(request.abort)));
                 continue;
             case Read::value: break;
             }
             ++read;
-            // As the description has it where it is that, so that the file serves a node with another id, too.
+            // As in the description where equal ($NODEID), so that the file also fits a node with another ID.
             const eds::Encoded usual = eds::encode(entry.default_value, entry.data_type, node);
             entry.parameter_value =
                 usual && usual.bytes == bytes && !bytes.empty() ? entry.default_value : eds::spell(bytes, entry.data_type);
@@ -108,14 +108,14 @@ int run_can_dcf_read(const DcfReadOptions& options) {
     if (const std::string wrong = write_file(options.output, text); !wrong.empty())
         return fail(options, fmt::format("cannot write '{}': {}", options.output, wrong));
     return print(fmt::format("{}: {} settings of node {}{}\n", options.output, read, node,
-                             refused == 0 ? "" : fmt::format(", {} left out", refused)))
+                             refused == 0 ? "" : fmt::format(", {} skipped", refused)))
                ? 0
                : 1;
 }
 
 namespace {
 
-/// What a file wants of a node, compared with what the node has.
+/// Compares the settings of a file with those of a node.
 class Download {
 public:
     Download(const DcfWriteOptions& options, std::uint8_t node, const ObjectNames& names, std::vector<eds::Write> writes)
@@ -141,7 +141,7 @@ public:
                                              : differences_ == 0 ? "differed"
                                                                  : "differed and were written");
         if (!print(what)) return 1;
-        if (written != 0 && !print(fmt::format("they last until its power goes; to store them: hal can sdo write {} {} 1010:1 0x65766173 "
+        if (written != 0 && !print(fmt::format("not stored: they are lost at power-off; to store them: hal can sdo write {} {} 1010:1 0x65766173 "
                                                "--type u32\n",
                                                options_.words[0], node_)))
             return 1;
@@ -150,7 +150,7 @@ public:
 
 private:
     static std::uint32_t key(const eds::Write& write) { return std::uint32_t{write.index} << 8 | write.sub; }
-    /// The writes that go together: a PDO is off while it changes.
+    /// Writes settings that belong together: a PDO is disabled while it changes.
     static std::uint32_t group(const eds::Write& write) {
         const bool of_pdo = write.index >= 0x1400 && write.index < 0x1c00;
         return of_pdo ? std::uint32_t{write.index & 0xfdffU} << 8 | 0xff : key(write);
@@ -159,7 +159,7 @@ private:
     std::string shown(const eds::Write& write, std::span<const std::uint8_t> bytes) const {
         return value_text(bytes, names_.named(write.index, write.sub).type);
     }
-    /// False after saying why: the node does not answer.
+    /// Returns false after printing the reason: the node does not respond.
     bool compare(const eds::Write& write) {
         SdoRequest request;
         std::vector<std::uint8_t> bytes;
@@ -180,11 +180,11 @@ private:
         std::vector<std::uint8_t> bytes;
         switch (read_object(station_, node_, write.index, write.sub, bytes, request)) {
         case Read::failed: return station_.fail_transfer(node_, request, label(write)), false;
-        case Read::refused: return true;  // can only be written
+        case Read::refused: return true;  // write-only
         case Read::value: break;
         }
         if (canopen::same_value(write.index, write.sub, write.data, bytes)) return true;
-        return fail(options_, fmt::format("node {} took {} for {} and holds {}; write what it can hold", node_, shown(write, write.data),
+        return fail(options_, fmt::format("node {} accepted {} for {} but stored {}; write a value it can store", node_, shown(write, write.data),
                                           label(write), shown(write, bytes))),
                false;
     }
@@ -193,7 +193,7 @@ private:
     const std::uint8_t node_;
     const ObjectNames& names_;
     const std::vector<eds::Write> writes_;
-    Station station_;
+    NodeClient station_;
     std::map<std::uint32_t, const eds::Write*> wanted_;  // the last of each object
     std::map<std::uint32_t, bool> differing_;            // by group
     std::size_t differences_ = 0;
@@ -202,7 +202,7 @@ private:
 }  // namespace
 
 int run_can_dcf_write(const DcfWriteOptions& options) {
-    if (options.words.size() != 3) return fail(options, "three words are needed; type: hal can dcf write ADDRESS NODE FILE.dcf");
+    if (options.words.size() != 3) return fail(options, "expected ADDRESS NODE FILE; type: hal can dcf write ADDRESS NODE FILE.dcf");
     std::uint8_t node = 0;
     if (!node_of(options, options.words[1], node)) return 1;
     ObjectNames names;
@@ -213,12 +213,12 @@ int run_can_dcf_write(const DcfWriteOptions& options) {
                                   message.help.empty() ? "" : "; " + message.help));
     std::erase_if(configuration.writes, [&](const eds::Write& write) {
         if (moves(write.index))
-            fail(options, fmt::format("left out: {}: it moves the device", names.named(write.index, write.sub).label()));
+            fail(options, fmt::format("skipped: {}: it moves the device", names.named(write.index, write.sub).label()));
         return moves(write.index);
     });
     if (configuration.writes.empty())
         return fail(options,
-                    fmt::format("'{}' has no settings: it has no ParameterValue that could be written; hal can dcf read makes such a file",
+                    fmt::format("'{}' has no settings: no ParameterValue to write; to create such a file: hal can dcf read",
                                 options.words[2]));
     return Download(options, node, names, std::move(configuration.writes)).run();
 }

@@ -10,23 +10,23 @@ namespace hal::tools {
 
 struct DcfReadOptions : Options {
     std::string eds, output;
-    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+    std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE", "the bus; a node 1-127");
-        declare_eds(set, eds, "the node's description, EDS, DCF or XDD: which objects it has");
-        set.value("-o,--output", output, "FILE", "the DCF; without it: standard output");
+        set.words("ADDRESS NODE", "the bus; node ID 1..127");
+        declare_eds(set, eds, "device description (EDS, DCF, XDD) with the objects of the node");
+        set.value("-o,--output", output, "FILE", "output file (default: standard output)");
         declare_timeout(set, timeout_ns);
     }
 };
 
 struct DcfWriteOptions : Options {
     bool check = false;           ///< only compare
-    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+    std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE FILE", "the bus; a node 1-127; a DCF");
-        set.flag("--check", check, "only say what differs; exit code 1 if anything does");
+        set.words("ADDRESS NODE FILE", "the bus; node ID 1..127; a DCF");
+        set.flag("--check", check, "only print the differences; exit code 1 if there are any");
         declare_timeout(set, timeout_ns);
     }
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can drive`: a drive of CiA 402 by hand, one command or a shell of them.
+// `hal can drive`: controls a CiA 402 drive by SDO, one command or an interactive session.
 #include "bus/can/drive.hpp"
 
 #include <algorithm>
@@ -24,21 +24,21 @@ struct Verb {
     const char *name, *arguments, *what;
 };
 constexpr Verb verbs[] = {
-    {"on", "", "walk to operation enabled"},
-    {"off", "", "brake and switch off"},
-    {"go", "POSITION [relative] [nowait]", "move there (pp); ends when it is there"},
-    {"speed", "SPEED [nowait]", "turn at that speed (pv; in mode vl: r/min)"},
-    {"torque", "PERMILLE [nowait]", "give that torque, in thousandths of the rated one (tq)"},
-    {"stop", "", "stand still, and stay on"},
-    {"quickstop", "", "brake as fast as the drive may, and switch off"},
-    {"home", "[METHOD]", "find the home position; a method of CiA 402, 1 to 37"},
+    {"on", "", "enable the axis (operation enabled)"},
+    {"off", "", "brake and disable the axis"},
+    {"go", "POSITION [relative] [nowait]", "move to a position (pp); ends on arrival"},
+    {"speed", "SPEED [nowait]", "move at a speed (pv; in mode vl: r/min)"},
+    {"torque", "PERMILLE [nowait]", "apply a torque in thousandths of the rated torque (tq)"},
+    {"stop", "", "brake to standstill and stay enabled"},
+    {"quickstop", "", "brake with quick stop and disable the axis"},
+    {"home", "[METHOD]", "home the axis; METHOD of CiA 402, 1..37"},
     {"reset", "", "reset a fault"},
     {"mode", "pp|pv|tq|vl", "mode of operation"},
-    {"wait", "", "until the target is reached"},
-    {"status", "", "state, mode, position, speed, torque, error"},
-    {"set", "NAME VALUE", "a value of the drive, or a factor: position-factor 4096/360"},
-    {"help", "", "this list"},
-    {"quit", "", "end, and leave the axes as they are: on, or moving"},
+    {"wait", "", "wait until the target is reached"},
+    {"status", "", "print state, mode, position, speed, torque, error"},
+    {"set", "NAME VALUE", "set a parameter of the drive, or a factor: position-factor 4096/360"},
+    {"help", "", "print this list"},
+    {"quit", "", "end the session and leave the axes as they are: enabled, or moving"},
 };
 
 const char* arguments_of(const std::string& verb) {
@@ -48,26 +48,26 @@ const char* arguments_of(const std::string& verb) {
 
 }  // namespace
 
-DriveShell::DriveShell(const Options& options, Station& station, Supervision& supervision, const Settings& settings)
+DriveShell::DriveShell(const Options& options, NodeClient& station, Supervision& supervision, const Settings& settings)
     : options_(options), station_(station), supervision_(supervision), settings_(settings) {}
 
 bool DriveShell::print_line(const std::string& text) const { return print(text + "\n"); }
 bool DriveShell::wrong(const std::string& sentence) const { return fail(options_, sentence), false; }
 
 std::string DriveShell::help_text() {
-    std::string text = "  commands stand behind the letter of an axis: A on\n";
+    std::string text = "  write the letter of the axis before a command: A on\n";
     for (const Verb& v : verbs) text += fmt::format("  {:38} {}\n", std::string(v.name) + " " + v.arguments, v.what);
     text +=
-        "  within TIME behind a command: it fails when it takes longer, and a motion is stopped; default 60s, of on, off, stop ... 15s\n";
-    text += "  values: set NAME VALUE writes, NAME? reads; position?, speed?, torque?, mode? and state? are read only\n";
-    return text + value_help() + "  HELP lists the words with the axis behind them: ONA: GA:1000 APA?\n";
+        "  COMMAND within TIME: the command fails after TIME, and a motion is stopped (default 60s; on, off, stop ... 15s)\n";
+    text += "  parameters: set NAME VALUE writes, NAME? reads; position?, speed?, torque?, mode? and state? are read-only\n";
+    return text + value_help() + "  HELP lists the robot-shell commands, which end with the axis: ONA: GA:1000 APA?\n";
 }
 
 int DriveShell::execute(std::string_view line) {
     line = line.substr(0, line.find('#'));
     pressed_.store(false);
     bool good = true;
-    if (const auto done = letter_line(line)) {
+    if (const auto done = robot_line(line)) {
         good = *done;
     } else {
         Words words;
@@ -94,23 +94,23 @@ int DriveShell::execute(std::string_view line) {
 std::function<void()> DriveShell::meanwhile() {
     return [this] {
         station_.turn(0);
-        if (pressed_.load() || supervision_.collided()) station_.bus.stop.request();  // no command is running that it could be for
+        if (pressed_.load() || supervision_.collided()) station_.bus.stop.request();  // no command is running that it could interrupt
     };
 }
 
-HandAxis::Interruption DriveShell::interruption() const {
-    using enum HandAxis::Interruption;
+SdoAxis::Interruption DriveShell::interruption() const {
+    using enum SdoAxis::Interruption;
     return station_.bus.stop.requested() || supervision_.collided() ? end : pressed_.load() ? stop : none;
 }
 
-HandAxis& DriveShell::axis(unsigned number) {
+SdoAxis& DriveShell::axis(unsigned number) {
     auto& made = axes_[number];
-    if (!made) made = std::make_unique<HandAxis>(options_, station_, settings_.node, number);
+    if (!made) made = std::make_unique<SdoAxis>(options_, station_, settings_.node, number);
     made->interrupted = [this] { return interruption(); };
     return *made;
 }
 
-bool DriveShell::watched(HandAxis& a) { return a.look() && supervision_.arm(a.number()); }
+bool DriveShell::watched(SdoAxis& a) { return a.look() && supervision_.arm(a.number()); }
 
 int DriveShell::end(bool leave, const char* why, bool expected) {
     bool all = true;
@@ -119,7 +119,7 @@ int DriveShell::end(bool leave, const char* why, bool expected) {
         if (leave) {
             if (supervision_.active() && a->moves())
                 write_all(STDERR_FILENO,
-                          fmt::format("{0}: {1}: still moving, and not supervised any more; to stop it: hal can drive {2} --node {3} "
+                          fmt::format("{0}: {1}: still moving, no longer supervised; to stop it: hal can drive {2} --node {3} "
                                       "{1} stop\n",
                                       options_.program, a->letter(), options_.words.front(), settings_.node));
             continue;
@@ -133,7 +133,7 @@ int DriveShell::end(bool leave, const char* why, bool expected) {
             fail(options_, fmt::format("{}: {}{} ({})", a->letter(), what,
                                        !done && supervision_.active() ? "; the drive stops when it misses our heartbeat" : "", why));
     }
-    // An axis that could not be stopped stays watched: the heartbeat ends with this program, and the drive reacts.
+    // An axis that could not be stopped stays supervised: the heartbeat ends with this program, and the drive reacts.
     return all && supervision_.release() ? 0 : 1;
 }
 
@@ -141,16 +141,16 @@ bool DriveShell::run(Words words) {
     unsigned number = settings_.axis;
     if (words[0].size() == 1) {
         const char letter = static_cast<char>(words[0][0] & ~0x20);
-        if (letter < 'A' || letter > 'H') return wrong(fmt::format("'{}' is no axis; write A to H", words[0]));
+        if (letter < 'A' || letter > 'H') return wrong(fmt::format("invalid axis '{}'; write A to H", words[0]));
         number = static_cast<unsigned>(letter - 'A');
         words.erase(words.begin());
-        if (words.empty()) return wrong(fmt::format("what shall axis {} do? type: help", letter));
+        if (words.empty()) return wrong(fmt::format("missing command for axis {}; type: help", letter));
     }
     const std::string verb = words[0];
     words.erase(words.begin());
     if (verb == "quit" || verb == "exit") return left_ = over_ = true;
     if (verb == "help") return print(help_text());
-    HandAxis& a = axis(number);
+    SdoAxis& a = axis(number);
     if (verb.ends_with('?')) return query(a, verb.substr(0, verb.size() - 1));
     const auto* row = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return verb == v.name; });
     if (row == std::end(verbs)) {
@@ -162,13 +162,13 @@ bool DriveShell::run(Words words) {
     return command(a, verb, std::move(words));
 }
 
-bool DriveShell::command(HandAxis& a, const std::string& verb, Words arguments) {
+bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {
     const std::string rest = arguments_of(verb), shown = fmt::format("type: {} {}{}{}", a.letter(), verb, rest.empty() ? "" : " ", rest);
     const auto usage = [&] { return wrong(shown); };
     std::int64_t within = settings_.within_ns;
     if (const auto at = std::find(arguments.begin(), arguments.end(), "within"); at != arguments.end()) {
         const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1]);
-        if (!ns || *ns <= 0) return wrong(fmt::format("{} within what? type: {} {} within 30s", verb, a.letter(), verb));
+        if (!ns || *ns <= 0) return wrong(fmt::format("{}: missing time after within; type: {} {} within 30s", verb, a.letter(), verb));
         within = *ns;
         arguments.erase(at, at + 2);
     }
@@ -185,25 +185,25 @@ bool DriveShell::command(HandAxis& a, const std::string& verb, Words arguments) 
             if (arguments[0] == m.abbreviation)
                 return wrong(m.mode == Mode::homing
                                  ? fmt::format("homing is a command: {} home", letter)
-                                 : fmt::format("{} wants a set-point every cycle; use component cia402 in a netlist", m.abbreviation));
-        return wrong(fmt::format("'{}' is no mode; write pp, pv, tq or vl", arguments[0]));
+                                 : fmt::format("mode {} needs a set-point every cycle; use component cia402 in a netlist", m.abbreviation));
+        return wrong(fmt::format("invalid mode '{}'; write pp, pv, tq or vl", arguments[0]));
     }
     if (verb == "set") {
         if (arguments.size() == 1 && arguments[0].ends_with('?')) return query(a, arguments[0].substr(0, arguments[0].size() - 1));
         return arguments.size() == 2 ? set(a, arguments[0], arguments[1]) : usage();
     }
-    if (!arguments.empty()) return wrong(fmt::format("nothing is expected at '{}'; type: {} {}", arguments[0], letter, verb));
+    if (!arguments.empty()) return wrong(fmt::format("unexpected argument '{}'; type: {} {}", arguments[0], letter, verb));
     if ((verb == "on" || verb == "reset") && !watched(a)) return false;
     if (verb == "on") return a.on() && print_line(fmt::format("{}: on", letter));
     if (verb == "off") return a.off() && print_line(fmt::format("{}: off", letter));
-    if (verb == "stop") return a.stop() && print_line(fmt::format("{}: stands at {:.10g}", letter, a.position()));
+    if (verb == "stop") return a.stop() && print_line(fmt::format("{}: stopped at {:.10g}", letter, a.position()));
     if (verb == "quickstop") return a.quick_stop() && print_line(fmt::format("{}: stopped and off, at {:.10g}", letter, a.position()));
     if (verb == "reset") return a.reset() && print_line(fmt::format("{}: no fault", letter));
     if (verb == "wait") return a.wait() && print_line(fmt::format("{}: at {:.10g}", letter, a.position()));
     return status(a);
 }
 
-bool DriveShell::motion(HandAxis& a, const std::string& verb, Words arguments, const std::string& usage) {
+bool DriveShell::motion(SdoAxis& a, const std::string& verb, Words arguments, const std::string& usage) {
     const auto flag = [&](const char* name) {
         const auto found = std::find(arguments.begin(), arguments.end(), name);
         if (found == arguments.end()) return false;
@@ -217,7 +217,7 @@ bool DriveShell::motion(HandAxis& a, const std::string& verb, Words arguments, c
         std::optional<int> method;
         if (!arguments.empty()) {
             if (!parse_real(arguments[0], value) || value != std::floor(value) || value < -128 || value > 127)
-                return wrong(fmt::format("'{}' is no homing method; write 1 to 37, or what the drive's manual has below 0", arguments[0]));
+                return wrong(fmt::format("invalid homing method '{}'; write 1..37, or a negative one of the drive's manual", arguments[0]));
             method = static_cast<int>(value);
         }
         return watched(a) && a.home(method) && print_line(fmt::format("{}: homed, at {:.10g}", letter, a.position()));
@@ -225,11 +225,11 @@ bool DriveShell::motion(HandAxis& a, const std::string& verb, Words arguments, c
     const bool relative = verb == "go" && flag("relative"), nowait = flag("nowait");
     if (arguments.size() != 1) return wrong(usage);
     if (!parse_real(arguments[0], value))
-        return wrong(fmt::format("'{}' is no number; type: {} {} {}", arguments[0], letter, verb, arguments_of(verb)));
+        return wrong(fmt::format("invalid number '{}'; type: {} {} {}", arguments[0], letter, verb, arguments_of(verb)));
     if (!watched(a)) return false;
     if (verb == "go") {
         if (!a.go(value, relative, !nowait)) return false;
-        return print_line(nowait ? fmt::format("{}: moves", letter) : fmt::format("{}: at {:.10g}", letter, a.position()));
+        return print_line(nowait ? fmt::format("{}: moving", letter) : fmt::format("{}: at {:.10g}", letter, a.position()));
     }
     if (verb == "speed") return a.speed(value, !nowait) && print_line(fmt::format("{}: speed {:.10g}", letter, value));
     return a.torque(value, !nowait) && print_line(fmt::format("{}: torque {:.10g}", letter, value));
@@ -254,11 +254,11 @@ namespace {
 
 bool duration_of(const Options& options, const std::string& text, std::int64_t& to) {
     const auto ns = parse_duration_ns(text);
-    if (!ns || *ns <= 0) return fail(options, fmt::format("'{}' is not a duration; write 200ms or 1s", text)), false;
+    if (!ns || *ns <= 0) return fail(options, fmt::format("invalid duration '{}'; use 200ms or 1s", text)), false;
     return to = *ns, true;
 }
 
-/// Takes the options out of the words: they may stand before and behind the address. What is left is the command.
+/// Takes the options out of the words: they may be before or after the address. The rest is the command.
 bool take_options(DriveOptions& options) {
     std::vector<std::string> rest;
     std::string timeout;
@@ -272,9 +272,9 @@ bool take_options(DriveOptions& options) {
                                 : w == "--heartbeat-id" ? &options.heartbeat_id
                                                         : nullptr;
         if (w == "-k" || w == "--keep-going") options.keep_going = true;
-        else if (to && i + 1 == options.words.size()) return fail(options, fmt::format("something is missing behind {}", w)), false;
+        else if (to && i + 1 == options.words.size()) return fail(options, fmt::format("missing value of {}", w)), false;
         else if (to) *to = options.words[++i];
-        else if (w.starts_with("--")) return fail(options, fmt::format("there is no option '{}'; see: hal help can drive", w)), false;
+        else if (w.starts_with("--")) return fail(options, fmt::format("unknown option '{}'; see: hal help can drive", w)), false;
         else rest.push_back(w);
     }
     options.words = std::move(rest);
@@ -296,20 +296,20 @@ bool supervision_of(const DriveOptions& options, SupervisionSettings& settings) 
 int run_can_drive(const DriveOptions& given) {
     DriveOptions options = given;
     if (!take_options(options)) return 1;
-    if (options.words.empty()) return fail(options, "the address is missing; type: hal can drive can:can0 --node 2 A on");
-    if (options.node.empty()) return fail(options, fmt::format("which node? type: hal can drive {} --node 2", options.words[0]));
+    if (options.words.empty()) return fail(options, "missing address; type: hal can drive can:can0 --node 2 A on");
+    if (options.node.empty()) return fail(options, fmt::format("missing --node; type: hal can drive {} --node 2", options.words[0]));
     std::uint8_t node = 0;
     if (!node_of(options, options.node, node)) return 1;
     const std::string& letter = options.axis;
     const char axis = letter.empty() ? 'A' : static_cast<char>(letter[0] & ~0x20);
-    if (letter.size() > 1 || axis < 'A' || axis > 'H') return fail(options, fmt::format("'{}' is no axis; write A to H", letter));
+    if (letter.size() > 1 || axis < 'A' || axis > 'H') return fail(options, fmt::format("invalid axis '{}'; write A to H", letter));
 
     SupervisionSettings watched;
     std::int64_t within = 0;
     if (!supervision_of(options, watched) || (!options.within.empty() && !duration_of(options, options.within, within)))
         return 1;
 
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     const bool one_shot = options.words.size() > 1, terminal = ::isatty(STDIN_FILENO) == 1;
     Supervision supervision(options, station, node, watched);
     DriveShell shell(options, station, supervision,
@@ -319,8 +319,8 @@ int run_can_drive(const DriveOptions& given) {
                       .prompt = !one_shot && terminal,
                       .within_ns = within});
     station.bus.stop.on_signal = [&shell] { shell.press(); };
-    station.bus.stop.spare(terminal && !one_shot);  // there Ctrl-C ends a command, not the session
-    station.outlasts_stop = true;                   // axes are stopped before it ends
+    station.bus.stop.spare(terminal && !one_shot);  // at a prompt Ctrl-C ends a command, not the session
+    station.outlasts_stop = true;                   // axes are stopped before the session ends
     if (!station.open(options.words[0])) return 1;
     int status = 1;
     try {
@@ -329,7 +329,7 @@ int run_can_drive(const DriveOptions& given) {
             for (std::size_t i = 1; i < options.words.size(); ++i) line += options.words[i] + " ";
             status = shell.execute(line);
         } else {
-            if (terminal) print(fmt::format("node {} on {}; 'help' lists the commands, Tab completes\n", node, options.words[0]));
+            if (terminal) print(fmt::format("node {} on {}; type 'help' for the commands, Tab completes\n", node, options.words[0]));
             status = run_prompt_loop(shell, {"drive> ", "drive> "}, station.bus.stop.fd());
         }
     } catch (...) {

@@ -16,17 +16,17 @@ using canopen::SdoRequest;
 
 namespace {
 
-constexpr std::int64_t rest_ns = 100'000'000;     // as long without a count it stands
-constexpr std::int64_t stall_ns = 2'000'000'000;  // as long without a count, and not there: it will not arrive
+constexpr std::int64_t rest_ns = 100'000'000;     // without a count: at standstill
+constexpr std::int64_t stall_ns = 2'000'000'000;  // without a count before arrival: stalled
 
 }  // namespace
 
-HandAxis::HandAxis(const Options& options, Station& station, std::uint8_t node, unsigned axis)
+SdoAxis::SdoAxis(const Options& options, NodeClient& station, std::uint8_t node, unsigned axis)
     : options_(options), station_(station), node_(node), axis_(axis) {
     emergencies_ = station_.network.add(node_).emergencies();
 }
 
-bool HandAxis::refuse(const std::string& sentence) const {
+bool SdoAxis::refuse(const std::string& sentence) const {
     std::string text = fmt::format("{}: {}", letter(), sentence);
     canopen::RemoteNode& node = station_.network.add(node_);
     if (node.emergencies() > emergencies_) {
@@ -36,7 +36,7 @@ bool HandAxis::refuse(const std::string& sentence) const {
     return fail(options_, text), false;
 }
 
-bool HandAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing) {
+bool SdoAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing) {
     std::uint8_t room[8] = {};
     const std::uint16_t at = of_axis(index, axis_);
     SdoRequest request{.index = at, .sub = sub, .upload = true, .buffer = room};
@@ -52,7 +52,7 @@ bool HandAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, 
     return true;
 }
 
-bool HandAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes) {
+bool SdoAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes) {
     std::uint8_t data[8];
     std::memcpy(data, &value, sizeof data);
     const std::uint16_t at = of_axis(index, axis_);
@@ -61,7 +61,7 @@ bool HandAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, 
     return station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub)), false;
 }
 
-bool HandAxis::look() {
+bool SdoAxis::look() {
     std::int64_t value = 0;
     bool missing = false;
     if (!read(object::statusword, 0, value, false, &missing))
@@ -89,8 +89,8 @@ bool HandAxis::look() {
     return true;
 }
 
-/// The drive may be running already, by an earlier command: it is taken over as it is.
-bool HandAxis::adopt() {
+/// Takes over a drive that is already running by an earlier command.
+bool SdoAxis::adopt() {
     emergencies_ = station_.network.add(node_).emergencies();
     if (adopted_) return true;
     if (!look()) return false;
@@ -105,17 +105,17 @@ bool HandAxis::adopt() {
     command_.torque = rules.torque.to_user(static_cast<double>(torque));
     if (command_.mode == Mode::cyclic_position || command_.mode == Mode::cyclic_velocity || command_.mode == Mode::cyclic_torque ||
         command_.mode == Mode::interpolated_position)
-        command_.mode = Mode::profile_position;  // nobody sends what these need
+        command_.mode = Mode::profile_position;  // the cyclic set-points of these modes are missing
     return adopted_ = true;
 }
 
-bool HandAxis::cycle() {
+bool SdoAxis::cycle() {
     if (!look()) return false;
     return tell(machine_.step(feedback_, command_, rules, now_ns()));
 }
 
-/// Writes what changed; the controlword last, because it makes the rest count.
-bool HandAxis::tell(const AxisOrders& orders) {
+/// Writes changed values; the controlword last, because it activates the others.
+bool SdoAxis::tell(const AxisOrders& orders) {
     const auto put = [&](auto& told, auto value, std::uint16_t index) {
         if (told == value) return true;
         if (!write(index, 0, static_cast<std::int64_t>(value), sizeof value)) return false;
@@ -133,17 +133,17 @@ bool HandAxis::tell(const AxisOrders& orders) {
     return put(told_.controlword, orders.controlword, object::controlword);
 }
 
-bool HandAxis::standing() { return now_ns() - rest_since_ >= rest_ns; }
+bool SdoAxis::standing() { return now_ns() - rest_since_ >= rest_ns; }
 
-/// Not there, and it has not moved for long.
-bool HandAxis::arrived() {
+/// Returns true when the axis has stalled before its target.
+bool SdoAxis::arrived() {
     if (now_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
     return refuse(
-        fmt::format("drive stands at {:.10g} and does not report target reached (statusword 0x{:04X})", position(), feedback_.statusword));
+        fmt::format("drive stopped at {:.10g} without reporting target reached (statusword 0x{:04X})", position(), feedback_.statusword));
 }
 
-/// Why the machine gave up, after it has switched the axis off.
-bool HandAxis::report() {
+/// Reports why the state machine gave up; it has already disabled the axis.
+bool SdoAxis::report() {
     const std::int64_t end = now_ns() + rules.limits.stop + rules.limits.step;
     while (machine_.walking() && now_ns() < end && cycle()) {}
     const Failure& failure = machine_.failure();
@@ -153,8 +153,8 @@ bool HandAxis::report() {
     return refuse(why);
 }
 
-/// Cycles until `ready`; `still` says, and why not, whether it can become true.
-bool HandAxis::until(const Ready& ready, bool (HandAxis::*still)()) {
+/// Runs cycles until `ready`; `still` reports when that is no longer possible.
+bool SdoAxis::until(const Ready& ready, bool (SdoAxis::*still)()) {
     moved_at_ = now_ns();
     for (;;) {
         if (!cycle()) return false;
@@ -167,14 +167,14 @@ bool HandAxis::until(const Ready& ready, bool (HandAxis::*still)()) {
             interrupted = nullptr;
             allow(rules.limits.stop);
             const bool stopped = machine_.enabled() && stop();
-            return refuse(stopped ? "interrupted; it was stopped" : "interrupted");
+            return refuse(stopped ? "interrupted; axis stopped" : "interrupted");
         }
         if (now_ns() >= deadline_) return overdue();
         station_.until([&] { return is_interrupted(); }, pause_ns);
     }
 }
 
-bool HandAxis::on() {
+bool SdoAxis::on() {
     if (!adopt()) return false;
     touched_ = true;
     if (command_.mode == Mode::none || command_.mode == Mode::homing) command_.mode = Mode::profile_position;
@@ -183,7 +183,7 @@ bool HandAxis::on() {
     const State state = state_of(feedback_.statusword);
     command_.quick_stop = command_.halt = command_.reset = false;
     if (state != State::operation_enabled || !machine_.enabled()) {
-        if (state != State::fault && machine_.failure()) {  // only ours is forgotten; a fault of the drive asks for `reset`
+        if (state != State::fault && machine_.failure()) {  // clears our failure only; a fault of the drive needs `reset`
             command_.enable = false, command_.reset = true;
             if (!cycle()) return false;
             command_.reset = false;
@@ -196,14 +196,14 @@ bool HandAxis::on() {
     return until([&] { return machine_.active(); });
 }
 
-bool HandAxis::off() {
+bool SdoAxis::off() {
     if (!adopt()) return false;
     command_.enable = command_.go = command_.home = command_.halt = false;
     return until([&] { return !machine_.walking() && state_of(feedback_.statusword) != State::operation_enabled; });
 }
 
-/// In that mode, enabled.
-bool HandAxis::begin_motion(Mode mode) {
+/// Checks that the axis is enabled, and selects the mode.
+bool SdoAxis::begin_motion(Mode mode) {
     if (!adopt()) return false;
     if (!look()) return false;
     if (state_of(feedback_.statusword) == State::fault && !machine_.failure()) {
@@ -216,56 +216,56 @@ bool HandAxis::begin_motion(Mode mode) {
     }
     if (machine_.failure()) return report();
     if (!command_.enable || state_of(feedback_.statusword) != State::operation_enabled)
-        return refuse(fmt::format("is not on (drive is in \"{}\"); type: {} on", word(state_of(feedback_.statusword)), letter()));
+        return refuse(fmt::format("not enabled (drive is in \"{}\"); type: {} on", to_string(state_of(feedback_.statusword)), letter()));
     command_.mode = mode, command_.home = command_.go = false;
     touched_ = in_motion_ = true;
     return until([&] { return machine_.active(); });
 }
 
-bool HandAxis::go(double position, bool relative, bool wait, bool queued) {
+bool SdoAxis::go(double position, bool relative, bool wait, bool queued) {
     const double counts = position * rules.position.ratio();
     if (std::fabs(counts) > 2147483647.0)
         return refuse(
-            fmt::format("{:.10g} is {:.10g} of the drive's counts; its positions go from -2147483648 to 2147483647", position, counts));
+            fmt::format("position {:.10g} is {:.10g} counts, out of the range -2147483648..2147483647 of the drive", position, counts));
     if (adopt() && command_.mode != Mode::profile_position) command_.velocity = 0.0;
     if (!begin_motion(Mode::profile_position)) return false;
     command_.position = position, command_.relative = relative;
-    command_.immediate = wait || !queued, command_.go = true;  // in a row of `nowait` each waits its turn in the drive
+    command_.immediate = wait || !queued, command_.go = true;  // several `nowait` are queued in the drive
     if (!cycle()) return false;
     command_.go = false;
     if (machine_.failure()) return report();
     const auto done = [&] { return machine_.set_points() == 0 && (machine_.target_reached() || !wait); };
-    if (!until(done, wait ? &HandAxis::arrived : nullptr)) return false;
+    if (!until(done, wait ? &SdoAxis::arrived : nullptr)) return false;
     if (wait) return true;
     for (int n = 0; n < 3; ++n)  // the edge, and its end
         if (!cycle()) return false;
     return !machine_.failure() || report();
 }
 
-bool HandAxis::speed(double velocity, bool wait) {
+bool SdoAxis::speed(double velocity, bool wait) {
     if (!adopt()) return false;
     const Mode mode = command_.mode == Mode::velocity ? Mode::velocity : Mode::profile_velocity;
     if (command_.mode != mode) command_.velocity = 0.0;
     if (!begin_motion(mode)) return false;
     command_.velocity = velocity, command_.halt = false;
-    for (int n = 0; n < 3; ++n)  // what the drive says by then is about this speed
+    for (int n = 0; n < 3; ++n)  // by then the status of the drive is that of this speed
         if (!cycle()) return false;
     if (!wait || mode == Mode::velocity) return !machine_.failure() || report();
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &HandAxis::arrived);
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &SdoAxis::arrived);
 }
 
-bool HandAxis::torque(double permille, bool wait) {
+bool SdoAxis::torque(double permille, bool wait) {
     if (adopt() && command_.mode != Mode::profile_torque) command_.torque = 0.0;
     if (!begin_motion(Mode::profile_torque)) return false;
     command_.torque = permille, command_.halt = false;
     for (int n = 0; n < 3; ++n)
         if (!cycle()) return false;
     if (!wait) return !machine_.failure() || report();
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &HandAxis::arrived);
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &SdoAxis::arrived);
 }
 
-/// A drive knows some of the methods; 60E3h says which, where it is there.
-bool HandAxis::choose_homing(int method) {
+/// Checks that the drive supports a homing method, by 60E3h if it exists.
+bool SdoAxis::choose_homing(int method) {
     const auto data = static_cast<std::uint8_t>(method);
     const std::uint16_t at = of_axis(object::homing_method, axis_);
     SdoRequest request{.index = at, .data = std::span(&data, 1)};
@@ -282,11 +282,11 @@ bool HandAxis::choose_homing(int method) {
             known += fmt::format("{}{}", known.empty() ? "" : ", ", one);
         }
     if (known.empty() && !missing) return false;  // the bus failed
-    return refuse(fmt::format("the drive knows no homing method {}; {}", method,
-                              known.empty() ? "its manual lists those it has" : "it has " + known));
+    return refuse(fmt::format("the drive does not support homing method {}; {}", method,
+                              known.empty() ? "see its manual for those it supports" : "it supports " + known));
 }
 
-bool HandAxis::home(std::optional<int> method) {
+bool SdoAxis::home(std::optional<int> method) {
     if (!adopt()) return false;
     if (method && !choose_homing(*method)) return false;
     const Mode before = command_.mode == Mode::profile_position ? command_.mode : Mode::profile_position;
@@ -298,7 +298,7 @@ bool HandAxis::home(std::optional<int> method) {
     return until([&] { return !machine_.homing() && machine_.active(); });
 }
 
-bool HandAxis::reset() {
+bool SdoAxis::reset() {
     if (!adopt()) return false;
     command_.enable = command_.reset = false;
     if (!cycle()) return false;
@@ -308,19 +308,19 @@ bool HandAxis::reset() {
     return good;
 }
 
-bool HandAxis::set_mode(Mode mode) {
+bool SdoAxis::set_mode(Mode mode) {
     if (!adopt()) return false;
     command_.velocity = command_.torque = 0.0;
     command_.mode = mode;
     const std::int64_t end = now_ns() + rules.limits.step;
     return until([&] { return feedback_.mode == mode || !feedback_.has_mode || now_ns() >= end; }) &&
            (feedback_.mode == mode || !feedback_.has_mode ||
-            refuse(fmt::format("drive does not take mode {}, it shows {}", abbreviation(mode), abbreviation(feedback_.mode))));
+            refuse(fmt::format("drive does not accept mode {}, displays {}", abbreviation(mode), abbreviation(feedback_.mode))));
 }
 
-bool HandAxis::wait() {
+bool SdoAxis::wait() {
     if (!adopt()) return false;
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0 && machine_.set_points() == 0; }, &HandAxis::arrived);
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0 && machine_.set_points() == 0; }, &SdoAxis::arrived);
 }
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How an axis comes to rest: halt, quick stop, after too long a time, and at the end of the session whatever its state.
+// Stopping an axis: halt, quick stop, after a timeout, and at the end of the session in any state.
 #include <fmt/core.h>
 
 #include "bus/can/drive_axis.hpp"
@@ -9,25 +9,25 @@ namespace hal::tools {
 
 using namespace canopen::cia402;
 
-void HandAxis::allow(std::int64_t ns) { allowed_ = ns, deadline_ = now_ns() + ns, in_motion_ = false; }
+void SdoAxis::allow(std::int64_t ns) { allowed_ = ns, deadline_ = now_ns() + ns, in_motion_ = false; }
 
-/// The command took too long: what it started is stopped.
-bool HandAxis::overdue() {
+/// Handles a timeout: stops what the command started.
+bool SdoAxis::overdue() {
     const double seconds = static_cast<double>(allowed_) / 1e9;
     if (!in_motion_)
         return refuse(
             fmt::format("not done within {:g} s (timeout; drive is in \"{}\", statusword 0x{:04X}); for more time add: within {:g}s",
-                        seconds, word(state_of(feedback_.statusword)), feedback_.statusword, 2 * seconds));
+                        seconds, to_string(state_of(feedback_.statusword)), feedback_.statusword, 2 * seconds));
     allow(rules.limits.stop);
     interrupted = nullptr;
     const bool stopped = machine_.enabled() && stop();
     return refuse(fmt::format("not done within {:g} s (timeout); {} at {:.10g}; for more time add: within {:g}s", seconds,
-                              stopped ? "the axis was stopped" : "the axis could not be stopped: it was last seen", position(),
+                              stopped ? "axis stopped" : "axis not stopped, last seen", position(),
                               2 * seconds));
 }
 
-/// Halt, then what it was on is taken back, so that nothing goes on when halt ends.
-bool HandAxis::stop() {
+/// Halts, then withdraws the motion, so that nothing continues when halt ends.
+bool SdoAxis::stop() {
     if (!adopt()) return false;
     if (!look()) return false;
     if (state_of(feedback_.statusword) != State::operation_enabled) return true;
@@ -45,10 +45,10 @@ bool HandAxis::stop() {
     }
     command_.halt = false;
     const bool by_set_point = command_.mode == Mode::profile_position && machine_.active();
-    return until([&] { return !by_set_point || machine_.target_reached(); }, &HandAxis::arrived);
+    return until([&] { return !by_set_point || machine_.target_reached(); }, &SdoAxis::arrived);
 }
 
-bool HandAxis::quick_stop() {
+bool SdoAxis::quick_stop() {
     if (!adopt()) return false;
     command_.quick_stop = true, command_.home = command_.go = false;
     if (!until([&] { return !machine_.walking() && standing(); })) return false;
@@ -56,12 +56,12 @@ bool HandAxis::quick_stop() {
     return true;
 }
 
-/// Without the state machine of the commands: that one may have failed, and this is for every state.
-bool HandAxis::secure(std::string& what) {
+/// Works without the state machine of the commands, which may have failed, and in every state.
+bool SdoAxis::secure(std::string& what) {
     interrupted = nullptr;
     touched_ = adopted_ = false;
     told_ = {};
-    if (!look()) {  // an answer may be lost, and the command still arrive
+    if (!look()) {  // the response may be lost although the command arrives
         const std::uint16_t at = of_axis(object::controlword, axis_);
         for (const std::uint16_t order : {command::quick_stop, command::disable_voltage}) {
             can::Frame f(0x600U + node_, {0x2b, static_cast<std::uint8_t>(at & 0xff), static_cast<std::uint8_t>(at >> 8), 0,
@@ -69,7 +69,7 @@ bool HandAxis::secure(std::string& what) {
             station_.out.push(f);
             station_.until([] { return false; }, 10 * pause_ns);
         }
-        return what = "quick stop and off were sent, and not answered", false;
+        return what = "quick stop and disable sent, no response", false;
     }
     State state = state_of(feedback_.statusword);
     const auto has_torque = [&] { return state == State::operation_enabled || state == State::quick_stop_active; };
@@ -81,7 +81,7 @@ bool HandAxis::secure(std::string& what) {
             station_.until([] { return false; }, pause_ns);
             if (!look()) return false;
             state = state_of(feedback_.statusword);
-            if (state == State::quick_stop_active && standing()) break;  // by 605Ah it may stay in this state
+            if (state == State::quick_stop_active && standing()) break;  // 605Ah may keep it in this state
         }
     }
     if (state != State::fault && state != State::fault_reaction_active && state != State::switch_on_disabled &&
@@ -90,7 +90,7 @@ bool HandAxis::secure(std::string& what) {
     if (!look()) return false;
     state = state_of(feedback_.statusword);
     if (!had_torque) return true;
-    what = has_torque() ? fmt::format("did not stop within {:g} s", static_cast<double>(rules.limits.stop) / 1e9)
+    what = has_torque() ? fmt::format("not stopped within {:g} s", static_cast<double>(rules.limits.stop) / 1e9)
            : state == State::fault || state == State::fault_reaction_active
                ? fmt::format("in fault (error 0x{:04X}: {}), off, at {:.10g}", feedback_.error_code, error_word(feedback_.error_code),
                              position())
@@ -98,7 +98,7 @@ bool HandAxis::secure(std::string& what) {
     return !has_torque();
 }
 
-bool HandAxis::moves() {
+bool SdoAxis::moves() {
     if (!touched_ || !look() || state_of(feedback_.statusword) != State::operation_enabled) return false;
     if (command_.mode == Mode::profile_position) return (feedback_.statusword & status::target_reached) == 0;
     return command_.velocity != 0.0 || command_.torque != 0.0;

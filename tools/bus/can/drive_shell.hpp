@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The commands of `hal can drive`: our own words, and those of the robot shell with an axis letter behind the word (`ONA:`).
+// The session of `hal can drive`: its own commands, and those of the robot shell, which end with the letter of the axis (`ONA:`).
 #pragma once
 
 #include <array>
@@ -19,61 +19,61 @@ class DriveShell final : public LineExecutor {
 public:
     struct Settings {
         std::uint8_t node = 0;
-        unsigned axis = 0;          ///< of commands that begin with none
+        unsigned axis = 0;          ///< axis of commands without a letter
         bool ends_at_failure = false;
-        bool prompt = false;        ///< a person types: what succeeded silently is answered by `ok`
-        std::int64_t within_ns = 0; ///< time for a command; 0: the default of each
+        bool prompt = false;        ///< interactive: `ok` confirms commands without output
+        std::int64_t within_ns = 0; ///< timeout of a command; 0: its default
     };
-    DriveShell(const Options&, Station&, Supervision&, const Settings&);
+    DriveShell(const Options&, NodeClient&, Supervision&, const Settings&);
 
     int execute(std::string_view line) override;
     Completion complete(std::string_view line, std::size_t cursor) override;
     bool collecting() const override { return false; }
     bool over() const override { return over_ || station_.bus.stop.requested(); }
     std::function<void()> meanwhile() override;
-    void press() { pressed_.store(true); }  ///< [any] a signal came
-    bool left() const { return left_; }     ///< by `quit`: the axes stay as they are
-    /// The end of the session. Unless `leave`, every axis that was switched on or moved is stopped and switched off first; an
-    /// `expected` end is no failure. Returns the exit status that follows.
+    void press() { pressed_.store(true); }  ///< Notes a signal. [any]
+    bool left() const { return left_; }     ///< Returns true after `quit`: the axes stay as they are.
+    /// Ends the session. Unless `leave`, first stops and disables every axis that was enabled or moved; an `expected` end is not a failure.
+    /// Returns the exit status.
     int end(bool leave, const char* why, bool expected = true);
 
 private:
     using Words = std::vector<std::string>;
-    struct LetterWord;
+    struct RobotCommand;
 
     bool run(Words);
-    /// `ONA:`, `GB: 1000`: the words of the robot shell. Nothing: it is not one of them.
-    std::optional<bool> letter_line(std::string_view line);
-    bool letter_command(HandAxis&, const LetterWord&, const std::vector<std::int64_t>&, bool query);
+    /// Runs `ONA:`, `GB: 1000`: a command of the robot shell. Returns nullopt for other commands.
+    std::optional<bool> robot_line(std::string_view line);
+    bool robot_command(SdoAxis&, const RobotCommand&, const std::vector<std::int64_t>&, bool query);
     bool print_line(const std::string& text) const;
     bool wrong(const std::string& sentence) const;
-    bool command(HandAxis&, const std::string& verb, Words arguments);
-    bool motion(HandAxis&, const std::string& verb, Words arguments, const std::string& usage);
-    bool query(HandAxis&, const std::string& name);
-    bool set(HandAxis&, const std::string& name, const std::string& value);
-    bool status(HandAxis&);
-    /// A value of the drive by the name of its row, in units of the user. False after saying why.
-    bool fetch(HandAxis&, const std::string& name, double& value);
-    bool store(HandAxis&, const std::string& name, double value, double& back);
-    HandAxis& axis(unsigned number);
-    bool watched(HandAxis&);  ///< it exists, and the drive supervises us as far as it can; before everything that may move it
-    HandAxis::Interruption interruption() const;
+    bool command(SdoAxis&, const std::string& verb, Words arguments);
+    bool motion(SdoAxis&, const std::string& verb, Words arguments, const std::string& usage);
+    bool query(SdoAxis&, const std::string& name);
+    bool set(SdoAxis&, const std::string& name, const std::string& value);
+    bool status(SdoAxis&);
+    /// Accesses a parameter of the drive by name, in user units. Returns false after printing the reason.
+    bool fetch(SdoAxis&, const std::string& name, double& value);
+    bool store(SdoAxis&, const std::string& name, double value, double& back);
+    SdoAxis& axis(unsigned number);
+    bool watched(SdoAxis&);  ///< Checks that the axis exists and is supervised as far as possible; call it before a motion.
+    SdoAxis::Interruption interruption() const;
     static std::string help_text();
 
     const Options& options_;
-    Station& station_;
+    NodeClient& station_;
     Supervision& supervision_;
     const Settings settings_;
-    std::array<std::unique_ptr<HandAxis>, canopen::cia402::most_axes> axes_;
+    std::array<std::unique_ptr<SdoAxis>, canopen::cia402::most_axes> axes_;
     std::atomic<bool> pressed_{false};
     bool over_ = false, left_ = false;
 };
 
-// What the sources of the shell share.
+// Shared by the sources of the session.
 bool parse_real(const std::string& text, double& value);
-/// `4096/360`, `4096,360`, `4096`.
+/// Parses `4096/360`, `4096,360`, `4096`.
 bool parse_factor(const std::string& text, canopen::cia402::Factor&);
-/// Names of settings and factors, in the order of the help; with `reading` those that can only be read, too.
+/// Returns the names of parameters and factors in the order of the help; with `reading` also the read-only ones.
 std::vector<std::string> value_names(bool reading);
 std::string value_help();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `set` writes and `NAME?` reads.
+// The parameters of `set` and `NAME?`.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -16,7 +16,7 @@ using namespace canopen::cia402;
 
 namespace {
 
-/// In units of the user where `unit` says which.
+/// A parameter; in user units if it has a `unit`.
 struct Setting {
     enum class Unit { none, position, velocity, acceleration };
     const char* name;
@@ -29,18 +29,18 @@ struct Setting {
 };
 using enum Setting::Unit;
 constexpr Setting settings[] = {
-    {"max-speed", object::profile_velocity, 0, 4, false, velocity, "of moves (6081h)"},
-    {"max-acceleration", object::profile_acceleration, 0, 4, false, acceleration, "of moves (6083h)"},
-    {"max-deceleration", object::profile_deceleration, 0, 4, false, acceleration, "of moves (6084h)"},
-    {"jerk", object::profile_jerk, 1, 4, false, acceleration, "of moves with ramps 3, per second (60A4h:1)"},
-    {"ramps", object::motion_profile_type, 0, 2, true, none, "of moves: 0 linear, 3 with limited jerk (6086h)"},
-    {"quick-stop-deceleration", object::quick_stop_deceleration, 0, 4, false, acceleration, "6085h"},
-    {"max-torque", object::max_torque, 0, 2, false, none, "thousandths of the rated one (6072h)"},
-    {"following-error-window", object::following_error_window, 0, 4, false, position, "6065h"},
+    {"max-speed", object::profile_velocity, 0, 4, false, velocity, "profile velocity (6081h)"},
+    {"max-acceleration", object::profile_acceleration, 0, 4, false, acceleration, "profile acceleration (6083h)"},
+    {"max-deceleration", object::profile_deceleration, 0, 4, false, acceleration, "profile deceleration (6084h)"},
+    {"jerk", object::profile_jerk, 1, 4, false, acceleration, "profile jerk, per second, with ramps 3 (60A4h:1)"},
+    {"ramps", object::motion_profile_type, 0, 2, true, none, "motion profile: 0 linear, 3 with limited jerk (6086h)"},
+    {"quick-stop-deceleration", object::quick_stop_deceleration, 0, 4, false, acceleration, "quick stop deceleration (6085h)"},
+    {"max-torque", object::max_torque, 0, 2, false, none, "maximum torque in thousandths of the rated torque (6072h)"},
+    {"following-error-window", object::following_error_window, 0, 4, false, position, "following error window (6065h)"},
     {"home-offset", object::home_offset, 0, 4, true, position, "position at the home switch (607Ch)"},
-    {"home-speed", object::homing_speeds, 1, 4, false, velocity, "to the switch (6099h:1)"},
-    {"home-slow-speed", object::homing_speeds, 2, 4, false, velocity, "to the index pulse or edge (6099h:2)"},
-    {"home-acceleration", object::homing_acceleration, 0, 4, false, acceleration, "609Ah"},
+    {"home-speed", object::homing_speeds, 1, 4, false, velocity, "speed to the switch (6099h:1)"},
+    {"home-slow-speed", object::homing_speeds, 2, 4, false, velocity, "speed to the index pulse or edge (6099h:2)"},
+    {"home-acceleration", object::homing_acceleration, 0, 4, false, acceleration, "homing acceleration (609Ah)"},
 };
 constexpr const char* factors[] = {"position-factor", "velocity-factor", "acceleration-factor"};
 
@@ -49,14 +49,14 @@ const Setting* find_setting(const std::string& name) {
     return s == std::end(settings) ? nullptr : s;
 }
 
-double factor_of(const HandAxis& a, Setting::Unit unit) {
+double factor_of(const SdoAxis& a, Setting::Unit unit) {
     return unit == position       ? a.rules.position.ratio()
            : unit == velocity     ? std::fabs(a.rules.velocity.ratio())
            : unit == acceleration ? std::fabs(a.rules.acceleration.ratio())
                                   : 1.0;
 }
 
-Factor* find_factor(HandAxis& a, const std::string& name) {
+Factor* find_factor(SdoAxis& a, const std::string& name) {
     Factor* const all[] = {&a.rules.position, &a.rules.velocity, &a.rules.acceleration};
     const auto* found = std::find(std::begin(factors), std::end(factors), name);
     return found == std::end(factors) ? nullptr : all[found - std::begin(factors)];
@@ -64,7 +64,7 @@ Factor* find_factor(HandAxis& a, const std::string& name) {
 
 bool no_such_value(const Options& options, const std::string& name, bool reading) {
     const std::string hint = did_you_mean(name, value_names(reading));
-    return fail(options, fmt::format("there is no value '{}'; {}", name, hint.empty() ? "type: help" : hint)), false;
+    return fail(options, fmt::format("unknown parameter '{}'; {}", name, hint.empty() ? "type: help" : hint)), false;
 }
 
 }  // namespace
@@ -75,7 +75,7 @@ bool parse_real(const std::string& text, double& value) {
     return error == std::errc() && *end == '\0' && std::isfinite(value);
 }
 
-/// `4096/360`, `4096,360`, `4096`.
+/// Parses `4096/360`, `4096,360`, `4096`.
 bool parse_factor(const std::string& text, Factor& factor) {
     const auto mark = text.find_first_of("/,");
     Factor read;
@@ -95,11 +95,11 @@ std::vector<std::string> value_names(bool reading) {
 std::string value_help() {
     std::string text;
     for (const Setting& s : settings) text += fmt::format("    {:36} {}\n", s.name, s.what);
-    for (const char* name : factors) text += fmt::format("    {:36} drive's units per unit of yours, NUMERATOR/DENOMINATOR\n", name);
+    for (const char* name : factors) text += fmt::format("    {:36} drive units per user unit, NUMERATOR/DENOMINATOR\n", name);
     return text;
 }
 
-bool DriveShell::query(HandAxis& a, const std::string& name) {
+bool DriveShell::query(SdoAxis& a, const std::string& name) {
     if (const Factor* f = find_factor(a, name))
         return print_line(fmt::format("{}: {} {:.10g}/{:.10g}", a.letter(), name, f->numerator, f->denominator));
     for (const Setting& s : settings) {
@@ -115,30 +115,30 @@ bool DriveShell::query(HandAxis& a, const std::string& name) {
                               : name == "speed"  ? fmt::format("{:.10g}", a.velocity())
                               : name == "torque" ? fmt::format("{:.10g}", a.rules.torque.to_user(seen.torque))
                               : name == "mode"   ? std::string(abbreviation(seen.mode))
-                                                 : std::string(word(state_of(seen.statusword)));
+                                                 : std::string(to_string(state_of(seen.statusword)));
     return print_line(fmt::format("{}: {} {}", a.letter(), name, value));
 }
 
-bool DriveShell::set(HandAxis& a, const std::string& name, const std::string& text) {
+bool DriveShell::set(SdoAxis& a, const std::string& name, const std::string& text) {
     if (Factor* f = find_factor(a, name)) {
         if (!parse_factor(text, *f))
-            return wrong(fmt::format("'{}' is no factor; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0", text));
+            return wrong(fmt::format("invalid factor '{}'; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0", text));
         return query(a, name);
     }
     double value = 0, back = 0;
     if (!find_setting(name)) return no_such_value(options_, name, false);
-    if (!parse_real(text, value)) return wrong(fmt::format("'{}' is no number; type: {} set {} NUMBER", text, a.letter(), name));
+    if (!parse_real(text, value)) return wrong(fmt::format("invalid number '{}'; type: {} set {} NUMBER", text, a.letter(), name));
     return store(a, name, value, back) && print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, back));
 }
 
-bool DriveShell::fetch(HandAxis& a, const std::string& name, double& value) {
+bool DriveShell::fetch(SdoAxis& a, const std::string& name, double& value) {
     const Setting* s = find_setting(name);
     std::int64_t raw = 0;
     if (!s || !a.read(s->index, s->sub, raw, s->is_signed)) return false;
     return value = static_cast<double>(raw) / factor_of(a, s->unit), true;
 }
 
-bool DriveShell::store(HandAxis& a, const std::string& name, double value, double& back) {
+bool DriveShell::store(SdoAxis& a, const std::string& name, double value, double& back) {
     const Setting* s = find_setting(name);
     if (!s) return false;
     const double raw = std::nearbyint(value * factor_of(a, s->unit));
@@ -146,20 +146,20 @@ bool DriveShell::store(HandAxis& a, const std::string& name, double value, doubl
     const double least = s->is_signed ? -most - 1 : 0.0;
     if (raw < least || raw > most)
         return wrong(
-            fmt::format("{} {:.10g} is {:.10g} in the drive's units, which go from {:.10g} to {:.10g}", name, value, raw, least, most));
+            fmt::format("{} {:.10g} is {:.10g} in drive units, out of the range {:.10g}..{:.10g}", name, value, raw, least, most));
     std::int64_t kept = 0;
     if (!a.write(s->index, s->sub, static_cast<std::int64_t>(raw), s->bytes)) return false;
     if (!a.read(s->index, s->sub, kept, s->is_signed)) return false;
     back = static_cast<double>(kept) / factor_of(a, s->unit);
-    return static_cast<double>(kept) == raw || a.refuse(fmt::format("drive keeps {} at {:.10g}", name, back));
+    return static_cast<double>(kept) == raw || a.refuse(fmt::format("drive accepted the write but keeps {} at {:.10g}", name, back));
 }
 
-bool DriveShell::status(HandAxis& a) {
+bool DriveShell::status(SdoAxis& a) {
     if (!a.look()) return false;
     const AxisFeedback& seen = a.seen();
     const State state = state_of(seen.statusword);
     std::string text =
-        fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), word(state), abbreviation(seen.mode), seen.statusword);
+        fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), to_string(state), abbreviation(seen.mode), seen.statusword);
     constexpr std::pair<std::uint16_t, const char*> bits[] = {{status::voltage_enabled, "voltage enabled"},
                                                               {status::warning, "warning"},
                                                               {status::remote, "remote"},

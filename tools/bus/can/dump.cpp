@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can dump`: what is on one bus or several, a line per frame.
+// `hal can dump`: prints the frames of one or more buses, one per line.
 #include "bus/can/dump.hpp"
 
 #include <algorithm>
@@ -34,13 +34,13 @@ constexpr const char* colour(FrameKind kind) {
     }
 }
 
-/// A bus among several.
+/// One of the buses.
 struct Source {
     can::Link* link = nullptr;
-    std::string name;            ///< in the lines; empty: it is the only bus
-    std::int64_t to_wall = 0;    ///< from the time of its frames to the time of day
+    std::string name;            ///< shown in each line; empty: the only bus
+    std::int64_t to_wall = 0;    ///< offset from the time of its frames to the time of day
     std::uint64_t frames = 0;
-    std::int64_t busy = 0;       ///< time of the bus that its frames took
+    std::int64_t busy = 0;       ///< bus time taken by its frames
     FrameDecoder decoder = {};
     std::vector<can::Frame> room = std::vector<can::Frame>(256);
 };
@@ -67,19 +67,19 @@ std::string json_line(const can::Frame& f, double time, const Source& source, co
     return text + "}\n";
 }
 
-/// `can0` of `can:can0?bitrate=500k`.
+/// Returns `can0` of `can:can0?bitrate=500k`.
 std::string short_name(const std::string& address) {
     const std::string plain = address.substr(0, address.find('?'));
     return plain.substr(plain.find(':') + 1);
 }
 
-/// From the time of a link's frames to the time of day. A capture is played now and keeps the times of its recording.
+/// Returns the offset from the time of a link's frames to the time of day. A capture is played now and keeps the times of its recording.
 std::int64_t shift_to_wall(const can::Link& link, const can::Frame& first) {
     const can::Description& about = link.description();
     if (!about.file.empty()) {
         const can::Capture capture = can::read_capture(about.file);
         for (const can::Frame& f : capture.frames)
-            if (f.same(first)) return f.time_ns - first.time_ns;  // not the first of the file where a filter left that out
+            if (f.same(first)) return f.time_ns - first.time_ns;  // a filter may have dropped the first frame of the file
     }
     timespec real{};
     clock_gettime(CLOCK_REALTIME, &real);
@@ -91,7 +91,7 @@ struct Heard {
     Source* source;
 };
 
-/// As `listen` does with one bus: batches in the order of their times.
+/// Like `listen` for several buses: batches in the order of their times.
 void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns, const std::function<bool(std::span<const Heard>)>& take) {
     const std::int64_t end = for_ns >= 0 ? now_ns() + for_ns : INT64_MAX;
     std::vector<Heard> batch;
@@ -126,13 +126,13 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
         return print(fmt::format(
             R"({{"statistics":{{{}"frames":{},"seconds":{:.3f},"load_percent":{},"errors":{},"lost":{},"bus_offs":{},"state":"{}"}}}})"
             "\n",
-            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs, can::word(s.state)));
+            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs, can::to_string(s.state)));
     }
     const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load) : "unknown (add ?bitrate=500k to the address)";
     write_all(STDERR_FILENO,
               fmt::format("{}{}{} frame{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", source.name, source.name.empty() ? "" : ": ",
                           source.frames, source.frames == 1 ? "" : "s", seconds, share, s.errors, s.lost,
-                          about.transport == "capture" ? "" : fmt::format(", bus {}", can::word(s.state))));
+                          about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state))));
     return true;
 }
 
@@ -141,7 +141,7 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
 int run_can_dump(const DumpOptions& options) {
     const bool delta = options.time == "delta", absolute = options.time == "absolute";
     if (!options.time.empty() && options.time != "relative" && !delta && !absolute)
-        return fail(options, fmt::format("--time: unknown form '{}'; use relative, delta or absolute", options.time));
+        return fail(options, fmt::format("invalid --time '{}'; write relative, delta or absolute", options.time));
     Bus bus;
     if (!bus.open(options, options.words, options.filters)) return 1;
     bus.announce(options);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can eds check FILE…`: device descriptions with everything that is wrong with them, in the lines of the file.
+// `hal can eds check FILE…`: checks device descriptions and prints every problem with its line.
 #include "bus/can/eds_check.hpp"
 
 #include <fmt/core.h>
@@ -70,7 +70,7 @@ int check(const Options& options, const std::string& path) {
     std::string text = render(found, sources, colours(STDERR_FILENO));
     if (!text.empty()) text += "\n";
     text += reading.description ? printable(summary(path, reading)) + "\n"
-                                : fmt::format("{}: refused, nothing of it can be used\n", printable(path));
+                                : fmt::format("{}: rejected, not a usable device description\n", printable(path));
     write_all(STDERR_FILENO, text);
     return reading.description ? 0 : 1;
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// `hal can flash`: another program for a node, as CiA 302-3 has it: stop it, erase the flash, download, start it, and look what came of it.
+// `hal can flash`: program download after CiA 302-3: stop the program, erase the flash, download, start, and check the result.
 #include "bus/can/flash.hpp"
 
 #include <cstring>
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 #include "cli/output.hpp"
 
 namespace hal::tools {
@@ -22,9 +22,9 @@ constexpr std::uint32_t flash_busy = 1, no_valid_program = 1,  // bit 0 of 1F57h
 constexpr std::int64_t between_looks = 100'000'000, patience = 60'000'000'000;
 
 const char* flash_error(std::uint32_t code) {
-    constexpr const char* words[] = {"no error", "no valid program", "unknown data format", "wrong data or checksum", "flash not cleared before",
+    constexpr const char* words[] = {"no error", "no valid program", "unknown data format", "wrong data or checksum", "flash not cleared before writing",
                                      "flash write error", "address error", "flash secured"};
-    return code < std::size(words) ? words[code] : code == 63 ? "unspecified error" : "error of the manufacturer";
+    return code < std::size(words) ? words[code] : code == 63 ? "unspecified error" : "manufacturer-specific error";
 }
 
 class Flash {
@@ -37,7 +37,7 @@ public:
         std::uint32_t running = 0;
         if (const Answer has = read(0x1f51, running); has == Answer::silent) return report(0x1f51);
         else if (has == Answer::refused)
-            return fail(options_, fmt::format("node {} has no program control 1F51:{} ({}): its program is not changed over CANopen", node_, program_,
+            return fail(options_, fmt::format("node {} has no program control 1F51:{} ({}): it does not support program download", node_, program_,
                                               canopen::to_string(last_.abort)));
         if (!note("stopping the program") || !control(stop_program) || !settle("stop", any_error)) return 1;
         if (!note("erasing the flash") || !control(clear_program) || !settle("erase", no_valid_program)) return 1;
@@ -60,7 +60,7 @@ private:
         if (ok) std::memcpy(&value, room, sizeof value);
         return ok ? Answer::value : last_.aborted_by_server ? Answer::refused : Answer::silent;
     }
-    /// A node that restarts into its boot loader may not answer: settle() finds out.
+    /// Sends a command. A node that restarts into its boot loader may not respond; settle() finds out.
     bool control(std::uint8_t value) {
         last_ = {.index = 0x1f51, .sub = program_, .data = std::span(&value, 1)};
         if (station_.transfer(node_, last_) || (!last_.aborted_by_server && !station_.bus.stop.requested())) return true;
@@ -71,40 +71,40 @@ private:
                  .data = std::span(reinterpret_cast<const std::uint8_t*>(image_.data()), image_.size())};
         return station_.transfer(node_, last_) || (report(0x1f50), false);
     }
-    /// Until 1F57h says that the flash is ready. `allowed`: the error code that belongs to this step; any_error: one left from before.
+    /// Waits until 1F57h reports the flash ready. `allowed`: the error code that belongs to this step; any_error: ignores a stale one.
     bool settle(const char* step, std::uint32_t allowed) {
         for (const std::int64_t end = now_ns() + patience; now_ns() < end && !station_.bus.stop.requested();) {
             std::uint32_t status = 0;
             switch (read(0x1f57, status)) {
-            case Answer::refused: return true;  // an optional object: the answers to the commands are all there is
+            case Answer::refused: return true;  // an optional object: only the responses to the commands are known
             case Answer::silent: break;
             case Answer::value:
                 if ((status & flash_busy) != 0) break;
                 if (const std::uint32_t error = status >> 1 & 0x7f; error != 0 && error != allowed && allowed != any_error)
-                    return fail(options_, fmt::format("node {}: {} failed: {} (1F57:{} = 0x{:08X}); it has no usable program now: type the same again",
+                    return fail(options_, fmt::format("node {}: {} failed: {} (1F57:{} = 0x{:08X}); the node has no valid program now; to retry, type the same command",
                                                       node_, step, flash_error(error), program_, status)), false;
                 return true;
             }
             station_.until([] { return false; }, between_looks);
         }
-        return fail(options_, fmt::format("node {}: {} {}; it may have no usable program now", node_, step,
-                                          station_.bus.stop.requested() ? "was interrupted" : "was not done within 60 s")), false;
+        return fail(options_, fmt::format("node {}: {} {}; the node may have no valid program now", node_, step,
+                                          station_.bus.stop.requested() ? "interrupted" : "not finished within 60 s")), false;
     }
     int look() {
         std::uint32_t running = 0, id = 0;
         for (const std::int64_t end = now_ns() + patience; now_ns() < end && !station_.bus.stop.requested();) {
             station_.until([] { return false; }, between_looks);
-            if (read(0x1f51, running) != Answer::value) continue;  // it starts
+            if (read(0x1f51, running) != Answer::value) continue;  // starting
             if ((running & 0xff) != start_program)
                 return fail(options_, fmt::format("node {} did not start the program: 1F51:{} is {}", node_, program_, running & 0xff));
             const bool has_id = read(0x1f56, id) == Answer::value;
-            return note(has_id ? fmt::format("runs, software identification 0x{:08X}", id) : "runs") ? 0 : 1;
+            return note(has_id ? fmt::format("program running, software identification 0x{:08X}", id) : "program running") ? 0 : 1;
         }
         return report(0x1f51);
     }
 
     const FlashOptions& options_;
-    Station station_;
+    NodeClient station_;
     const std::uint8_t node_, program_;
     const std::string& image_;
     SdoRequest last_;
@@ -113,12 +113,12 @@ private:
 }  // namespace
 
 int run_can_flash(const FlashOptions& options) {
-    if (options.words.size() != 3) return fail(options, "three words are needed; type: hal can flash ADDRESS NODE IMAGE");
+    if (options.words.size() != 3) return fail(options, "expected ADDRESS NODE IMAGE; type: hal can flash ADDRESS NODE IMAGE");
     std::uint8_t node = 0;
     if (!node_of(options, options.words[1], node)) return 1;
     std::string image;
     if (!read_file(options.words[2], image)) return fail(options, fmt::format("cannot read '{}': {}", options.words[2], image));
-    if (image.empty()) return fail(options, fmt::format("'{}' is empty: nothing was changed", options.words[2]));
+    if (image.empty()) return fail(options, fmt::format("'{}' is empty; the node is unchanged", options.words[2]));
     return Flash(options, node, static_cast<std::uint8_t>(options.program_number), image).run();
 }
 

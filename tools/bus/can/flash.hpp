@@ -10,12 +10,12 @@ namespace hal::tools {
 struct FlashOptions : Options {
     int program_number = 1;
     bool segmented = false;
-    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+    std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE IMAGE", "the bus; a node 1-127; the file with the program, as the device takes it");
-        set.value("--program", program_number, "N", "which of its programs: sub-index of 1F50h, 1-254 (default 1)").in(1, 254);
-        set.flag("--segmented", segmented, "never by block transfer");
+        set.words("ADDRESS NODE IMAGE", "the bus; node ID 1..127; program file in the format of the device");
+        set.value("--program", program_number, "N", "program number, sub-index of 1F50h, 1..254 (default 1)").in(1, 254);
+        set.flag("--segmented", segmented, "do not use block transfer");
         declare_timeout(set, timeout_ns);
     }
 };

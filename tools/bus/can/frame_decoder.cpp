@@ -28,7 +28,7 @@ std::string expedited(const Frame& f) {
     return fmt::format("{} = 0x{:0{}X}{}", object(f), value, 2 * bytes, value > 9 ? fmt::format(" ({})", value) : "");
 }
 
-/// Download and upload begin with the same flags in both directions.
+/// Initiate responses of downloads and uploads have the same flags in both directions.
 std::string initiated(const Frame& f) {
     if ((f.data[0] & 2) != 0) return expedited(f);
     return object(f) + ((f.data[0] & 1) != 0 ? fmt::format(", {} bytes in segments", number(f, 4, 4)) : ", in segments");
@@ -94,11 +94,11 @@ DecodedFrame heartbeat(unsigned node, const Frame& f) {
 struct LssCommand {
     std::uint8_t code;
     const char* text;
-    unsigned bytes;  ///< of a number behind it
+    unsigned bytes;  ///< of the number after it
 };
 constexpr LssCommand lss_commands[] = {
     {0x04, "switch all to state", 1},
-    {0x11, "configure node id", 1},
+    {0x11, "configure node ID", 1},
     {0x13, "configure bit timing", 2},
     {0x15, "activate bit timing, ms", 2},
     {0x17, "store configuration", 0},
@@ -113,15 +113,15 @@ constexpr LssCommand lss_commands[] = {
     {0x49, "identify revision to", 4},
     {0x4a, "identify serial number from", 4},
     {0x4b, "identify serial number to", 4},
-    {0x4c, "identify those without node id", 0},
+    {0x4c, "identify unconfigured slaves", 0},
     {0x4f, "identified", 0},
-    {0x50, "identified, without node id", 0},
+    {0x50, "unconfigured slave identified", 0},
     {0x51, "fastscan", 4},
     {0x5a, "inquire vendor", 4},
     {0x5b, "inquire product", 4},
     {0x5c, "inquire revision", 4},
     {0x5d, "inquire serial number", 4},
-    {0x5e, "inquire node id", 1},
+    {0x5e, "inquire node ID", 1},
 };
 
 DecodedFrame lss(bool master, const Frame& f) {
@@ -142,7 +142,7 @@ DecodedFrame error(const Frame& f) {
         {can::error_controller, "controller"},
         {can::error_protocol, "protocol violation"},
         {can::error_transceiver, "transceiver"},
-        {can::error_no_acknowledge, "nobody acknowledges"},
+        {can::error_no_acknowledge, "no acknowledgement"},
         {can::error_bus_off, "bus off"},
         {can::error_bus, "bus error"},
         {can::error_restarted, "restarted after bus off"},
@@ -177,7 +177,7 @@ DecodedFrame FrameDecoder::request(unsigned node, const Frame& f) {
         case 0: return sdo(fmt::format("read {} in blocks of {}", object(f), f.data[4]));
         case 1: return sdo("block read done");
         case 2: return sdo(fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
-        default: blocks.up = true; return sdo("begin to send blocks");
+        default: blocks.up = true; return sdo("start block upload");
         }
     case 6:
         if ((f.data[0] & 1) == 0)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a frame is in CANopen, in words; as far as the predefined connection set tells.
+// The meaning of a frame in CANopen, by the predefined connection set.
 #pragma once
 
 #include <array>
@@ -14,10 +14,10 @@ enum class FrameKind : std::uint8_t { other, error, nmt, sync, time, emergency, 
 
 struct DecodedFrame {
     FrameKind kind = FrameKind::other;
-    std::string text;  ///< empty: it has none
+    std::string text;  ///< empty: unknown
 };
 
-/// Reads frames in the order of the bus: what a segment of a block transfer is depends on what came before it.
+/// Decodes frames in the order of the bus: segments of a block transfer are recognised by the preceding frames.
 class FrameDecoder {
 public:
     DecodedFrame decode(const can::Frame&);
@@ -31,9 +31,9 @@ private:
     std::array<Blocks, 128> blocks_{};
 };
 
-/// By the identifier alone: "TPDO1 of node 2".
+/// Returns the service of an identifier: "TPDO1 of node 2".
 std::string service_name(std::uint32_t id, bool extended);
-/// "402 drive", "401 I/O module", …: from object 1000h.
+/// Returns the profile of object 1000h: "402 drive", "401 I/O module", …
 std::string profile_name(std::uint32_t device_type);
 
 }  // namespace hal::tools

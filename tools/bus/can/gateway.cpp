@@ -29,7 +29,7 @@ namespace {
 
 using canopen::gateway::Gateway;
 
-/// A socket file that goes with its owner.
+/// A socket file that is removed with its owner.
 struct Listener {
     int fd = -1;
     std::string file, shown;
@@ -55,12 +55,12 @@ bool listen_locally(const GatewayOptions& options, Listener& out) {
     const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const bool taken = ::connect(probe, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
     ::close(probe);
-    if (taken) return fail(options, fmt::format("another gateway listens on '{}'; give this one its own: --socket PATH", path)), false;
+    if (taken) return fail(options, fmt::format("another gateway listens on '{}'; choose another socket: --socket PATH", path)), false;
     struct stat about{};
     if (::lstat(path.c_str(), &about) == 0) {
         if (!S_ISSOCK(about.st_mode))
-            return fail(options, fmt::format("'{}' is there and no socket; give another: --socket PATH", path)), false;
-        ::unlink(path.c_str());  // left behind by one that was killed
+            return fail(options, fmt::format("'{}' exists and is not a socket; choose another: --socket PATH", path)), false;
+        ::unlink(path.c_str());  // left by a killed gateway
     }
     const mode_t before = ::umask(0177);  // for its owner only
     const bool bound = ::bind(out.fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
@@ -81,10 +81,10 @@ bool listen_on_port(const GatewayOptions& options, Listener& out) {
     const char* end = text.data() + text.size();
     const bool good = colon != text.npos && std::from_chars(text.data() + colon + 1, end, port).ptr == end &&
                       ::inet_pton(AF_INET, text.substr(0, colon).c_str(), &at.sin_addr) == 1;
-    if (!good) return fail(options, fmt::format("'{}' is no place to listen; write 127.0.0.1:6000", text)), false;
+    if (!good) return fail(options, fmt::format("invalid --listen '{}'; write 127.0.0.1:6000", text)), false;
     if ((ntohl(at.sin_addr.s_addr) >> 24) != 127)
         return fail(options,
-                    fmt::format("'{}' would let other machines command this bus; listen on 127.0.0.1 and forward it: ssh -L", text)),
+                    fmt::format("--listen '{}' would let other machines command this bus; listen on 127.0.0.1 and forward the port: ssh -L", text)),
                false;
     at.sin_port = htons(port);
     out.fd = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -93,7 +93,7 @@ bool listen_on_port(const GatewayOptions& options, Listener& out) {
     if (::bind(out.fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 || ::listen(out.fd, 16) != 0)
         return fail(options, fmt::format("cannot listen on {}: {}", text, std::strerror(errno))), false;
     socklen_t size = sizeof at;
-    ::getsockname(out.fd, reinterpret_cast<sockaddr*>(&at), &size);  // port 0: one that is free
+    ::getsockname(out.fd, reinterpret_cast<sockaddr*>(&at), &size);  // port 0: a free port was chosen
     out.shown = text.substr(0, colon) + ":" + std::to_string(ntohs(at.sin_port));
     return true;
 }
@@ -146,7 +146,7 @@ private:
             all.push_back({c.fd, static_cast<short>(POLLIN | (gateway_.output(c.client).empty() ? 0 : POLLOUT)), 0});
         ::poll(all.data(), all.size(), gateway_.idle() && polled ? 20 : 1);
     }
-    /// Frames between the nets and their buses.
+    /// Exchanges frames between the nets and their buses.
     void carry() {
         for (unsigned net = 1; net <= links_.size(); ++net) {
             can::Link& link = *links_[net - 1];
@@ -175,7 +175,7 @@ private:
         gateway_.disconnect(c.client);
         return ::close(c.fd), true;
     }
-    /// False: the client has gone, or does not read.
+    /// Returns false when the client has disconnected, or does not read.
     bool flush(const Connection& c) {
         std::string& text = gateway_.output(c.client);
         while (!text.empty()) {
@@ -217,7 +217,7 @@ bool read_identity(const GatewayOptions& options, canopen::gateway::Identity& ou
     for (const Name& name : {Name{"--vendor-name", options.vendor_name, out.vendor_name}, Name{"--product-name", options.product_name, out.product_name},
                              Name{"--order-code", options.order_code, out.order_code}}) {
         if (name.given.size() > canopen::gateway::Identity::most_name)
-            return fail(options, fmt::format("{} has {} bytes; at most {} are possible", name.option, name.given.size(), canopen::gateway::Identity::most_name)), false;
+            return fail(options, fmt::format("{} has {} bytes; at most {} are allowed", name.option, name.given.size(), canopen::gateway::Identity::most_name)), false;
         if (!name.given.empty()) name.to = name.given;
     }
     return true;
@@ -246,7 +246,7 @@ int run_can_gateway(const GatewayOptions& options) {
     std::string nets;
     for (std::size_t n = 0; n < links.size(); ++n)
         nets += fmt::format("{}net {} is {}", n == 0 ? "" : ", ", n + 1, links[n]->description().address);
-    write_all(STDERR_FILENO, fmt::format("{}: {}; listening on {}; Ctrl-C ends it\n", options.program, nets, listener.shown));
+    write_all(STDERR_FILENO, fmt::format("{}: {}; listening on {}; press Ctrl-C to end\n", options.program, nets, listener.shown));
     return Server(options, links, stop, std::move(identity)).run(listener);
 }
 

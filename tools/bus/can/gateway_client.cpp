@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can gateway --connect`: a client of a CiA 309-3 gateway. Sequence numbers are its own matter; errors come in words.
+// `hal can gateway --connect`: a client of a CiA 309-3 gateway. It adds the sequence numbers and prints error texts.
 #include "bus/can/gateway.hpp"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace hal::tools {
 
 namespace {
 
-/// A connected socket, or -1 after printing the reason.
+/// Connects a socket; returns -1 after printing the reason.
 int connect_to_gateway(const GatewayOptions& options) {
     const std::string& place = options.connect;
     const auto colon = place.rfind(':');
@@ -64,7 +64,7 @@ int connect_to_gateway(const GatewayOptions& options) {
     return fd;
 }
 
-/// `1 5 EMCY … #life guard error`: net and node by name, the comment as part of the sentence.
+/// Formats `1 5 EMCY … #life guard error`: net and node by name, the comment as part of the sentence.
 std::string event_text(std::string_view line) {
     std::string text(line);
     if (const auto mark = text.find(" #"); mark != text.npos) text.replace(mark, 2, ": ");
@@ -77,7 +77,7 @@ std::string event_text(std::string_view line) {
     return fmt::format("net {}, node {}: {}", net, node, after_node.ptr + 1);
 }
 
-/// `ERROR:105 #no default node set` as "no default node set (error 105); …".
+/// Formats `ERROR:105 #no default node set` as "no default node set (error 105); …".
 std::string error_text(std::string_view answer) {
     const auto mark = answer.find('#');
     const std::string_view begins = "ERROR:";
@@ -86,12 +86,12 @@ std::string error_text(std::string_view answer) {
     const bool abort = number.starts_with("0x");
     std::string text = mark == answer.npos ? (abort ? "SDO abort" : "error") : std::string(answer.substr(mark + 1));
     text += abort ? fmt::format(" ({})", number) : fmt::format(" (error {})", number);
-    if (number == "104") text += "; put the net before the command, or type: set network NET";
-    if (number == "105") text += "; put the node before the command, or type: set node NODE";
+    if (number == "104") text += "; write the net before the command, or type: set network NET";
+    if (number == "105") text += "; write the node before the command, or type: set node NODE";
     return text;
 }
 
-/// Words of the command line as one line of CiA 309-3.
+/// Joins the words of the command line to one line of CiA 309-3.
 std::string joined(std::span<const std::string> words) {
     std::string line;
     for (const std::string& word : words) {
@@ -125,7 +125,7 @@ public:
         if (answer.starts_with("ERROR:")) return fail(options_, fmt::format("{}: {}", text, error_text(answer)));
         if (!print(answer + "\n")) return over_ = true, 1;
         if (text != "help") return 0;
-        listing_ = true;  // lines behind the answer; the next answer is their end
+        listing_ = true;  // lines follow the response; the next response ends them
         const bool whole = ask("info version", answer);
         listing_ = false;
         return whole ? 0 : 1;
@@ -180,7 +180,7 @@ public:
     }
 
 private:
-    /// The answer to one command. False after printing why there is none.
+    /// Waits for the response to a command. Returns false after printing the reason.
     bool ask(std::string_view text, std::string& answer) {
         constexpr std::int64_t limit = 60'000'000'000;
         const std::uint32_t number = ++sequence_;
@@ -192,12 +192,12 @@ private:
             sent += static_cast<std::size_t>(now);
         }
         for (const std::int64_t end = now_ns() + limit; now_ns() < end;) {
-            if (stop_.requested()) return fail(options_, fmt::format("interrupted; '{}' has no answer", text)), false;
+            if (stop_.requested()) return fail(options_, fmt::format("interrupted while waiting for the response to '{}'", text)), false;
             if (!readable(100)) continue;
             if (take(number, answer)) return true;
             if (over_) return false;
         }
-        return fail(options_, fmt::format("no answer to '{}' within 60 s; is the gateway stopped?", text)), false;
+        return fail(options_, fmt::format("no response to '{}' within 60 s; check that the gateway is running", text)), false;
     }
     bool readable(int ms) {
         if (in_.find('\n') != in_.npos) return true;
@@ -208,7 +208,7 @@ private:
         over_ = true;
         return fail(options_, fmt::format("the gateway at '{}' closed the connection", options_.connect)), false;
     }
-    /// Reads what there is and prints events. True: `answer` is that of `number`.
+    /// Reads pending lines and prints events. Returns true when `answer` is the response to `number`.
     bool take(std::uint32_t number, std::string& answer) {
         if (in_.find('\n') == in_.npos) {
             char bytes[65536];
@@ -250,7 +250,7 @@ int run_can_gateway_client(const GatewayOptions& options) {
     stop.listen();
     if (options.words.empty()) {
         const bool terminal = ::isatty(STDIN_FILENO) == 1;
-        if (terminal) print(fmt::format("connected to {}; 'help' lists the commands, Tab completes\n", options.connect));
+        if (terminal) print(fmt::format("connected to {}; type 'help' for the commands, Tab completes\n", options.connect));
         return run_prompt_loop(session, {"gateway> ", "gateway> "}, stop.fd());
     }
     if (options.words.front().find(' ') == options.words.front().npos) return session.execute(joined(options.words));

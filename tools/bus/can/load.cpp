@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can load`: which identifiers fill the bus.
+// `hal can load`: the bus load by identifier.
 #include "bus/can/load.hpp"
 
 #include <algorithm>
@@ -69,8 +69,8 @@ int run_can_load(const BusLoadOptions& options) {
     std::int64_t peak = 0;
     for (const auto& [window, busy] : windows) peak = std::max(peak, busy);
     const can::Statistics s = bus.link->statistics();
-    const std::string most = about.bit_rate ? fmt::format("busiest tenth of a second {:.1f} %", static_cast<double>(peak) * 100 / window_ns)
-                                            : "no percent without a bit rate: add ?bitrate=500k to the address";
+    const std::string most = about.bit_rate ? fmt::format("peak load over 0.1 s: {:.1f} %", static_cast<double>(peak) * 100 / window_ns)
+                                            : "load unknown without a bit rate; add ?bitrate=500k to the address";
     write_all(STDERR_FILENO, fmt::format("{:.2f} s; {}; {} errors, {} lost\n", seconds, most, s.errors, s.lost));
     return 0;
 }

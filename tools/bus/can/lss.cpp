@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// `hal can lss`: node ids and bit rates of nodes that have none yet, or wrong ones.
+// `hal can lss`: configures node ID and bit rate of nodes by LSS (CiA 305).
 #include "bus/can/lss.hpp"
 
 #include <charconv>
 #include <fmt/core.h>
 
 #include "base/types.hpp"
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
 
@@ -19,7 +19,7 @@ namespace {
 
 struct Lss {
     const Options& options;
-    Station& station;
+    NodeClient& station;
     std::vector<std::string> arguments;
 
     bool wait() const {
@@ -30,19 +30,19 @@ struct Lss {
         station.until([&] { return station.out.size() == 0; }, 1'000'000'000);
     }
     int silent(const char* help) const {
-        if (station.bus.stop.requested()) return fail(options, "ended before there was an answer");
-        return fail(options, fmt::format("no slave answered; {}", help));
+        if (station.bus.stop.requested()) return fail(options, "interrupted before a response arrived");
+        return fail(options, fmt::format("no slave responded; {}", help));
     }
-    /// After a configuration service: its error byte in words.
+    /// Finishes a configuration service and reports its error byte.
     int configured(const char* out_of_range) const {
-        if (!wait()) return silent("one slave has to be in configuration: see switch and select in: hal help can lss");
+        if (!wait()) return silent("one slave must be in the configuration state: see switch and select in: hal help can lss");
         const LssMaster::Result& r = station.lss.result();
         switch (r.error) {
         case 0: return 0;
-        case 1: return fail(options, fmt::format("the slave refused: {}", out_of_range));
-        case 255: return fail(options, fmt::format("the slave refused with its own error 0x{:02X}; see its manual", r.specific));
+        case 1: return fail(options, fmt::format("the slave rejected the request: {}", out_of_range));
+        case 255: return fail(options, fmt::format("the slave rejected the request with its specific error 0x{:02X}; see its manual", r.specific));
         default:
-            return fail(options, fmt::format("the slave refused with error {}: it has no access to its memory; see its manual", r.error));
+            return fail(options, fmt::format("the slave rejected the request with error {}: cannot access its memory; see its manual", r.error));
         }
     }
     bool number(std::size_t n, const char* what, std::uint64_t most, std::uint32_t& value) const {
@@ -52,10 +52,10 @@ struct Lss {
         std::uint64_t read = 0;
         const auto [stop, error] = std::from_chars(text.data() + (hex ? 2 : 0), end, read, hex ? 16 : 10);
         if (error == std::errc() && stop == end && read <= most) return value = static_cast<std::uint32_t>(read), true;
-        return fail(options, fmt::format("'{}' is no {}; write a number up to {}, or 0x…", text, what, most)), false;
+        return fail(options, fmt::format("invalid {1} '{0}'; write a number up to {2}, or 0x…", text, what, most)), false;
     }
     bool identity(std::size_t from, Identity& out) const {
-        constexpr const char* parts[] = {"vendor id", "product code", "revision number", "serial number"};
+        constexpr const char* parts[] = {"vendor ID", "product code", "revision number", "serial number"};
         for (std::size_t n = 0; n < 4; ++n)
             if (!number(from + n, parts[n], UINT32_MAX, out[n])) return false;
         return true;
@@ -69,7 +69,7 @@ std::string text_of(const Identity& id, const char* state) {
 int switch_all(Lss& l) {
     const bool configuration = l.arguments[0] == "configuration";
     if (!configuration && l.arguments[0] != "waiting")
-        return fail(l.options, fmt::format("'{}' is no state; write configuration or waiting", l.arguments[0]));
+        return fail(l.options, fmt::format("invalid state '{}'; write configuration or waiting", l.arguments[0]));
     l.station.lss.switch_global(configuration);
     l.sent();
     return 0;
@@ -79,26 +79,26 @@ int select(Lss& l) {
     Identity id{};
     if (!l.identity(0, id)) return 1;
     l.station.lss.select(id, now_ns());
-    return l.wait() ? 0 : l.silent("hal can scan and the label on the device tell the four numbers: vendor, product, revision, serial");
+    return l.wait() ? 0 : l.silent("check the four numbers vendor, product, revision and serial on the label of the device or with hal can scan");
 }
 
 int inquire(Lss& l) {
     Identity id{};
     for (unsigned part = 0; part < 5; ++part) {
         l.station.lss.inquire(part, now_ns());
-        if (!l.wait()) return l.silent("one slave has to be in configuration: see switch and select in: hal help can lss");
+        if (!l.wait()) return l.silent("one slave must be in the configuration state: see switch and select in: hal help can lss");
         if (part < 4) id[part] = l.station.lss.result().value;
     }
     const std::uint32_t node = l.station.lss.result().value;
-    return print(text_of(id, node == canopen::unconfigured ? ", no node id" : fmt::format(", node id {}", node).c_str())) ? 0 : 1;
+    return print(text_of(id, node == canopen::unconfigured ? ", no node ID" : fmt::format(", node ID {}", node).c_str())) ? 0 : 1;
 }
 
 int node_id(Lss& l) {
     std::uint32_t id = canopen::unconfigured;
-    if (l.arguments[0] != "none" && (!l.number(0, "node id", 255, id) || (id != canopen::unconfigured && (id < 1 || id > 127))))
-        return id > 127 ? fail(l.options, fmt::format("'{}' is no node id; write 1 to 127, or none", l.arguments[0])) : 1;
+    if (l.arguments[0] != "none" && (!l.number(0, "node ID", 255, id) || (id != canopen::unconfigured && (id < 1 || id > 127))))
+        return id > 127 ? fail(l.options, fmt::format("invalid node ID '{}'; write 1..127, or none", l.arguments[0])) : 1;
     l.station.lss.configure_node_id(static_cast<std::uint8_t>(id), now_ns());
-    return l.configured("the node id is out of its range");
+    return l.configured("node ID out of range");
 }
 
 int bit_rate(Lss& l) {
@@ -112,15 +112,15 @@ int bit_rate(Lss& l) {
                                    : std::uint8_t{255};
     if (index == 255)
         return fail(l.options,
-                    fmt::format("'{}' is no bit rate of LSS; there are 1M, 800k, 500k, 250k, 125k, 50k, 20k and 10k", l.arguments[0]));
+                    fmt::format("invalid bit rate '{}'; write 1M, 800k, 500k, 250k, 125k, 50k, 20k or 10k", l.arguments[0]));
     l.station.lss.configure_bit_timing(index, now_ns());
-    return l.configured("it does not know this bit rate");
+    return l.configured("unsupported bit rate");
 }
 
 int activate(Lss& l) {
     const auto ns = parse_duration_ns(l.arguments[0]);
     if (!ns || *ns < 0 || *ns > 65'535'000'000)
-        return fail(l.options, fmt::format("'{}' is no delay; write how long all are silent before and after: 1s, 500ms", l.arguments[0]));
+        return fail(l.options, fmt::format("invalid delay '{}'; write the pause before and after the switch: 1s, 500ms", l.arguments[0]));
     l.station.lss.activate_bit_timing(static_cast<std::uint16_t>(*ns / 1'000'000));
     l.sent();
     return 0;
@@ -128,38 +128,38 @@ int activate(Lss& l) {
 
 int store(Lss& l) {
     l.station.lss.store_configuration(now_ns());
-    return l.configured("it cannot store");
+    return l.configured("storing is unsupported");
 }
 
 int fastscan(Lss& l) {
     l.station.lss.scan(now_ns());
-    if (!l.wait()) return l.silent("a scan finds slaves without node id, in the state waiting");
-    return print(text_of(l.station.lss.result().identity, ", now in configuration")) ? 0 : 1;
+    if (!l.wait()) return l.silent("a scan finds unconfigured slaves in the waiting state only");
+    return print(text_of(l.station.lss.result().identity, ", now in the configuration state")) ? 0 : 1;
 }
 
 int identify(Lss& l) {
     if (l.arguments.empty()) {
         l.station.lss.identify_unconfigured(now_ns());
-        return l.wait() ? print("at least one slave has no node id\n") ? 0 : 1
-                        : l.silent("so none is without node id, as far as they know LSS");
+        return l.wait() ? print("at least one unconfigured slave\n") ? 0 : 1
+                        : l.silent("no unconfigured slave that supports LSS");
     }
     Identity low{}, high{};
     std::uint32_t revision = 0, serial = 0;
     if (l.arguments.size() != 4 && l.arguments.size() != 6)
         return fail(l.options,
-                    "identify takes nothing, VENDOR PRODUCT REVISION SERIAL, or the last two from and to: VENDOR PRODUCT FROM TO FROM TO");
+                    "identify takes no arguments, VENDOR PRODUCT REVISION SERIAL, or ranges: VENDOR PRODUCT FROM TO FROM TO");
     if (l.arguments.size() == 4) {
         if (!l.identity(0, low)) return 1;
         high = low;
     } else {
-        if (!l.number(0, "vendor id", UINT32_MAX, low[0]) || !l.number(1, "product code", UINT32_MAX, low[1]) ||
+        if (!l.number(0, "vendor ID", UINT32_MAX, low[0]) || !l.number(1, "product code", UINT32_MAX, low[1]) ||
             !l.number(2, "revision number", UINT32_MAX, low[2]) || !l.number(3, "revision number", UINT32_MAX, revision) ||
             !l.number(4, "serial number", UINT32_MAX, low[3]) || !l.number(5, "serial number", UINT32_MAX, serial))
             return 1;
         high = {low[0], low[1], revision, serial};
     }
     l.station.lss.identify(low, high, now_ns());
-    return l.wait() ? print("there is such a slave\n") ? 0 : 1 : l.silent("so there is none of that identity, as far as they know LSS");
+    return l.wait() ? print("slave identified\n") ? 0 : 1 : l.silent("no slave of this identity that supports LSS");
 }
 
 struct Command {
@@ -186,7 +186,7 @@ constexpr Command commands[] = {
 int run_can_lss(const LssOptions& options) {
     if (options.words.size() < 2)
         return fail(options,
-                    "two words are needed; type: hal can lss ADDRESS scan|switch|select|inquire|node-id|bit-rate|activate|store|identify");
+                    "expected ADDRESS COMMAND; type: hal can lss ADDRESS scan|switch|select|inquire|node-id|bit-rate|activate|store|identify");
     const std::string& word = options.words[1];
     const Command* command = nullptr;
     std::vector<std::string> names;
@@ -200,8 +200,8 @@ int run_can_lss(const LssOptions& options) {
     }
     std::vector<std::string> arguments(options.words.begin() + 2, options.words.end());
     if (arguments.size() < command->least || arguments.size() > command->most)
-        return fail(options, fmt::format("{} takes other words; type: hal can lss ADDRESS {}{}", word, word, command->arguments));
-    Station station(options, options.timeout_ns);
+        return fail(options, fmt::format("wrong arguments of {}; type: hal can lss ADDRESS {}{}", word, word, command->arguments));
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     Lss lss{options, station, std::move(arguments)};
     return command->run(lss);

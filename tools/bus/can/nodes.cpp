@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can nodes`: who is alive, as it can be heard: states, age of the last heartbeat, the newest emergencies in words. Sends nothing.
+// `hal can nodes`: lists the nodes that send: states, age of the last heartbeat, newest emergencies. Sends nothing.
 #include "bus/can/nodes.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace hal::tools {
 namespace {
 
 constexpr std::int64_t redraw_ns = 250'000'000;
-constexpr std::size_t most_emergencies = 3;  // shown of a node
+constexpr std::size_t most_emergencies = 3;  // shown per node
 
 struct Emergency {
     std::uint16_t code = 0;
@@ -28,9 +28,9 @@ struct Emergency {
 };
 
 struct Heard {
-    bool beats = false;  ///< a heartbeat or an answer to guarding was heard
+    bool has_heartbeat = false;  ///< a heartbeat or a guarding response was received
     canopen::NmtState state = canopen::NmtState::initialising;
-    std::int64_t last = 0, longest = 0;  ///< newest one; the longest gap between two
+    std::int64_t last = 0, longest = 0;  ///< time of the newest one; the longest interval
     std::uint64_t boot_ups = 0, emergencies = 0;
     std::deque<Emergency> newest;
 };
@@ -42,10 +42,10 @@ void take(Nodes& nodes, const can::Frame& f) {
     if (f.id > 0x700 && f.id < 0x780 && f.length == 1) {
         Heard& n = nodes[f.id & 0x7f];
         if (f.data[0] == 0) ++n.boot_ups, n.longest = 0;
-        else if (n.beats && n.state != canopen::NmtState::initialising) n.longest = std::max(n.longest, f.time_ns - n.last);
+        else if (n.has_heartbeat && n.state != canopen::NmtState::initialising) n.longest = std::max(n.longest, f.time_ns - n.last);
         n.state = static_cast<canopen::NmtState>(f.data[0] & 0x7f);
         n.last = f.time_ns;
-        n.beats = true;
+        n.has_heartbeat = true;
     } else if (f.id > 0x80 && f.id < 0x100 && f.length >= 3) {
         Heard& n = nodes[f.id & 0x7f];
         ++n.emergencies;
@@ -56,25 +56,25 @@ void take(Nodes& nodes, const can::Frame& f) {
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
 
-/// Missing for more than twice the longest gap there was.
-bool silent(const Heard& n, std::int64_t now) { return n.longest > 0 && now - n.last > 2 * n.longest + 50'000'000; }
+/// Returns true when no heartbeat was received for more than twice its longest interval.
+bool is_offline(const Heard& n, std::int64_t now) { return n.longest > 0 && now - n.last > 2 * n.longest + 50'000'000; }
 
 std::string state_of(const Heard& n) {
-    if (!n.beats) return "no heartbeat";
+    if (!n.has_heartbeat) return "no heartbeat";
     return n.state == canopen::NmtState::initialising ? "boot-up" : canopen::to_string(n.state);
 }
 
 std::string emergency_text(const Emergency& e, std::int64_t now) {
-    const std::string what = e.code == 0 ? "no error any more" : fmt::format("0x{:04X} {}", e.code, canopen::emergency_text(e.code));
+    const std::string what = e.code == 0 ? "error reset" : fmt::format("0x{:04X} {}", e.code, canopen::emergency_text(e.code));
     return fmt::format("{}, {:.1f} s ago", what, seconds(now - e.at));
 }
 
 std::string table(const Nodes& nodes, std::int64_t now) {
     std::string text = fmt::format("{:>4}  {:15}  {:>10}  {:>8}  {}\n", "node", "state", "heard", "boot-ups", "emergencies");
     for (const auto& [id, n] : nodes) {
-        const std::string age = n.beats ? fmt::format("{:.2f} s", seconds(now - n.last)) : "-";
+        const std::string age = n.has_heartbeat ? fmt::format("{:.2f} s", seconds(now - n.last)) : "-";
         std::string line = fmt::format("{:>4}  {:15}  {:>10}  {:>8}  {}", id, state_of(n), age, n.boot_ups, n.emergencies);
-        if (silent(n, now)) line += fmt::format("; SILENT: its heartbeats came every {:.2f} s", seconds(n.longest));
+        if (is_offline(n, now)) line += fmt::format("; OFFLINE: heartbeats were {:.2f} s apart", seconds(n.longest));
         text += line + "\n";
         for (const Emergency& e : n.newest) text += fmt::format("{:47}{}\n", "", emergency_text(e, now));
     }
@@ -87,9 +87,9 @@ std::string json(const Nodes& nodes, std::int64_t now) {
         std::string list;
         for (const Emergency& e : n.newest)
             list += fmt::format(R"({}{{"code":{},"text":{},"error_register":{},"age":{:.3f}}})", list.empty() ? "" : ",", e.code,
-                                json_text(e.code == 0 ? "no error any more" : canopen::emergency_text(e.code)), e.error_register, seconds(now - e.at));
+                                json_text(e.code == 0 ? "error reset" : canopen::emergency_text(e.code)), e.error_register, seconds(now - e.at));
         text += fmt::format(R"({}{{"node":{},"state":"{}","age":{},"silent":{},"boot_ups":{},"emergencies":{},"newest":[{}]}})",
-                            text.empty() ? "[" : ",\n ", id, state_of(n), n.beats ? fmt::format("{:.3f}", seconds(now - n.last)) : "null", silent(n, now),
+                            text.empty() ? "[" : ",\n ", id, state_of(n), n.has_heartbeat ? fmt::format("{:.3f}", seconds(now - n.last)) : "null", is_offline(n, now),
                             n.boot_ups, n.emergencies, list);
     }
     return (text.empty() ? "[" : text) + "]\n";
@@ -107,7 +107,7 @@ int run_can_nodes(const NodesOptions& options) {
     Nodes nodes;
     std::int64_t newest = 0, drawn = 0;
     bool written = true;
-    // A live list lasts until Ctrl-C; a table needs as long as the slowest usual heartbeat.
+    // A live list runs until Ctrl-C; a table takes as long as the slowest usual heartbeat.
     const std::int64_t for_ns = options.for_ns >= 0 || live ? options.for_ns : 2'000'000'000;
     const auto now = [&] { return bus.is_capture() ? newest : now_ns(); };
     listen(bus, for_ns, [&](std::span<const can::Frame> batch) {
@@ -116,13 +116,13 @@ int run_can_nodes(const NodesOptions& options) {
     }, redraw_ns, [&] {
         if (!live || now_ns() - drawn < redraw_ns) return;
         drawn = now_ns();
-        written = print("\x1b[H\x1b[J" + table(nodes, drawn) + (nodes.empty() ? "nothing heard yet\n" : ""));
+        written = print("\x1b[H\x1b[J" + table(nodes, drawn) + (nodes.empty() ? "no node received yet\n" : ""));
         if (!written) bus.stop.request();
     });
     if (live) return written ? 0 : 1;
     if (options.json) return print(json(nodes, now())) ? 0 : 1;
     if (nodes.empty())
-        return fail(options, fmt::format("no heartbeat and no emergency was heard within {:g} s; hal can scan {} asks every node",
+        return fail(options, fmt::format("no heartbeat and no emergency received within {:g} s; to query every node: hal can scan {}",
                                          seconds(std::max<std::int64_t>(for_ns, 0)), options.words[0]));
     return print(table(nodes, now())) ? 0 : 1;
 }

@@ -21,7 +21,7 @@ using canopen::Type;
 
 namespace {
 
-/// Lower case, everything but letters and digits as single dashes: names compare as people say them.
+/// Lower case, everything but letters and digits as single dashes: for tolerant comparison of names.
 std::string plain(std::string_view name) {
     std::string out;
     for (const char c : name) {
@@ -81,7 +81,7 @@ bool ObjectNames::load(const Options& options, const std::string& file) {
     if (!read_file(file, bytes)) return fail(options, fmt::format("cannot read '{}': {}", file, bytes)), false;
     eds::Reading reading = eds::read_description(bytes);
     if (!reading.description)
-        return fail(options, fmt::format("'{0}' is no device description; hal can eds check {0} says why", file)), false;
+        return fail(options, fmt::format("'{0}' is not a valid device description; for the problems type: hal can eds check {0}", file)), false;
     file_ = file;
     description_ = std::move(reading.description);
     for (const eds::Object& object : description_->objects)
@@ -111,7 +111,7 @@ bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& pr
         return out = named(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)), true;
     if (!description_)
         return problem = fmt::format(
-                   "'{}' is no object; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names", text),
+                   "invalid object '{}'; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names", text),
                false;
     const std::string wanted = plain(text);
     std::vector<const ObjectName*> found;
@@ -125,14 +125,14 @@ bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& pr
     if (found.size() == 1) return out = *found[0], true;
     if (found.empty()) {
         const std::string hint = did_you_mean(wanted, names);
-        return problem = fmt::format("'{}' is no object of {}; {}", text, file_,
+        return problem = fmt::format("unknown object '{}' in {}; {}", text, file_,
                                      hint.empty() ? "write INDEX:SUB in hex, or one of its names" : hint),
                false;
     }
     std::string all;
     for (std::size_t n = 0; n < found.size() && n < 4; ++n)
         all += (n == 0 ? "" : ", ") + fmt::format("{:04X}:{:X}", found[n]->index, found[n]->sub);
-    return problem = fmt::format("'{}' is the name of {} objects ({}{}); write which, such as {:04X}:{:X}", text, found.size(), all,
+    return problem = fmt::format("ambiguous name '{}' of {} objects ({}{}); write the index, such as {:04X}:{:X}", text, found.size(), all,
                                  found.size() > 4 ? ", …" : "", found[0]->index, found[0]->sub),
            false;
 }
@@ -171,7 +171,7 @@ std::string json_text(std::string_view text) {
 }
 
 std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
-    if (bytes.empty()) return "nothing (0 bytes)";
+    if (bytes.empty()) return "empty (0 bytes)";
     const std::string raw = bytes.size() <= 8 ? fmt::format("0x{:0{}X}", natural(bytes), 2 * bytes.size()) : "";
     if (type == Type::boolean && bytes.size() == 1) return fmt::format("{} ({})", bytes[0] != 0 ? "true" : "false", raw);
     if (is_number(type, bytes.size())) {
@@ -204,7 +204,7 @@ std::string value_json(std::span<const std::uint8_t> bytes, Type type) {
     if (is_text(type)) return json_text(text_in(bytes));
     if (is_number(type, bytes.size())) {
         const std::string text = gateway::text_of(bytes, *gateway::format(type));
-        return text.find_first_of("nN") == text.npos ? text : json_text(text);  // nan and inf are no JSON
+        return text.find_first_of("nN") == text.npos ? text : json_text(text);  // nan and inf are invalid in JSON
     }
     if (type == Type::none && !bytes.empty() && bytes.size() <= 8) return fmt::format("{}", natural(bytes));
     if (type == Type::none && looks_like_text(bytes)) return json_text(text_in(bytes));
@@ -215,8 +215,8 @@ bool parse_value(const std::string& text, Type type, std::vector<std::uint8_t>& 
     if (is_text(type)) return bytes.assign(text.begin(), text.end()), true;
     const eds::Encoded value = eds::encode_strictly(text, static_cast<std::uint16_t>(type), 0);
     if (!value) return problem = value.error, false;
-    if (value.node_id) return problem = fmt::format("'{}' has a $NODEID in it; write the number", text), false;
-    if (value.bytes.empty() && canopen::bits_of(type) != 0) return problem = "the value is empty", false;
+    if (value.node_id) return problem = fmt::format("invalid value '{}' with $NODEID; write the number", text), false;
+    if (value.bytes.empty() && canopen::bits_of(type) != 0) return problem = "empty value", false;
     return bytes = value.bytes, true;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can pdo`: which PDOs a node has, what they carry, and their values as they pass by; mapping them anew in the order CiA 301 wants.
+// `hal can pdo`: lists the PDOs of a node and their mapping, prints received values, and changes a mapping in the order of CiA 301.
 #include "bus/can/pdo.hpp"
 
 #include <algorithm>
@@ -16,15 +16,15 @@ using canopen::SdoRequest;
 
 namespace {
 
-/// ADDRESS NODE and, where `with_pdo`, PDO.
+/// Parses ADDRESS NODE and, with `with_pdo`, PDO.
 bool read_words(const PdoOptions& options, bool with_pdo, std::uint8_t& node, ObjectNames& names, PdoSettings* pdo) {
     if (options.words.size() < (with_pdo ? 3U : 2U))
-        return fail(options, fmt::format("{} words are needed; type: {} ADDRESS NODE{}", with_pdo ? "three" : "two", options.program,
+        return fail(options, fmt::format("expected ADDRESS NODE{1}; type: {0} ADDRESS NODE{1}", options.program,
                                          with_pdo ? " PDO" : "")),
                false;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return false;
     if (with_pdo && !parse_pdo(options.words[2], *pdo))
-        return fail(options, fmt::format("'{}' is no PDO; write rpdo1 to rpdo512 or tpdo1 to tpdo512", options.words[2])), false;
+        return fail(options, fmt::format("invalid PDO '{}'; write rpdo1 to rpdo512 or tpdo1 to tpdo512", options.words[2])), false;
     return true;
 }
 
@@ -43,7 +43,7 @@ std::string json_of(const PdoSettings& p) {
                        p.name(), p.on(), canopen::cob_id(p.cob), p.transmission, p.inhibit_100us * 100, p.event_ms, p.sync_start, mapping);
 }
 
-/// A line, and one below it for each object.
+/// Formats a PDO as a line, and a line for each mapped object.
 std::string lines_of(const PdoSettings& p) {
     std::string text = fmt::format("{:7} {:>8}  {}", p.name(), p.identifier(), p.timing());
     if (p.count > 64)
@@ -64,7 +64,7 @@ int run_can_pdo_show(const PdoShowOptions& options) {
     std::uint8_t node = 0;
     ObjectNames names;
     if (!read_words(options, false, node, names, nullptr)) return 1;
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     std::vector<PdoSettings> pdos;
     if (!read_pdos(station, options, node, names, pdos)) return 1;
@@ -75,7 +75,7 @@ int run_can_pdo_show(const PdoShowOptions& options) {
 
 namespace {
 
-/// One write of a re-mapping, and what it is for.
+/// One write of a re-mapping, and its purpose.
 struct Step {
     std::uint16_t index;
     std::uint8_t sub;
@@ -84,22 +84,22 @@ struct Step {
     std::string what;
 };
 
-/// The order of CiA 301: off, mapping off, the entries, mapping on, the parameters, and then on again.
+/// Returns the writes in the order of CiA 301: PDO off, mapping off, the entries, mapping on, the parameters, PDO on.
 std::vector<Step> steps_to(const PdoSettings& p, std::uint32_t old_cob) {
     const std::uint16_t communication = p.communication_index(), mapping = p.mapping_index();
-    std::vector<Step> steps{{communication, 1, old_cob | canopen::cob_invalid, 4, "switch the PDO off"},
-                            {mapping, 0, 0, 1, "switch the mapping off"}};
+    std::vector<Step> steps{{communication, 1, old_cob | canopen::cob_invalid, 4, "disable the PDO"},
+                            {mapping, 0, 0, 1, "disable the mapping"}};
     for (std::size_t n = 0; n < p.mapping.size(); ++n)
         steps.push_back({mapping, static_cast<std::uint8_t>(n + 1), p.mapping[n].entry(), 4, "map " + item_text(p.mapping[n])});
-    steps.push_back({mapping, 0, static_cast<std::uint32_t>(p.mapping.size()), 1, "switch the mapping on"});
+    steps.push_back({mapping, 0, static_cast<std::uint32_t>(p.mapping.size()), 1, "enable the mapping"});
     steps.push_back({communication, 2, p.transmission, 1, fmt::format("set the transmission type {}", p.transmission)});
     if (p.has_inhibit) steps.push_back({communication, 3, p.inhibit_100us, 2, "set the inhibit time"});
     if (p.has_event) steps.push_back({communication, 5, p.event_ms, 2, "set the event timer"});
-    steps.push_back({communication, 1, p.cob, 4, p.on() ? "switch the PDO on" : "set the identifier"});
+    steps.push_back({communication, 1, p.cob, 4, p.on() ? "enable the PDO" : "set the identifier"});
     return steps;
 }
 
-bool write_steps(Station& station, std::uint8_t node, const std::vector<Step>& steps, const Step*& failed, SdoRequest& last) {
+bool write_steps(NodeClient& station, std::uint8_t node, const std::vector<Step>& steps, const Step*& failed, SdoRequest& last) {
     for (const Step& step : steps) {
         std::uint8_t bytes[4];
         canopen::store(bytes, step.value);
@@ -111,15 +111,15 @@ bool write_steps(Station& station, std::uint8_t node, const std::vector<Step>& s
     return true;
 }
 
-/// How many bits an object has: as typed, as described, or as the node answers.
-bool parse_item(Station& station, std::uint8_t node, const ObjectNames& names, const std::string& word, PdoSettings::Item& item,
+/// Determines the length of an object in bits: as typed, as described, or as read from the node.
+bool parse_item(NodeClient& station, std::uint8_t node, const ObjectNames& names, const std::string& word, PdoSettings::Item& item,
                 std::string& problem) {
-    // A name may have a slash in it; only digits behind the last one are a length.
+    // A name may contain a slash; only digits after the last one are a length.
     const auto slash = word.rfind('/');
     unsigned bits = 0;
     const bool sized = slash != word.npos && slash + 1 < word.size() &&
                        std::from_chars(word.data() + slash + 1, word.data() + word.size(), bits).ptr == word.data() + word.size();
-    if (sized && (bits < 1 || bits > 64)) return problem = fmt::format("'{}': an object in a PDO has 1 to 64 bits", word), false;
+    if (sized && (bits < 1 || bits > 64)) return problem = fmt::format("invalid length in '{}'; an object in a PDO has 1..64 bits", word), false;
     if (!names.find(sized ? word.substr(0, slash) : word, item.object, problem)) return false;
     item.bits = bits;
     if (item.bits == 0) item.bits = canopen::bits_of(item.object.type);
@@ -128,7 +128,7 @@ bool parse_item(Station& station, std::uint8_t node, const ObjectNames& names, c
     std::uint8_t room[8];
     SdoRequest request{.index = item.object.index, .sub = item.object.sub, .upload = true, .buffer = room};
     if (station.transfer(node, request) && request.size > 0) return item.bits = static_cast<unsigned>(request.size) * 8, true;
-    return problem = fmt::format("how long {0} is cannot be read ({1}); write it in bits: {2:04X}:{3:X}/16", item.object.label(),
+    return problem = fmt::format("cannot read the length of {0} ({1}); write it in bits: {2:04X}:{3:X}/16", item.object.label(),
                                  canopen::to_string(request.abort), item.object.index, item.object.sub),
            false;
 }
@@ -140,31 +140,31 @@ bool take_options(const PdoMapOptions& options, PdoSettings& p) {
         can::Filter id;
         std::string why;
         if (options.id.find('/') != std::string::npos || !parse_filter(options.id, id, why))
-            return problem(fmt::format("'{}' is no identifier; write it in hex: 181, or eight digits for an extended one", options.id));
+            return problem(fmt::format("invalid identifier '{}'; write it in hex: 181, or eight digits for an extended one", options.id));
         p.cob = id.id | (id.extended ? canopen::cob_extended : 0) | (p.cob & canopen::cob_flag30);
     }
     if (options.inhibit_ns >= 0) {
         if (p.received || !p.has_inhibit) return problem(p.name() + " has no inhibit time");
-        if (options.inhibit_ns > 6'553'500'000) return problem("an inhibit time is at most 6.5535 s");
+        if (options.inhibit_ns > 6'553'500'000) return problem("inhibit time out of range; at most 6.5535 s");
         p.inhibit_100us = static_cast<std::uint16_t>((options.inhibit_ns + 50'000) / 100'000);
     }
     if (options.event_ns >= 0) {
         if (!p.has_event) return problem(p.name() + " has no event timer");
-        if (options.event_ns > 65'535'000'000) return problem("an event timer is at most 65.535 s");
+        if (options.event_ns > 65'535'000'000) return problem("event timer out of range; at most 65.535 s");
         p.event_ms = static_cast<std::uint16_t>((options.event_ns + 500'000) / 1'000'000);
     }
     return true;
 }
 
-/// Reads the PDO of the words. False after saying why not.
-bool present(Station& station, const Options& options, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {
+/// Reads the PDO given by the words. Returns false after printing the reason.
+bool present(NodeClient& station, const Options& options, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {
     const Abort why = read_pdo(station, node, names, p);
     if (why == Abort::none) return true;
     SdoRequest request{.index = p.communication_index(), .sub = 1};
     request.abort = why, request.aborted_by_server = why != Abort::timeout;
     if (why == Abort::no_object || why == Abort::no_sub)
         return fail(options,
-                    fmt::format("node {} has no {}; hal can pdo show {} {} shows those it has", node, p.name(), options.words[0], node)),
+                    fmt::format("node {} has no {}; to list its PDOs: hal can pdo show {} {}", node, p.name(), options.words[0], node)),
                false;
     return station.fail_transfer(node, request, ObjectName{p.communication_index(), 1, {}, {}}.label()), false;
 }
@@ -176,7 +176,7 @@ int run_can_pdo_map(const PdoMapOptions& options) {
     ObjectNames names;
     PdoSettings before;
     if (!read_words(options, true, node, names, &before)) return 1;
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0]) || !present(station, options, node, names, before)) return 1;
     PdoSettings after = before;
     std::string problem;
@@ -187,12 +187,12 @@ int run_can_pdo_map(const PdoMapOptions& options) {
         after.mapping.push_back(std::move(item));
     }
     if (after.bits() > 64)
-        return fail(options, fmt::format("these are {} bits, and a PDO holds 64; map {} bits less, or use a second PDO", after.bits(),
+        return fail(options, fmt::format("mapping too long: {} bits, a PDO holds 64; map {} bits less, or use a second PDO", after.bits(),
                                          after.bits() - 64));
     if (!take_options(options, after)) return 1;
     after.cob &= ~canopen::cob_invalid;
     if (canopen::cob_id(after.cob) == 0)
-        return fail(options, fmt::format("{} has no identifier yet; add --id, such as --id {:X}", after.name(),
+        return fail(options, fmt::format("{} has no identifier; add --id, such as --id {:X}", after.name(),
                                          (after.received ? 0x200U : 0x180U) + node));
     SdoRequest last;
     const Step* failed = nullptr;
@@ -201,20 +201,20 @@ int run_can_pdo_map(const PdoMapOptions& options) {
         const std::string step = fmt::format("{:04X}:{:X} (to {})", failed->index, failed->sub, failed->what);
         const int status = station.fail_transfer(node, last, step);
         const bool restored = !station.bus.stop.requested() && write_steps(station, node, back, failed, last);
-        return fail(options, restored ? fmt::format("{} is as it was before", before.name())
-                                      : fmt::format("{} may be off now: hal can pdo show", before.name())),
+        return fail(options, restored ? fmt::format("{} restored", before.name())
+                                      : fmt::format("{} may be disabled now; to check: hal can pdo show", before.name())),
                status;
     }
     PdoSettings now = after;
     if (const Abort why = read_pdo(station, node, names, now); why != Abort::none)
-        return fail(options, "what was written cannot be read back");
+        return fail(options, "cannot read back the written values");
     const auto entries = [](const PdoSettings& p) {
         std::vector<std::uint32_t> all;
         for (const auto& item : p.mapping) all.push_back(item.entry());
         return all;
     };
     if (entries(now) != entries(after) || now.transmission != after.transmission || now.cob != after.cob)
-        return print(lines_of(now)), fail(options, "the node took every value but has others now: this is how it is");
+        return print(lines_of(now)), fail(options, "the node accepted every write but has other values now, as shown");
     return print(lines_of(now)) ? 0 : 1;
 }
 
@@ -225,11 +225,11 @@ int set_on(const PdoSwitchOptions& options, bool on) {
     ObjectNames names;
     PdoSettings p;
     if (!read_words(options, true, node, names, &p)) return 1;
-    if (options.words.size() > 3) return fail(options, fmt::format("nothing is expected at '{}'", options.words[3]));
-    Station station(options, options.timeout_ns);
+    if (options.words.size() > 3) return fail(options, fmt::format("unexpected argument '{}'", options.words[3]));
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0]) || !present(station, options, node, names, p)) return 1;
     if (on && canopen::cob_id(p.cob) == 0)
-        return fail(options, fmt::format("{0} has no identifier yet; type: hal can pdo map {1} {2} {3} --id {4:X}", p.name(),
+        return fail(options, fmt::format("{0} has no identifier; type: hal can pdo map {1} {2} {3} --id {4:X}", p.name(),
                                          options.words[0], node, options.words[2], (p.received ? 0x200U : 0x180U) + node));
     std::uint8_t bytes[4];
     canopen::store(bytes, on ? p.cob & ~canopen::cob_invalid : p.cob | canopen::cob_invalid);
@@ -238,7 +238,7 @@ int set_on(const PdoSwitchOptions& options, bool on) {
     return station.fail_transfer(node, request, ObjectName{p.communication_index(), 1, {}, {}}.label());
 }
 
-/// A value out of a frame, lowest bit first.
+/// Extracts a value from a frame, lowest bit first.
 std::vector<std::uint8_t> field(const can::Frame& f, unsigned first, unsigned bits) {
     std::vector<std::uint8_t> bytes((bits + 7) / 8);
     for (unsigned n = 0; n < bits; ++n)
@@ -274,18 +274,18 @@ int run_can_pdo_watch(const PdoWatchOptions& options) {
     std::uint8_t node = 0;
     ObjectNames names;
     if (!read_words(options, false, node, names, nullptr)) return 1;
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     std::vector<PdoSettings> pdos;
     if (station.bus.is_capture()) {
         pdos = described_pdos(names, node);
         if (pdos.empty())
-            return fail(options, "a capture cannot be asked which PDOs the node has; add --eds FILE, an EDS or DCF with them");
+            return fail(options, "cannot read the PDOs of a node from a capture; add --eds FILE, an EDS or DCF that describes them");
     } else if (!read_pdos(station, options, node, names, pdos)) {
         return 1;
     }
     std::erase_if(pdos, [](const PdoSettings& p) { return !p.on(); });
-    if (pdos.empty()) return fail(options, fmt::format("all PDOs of node {} are off; hal can pdo enable switches them on", node));
+    if (pdos.empty()) return fail(options, fmt::format("all PDOs of node {} are disabled; to enable one: hal can pdo enable", node));
     station.bus.announce(options);
     std::uint64_t seen = 0;
     std::int64_t first = 0;

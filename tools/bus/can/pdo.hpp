@@ -11,10 +11,10 @@ namespace hal::tools {
 
 struct PdoOptions : Options {
     std::string eds;              ///< names and types of the objects
-    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+    std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE", "the bus; a node 1-127");
+        set.words("ADDRESS NODE", "the bus; node ID 1..127");
         declare_eds(set, eds);
         declare_timeout(set, timeout_ns);
     }
@@ -25,30 +25,30 @@ struct PdoShowOptions : PdoOptions {
 
     void declare(OptionSet& set) override {
         PdoOptions::declare(set);
-        set.flag("--json", json, "as JSON, a line per PDO");
+        set.flag("--json", json, "print JSON, a line per PDO");
     }
 };
 
 struct PdoSwitchOptions : PdoOptions {
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE PDO", "the bus; a node 1-127; rpdo1 … or tpdo1 …");
+        set.words("ADDRESS NODE PDO", "the bus; node ID 1..127; rpdo1 … or tpdo1 …");
         declare_timeout(set, timeout_ns);
     }
 };
 
 struct PdoMapOptions : PdoOptions {
-    int transmission = -1;  ///< -1, here and below: as it is
-    std::string id;         ///< empty: as it is
+    int transmission = -1;  ///< -1, here and below: unchanged
+    std::string id;         ///< empty: unchanged
     std::int64_t inhibit_ns = -1, event_ns = -1;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE PDO OBJECT", "the bus; a node 1-127; rpdo1 … or tpdo1 …; what it carries: INDEX:SUB or a name, with /BITS where the length is not known");
+        set.words("ADDRESS NODE PDO OBJECT", "the bus; node ID 1..127; rpdo1 … or tpdo1 …; mapped objects: INDEX:SUB or a name, with /BITS if the length is unknown");
         declare_eds(set, eds);
         declare_timeout(set, timeout_ns);
-        set.value("--transmission", transmission, "N", "type: 0 SYNC after an event, 1-240 every n-th SYNC, 252, 253 on request, 254, 255 on event").in(0, 255);
-        set.value("--id", id, "ID", "identifier in hex; without it, as it is");
-        set.duration("--inhibit", inhibit_ns, "of a TPDO: at least so long between two");
-        set.duration("--event", event_ns, "event timer: a TPDO is sent, an RPDO expected that often");
+        set.value("--transmission", transmission, "N", "transmission type: 0 SYNC after an event, 1..240 every n-th SYNC, 252, 253 on request, 254, 255 on event").in(0, 255);
+        set.value("--id", id, "ID", "identifier in hex (default: unchanged)");
+        set.duration("--inhibit", inhibit_ns, "TPDO inhibit time, the minimum interval: 1ms, 500us …");
+        set.duration("--event", event_ns, "event timer: maximum interval of a TPDO, deadline of an RPDO");
     }
 };
 
@@ -58,8 +58,8 @@ struct PdoWatchOptions : PdoShowOptions {
 
     void declare(OptionSet& set) override {
         PdoShowOptions::declare(set);
-        set.for_how_long(for_ns, "end after 2s, 500ms …; without it: until Ctrl-C");
-        set.value("-n,--count", count, "N", "end after so many PDOs");
+        set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
+        set.value("-n,--count", count, "N", "end after N PDOs");
     }
 };
 

@@ -14,16 +14,16 @@ using canopen::SdoRequest;
 
 namespace {
 
-/// Where a value of an object comes from: the node, or its description. False: there is none.
+/// Reads a value from the node, or from its description. Returns false when there is none.
 using Source = std::function<Abort(std::uint16_t index, std::uint8_t sub, std::uint32_t& value)>;
 
-Source of_node(Station& station, std::uint8_t node) {
+Source of_node(NodeClient& station, std::uint8_t node) {
     return [&station, node](std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
         std::uint8_t room[8] = {};
         SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = room};
         station.transfer(node, request);
         value = canopen::load<std::uint32_t>(room);
-        // Silence has to be told from a refusal.
+        // A missing response is not an abort.
         return request.ok() || request.aborted_by_server ? request.abort : Abort::timeout;
     };
 }
@@ -82,7 +82,7 @@ std::string PdoSettings::identifier() const {
 }
 std::string PdoSettings::timing() const {
     std::string text;
-    if (transmission <= 240 && received) text = "taken over at the SYNC";
+    if (transmission <= 240 && received) text = "applied at the SYNC";
     else if (transmission == 0) text = "at the SYNC after an event";
     else if (transmission == 1) text = "every SYNC";
     else if (transmission <= 240) text = fmt::format("every {} SYNCs", transmission);
@@ -90,7 +90,7 @@ std::string PdoSettings::timing() const {
     else if (transmission == 253) text = "on request";
     else if (transmission >= 254) text = received ? "at once" : "on event";
     else text = fmt::format("type {}", transmission);
-    if (inhibit_100us != 0 && !received) text += fmt::format(", {:g} ms apart", inhibit_100us / 10.0);
+    if (inhibit_100us != 0 && !received) text += fmt::format(", inhibit time {:g} ms", inhibit_100us / 10.0);
     if (event_ms != 0) text += received ? fmt::format(", at least every {} ms", event_ms) : fmt::format(" or after {} ms", event_ms);
     if (sync_start != 0) text += fmt::format(", from SYNC {}", sync_start);
     return text;
@@ -105,11 +105,11 @@ bool parse_pdo(const std::string& text, PdoSettings& p) {
            p.number <= 512;
 }
 
-Abort read_pdo(Station& station, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {
+Abort read_pdo(NodeClient& station, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {
     return fill(of_node(station, node), names, p);
 }
 
-bool read_pdos(Station& station, const Options& options, std::uint8_t node, const ObjectNames& names, std::vector<PdoSettings>& out) {
+bool read_pdos(NodeClient& station, const Options& options, std::uint8_t node, const ObjectNames& names, std::vector<PdoSettings>& out) {
     const auto take = [&](bool received, unsigned number, bool& there) {
         PdoSettings p;
         p.received = received, p.number = number;
@@ -129,7 +129,7 @@ bool read_pdos(Station& station, const Options& options, std::uint8_t node, cons
                 if (object.index >= base && object.index < base + 512 && !take(received, object.index - base + 1, there)) return false;
             continue;
         }
-        // Without a description: from the first one of each axis (they are 64 apart) on, until four in a row are missing.
+        // Without a description: from the first PDO of each axis (they are 64 apart) until four consecutive ones are missing.
         for (unsigned axis = 0; axis < 512; axis += 64)
             for (unsigned n = 1, missing = 0; n <= 64 && missing < (axis == 0 ? 4U : 1U); ++n) {
                 if (!take(received, axis + n, there)) return false;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// How the PDOs of a node are set up, as the node itself or its EDS says.
+// The settings of PDOs, as read from the node or its EDS.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "bus/can/objects.hpp"
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 
 namespace hal::tools {
 
@@ -36,13 +36,13 @@ struct PdoSettings {
     std::string timing() const;    ///< "every SYNC", "on event, at most every 10 ms"
 };
 
-/// `rpdo1`, `TPDO12`. False when it is none.
+/// Parses `rpdo1`, `TPDO12`. Returns false for an invalid one.
 bool parse_pdo(const std::string& text, PdoSettings&);
-/// Reads one from the node. Abort::no_object: it has no such PDO.
-canopen::Abort read_pdo(Station&, std::uint8_t node, const ObjectNames&, PdoSettings&);
-/// All of a node. False after saying why.
-bool read_pdos(Station&, const Options&, std::uint8_t node, const ObjectNames&, std::vector<PdoSettings>&);
-/// As the EDS or DCF has them, for a node that cannot be asked.
+/// Reads a PDO from the node. Abort::no_object: no such PDO.
+canopen::Abort read_pdo(NodeClient&, std::uint8_t node, const ObjectNames&, PdoSettings&);
+/// Reads all PDOs of a node. Returns false after printing the reason.
+bool read_pdos(NodeClient&, const Options&, std::uint8_t node, const ObjectNames&, std::vector<PdoSettings>&);
+/// Returns the PDOs of the EDS or DCF, for a node that cannot be read.
 std::vector<PdoSettings> described_pdos(const ObjectNames&, std::uint8_t node);
 
 }  // namespace hal::tools

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal canopen plan`: what a configuration puts on the bus, and whether each message arrives in time. `hal canopen check`: what is wrong
-// in it, and the pins it makes.
+// `hal canopen plan`: schedulability of a configuration, the worst-case response time of each message. `hal canopen check`: checks a
+// configuration and lists its pins.
 #include "bus/can/plan.hpp"
 
 #include <algorithm>
@@ -30,8 +30,8 @@ struct Row {
 
 struct Table {
     plan::Bus bus;
-    std::vector<Row> rows;  ///< the most important first
-    std::string per_sync;   ///< what goes with a SYNC; empty: there is none
+    std::vector<Row> rows;  ///< highest priority first
+    std::string per_sync;   ///< frames of a SYNC; empty: no SYNC
 };
 
 Table table_of(const config::Schedule& schedule) {
@@ -46,7 +46,7 @@ Table table_of(const config::Schedule& schedule) {
     return table;
 }
 
-/// Milliseconds, so that a column can be compared.
+/// Formats milliseconds with fixed digits, for columns.
 std::string ms(std::int64_t ns) { return ns < 0 ? "endless" : fmt::format("{:.3f}", static_cast<double>(ns) / 1e6); }
 
 std::string id_of(const plan::Message& m) { return fmt::format("{:0{}X}", m.id, m.extended ? 8 : 3); }
@@ -70,7 +70,7 @@ std::string table_text(const Table& table, const plan::Analysis& a) {
            fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits\n", table.rows.size(), table.bus.bit_rate, 100 * a.load);
 }
 
-/// The arithmetic of one that is late.
+/// Explains the response time of a late message.
 std::string why_late(const Table& table, const std::vector<plan::Message>& messages, const plan::Analysis& a, std::size_t i) {
     const plan::Response& r = a.responses[i];
     const Row& row = table.rows[i];
@@ -79,11 +79,11 @@ std::string why_late(const Table& table, const std::vector<plan::Message>& messa
         for (std::size_t k = 0; k < messages.size(); ++k)
             if (k == i || plan::before(messages[k], messages[i]))
                 use += static_cast<double>(a.responses[k].frame) / static_cast<double>(messages[k].period);
-        return fmt::format("{} may wait for ever: with what goes before it it needs {:.1f} % of the bus's time", called(row), 100 * use);
+        return fmt::format("{} may never be sent: with the messages before it, it needs {:.1f} % of the bus time", called(row), 100 * use);
     }
-    std::string text = fmt::format("{} needs {} ms and has {} ms:", called(row), ms(r.worst), ms(row.message.limit()));
-    if (r.blocker) text += fmt::format(" {} for {} already on the wire +", ms(r.blocking), id_of(messages[*r.blocker]));
-    if (r.instance > 0) text += fmt::format(" {} for {} of its own before it +", ms(r.instance * r.frame), r.instance);
+    std::string text = fmt::format("{} needs {} ms, deadline {} ms:", called(row), ms(r.worst), ms(row.message.limit()));
+    if (r.blocker) text += fmt::format(" {} for {} already on the bus +", ms(r.blocking), id_of(messages[*r.blocker]));
+    if (r.instance > 0) text += fmt::format(" {} for {} earlier instances of itself +", ms(r.instance * r.frame), r.instance);
     for (std::size_t k = 0; k < messages.size(); ++k) {
         if (k == i || !plan::before(messages[k], messages[i])) continue;
         const std::int64_t times = plan::times_before(messages[k], r.queued, table.bus);
@@ -95,14 +95,14 @@ std::string why_late(const Table& table, const std::vector<plan::Message>& messa
     return text;
 }
 
-/// What to change, best first.
+/// Suggests changes, best first.
 std::string help_text(const Table& table, const std::vector<plan::Message>& messages) {
     std::string text;
     if (const auto rate = plan::sufficient_bit_rate(messages, table.bus))
-        text += fmt::format("  = help: with bitrate = {} everything is in time\n",
+        text += fmt::format("  = help: with bitrate = {} every message meets its deadline\n",
                             *rate == 1'000'000 ? "1M" : fmt::format("{}k", *rate / 1000));
     if (const auto order = plan::sufficient_order(messages, table.bus); !order.empty()) {
-        text += "  = help: in this order of identifiers, lowest first, everything is in time:";
+        text += "  = help: with identifiers in this order, lowest first, every message meets its deadline:";
         for (const std::size_t i : order) text += fmt::format(" {}", id_of(messages[i]));
         text += "\n";
     }
@@ -111,9 +111,9 @@ std::string help_text(const Table& table, const std::vector<plan::Message>& mess
         for (plan::Message& m : slower) m.deadline = m.limit(), m.period = m.period * percent / 100;
         if (!plan::analyse(slower, table.bus).fits) continue;
         return text +
-               fmt::format("  = help: with every period {} % longer and the deadlines as they are, everything is in time\n", percent - 100);
+               fmt::format("  = help: with every period {} % longer and unchanged deadlines, every message meets its deadline\n", percent - 100);
     }
-    return text + "  = help: put several values into one message, take messages away, or use a second bus\n";
+    return text + "  = help: combine values in one message, remove messages, or use a second bus\n";
 }
 
 std::string json_text(const Table& table, const plan::Analysis& a) {
@@ -129,7 +129,7 @@ std::string json_text(const Table& table, const plan::Analysis& a) {
     return text + "]}\n";
 }
 
-/// The configuration, its errors and warnings said. 0: it can be used.
+/// Reads the configuration and prints its errors and warnings. Returns 0 when it is valid.
 int read_configuration(const Options& options, const std::string& file, config::Reading& reading) {
     std::string text;
     if (!config::read_from_disk(file, text)) return fail(options, fmt::format("cannot read '{}': {}", file, text));
@@ -171,7 +171,7 @@ std::string pin_text(const config::Node& node, const config::Object& object, boo
 
 std::string transmission_text(const config::Pdo& pdo) {
     if (pdo.multiplexed()) return "multiplexed: one object at a time, when it changes";
-    if (pdo.request != 0) return fmt::format("asked for every {} ms", pdo.request / canopen::millisecond);
+    if (pdo.request != 0) return fmt::format("requested every {} ms", pdo.request / canopen::millisecond);
     if (pdo.transmission == 0) return "with the SYNC when changed";
     if (pdo.transmission == 1) return "with every SYNC";
     if (pdo.transmission <= 240) return fmt::format("with every SYNC number {}", pdo.transmission);
@@ -185,7 +185,7 @@ std::string network_text(const std::string& file, const config::MasterConfig& c)
         text += fmt::format("node {} {}, {}\n", n.setup.id, n.name, n.setup.mandatory ? "mandatory" : "optional");
         for (const config::Pdo& p : n.pdos) {
             if (p.safety)
-                text += fmt::format("  {}{} {:X} and {:X}, {} bytes and the same inverted, every {} ms; SCT {} ms, SRVT {} ms\n",
+                text += fmt::format("  {}{} {:X} and {:X}, {} bytes plain and inverted, every {} ms; SCT {} ms, SRVT {} ms\n",
                                     p.to_node ? "rsrdo" : "tsrdo", p.number, p.cob, p.cob + 1, p.bytes(),
                                     p.safety->refresh / canopen::millisecond, p.safety->sct / canopen::millisecond,
                                     p.safety->srvt / canopen::millisecond);
@@ -208,10 +208,10 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
     config::Reading reading;
     if (const int status = read_configuration(options, file, reading); status != 0) return status;
     if (const std::string& link = reading.config.link; !can::describe(link).has_bit_rate)
-        return fail(options, fmt::format("the frames of {} travel on Ethernet ({}), where no identifier waits for another; who sends when says: "
+        return fail(options, fmt::format("{} uses Ethernet ({}), where identifiers do not arbitrate; for its schedule type: "
                                          "hal tdma plan FILE.tdma", file, link));
     const auto cycle = parse_duration_ns(options.cycle);
-    if (!cycle || *cycle < 1000) return fail(options, fmt::format("'{}' is no period of a thread; write --cycle 1ms", options.cycle));
+    if (!cycle || *cycle < 1000) return fail(options, fmt::format("invalid --cycle '{}'; write --cycle 1ms", options.cycle));
     const Table table = table_of(config::schedule_of(reading.config, *cycle));
     std::vector<plan::Message> messages;
     for (const Row& row : table.rows) messages.push_back(row.message);
@@ -225,7 +225,7 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
             said += fmt::format("{}:{}: {}\n", file, table.rows[i].line, why_late(table, messages, a, i));
     if (late > 3) said += fmt::format("{}: {} more are late\n", file, late - 3);
     if (reading.config.sync != config::SyncMode::none && reading.config.sync_period == 0)
-        said += fmt::format("  = help: the SYNC comes with each cycle of the thread, here taken as {}; for another period add: --cycle 2ms\n", options.cycle);
+        said += fmt::format("  = help: the SYNC is sent every cycle of the thread, assumed to be {}; for another period add: --cycle 2ms\n", options.cycle);
     write_all(STDERR_FILENO, said + help_text(table, messages));
     return 1;
 }

@@ -12,9 +12,9 @@ struct CanopenPlanOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "the configuration of the network, NAME.canopen");
-        set.value("--cycle", cycle, "TIME", "the period of the master's thread, where the SYNC comes with every cycle (default 1ms)");
-        set.flag("--json", json, "as JSON");
+        set.words("FILE", "configuration of the network, NAME.canopen");
+        set.value("--cycle", cycle, "TIME", "period of the master's thread, for a SYNC in every cycle (default 1ms)");
+        set.flag("--json", json, "print JSON");
     }
 };
 

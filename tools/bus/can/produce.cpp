@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can generate`: traffic to load a bus with. `hal can produce`: what a master sends periodically: heartbeat, SYNC, guarding.
+// `hal can generate`: generates bus load. `hal can produce`: sends the periodic frames of a master: heartbeat, SYNC, guarding.
 #include "bus/can/produce.hpp"
 
 #include <charconv>
@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "bus/can/bus.hpp"
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 #include "canopen/protocol/numbers.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
@@ -17,12 +17,12 @@ namespace hal::tools {
 
 namespace {
 
-/// Sends what `next` makes, `every` apart, until the time or the count is over or somebody ends it.
+/// Sends the frames of `next` every `every` until the time or count is reached or a signal arrives.
 int send_periodically(Bus& bus, const PeriodicOptions& options, std::int64_t every, const std::function<can::Frame(std::uint64_t)>& next) {
     std::uint64_t wanted = 0;
     const std::int64_t began = now_ns();
     for (std::int64_t due = began;;) {
-        send_patiently(bus, next(wanted));
+        send_with_timeout(bus, next(wanted));
         bus.link->flush(can::unclocked);
         ++wanted;
         due += every;
@@ -36,7 +36,7 @@ int send_periodically(Bus& bus, const PeriodicOptions& options, std::int64_t eve
     return status;
 }
 
-/// `181` or `100-1FF`, hexadecimal.
+/// Parses `181` or `100-1FF`, hexadecimal.
 bool parse_range(const std::string& text, std::uint32_t most, std::uint32_t& first, std::uint32_t& last) {
     const char* const end = text.data() + text.size();
     const auto one = std::from_chars(text.data(), end, first, 16);
@@ -59,7 +59,7 @@ int run_can_generate(const GenerateOptions& options) {
     std::uint32_t first = 0, last = most;
     if (!options.id.empty() && !parse_range(options.id, most, first, last))
         return fail(options, fmt::format("invalid --id '{}'; write an identifier or a range in hex, at most {:X}: 181 or 100-1FF", options.id, most));
-    if (options.length > 8) return fail(options, fmt::format("invalid --length {}; write 0 to 8", options.length));
+    if (options.length > 8) return fail(options, fmt::format("invalid --length {}; write 0..8", options.length));
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
     std::mt19937_64 random(options.seed >= 0 ? static_cast<std::uint64_t>(options.seed) : std::random_device{}());
@@ -80,17 +80,17 @@ int run_can_produce(const ProduceOptions& options) {
     const std::string kind = options.words.size() > 1 ? options.words[1] : "";
     if (kind != "heartbeat" && kind != "sync" && kind != "guarding") {
         const std::string hint = did_you_mean(kind, kinds);
-        return fail(options, kind.empty() ? "what shall be produced? type: hal can produce ADDRESS heartbeat NODE | sync | guarding NODE"
-                                          : fmt::format("unknown '{}'; {}", kind, hint.empty() ? "there are heartbeat, sync and guarding" : hint));
+        return fail(options, kind.empty() ? "missing KIND; type: hal can produce ADDRESS heartbeat NODE | sync | guarding NODE"
+                                          : fmt::format("unknown kind '{}'; {}", kind, hint.empty() ? "write heartbeat, sync or guarding" : hint));
     }
     std::uint8_t node = 0;
     const bool of_node = kind != "sync";
     if (options.words.size() != (of_node ? 3U : 2U))
-        return fail(options, of_node ? fmt::format("the node is missing or too much follows; type: hal can produce ADDRESS {} NODE", kind)
-                                     : fmt::format("nothing is expected at '{}'; a SYNC has no node", options.words[2]));
+        return fail(options, of_node ? fmt::format("expected one node; type: hal can produce ADDRESS {} NODE", kind)
+                                     : fmt::format("unexpected argument '{}'; a SYNC has no node", options.words[2]));
     if (of_node && !node_of(options, options.words[2], node)) return 1;
-    if (options.counter > 240 || options.counter == 1) return fail(options, fmt::format("invalid --counter {}; write 2 to 240", options.counter));
-    if (options.counter != 0 && of_node) return fail(options, "--counter belongs to sync");
+    if (options.counter > 240 || options.counter == 1) return fail(options, fmt::format("invalid --counter {}; write 2..240", options.counter));
+    if (options.counter != 0 && of_node) return fail(options, "--counter is valid with sync only");
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
     const std::int64_t usual = kind == "sync" ? 10'000'000 : 100'000'000;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can read-all`: every object of a node that its description lists, read-only ones too; refusals in words.
+// `hal can read-all`: reads every object that the description of a node lists, with the reason of each abort.
 #include "bus/can/read_all.hpp"
 
 #include <fmt/core.h>
@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "bus/can/objects.hpp"
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 #include "cli/output.hpp"
 
 namespace hal::tools {
@@ -16,7 +16,7 @@ namespace {
 
 namespace eds = canopen::eds;
 
-/// One object as it was read, or why not.
+/// The result of reading an object.
 struct ReadObject {
     ObjectName object;
     std::string_view access;
@@ -31,7 +31,7 @@ struct ReadObject {
     std::string table_line() const {
         const std::string why = reason();
         return why.empty() ? fmt::format("{} = {}\n", object.label(), value_text(bytes, object.type))
-                           : fmt::format("{}: {}: {}\n", object.label(), asked ? "refused" : "not read", why);
+                           : fmt::format("{}: {}: {}\n", object.label(), asked ? "rejected" : "not read", why);
     }
     std::string csv_line() const {
         std::string value = reason().empty() ? value_json(bytes, object.type) : "";
@@ -52,7 +52,7 @@ struct ReadObject {
     }
 
 private:
-    /// RFC 4180: in quotation marks where it has to be.
+    /// Quotes a field if necessary (RFC 4180).
     static std::string quoted(std::string_view text) {
         if (text.find_first_of(",\"\r\n") == text.npos) return std::string(text);
         std::string out = "\"";
@@ -64,14 +64,14 @@ private:
 }  // namespace
 
 int run_can_read_all(const ReadAllOptions& options) {
-    constexpr std::size_t most_bytes = 64 << 20;  // of one object; taken from the system only as far as it is filled
-    if (options.words.size() != 2) return fail(options, "two words are needed; type: hal can read-all ADDRESS NODE --eds FILE");
+    constexpr std::size_t most_bytes = 64 << 20;  // of one object; memory is used only as far as it is filled
+    if (options.words.size() != 2) return fail(options, "expected ADDRESS NODE; type: hal can read-all ADDRESS NODE --eds FILE");
     if (options.eds.empty()) return fail(options, "missing --eds FILE: the description lists the objects of the node");
     if (options.json && !options.output.empty()) return fail(options, "--json and -o exclude each other: -o writes CSV");
     std::uint8_t node = 0;
     ObjectNames names;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
     std::string csv = "index,sub,name,type,access,value,data,reason\r\n";
@@ -96,7 +96,7 @@ int run_can_read_all(const ReadAllOptions& options) {
     if (!options.output.empty())
         if (const std::string wrong = write_file(options.output, csv); !wrong.empty())
             return fail(options, fmt::format("cannot write '{}': {}", options.output, wrong));
-    const std::string sum = fmt::format("{} objects of node {} read, {} refused, {} write-only\n", read, node, refused, write_only);
+    const std::string sum = fmt::format("{} objects of node {} read, {} rejected, {} write-only\n", read, node, refused, write_only);
     if (!options.output.empty()) return print(options.output + ": " + sum) ? 0 : 1;
     return write_all(STDERR_FILENO, sum), 0;
 }

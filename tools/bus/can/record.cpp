@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can record` and `hal can replay`: a bus into a file, and a file onto a bus.
+// `hal can record` and `hal can replay`: records a bus to a file, and sends a file to a bus.
 #include "bus/can/record.hpp"
 
 #include <cerrno>
@@ -16,15 +16,15 @@
 namespace hal::tools {
 
 int run_can_record(const CanRecordOptions& options) {
-    if (options.words.size() != 2) return fail(options, "two words are needed; type: hal can record ADDRESS FILE.log");
+    if (options.words.size() != 2) return fail(options, "expected ADDRESS FILE; type: hal can record ADDRESS FILE.log");
     const std::string& file = options.words[1];
     if (!file.ends_with(".log") && !file.ends_with(".pcapng"))
-        return fail(options, fmt::format("'{}' must end in .log (candump's form) or .pcapng (Wireshark)", file));
+        return fail(options, fmt::format("unknown format of '{}'; write a name that ends in .log (candump) or .pcapng (Wireshark)", file));
     Bus bus;
     if (!bus.open(options, options.words[0], true, options.filters)) return 1;
     std::string problem, channel = options.words[0].substr(0, options.words[0].find('?'));
     channel.erase(0, channel.find(':') + 1);
-    if (channel.empty() || channel.find_first_of("/: %[") != channel.npos) channel = "can0";  // candump's form has one word here
+    if (channel.empty() || channel.find_first_of("/: %[") != channel.npos) channel = "can0";  // the candump format has one word here
     const auto recorder = can::record(file, channel, problem);
     if (!recorder) return fail(options, problem);
     bus.announce(options);
@@ -42,24 +42,24 @@ int run_can_record(const CanRecordOptions& options) {
         return written = recorder->flush();
     });
     if (!written || !recorder->flush())
-        return fail(options, fmt::format("cannot write '{}': {}; the file ends with a whole frame", file, std::strerror(errno)));
+        return fail(options, fmt::format("cannot write '{}': {}; the file ends with the last complete frame", file, std::strerror(errno)));
     const can::Statistics s = bus.link->statistics();
     write_all(STDERR_FILENO, fmt::format("{} frame{} in {}, {} lost\n", frames, frames == 1 ? "" : "s", file, s.lost));
     return 0;
 }
 
 int run_can_replay(const CanReplayOptions& options) {
-    if (options.words.size() != 2) return fail(options, "two words are needed; type: hal can replay FILE ADDRESS");
+    if (options.words.size() != 2) return fail(options, "expected FILE ADDRESS; type: hal can replay FILE ADDRESS");
     if (!(options.speed > 0) || !std::isfinite(options.speed))
-        return fail(options, "--speed is a factor above 0: 1 as recorded, 2 twice as fast");
+        return fail(options, "invalid --speed; write a factor above 0: 1 as recorded, 2 twice as fast");
     const can::Capture capture = can::read_capture(options.words[0]);
     if (!capture.problem.empty()) return fail(options, fmt::format("{}: {}", options.words[0], capture.problem));
-    if (capture.frames.empty()) return fail(options, fmt::format("{}: there is no CAN frame in this file", options.words[0]));
+    if (capture.frames.empty()) return fail(options, fmt::format("{}: no CAN frames in this file", options.words[0]));
     bool fd = false;
     for (const can::Frame& f : capture.frames) fd = fd || f.fd;
     Bus bus;
     if (!bus.open(options, options.words[1], fd)) return 1;
-    if (bus.is_capture()) return fail(options, fmt::format("'{}' is no bus; a capture cannot be sent to", options.words[1]));
+    if (bus.is_capture()) return fail(options, fmt::format("cannot send to '{}': it is a capture", options.words[1]));
     const std::int64_t began = now_ns(), zero = capture.frames.front().time_ns;
     std::uint64_t sent = 0, skipped = 0;
     for (const can::Frame& f : capture.frames) {
@@ -71,7 +71,7 @@ int run_can_replay(const CanReplayOptions& options) {
         const std::int64_t left = began + static_cast<std::int64_t>(after < 9e17 ? after : 9e17) - now_ns();
         if (left > 0) bus.link->flush(can::unclocked);
         if (left > 0 ? bus.stop.wait_ns(left) : bus.stop.requested()) break;
-        send_patiently(bus, f);
+        send_with_timeout(bus, f);
         ++sent;
     }
     const int status = finish_sending(bus, options, sent);

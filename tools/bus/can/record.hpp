@@ -15,9 +15,9 @@ struct CanRecordOptions : Options {
     std::int64_t for_ns = -1;  ///< -1: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS FILE", "what to listen to; a .log file (candump's form) or a .pcapng file (Wireshark)");
+        set.words("ADDRESS FILE", "the bus; a .log file (candump) or a .pcapng file (Wireshark)");
         declare_filter(set, filters, count);
-        set.for_how_long(for_ns, "end after 2s, 500ms …; without it: until Ctrl-C");
+        set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
     }
 };
 
@@ -25,8 +25,8 @@ struct CanReplayOptions : Options {
     double speed = 1.0;
 
     void declare(OptionSet& set) override {
-        set.words("FILE ADDRESS", "a candump log, pcapng or pcap file; the bus its frames are sent to, at their times");
-        set.value("--speed", speed, "FACTOR", "so many times as fast (default 1)");
+        set.words("FILE ADDRESS", "a candump log, pcapng or pcap file; the bus to send its frames to, at their recorded times");
+        set.value("--speed", speed, "FACTOR", "replay speed (default 1: as recorded)");
     }
 };
 

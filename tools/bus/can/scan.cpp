@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can scan`: which CANopen nodes there are. All 127 are asked at once for type and identity while heartbeats are listened to.
+// `hal can scan`: finds CANopen nodes. All 127 are queried at once for type and identity while heartbeats are received.
 #include "bus/can/scan.hpp"
 
 #include <fmt/core.h>
@@ -20,7 +20,7 @@ namespace {
 struct Node {
     std::optional<canopen::NmtState> state;
     std::optional<std::uint32_t> type, identity[4];
-    std::string refused;  ///< why it does not tell its type
+    std::string refused;  ///< abort of the read of its type
     unsigned unasked = 0;
     bool booted = false;
 };
@@ -29,9 +29,9 @@ std::string cell(const std::optional<std::uint32_t>& value) { return value ? fmt
 std::string member(const std::optional<std::uint32_t>& value) { return value ? fmt::format("{}", *value) : "null"; }
 
 std::string remark(const Node& n) {
-    if (n.unasked > 1) return "answers more than once: do two nodes have this id?";
-    if (!n.refused.empty()) return "does not tell its type: " + n.refused;
-    if (!n.type) return "no answer to SDO requests";
+    if (n.unasked > 1) return "more than one response: possible duplicate node ID";
+    if (!n.refused.empty()) return "cannot read its type: " + n.refused;
+    if (!n.type) return "no response to SDO requests";
     return profile_name(*n.type);
 }
 
@@ -43,10 +43,10 @@ int run_can_scan(const ScanOptions& options) {
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
     std::map<unsigned, Node> nodes;
-    Reads reads;
+    ParallelReads reads;
     std::uint64_t heard = 0;
     for (std::uint8_t node = 1; node <= 127; ++node) reads.ask(node, 0x1000, 0);
-    reads.on_answer = [&](const Reads::Answer& a) {
+    reads.on_answer = [&](const ParallelReads::Answer& a) {
         Node& n = nodes[a.node];
         if (!a.asked) ++n.unasked;
         else if (a.index == 0x1000) {
@@ -73,8 +73,8 @@ int run_can_scan(const ScanOptions& options) {
     if (nodes.empty())
         return fail(
             options,
-            fmt::format("no node answered within {:g} s; the bus is {}, {} frames of others were heard; are bit rate and wiring right?",
-                        static_cast<double>(for_ns) / 1e9, can::word(s.state), heard));
+            fmt::format("no node responded within {:g} s; the bus is {}, {} frames of others received; check bit rate and wiring",
+                        static_cast<double>(for_ns) / 1e9, can::to_string(s.state), heard));
     std::string text;
     for (const auto& [id, n] : nodes) {
         const char* state =

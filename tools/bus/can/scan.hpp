@@ -13,8 +13,8 @@ struct ScanOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS", bus_address);
-        set.for_how_long(for_ns, "listen for 2s, 500ms … (default 1s); as long as the slowest heartbeat finds stopped nodes too");
-        set.flag("--json", json, "as JSON");
+        set.for_how_long(for_ns, "listen for 2s, 500ms … (default 1s); at least the slowest heartbeat period finds stopped nodes too");
+        set.flag("--json", json, "print JSON");
     }
 };
 

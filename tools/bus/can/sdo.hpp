@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The little that a scan needs of SDO: values of up to four bytes, read from many nodes side by side. This is the seam behind which the
-// protocol library's client can do the same.
+// A minimal SDO client for scans: reads values of up to four bytes from many nodes in parallel.
 #pragma once
 
 #include <array>
@@ -12,20 +11,20 @@
 
 namespace hal::tools {
 
-class Reads {
+class ParallelReads {
 public:
     struct Answer {
         std::uint8_t node = 0, sub = 0;
         std::uint16_t index = 0;
-        bool asked = true;          ///< false: nobody asked, or it was answered already
-        std::uint32_t abort = 0;    ///< not 0: why there is no value
+        bool asked = true;          ///< false: unsolicited, or a duplicate response
+        std::uint32_t abort = 0;    ///< abort code; 0: the value is valid
         std::uint32_t value = 0;
     };
     std::function<void(const Answer&)> on_answer;
 
-    /// Asks when all that was asked of this node before is answered.
+    /// Queues a read; it is sent when the earlier ones of this node are done.
     void ask(std::uint8_t node, std::uint16_t index, std::uint8_t sub);
-    /// Sends what can be sent now, at most `frames`.
+    /// Sends pending requests, at most `frames`.
     void poll(can::Link&, unsigned frames);
     void handle(const can::Frame&);
 
@@ -36,7 +35,7 @@ private:
     };
     struct Node {
         std::deque<Question> questions;
-        bool waits = false;  ///< for the answer to the first
+        bool waits = false;  ///< for the response to the first
     };
     std::array<Node, 128> nodes_;
 };

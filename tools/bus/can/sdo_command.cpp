@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// `hal can sdo read` and `hal can sdo write`: one object of a node, in its type.
+// `hal can sdo read` and `hal can sdo write`: reads or writes objects of a node by their types.
 #include "bus/can/sdo_command.hpp"
 
 #include <fmt/core.h>
 #include <memory>
 
 #include "bus/can/objects.hpp"
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 #include "cli/output.hpp"
 
 namespace hal::tools {
@@ -17,22 +17,22 @@ using canopen::Type;
 
 namespace {
 
-constexpr std::size_t most_bytes = 64 << 20;  // of one object; taken from the system only as far as it is filled
+constexpr std::size_t most_bytes = 64 << 20;  // of one object; memory is used only as far as it is filled
 
-struct Words {
+struct SdoTarget {
     std::uint8_t node = 0;
     std::optional<Type> type;
     ObjectNames names;
     SdoMode mode = SdoMode::automatic;
 };
 
-/// What both commands take, before the bus is opened.
-bool read_words(const SdoOptions& options, Words& words) {
-    if (!node_of(options, options.words[1], words.node) || !words.names.load(options, options.eds)) return false;
-    if (!options.type.empty() && !(words.type = parse_type(options.type)))
-        return fail(options, fmt::format("'{}' is no data type; there are {}", options.type, type_words())), false;
+/// Checks the options of both commands before the bus is opened.
+bool parse_target(const SdoOptions& options, SdoTarget& target) {
+    if (!node_of(options, options.words[1], target.node) || !target.names.load(options, options.eds)) return false;
+    if (!options.type.empty() && !(target.type = parse_type(options.type)))
+        return fail(options, fmt::format("invalid --type '{}'; write one of: {}", options.type, type_words())), false;
     if (options.block && options.segmented) return fail(options, "--block and --segmented exclude each other"), false;
-    words.mode = options.block ? SdoMode::block : options.segmented ? SdoMode::segmented : SdoMode::automatic;
+    target.mode = options.block ? SdoMode::block : options.segmented ? SdoMode::segmented : SdoMode::automatic;
     return true;
 }
 
@@ -52,24 +52,24 @@ std::string json_line(std::uint8_t node, const ObjectName& object, Type type, st
 }  // namespace
 
 int run_can_sdo_read(const SdoReadOptions& options) {
-    if (options.words.size() < 3) return fail(options, "three words are needed; type: hal can sdo read ADDRESS NODE OBJECT");
-    Words words;
-    if (!read_words(options, words)) return 1;
+    if (options.words.size() < 3) return fail(options, "expected ADDRESS NODE OBJECT; type: hal can sdo read ADDRESS NODE OBJECT");
+    SdoTarget target;
+    if (!parse_target(options, target)) return 1;
     std::vector<ObjectName> objects(options.words.size() - 2);
     std::string problem;
     for (std::size_t n = 0; n < objects.size(); ++n)
-        if (!words.names.find(options.words[n + 2], objects[n], problem)) return fail(options, problem);
-    if (!options.output.empty() && objects.size() != 1) return fail(options, "-o takes the bytes of one object; name only one");
-    Station station(options, options.timeout_ns);
+        if (!target.names.find(options.words[n + 2], objects[n], problem)) return fail(options, problem);
+    if (!options.output.empty() && objects.size() != 1) return fail(options, "-o writes the bytes of one object; name only one");
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
     for (const ObjectName& object : objects) {
-        SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .mode = words.mode, .buffer = {room.get(), most_bytes}};
-        if (!station.transfer(words.node, request)) return station.fail_transfer(words.node, request, object.label());
+        SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .mode = target.mode, .buffer = {room.get(), most_bytes}};
+        if (!station.transfer(target.node, request)) return station.fail_transfer(target.node, request, object.label());
         const std::span<const std::uint8_t> bytes(room.get(), request.size);
-        const Type type = words.type.value_or(object.type);
+        const Type type = target.type.value_or(object.type);
         if (!options.output.empty()) return save(options, bytes) ? 0 : 1;
-        if (!print(options.json ? json_line(words.node, object, type, bytes)
+        if (!print(options.json ? json_line(target.node, object, type, bytes)
                                 : fmt::format("{} = {}\n", object.label(), value_text(bytes, type))))
             return 1;
     }
@@ -78,8 +78,8 @@ int run_can_sdo_read(const SdoReadOptions& options) {
 
 namespace {
 
-/// The type of an object nobody has described: as wide as what it holds now, signed for a negative value.
-bool width_of(Station& station, std::uint8_t node, const ObjectName& object, const std::string& value, Type& type, std::string& problem) {
+/// Guesses the type of an object without a description: as wide as its present value, signed for a negative value.
+bool width_of(NodeClient& station, std::uint8_t node, const ObjectName& object, const std::string& value, Type& type, std::string& problem) {
     std::uint8_t room[64];
     SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .buffer = room};
     const bool read = station.transfer(node, request), negative = value.starts_with('-');
@@ -90,10 +90,10 @@ bool width_of(Station& station, std::uint8_t node, const ObjectName& object, con
     case 8: type = negative ? Type::integer64 : Type::unsigned64; return true;
     default: break;
     }
-    problem = read ? fmt::format("it holds {} bytes now", request.size)
-                   : fmt::format("it could not be read to see ({})", canopen::to_string(request.abort));
+    problem = read ? fmt::format("it has {} bytes now", request.size)
+                   : fmt::format("cannot read it ({})", canopen::to_string(request.abort));
     problem =
-        fmt::format("the type of {} is not known: {}; add --type, such as u16 or visible_string, or --eds FILE", object.label(), problem);
+        fmt::format("unknown type of {}: {}; add --type, such as u16 or visible_string, or --eds FILE", object.label(), problem);
     return false;
 }
 
@@ -103,13 +103,13 @@ int run_can_sdo_write(const SdoWriteOptions& options) {
     const bool from_file = !options.input.empty();
     if (options.words.size() != (from_file ? 3 : 4))
         return fail(options,
-                    "the value is missing or too many; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE for the value");
-    Words words;
-    if (!read_words(options, words)) return 1;
+                    "expected one value; type: hal can sdo write ADDRESS NODE OBJECT VALUE, or --from FILE in place of VALUE");
+    SdoTarget target;
+    if (!parse_target(options, target)) return 1;
     ObjectName object;
     std::string problem;
-    if (!words.names.find(options.words[2], object, problem)) return fail(options, problem);
-    Type type = words.type.value_or(object.type);
+    if (!target.names.find(options.words[2], object, problem)) return fail(options, problem);
+    Type type = target.type.value_or(object.type);
     std::vector<std::uint8_t> bytes;
     if (from_file) {
         std::string text;
@@ -118,14 +118,14 @@ int run_can_sdo_write(const SdoWriteOptions& options) {
     } else if (type != Type::none && !parse_value(options.words[3], type, bytes, problem)) {
         return fail(options, problem);
     }
-    Station station(options, options.timeout_ns);
+    NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     if (!from_file && type == Type::none) {
-        if (!width_of(station, words.node, object, options.words[3], type, problem)) return fail(options, problem);
+        if (!width_of(station, target.node, object, options.words[3], type, problem)) return fail(options, problem);
         if (!parse_value(options.words[3], type, bytes, problem)) return fail(options, problem);
     }
-    SdoRequest request{.index = object.index, .sub = object.sub, .mode = words.mode, .data = bytes};
-    if (!station.transfer(words.node, request)) return station.fail_transfer(words.node, request, object.label());
+    SdoRequest request{.index = object.index, .sub = object.sub, .mode = target.mode, .data = bytes};
+    if (!station.transfer(target.node, request)) return station.fail_transfer(target.node, request, object.label());
     return 0;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can sdo`: one object of a node, in its type.
+// `hal can sdo`: reads or writes objects of a node by their types.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@ struct SdoOptions : Options {
     std::string eds;   ///< names and types of the objects
     std::string type;  ///< empty: not given
     bool block = false, segmented = false;
-    std::int64_t timeout_ns = 0;  ///< of one answer; 0: not given
+    std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
 protected:
     void declare_transfer(OptionSet& set) {
         declare_eds(set, eds);
-        set.value("--type", type, "TYPE", "of the value: u8 … u64, i8 … i64, r32, r64, bool, visible_string, octet_string, domain");
-        set.flag("--block", block, "by block transfer, where the node knows it");
-        set.flag("--segmented", segmented, "never by block transfer");
+        set.value("--type", type, "TYPE", "type of the value: u8 … u64, i8 … i64, r32, r64, bool, visible_string, octet_string, domain");
+        set.flag("--block", block, "use block transfer, if the node supports it");
+        set.flag("--segmented", segmented, "do not use block transfer");
         declare_timeout(set, timeout_ns);
     }
 };
@@ -30,10 +30,10 @@ struct SdoReadOptions : SdoOptions {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE OBJECT", "the bus; a node 1-127; objects: INDEX:SUB in hex (6041, 1018:1) or names of the EDS");
+        set.words("ADDRESS NODE OBJECT", "the bus; node ID 1..127; objects: INDEX:SUB in hex (6041, 1018:1) or names of the EDS");
         declare_transfer(set);
-        set.value("-o,--output", output, "FILE", "the bytes as they are into this file");
-        set.flag("--json", json, "as JSON, a line per object");
+        set.value("-o,--output", output, "FILE", "write the raw bytes to this file");
+        set.flag("--json", json, "print JSON, a line per object");
     }
 };
 
@@ -41,9 +41,9 @@ struct SdoWriteOptions : SdoOptions {
     std::string input;  ///< --from FILE
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE OBJECT VALUE", "the bus; a node 1-127; INDEX:SUB in hex or a name of the EDS; a number, 0x…, text, or hex bytes");
+        set.words("ADDRESS NODE OBJECT VALUE", "the bus; node ID 1..127; INDEX:SUB in hex or a name of the EDS; a number, 0x…, text, or hex bytes");
         declare_transfer(set);
-        set.value("--from", input, "FILE", "the bytes of this file instead of a value");
+        set.value("--from", input, "FILE", "write the bytes of this file instead of a value");
     }
 };
 

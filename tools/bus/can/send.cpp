@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can send`: frames, once or again and again. `hal can nmt`: the one frame that commands CANopen nodes.
+// `hal can send`: sends frames, once or periodically. `hal can nmt`: sends an NMT command.
 #include "bus/can/send.hpp"
 
 #include <charconv>
@@ -14,16 +14,16 @@
 namespace hal::tools {
 
 int run_can_send(const SendOptions& options) {
-    if (options.words.size() < 2) return fail(options, "the frame is missing; type: hal can send ADDRESS 123#1122AABB");
+    if (options.words.size() < 2) return fail(options, "missing frame; type: hal can send ADDRESS 123#1122AABB");
     if (options.every_ns == 0 && (options.for_ns >= 0 || options.count != 0))
-        return fail(options, "--for and --count say when to end what --every repeats; add --every 10ms");
+        return fail(options, "--for and --count limit the repetition of --every; add --every 10ms");
     std::vector<can::Frame> frames(options.words.size() - 1);
     std::string problem;
     bool fd = false;
     for (std::size_t i = 0; i < frames.size(); ++i) {
         if (!parse_frame(options.words[i + 1], frames[i], problem)) return fail(options, problem);
         if (frames[i].error)
-            return fail(options, fmt::format("'{}' is an error frame; only a controller can send one", options.words[i + 1]));
+            return fail(options, fmt::format("cannot send error frame '{}'; only a controller can send one", options.words[i + 1]));
         fd = fd || frames[i].fd;
     }
     Bus bus;
@@ -32,7 +32,7 @@ int run_can_send(const SendOptions& options) {
     const std::int64_t began = now_ns();
     for (std::int64_t due = began;;) {
         for (const can::Frame& f : frames) {
-            send_patiently(bus, f);
+            send_with_timeout(bus, f);
             ++wanted;
         }
         bus.link->flush(can::unclocked);
@@ -59,7 +59,7 @@ int run_can_nmt(const NmtOptions& options) {
         {"reset-comm", NmtCommand::reset_communication},
     };
     if (options.words.size() != 3)
-        return fail(options, "three words are needed; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all");
+        return fail(options, "expected ADDRESS COMMAND NODE; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all");
     const std::string &word = options.words[1], &node_text = options.words[2];
     const NmtCommand* command = nullptr;
     std::vector<std::string> names;
@@ -70,17 +70,17 @@ int run_can_nmt(const NmtOptions& options) {
     if (!command) {
         const std::string hint = did_you_mean(word, names);
         return fail(options, fmt::format("unknown command '{}'; {}", word,
-                                         hint.empty() ? "there are start, stop, preop, reset and reset-comm" : hint));
+                                         hint.empty() ? "write start, stop, preop, reset or reset-comm" : hint));
     }
     unsigned node = 0;
     const bool hex = node_text.starts_with("0x");
     const char* end = node_text.data() + node_text.size();
     const auto read = std::from_chars(node_text.data() + (hex ? 2 : 0), end, node, hex ? 16 : 10);
     if (node_text != "all" && (read.ec != std::errc() || read.ptr != end || node < 1 || node > 127))
-        return fail(options, fmt::format("'{}' is no node; write 1 to 127, or all", node_text));
+        return fail(options, fmt::format("invalid node '{}'; write 1..127, or all", node_text));
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
-    send_patiently(bus, can::Frame(0x000, {static_cast<std::uint8_t>(*command), static_cast<std::uint8_t>(node_text == "all" ? 0 : node)}));
+    send_with_timeout(bus, can::Frame(0x000, {static_cast<std::uint8_t>(*command), static_cast<std::uint8_t>(node_text == "all" ? 0 : node)}));
     return finish_sending(bus, options, 1);
 }
 

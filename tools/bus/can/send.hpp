@@ -13,16 +13,16 @@ struct SendOptions : Options {
     std::uint64_t count = 0;    ///< 0: unlimited
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS FRAME", "where to; then frames as candump writes them: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
-        set.duration("--every", every_ns, "send them again and again, this far apart", 1);
-        set.for_how_long(for_ns, "with --every: end after 2s, 500ms …; without it: until Ctrl-C");
-        set.value("-n,--count", count, "N", "with --every: end after so many rounds");
+        set.words("ADDRESS FRAME", "the bus; frames in candump format: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
+        set.duration("--every", every_ns, "send them periodically with this interval", 1);
+        set.for_how_long(for_ns, "with --every: end after 2s, 500ms … (default: until Ctrl-C)");
+        set.value("-n,--count", count, "N", "with --every: end after N rounds");
     }
 };
 
 struct NmtOptions : Options {
     void declare(OptionSet& set) override {
-        set.words("ADDRESS COMMAND NODE", "the bus; start, stop, preop, reset or reset-comm; a node 1-127 (or 0x..), or all");
+        set.words("ADDRESS COMMAND NODE", "the bus; start, stop, preop, reset or reset-comm; node ID 1..127 (or 0x..), or all");
     }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal can sniff`: a line per identifier with its newest data, and the bytes that changed marked.
+// `hal can sniff`: a line per identifier with its newest data, changed bytes marked.
 #include "bus/can/sniff.hpp"
 
 #include <algorithm>
@@ -21,8 +21,8 @@ constexpr std::int64_t redraw_ns = 200'000'000, marked_ns = 1'000'000'000;  // h
 struct Row {
     can::Frame frame;
     std::uint64_t count = 0;
-    std::int64_t period = 0;                    ///< between the newest two
-    std::array<std::int64_t, 64> changed{};     ///< when each byte changed; 0: not since the first frame
+    std::int64_t period = 0;                    ///< between the newest two frames
+    std::array<std::int64_t, 64> changed{};     ///< when each byte changed; 0: unchanged since the first frame
 };
 
 using Rows = std::map<std::uint64_t, Row>;  // by kind and identifier
@@ -39,9 +39,9 @@ void take(Rows& rows, const can::Frame& f) {
     ++row.count;
 }
 
-/// A changed byte is bold red where there are colours, else it has a star behind it. `now` 0: every change since the beginning counts.
+/// Marks changed bytes in bold red, or with a star without colours. `now` 0: marks every change since the start.
 std::string table(const Rows& rows, std::int64_t now, bool coloured) {
-    std::string text = fmt::format("{:>8}  {:>8}  {:>10}  {}\n", "id", "frames", "period", "data, what changed marked");
+    std::string text = fmt::format("{:>8}  {:>8}  {:>10}  {}\n", "id", "frames", "period", "data, changed bytes marked");
     for (const auto& [key, row] : rows) {
         std::string data = row.frame.remote ? fmt::format("remote request, {} bytes", row.frame.length) : "";
         for (unsigned i = 0; i < row.frame.bytes().size(); ++i) {
@@ -82,7 +82,7 @@ int run_can_sniff(const SniffOptions& options) {
         if (!written) bus.stop.request();
     });
     if (live) return written ? 0 : 1;
-    if (rows.empty()) return fail(options, "no frame was heard");
+    if (rows.empty()) return fail(options, "no frames received");
     return print(table(rows, 0, colours(STDOUT_FILENO))) ? 0 : 1;
 }
 

@@ -16,32 +16,32 @@ using canopen::SdoRequest;
 
 namespace {
 
-constexpr int beats = 5;                           // heartbeats within the drive's limit
-constexpr std::int64_t slowest_beat_ns = 100'000'000, listening_ns = 250'000'000;  // other programs like this one are heard in that time
-constexpr std::uint8_t first_own = 112, last_own = 126;  // 127 is what masters take by default
+constexpr int heartbeats_per_timeout = 5;
+constexpr std::int64_t longest_heartbeat_ns = 100'000'000, listening_ns = 250'000'000;  // long enough to receive other instances of this program
+constexpr std::uint8_t first_own = 112, last_own = 126;  // 127 is the default of masters
 constexpr std::uint32_t no_reaction = 0, quick_stop = 3;  // 6007h
 
 }  // namespace
 
-Supervision::Supervision(const Options& options, Station& station, std::uint8_t node, const SupervisionSettings& settings)
+Supervision::Supervision(const Options& options, NodeClient& station, std::uint8_t node, const SupervisionSettings& settings)
     : options_(options), station_(station), node_(node), settings_(settings), began_(now_ns()) {
     station_.on_frame = [this](const can::Frame& f) {
         if (f.extended || f.remote || f.length < 1 || f.id <= 0x700 || f.id >= 0x780) return;
         heard_[f.id & 0x7f] = true;
         if (way_ == Way::heartbeat && (f.id & 0x7f) == own_) collided_ = true;
     };
-    station_.on_turn = [this](std::int64_t now) { beat(now); };
+    station_.on_turn = [this](std::int64_t now) { send_heartbeat(now); };
 }
 
 void Supervision::warn(const std::string& sentence) const {
     write_all(STDERR_FILENO, fmt::format("{}: warning: {}\n", options_.program, sentence));
 }
 
-void Supervision::beat(std::int64_t now) {
-    if (way_ != Way::heartbeat || now < next_beat_) return;
+void Supervision::send_heartbeat(std::int64_t now) {
+    if (way_ != Way::heartbeat || now < next_heartbeat_) return;
     canopen::Frame f = canopen::make_frame(0x700U + own_, 1);
     f.data[0] = static_cast<std::uint8_t>(canopen::NmtState::operational);
-    if (station_.out.push(f)) next_beat_ = now + std::min(settings_.limit_ns / beats, slowest_beat_ns);
+    if (station_.out.push(f)) next_heartbeat_ = now + std::min(settings_.limit_ns / heartbeats_per_timeout, longest_heartbeat_ns);
 }
 
 Supervision::Read Supervision::read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
@@ -51,7 +51,7 @@ Supervision::Read Supervision::read(std::uint16_t index, std::uint8_t sub, std::
         std::memcpy(&value, room, sizeof value);
         return Read::value;
     }
-    if (request.aborted_by_server) return Read::missing;  // whatever the reason: it is of no use
+    if (request.aborted_by_server) return Read::missing;  // unusable, whatever the reason
     station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", index, sub));
     return Read::failed;
 }
@@ -87,7 +87,7 @@ bool Supervision::set_up() {
     if (way_ != Way::none) return true;
     if (!by_guarding(guarding)) return false;
     if (way_ == Way::none)
-        warn(fmt::format("node {} does not watch this program ({}; {}): if this program is killed or the bus is cut, the axis keeps moving",
+        warn(fmt::format("node {} does not supervise this program ({}; {}): if this program is killed or the bus is cut, the axis keeps moving",
                          node_, heartbeat, guarding));
     return true;
 }
@@ -98,7 +98,7 @@ bool Supervision::by_heartbeat(std::string& why_not) {
     if (there == Read::failed) return false;
     count &= 0xff;
     if (there == Read::missing || count == 0) return why_not = "it has no heartbeat consumer, 1016h", true;
-    station_.until([] { return false; }, std::max<std::int64_t>(began_ + listening_ns - now_ns(), 0));  // who else is there
+    station_.until([] { return false; }, std::max<std::int64_t>(began_ + listening_ns - now_ns(), 0));  // receive other heartbeats
     std::vector<std::uint32_t> entries(count + 1);
     for (unsigned sub = 1; sub <= count; ++sub)
         if (read(0x1016, static_cast<std::uint8_t>(sub), entries[sub]) == Read::failed) return false;
@@ -110,7 +110,7 @@ bool Supervision::by_heartbeat(std::string& why_not) {
                    false;
         own_ = settings_.own_node;
     } else {
-        // Programs that start together begin at different places.
+        // Programs that start together begin with different IDs.
         constexpr unsigned all = last_own - first_own + 1;
         const auto start = static_cast<unsigned>(::getpid()) % all;
         for (unsigned n = 0; n < all && own_ == 0; ++n)
@@ -120,19 +120,19 @@ bool Supervision::by_heartbeat(std::string& why_not) {
     unsigned sub = 0;
     for (unsigned n = count; n >= 1; --n)
         if (node_in(entries[n]) == 0) sub = n;
-    for (unsigned n = 1; n <= count; ++n)  // left by one of us that was killed
+    for (unsigned n = 1; n <= count; ++n)  // left by a killed instance of this program
         if (const auto id = node_in(entries[n]);
             id == own_ || (settings_.own_node == 0 && id >= first_own && id <= last_own && !heard_[id]))
             sub = n, own_ = static_cast<std::uint8_t>(id), entries[n] = 0;
     if (sub == 0) return why_not = fmt::format("all {} entries of its heartbeat consumer, 1016h, are in use", count), true;
     const std::uint32_t entry = std::uint32_t{own_} << 16 | static_cast<std::uint32_t>(settings_.limit_ns / 1'000'000);
     bool failed = false;
-    // Zero first: some drives arm an entry only when it changes.
+    // Write zero first: some drives arm an entry only when it changes.
     if (!write(0x1016, static_cast<std::uint8_t>(sub), 4, 0, failed) ||
         !change(0x1016, static_cast<std::uint8_t>(sub), 4, entries[sub], entry, failed))
         return why_not = "it rejects an entry in its heartbeat consumer, 1016h", !failed;
     way_ = Way::heartbeat;
-    next_beat_ = 0;
+    next_heartbeat_ = 0;
     station_.turn(0);
     return true;
 }
@@ -145,13 +145,13 @@ bool Supervision::by_guarding(std::string& why_not) {
     if (read(0x1017, 0, producer) == Read::failed) return false;
     if ((producer & 0xffff) != 0) return why_not = "life guarding is not possible while it sends heartbeats, 1017h", true;
     if ((time & 0xffff) != 0 && (factor & 0xff) != 0) return why_not = "its life guarding is in use by another master", true;
-    const std::int64_t period = settings_.limit_ns / beats;
+    const std::int64_t period = settings_.limit_ns / heartbeats_per_timeout;
     bool failed = false;
     if (!change(0x100c, 0, 2, time & 0xffff, static_cast<std::uint32_t>(period / 1'000'000), failed) ||
-        !change(0x100d, 0, 1, factor & 0xff, beats, failed))
+        !change(0x100d, 0, 1, factor & 0xff, heartbeats_per_timeout, failed))
         return why_not = "it rejects life guarding, 100Ch and 100Dh", !failed;
     way_ = Way::guarding;
-    station_.network.add(node_).guard(period, beats, now_ns());
+    station_.network.add(node_).guard(period, heartbeats_per_timeout, now_ns());
     station_.turn(0);
     return true;
 }

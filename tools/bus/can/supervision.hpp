@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A drive that stops when this program is gone: our heartbeat watched by the drive (1016h), or life guarding (100Ch, 100Dh).
+// Stops a drive when this program is gone: the drive monitors our heartbeat (1016h), or life guarding (100Ch, 100Dh).
 #pragma once
 
 #include <array>
@@ -8,27 +8,27 @@
 #include <string>
 #include <vector>
 
-#include "bus/can/station.hpp"
+#include "bus/can/node_client.hpp"
 
 namespace hal::tools {
 
 struct SupervisionSettings {
-    std::int64_t limit_ns = 500'000'000;  ///< silence after which the drive reacts; 0: no supervision
-    std::uint8_t own_node = 0;            ///< node ID of our heartbeat; 0: one that is free
+    std::int64_t limit_ns = 500'000'000;  ///< timeout after which the drive reacts; 0: no supervision
+    std::uint8_t own_node = 0;            ///< node ID of our heartbeat; 0: a free one
 };
 
-/// Set up before the first motion and taken back at the end. Heartbeats leave with Station::turn(), so a program that hangs
-/// loses its drive as well as one that was killed.
+/// Set up before the first motion and removed at the end. Heartbeats are sent by NodeClient::turn(), so a program that hangs loses its drive as well
+/// as a killed one.
 class Supervision {
 public:
-    Supervision(const Options&, Station&, std::uint8_t node, const SupervisionSettings&);
+    Supervision(const Options&, NodeClient&, std::uint8_t node, const SupervisionSettings&);
 
     /// Makes the drive stop this axis when our heartbeat ends; reports on stderr what it cannot. False: the bus failed, and it was reported.
     bool arm(unsigned axis);
-    /// Writes back what arm() changed. True also when there was nothing to do.
+    /// Restores what arm() changed. Returns true also when there was nothing to restore.
     bool release();
     bool active() const { return way_ != Way::none; }
-    /// Another device sends heartbeats with our node ID: ours prove nothing any more.
+    /// Returns true when another device sends heartbeats with our node ID, so supervision is ineffective.
     bool collided() const { return collided_; }
     std::uint8_t own_node() const { return own_; }
 
@@ -43,18 +43,18 @@ private:
     };
 
     Read read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value);
-    /// False: rejected by the drive, or the bus failed; `failed` tells which.
+    /// Returns false when the drive rejected the write, or the bus failed and `failed` is set.
     bool write(std::uint16_t index, std::uint8_t sub, unsigned bytes, std::uint32_t value, bool& failed);
     bool change(std::uint16_t index, std::uint8_t sub, unsigned bytes, std::uint32_t was, std::uint32_t value, bool& failed);
     bool set_up();
     bool by_heartbeat(std::string& why_not);
     bool by_guarding(std::string& why_not);
     bool set_reaction(unsigned axis);
-    void beat(std::int64_t now);
+    void send_heartbeat(std::int64_t now);
     void warn(const std::string& sentence) const;
 
     const Options& options_;
-    Station& station_;
+    NodeClient& station_;
     const std::uint8_t node_;
     const SupervisionSettings settings_;
     const std::int64_t began_;
@@ -62,7 +62,7 @@ private:
     Way way_ = Way::none;
     bool tried_ = false, collided_ = false;
     std::uint8_t own_ = 0, axes_done_ = 0;  // a bit per axis
-    std::int64_t next_beat_ = 0;
+    std::int64_t next_heartbeat_ = 0;
     std::vector<Changed> changed_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal tdma plan`: a schedule of an Ethernet segment as a timeline, how full the line is, how long an input takes to become an output;
+// `hal tdma plan`: the schedule of an Ethernet segment as a timeline, with line load and worst-case latency from an input to an output;
 // or as a picture.
 #include "bus/can/tdma.hpp"
 
@@ -48,7 +48,7 @@ std::string table_text(const config::Schedule& s, const plan::Plan& p) {
     return text;
 }
 
-/// A letter per station, a place per hundredth of the cycle; the sync is |, a backup's '.
+/// Draws a letter per station, a column per hundredth of the cycle; the sync is |, a backup's '.
 std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
     constexpr std::size_t places = 100;
     constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
@@ -70,8 +70,8 @@ std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
 std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t, const std::string& by_way_of) {
     const auto& e = s.stations[t.station];
     return fmt::format(
-        "{}: an input of it becomes an output of it after {:.2f} us at worst, {} cycle{} after it was read\n"
-        "  read {:.2f}, sent {:.2f} (slot {}), there {:.2f}; {}'s thread {:.2f}, sent {:.2f}, there {:.2f}; written {:.2f}\n"
+        "{}: worst-case latency from input to output {:.2f} us, {} cycle{} after the input is read\n"
+        "  read {:.2f}, sent {:.2f} (slot {}), received {:.2f}; {}'s thread {:.2f}, sent {:.2f}, received {:.2f}; written {:.2f}\n"
         "  {:.2f} - {:.2f} + {:.2f} for an input that changed just after it was read = {:.2f} us\n",
         e.name, us(t.worst), t.cycles, t.cycles == 1 ? "" : "s", us(t.read), us(t.up), e.slots.front().setup.id, us(t.up_arrives),
         by_way_of, us(t.master), us(t.down), us(t.down_arrives), us(t.output), us(t.output), us(t.read), us(s.cycle), us(t.worst));
@@ -84,15 +84,15 @@ std::string text_of(const config::Schedule& s, const plan::Plan& p) {
                                    us(s.guard), s.stations.size(), s.stations.size() == 1 ? "" : "s", slots, slots == 1 ? "" : "s");
     text += table_text(s, p) + "\n" + timeline_text(s, p) + "\n";
     text += fmt::format(
-        "load {:.1f} % with every frame of its full length; a frame of 60 bytes takes {:.2f} us on a line, {:.2f} us from station to "
+        "load {:.1f} % with frames of full length; a frame of 60 bytes takes {:.2f} us on a line, {:.2f} us from station to "
         "station\n",
         100 * p.load, us(s.wire(60)), us(s.path(60)));
     for (const auto& e : s.stations)
         if (e.role == tdma::Role::backup)
             text +=
-                fmt::format("{} looks {:g} us after the beginning of the cycle and takes over {:g} us after the sync that did not come\n",
+                fmt::format("{} checks {:g} us after the start of the cycle and takes over {:g} us after a missing sync\n",
                             e.name, us(e.phase), us(e.backup_offset));
-    text += fmt::format("outputs are safe {} cycle{} after the last sync: {:g} us\n", s.lost, s.lost == 1 ? "" : "s", us(s.cycle * s.lost));
+    text += fmt::format("outputs are set to safe values {} cycle{} after the last sync: {:g} us\n", s.lost, s.lost == 1 ? "" : "s", us(s.cycle * s.lost));
     for (const plan::RoundTrip& t : p.trips) text += trip_text(s, t, s.stations[*p.by_way_of].name);
     return text;
 }
@@ -138,7 +138,7 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
     if (found.failed()) return 1;
     const plan::Plan p = plan::plan_of(reading.schedule);
     if (!options.svg.empty()) {
-        if (options.json) return fail(options, "--json and --svg are two answers; write one of them");
+        if (options.json) return fail(options, "--json and --svg exclude each other");
         const std::string picture = picture_of(reading.schedule, p);
         if (options.svg == "-") return print(picture) ? 0 : 1;
         const std::string why = write_file(options.svg, picture);

@@ -12,9 +12,9 @@ struct TdmaPlanOptions : Options {
     std::string svg;  ///< a file for the picture; -: standard output; empty: not given
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "the schedule of the segment, NAME.tdma or RTnet's tdma.conf");
-        set.flag("--json", json, "as JSON");
-        set.value("--svg", svg, "FILE", "a picture of a cycle into this file; -: standard output");
+        set.words("FILE", "schedule of the segment, NAME.tdma or RTnet's tdma.conf");
+        set.flag("--json", json, "print JSON");
+        set.value("--svg", svg, "FILE", "write a timing diagram to this file; -: standard output");
     }
 };
 

@@ -64,13 +64,13 @@ private:
         body_ += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" rx=\"2\" fill=\"{}\"{}/>\n", x0, at_y,
                              std::max(x1 - x0, 1.5), bar, fill, more);
     }
-    /// Where a thread's cycle begins: a flag.
+    /// Draws a flag where a thread's cycle begins.
     void flag(double at_x, double at_y) {
         body_ += fmt::format("<path d=\"M{0:.1f} {1:.1f}v{2:.1f}m0 {3:.1f}l8 5l-8 5z\" fill=\"{4}\" stroke=\"{4}\"/>\n", at_x, at_y, bar,
                              -bar, thread_colour);
     }
 
-    /// About ten lines a cycle, at round times.
+    /// Draws about ten grid lines per cycle, at round times.
     double step() const {
         const double about = us(s_.cycle) / 10, decade = std::pow(10.0, std::floor(std::log10(about)));
         for (const double round : {1.0, 2.0, 5.0})
@@ -100,7 +100,7 @@ private:
             for (Time k = 0; k < 2; ++k)
                 if (const double at = x(s_.stations[i].phase + k * s_.cycle); at <= left + width - 8) flag(at, y(i));
     }
-    /// On its sender's line, and pale until it has left the receiver's.
+    /// Draws a frame on its sender's line, and pale until it has left the receiver's.
     void frame(const plan::Entry& e, Time later, bool first) {
         const bool slot = e.what == What::slot;
         const double from = x(e.at + later), until = x(e.until + later), there = x(e.at + s_.path(e.bytes) + later), at_y = y(e.station);
@@ -137,13 +137,13 @@ private:
         at += 200;
         flag(at, at_y);
         text(at + 14, at_y + 15, 12, "start", "thread begins");
-        text(at + 120, at_y + 15, 12, "start", "pale: on its way to the receiver");
+        text(at + 120, at_y + 15, 12, "start", "pale: in transit to the receiver");
     }
     void summary(double at_y) {
-        std::string line = fmt::format("The line is {:.1f} % full", 100 * plan_.load);
+        std::string line = fmt::format("Line load {:.1f} %", 100 * plan_.load);
         const auto sooner = [](const plan::RoundTrip& a, const plan::RoundTrip& b) { return a.worst < b.worst; };
         if (const auto worst = std::max_element(plan_.trips.begin(), plan_.trips.end(), sooner); worst != plan_.trips.end())
-            line += fmt::format("; an input of {} is an output of it after {:g} us at worst", s_.stations[worst->station].name,
+            line += fmt::format("; worst-case latency from input to output of {}: {:g} us", s_.stations[worst->station].name,
                                 us(worst->worst));
         text(left, at_y + 12, 12, "start", line);
     }

@@ -8,7 +8,7 @@
 
 namespace hal::tools {
 
-/// SVG of a cycle and a third: a row per station, its thread's beginning, its frames with the way through the switch. The same schedule
+/// Returns the SVG of a cycle and a third: a row per station, its thread, its frames and their transit through the switch. The same schedule
 /// gives the same text. [setup]
 std::string picture_of(const tdma::config::Schedule&, const tdma::plan::Plan&);
 

@@ -12,6 +12,7 @@
 
 namespace hal::tools {
 
+/// Writes in a thread of its own.
 class BackgroundWriter {
 public:
     BackgroundWriter() : thread_([this] { serve(); }) {}  // [setup]
@@ -28,8 +29,8 @@ public:
         thread_.join();
     }
 
-    /// Hands over text. Never waits: while the writer holds the buffer, the text is kept until the next call. Returns false when standard
-    /// output is closed. One thread.
+    /// Queues text. Never waits: while the writer holds the buffer, the text is kept until the next call. Returns false when standard output is
+    /// closed. One thread. [realtime] except for allocation
     bool write(const std::string& text) {
         held_ += text;
         if (!held_.empty() && mutex_.try_lock()) {
@@ -54,10 +55,10 @@ private:
         }
     }
 
-    std::string held_;  // the caller's
+    std::string held_;  // used by the caller
     std::mutex mutex_;
     std::condition_variable bell_;
-    std::string waiting_;  // by the mutex, as is the next
+    std::string waiting_;  // protected by the mutex, as is the next
     bool ended_ = false;
     std::atomic<bool> is_read_{true};  // written by the thread
     std::thread thread_;

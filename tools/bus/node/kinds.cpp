@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal node KIND`: the device of each kind, made from the options.
+// `hal node KIND`: creates the device of each kind from the options.
 #include "bus/node/kinds.hpp"
 
 #include <charconv>
@@ -22,7 +22,7 @@ namespace {
 
 std::string counted(unsigned n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-/// "2.1" to 0x00020001. False when it is no version.
+/// Parses "2.1" to 0x00020001. Returns false for an invalid version.
 bool parse_version(const std::string& text, std::uint32_t& version) {
     unsigned major = 0, minor = 0;
     const char* end = text.data() + text.size();
@@ -33,10 +33,10 @@ bool parse_version(const std::string& text, std::uint32_t& version) {
     return version = major << 16 | minor, true;
 }
 
-/// What the sensor's line is for that long, into a file.
+/// Records the sensor's line to a file for the time of --for.
 int record_line(const Jr3NodeOptions& options) {
-    if (options.for_ns < 0) return fail(options, "for how long? add --for 2s; the calibration comes through in 1.02 s");
-    if (options.for_ns > 600'000'000'000) return fail(options, "more than 10min would be a file of hundreds of megabytes");
+    if (options.for_ns < 0) return fail(options, "missing --for; add --for 2s, the calibration takes 1.02 s");
+    if (options.for_ns > 600'000'000'000) return fail(options, "--for is too long; at most 10min, or the file would have hundreds of megabytes");
     canopen::jr3::Calibration calibration;
     calibration.serial = options.serial;
     std::array<std::uint8_t, canopen::jr3::memory_size> memory{};
@@ -66,7 +66,7 @@ int run_node_drive(const DriveNodeOptions& options) {
         const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), index, 16);
         if (wrong != std::errc() || end != text.data() + text.size() ||
             !(std::find(std::begin(optional), std::end(optional), index) != std::end(optional) || index % 0x800 == 0x6007 % 0x800))
-            return fail(options, fmt::format("--without '{}': not an optional object of this drive; there are 100C, 100D, 1016, 1029 and 6007 "
+            return fail(options, fmt::format("--without '{}': not an optional object of this drive; write 100C, 100D, 1016, 1029 or 6007 "
                                              "(6807, 7007 ... of further axes)", text));
         settings.without.push_back(index);
     }
@@ -85,9 +85,9 @@ int run_node_io(const IoNodeOptions& options) {
 int run_node_axis_io(const AxisIoNodeOptions& options) {
     const AxisIoNodeOptions& o = options;
     auto plant = canopen::make_plant(o.plant);
-    if (!plant) return fail(options, fmt::format("there is no plant '{}'; there are {}", o.plant, canopen::plant_names));
+    if (!plant) return fail(options, fmt::format("unknown plant '{}'; write one of: {}", o.plant, canopen::plant_names));
     canopen::AxisIo program({o.serial, o.heartbeat_ms, o.input_stops}, std::move(plant));
-    return run_node(options, {"axis-io", "loop over the bus, " + std::string(o.plant == "axis" ? "a slide on a screw" : "the pendulum rig")}, program);
+    return run_node(options, {"axis-io", "control loop over the bus, " + std::string(o.plant == "axis" ? "a slide on a screw" : "the pendulum rig")}, program);
 }
 
 int run_node_safe_io(const NodeOptions& options) {
@@ -104,7 +104,7 @@ int run_node_jr3(const Jr3NodeOptions& options) {
         std::string bytes;
         if (!read_file(options.stream, bytes)) return fail(options, fmt::format("cannot read '{}': {}", options.stream, bytes));
         if (bytes.empty())
-            return fail(options, fmt::format("'{}' is empty; it should hold the sensor's line, eight clocks to a byte", options.stream));
+            return fail(options, fmt::format("'{}' is empty; expected the sensor's line, eight clocks per byte", options.stream));
         settings.recording.assign(bytes.begin(), bytes.end());
     }
     const std::string source = options.stream.empty() ? "a simulated sensor" : "the sensor's line in " + options.stream;
@@ -116,7 +116,7 @@ int run_node_bootloader(const BootloaderNodeOptions& options) {
     canopen::BootloaderSettings settings;
     settings.serial = options.serial, settings.heartbeat_ms = options.heartbeat_ms;
     const auto version = [&](const std::string& text, std::uint32_t& to) {
-        return parse_version(text, to) || (fail(options, fmt::format("'{}' is no version; write 2.1", text)), false);
+        return parse_version(text, to) || (fail(options, fmt::format("invalid version '{}'; write 2.1", text)), false);
     };
     if (!options.image.empty()) {
         std::uint32_t wanted = 0;

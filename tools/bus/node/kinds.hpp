@@ -15,9 +15,9 @@ struct DriveNodeOptions : NodeOptions {
 
     void declare(OptionSet& set) override {
         NodeOptions::declare(set);
-        set.value("--axes", axes, "N", "1-8 (default 1)").quietly_in(1, 8);
-        set.values("--without", without, "INDEX", "an optional object it lacks, in hex: 1016, 6007; may be repeated");
-        set.values("--motor", motor, "NAME:VALUE", "of all axes: NAME:VALUE, as in inertia:1e-4,resolution:8192,endless:1; may be repeated");
+        set.value("--axes", axes, "N", "number of axes, 1..8 (default 1)").quietly_in(1, 8);
+        set.values("--without", without, "INDEX", "omit an optional object, in hex: 1016, 6007; may be repeated");
+        set.values("--motor", motor, "NAME:VALUE", "motor parameters of all axes, as in inertia:1e-4,resolution:8192,endless:1; may be repeated");
     }
 };
 
@@ -26,10 +26,10 @@ struct IoNodeOptions : NodeOptions {
 
     void declare(OptionSet& set) override {
         NodeOptions::declare(set);
-        set.value("--inputs", inputs, "N", "digital inputs, 0-64 (default 64)").quietly_in(0, 64);
-        set.value("--outputs", outputs, "N", "digital outputs, 0-64 (default 64)").quietly_in(0, 64);
-        set.value("--analog-inputs", analog_inputs, "N", "0-12 (default 12)").quietly_in(0, 12);
-        set.value("--analog-outputs", analog_outputs, "N", "0-12 (default 12)").quietly_in(0, 12);
+        set.value("--inputs", inputs, "N", "digital inputs, 0..64 (default 64)").quietly_in(0, 64);
+        set.value("--outputs", outputs, "N", "digital outputs, 0..64 (default 64)").quietly_in(0, 64);
+        set.value("--analog-inputs", analog_inputs, "N", "analogue inputs, 0..12 (default 12)").quietly_in(0, 12);
+        set.value("--analog-outputs", analog_outputs, "N", "analogue outputs, 0..12 (default 12)").quietly_in(0, 12);
     }
 };
 
@@ -39,8 +39,8 @@ struct AxisIoNodeOptions : NodeOptions {
 
     void declare(OptionSet& set) override {
         NodeOptions::declare(set);
-        set.value("--plant", plant, "NAME", "what it drives: axis, a slide on a screw (default), or furuta, the pendulum rig");
-        set.flag("--input-stops", input_stops, "an open input is a fault from the beginning");
+        set.value("--plant", plant, "NAME", "simulated plant: axis, a slide on a screw (default), or furuta, the pendulum rig");
+        set.flag("--input-stops", input_stops, "an open input is a fault (object 2111h)");
     }
 };
 
@@ -49,8 +49,8 @@ struct Jr3NodeOptions : NodeOptions {
 
     void declare(OptionSet& set) override {
         NodeOptions::declare(set);
-        set.value("--stream", stream, "FILE", "the sensor's line from this file, eight clocks to a byte, over and over");
-        set.value("--record", record, "FILE", "write the line of a simulated sensor for the time of --for into this file, and end");
+        set.value("--stream", stream, "FILE", "play the sensor's line from this file, eight clocks per byte, repeated");
+        set.value("--record", record, "FILE", "record the line of a simulated sensor to this file for the time of --for, and end");
     }
 };
 
@@ -59,13 +59,13 @@ struct BootloaderNodeOptions : NodeOptions {
 
     void declare(OptionSet& set) override {
         NodeOptions::declare(set);
-        set.value("--program", version, "VERSION", "version of the program it comes with (default 1.0); none: its flash is empty");
-        set.value("--flash", flash, "FILE", "keeps the flash from run to run");
-        set.value("--make-image", image, "VERSION", "print a program of this version, to be downloaded, and end");
+        set.value("--program", version, "VERSION", "version of the initial program (default 1.0); none: empty flash");
+        set.value("--flash", flash, "FILE", "file that keeps the flash between runs");
+        set.value("--make-image", image, "VERSION", "print a program image of this version for download, and end");
     }
 };
 
-/// Each returns the exit code.
+/// Run a device of each kind. Each returns the exit code.
 int run_node_drive(const DriveNodeOptions&);
 int run_node_io(const IoNodeOptions&);
 int run_node_axis_io(const AxisIoNodeOptions&);

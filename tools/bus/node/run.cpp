@@ -25,14 +25,14 @@ namespace hal::tools {
 
 namespace {
 
-/// A value of the world, at its time after the start.
+/// A value of the simulated environment, set at a time after the start.
 struct Setting {
     std::string name;
     double value = 0;
     std::int64_t at_ns = 0;
 };
 
-/// Reads NAME=VALUE or NAME=VALUE@TIME.
+/// Parses NAME=VALUE or NAME=VALUE@TIME.
 bool parse_setting(const std::string& text, Setting& setting, std::string& problem) {
     const auto equals = text.find('='), at = text.find('@');
     const auto ns = at == text.npos ? std::optional<std::int64_t>(0) : parse_duration_ns(text.substr(at + 1));
@@ -44,10 +44,10 @@ bool parse_setting(const std::string& text, Setting& setting, std::string& probl
             return true;
         }
     }
-    return problem = fmt::format("'{}' sets nothing; write NAME=VALUE, or NAME=VALUE@2s for later", text), false;
+    return problem = fmt::format("invalid --set '{}'; write NAME=VALUE, or NAME=VALUE@2s for later", text), false;
 }
 
-/// "in-0 … in-63, fx": names that differ only in a number behind them are one row.
+/// Joins names, "in-0 … in-63, fx": names that differ only in their number are abbreviated.
 std::string listed(const std::vector<std::string>& names) {
     const auto stem = [](const std::string& name) { return name.substr(0, name.find_last_not_of("0123456789") + 1); };
     std::string text;
@@ -61,13 +61,13 @@ std::string listed(const std::vector<std::string>& names) {
 bool parse_id(const NodeOptions& options, const NodeKind& kind, std::uint8_t& id, std::string& problem) {
     const std::string& text = options.id;
     if (text.empty() && kind.id != 0) return id = kind.id, true;
-    if (text.empty()) return problem = "which node-id shall it have? add --id 5; none for one that an LSS master gives", false;
+    if (text.empty()) return problem = "missing --id: use --id 5, or --id none to wait for an LSS master", false;
     if (text == "none") return id = canopen::unconfigured, true;
     const bool hex = text.starts_with("0x");
     unsigned value = 0;
     const auto [end, wrong] = std::from_chars(text.data() + (hex ? 2 : 0), text.data() + text.size(), value, hex ? 16 : 10);
     if (wrong != std::errc() || end != text.data() + text.size() || value < 1 || value > 127)
-        return problem = fmt::format("'{}' is no node-id; write 1 to 127, 0x50, or none for one that an LSS master gives", text), false;
+        return problem = fmt::format("invalid --id '{}'; write 1..127, 0x50, or none to wait for an LSS master", text), false;
     return id = static_cast<std::uint8_t>(value), true;
 }
 
@@ -83,26 +83,26 @@ std::string eds_text(const NodeKind& kind, const canopen::Program& program) {
     return canopen::eds::write_eds(eds);
 }
 
-/// Says what changes about a node, by `say`, which is false when nobody reads any more.
+/// Prints the changes of a node. It stops when `say` returns false when standard output is closed.
 class Reporter {
 public:
     Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began, std::function<bool(const std::string&)> say)
         : node_(node), program_(program), began_(began), say_(std::move(say)) {}
 
-    /// False: nobody reads any more.
+    /// Returns false when standard output is closed.
     bool look(std::int64_t now) {
         auto& device = node_.device();
         const auto say = [&](const std::string& what) { log_.print(what, timed(what, now), now); };
         if (device.state() != state_ || device.node_id() != id_) {
             state_ = device.state(), id_ = device.node_id();
-            say(id_ == canopen::unconfigured ? "waits for a node-id" : canopen::to_string(state_));
+            say(id_ == canopen::unconfigured ? "waiting for a node ID" : canopen::to_string(state_));
         }
         if (const auto errors = device.emcy().error_register(); errors != errors_) {
             errors_ = errors;
             const auto code = static_cast<std::uint16_t>(device.dictionary().get<std::uint32_t>(0x1003, 1, 0));
-            say(errors == 0 ? "no error any more" : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_text(code)));
+            say(errors == 0 ? "error reset" : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_text(code)));
         }
-        if (now - news_at_ >= 1'000'000'000) {  // outputs can change with every SYNC: the newest of a second
+        if (now - news_at_ >= 1'000'000'000) {  // outputs can change with every SYNC: print the newest once per second
             if (std::string news = program_.news(); news != news_) {
                 news_at_ = now;
                 text_ += timed(news_ = std::move(news), now) + "\n";
@@ -111,7 +111,7 @@ public:
         for (can::Rejected what; node_.link().rejected(what);) say(can::to_string(what));
         if (const auto bus = node_.link().state(); bus != bus_) {
             bus_ = bus;
-            say(fmt::format("bus {}", can::word(bus)));
+            say(fmt::format("bus {}", can::to_string(bus)));
         }
         log_.flush(now);
         std::string text;
@@ -129,7 +129,7 @@ public:
         log_.close();
         if (std::string news = program_.news(); news != news_) text_ += timed(news, now) + "\n";
         std::string text = std::exchange(text_, {});
-        text += fmt::format("{:.1f} s: {} frames sent, {} received, {} dropped, {} lost on the wire, {} lost here, {} rejected; "
+        text += fmt::format("{:.1f} s: {} frames sent, {} received, {} dropped, {} lost in transit, {} lost here, {} rejected; "
                             "{} SDO transfers, {} aborted; {} PDOs sent\n",
                             static_cast<double>(now - began_) / 1e9, s.sent, s.received, s.dropped, s.lost_on_wire, s.lost - s.lost_on_wire,
                             s.rejected, transfers, aborted, pdos);
@@ -178,8 +178,8 @@ int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::
     canopen::Node node(program, std::move(opened.link), {.node_id = id, .auto_start = options.starts_itself});
     for (const auto& [fault, setting] : faults) node.faults().set(fault, setting);
 
-    const std::string who = id == canopen::unconfigured ? "without node-id" : fmt::format("node {}", id);
-    if (!print(fmt::format("{}, {} on {} ({}): {}; Ctrl-C ends it\n", kind.name, who, about.address, about.transport, kind.what))) return 1;
+    const std::string who = id == canopen::unconfigured ? "without node ID" : fmt::format("node {}", id);
+    if (!print(fmt::format("{}, {} on {} ({}): {}; press Ctrl-C to end\n", kind.name, who, about.address, about.transport, kind.what))) return 1;
     const std::int64_t began = now_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
     std::optional<BackgroundWriter> writer;
     if (station) writer.emplace();
@@ -224,13 +224,14 @@ int run_node(const NodeOptions& options, const NodeKind& kind, canopen::Program&
     std::string problem;
     std::uint8_t id = 0;
     if (options.link.empty())
-        return fail(options, "on which bus? add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node " + kind.name);
+        return fail(options,
+                    "missing --link; add --link udp:239.74.163.2:43113, or can:can0, slcan:/dev/ttyACM0; see: hal help node " + kind.name);
     if (!parse_id(options, kind, id, problem)) return fail(options, problem);
     const NodeOptions& given = options;
     if (given.tdma.empty())
         for (const auto& [name, value] :
              {std::pair{"--station", &given.station}, {"--tunnel", &given.tunnel}, {"--skew", &given.skew}, {"--drift", &given.drift}})
-            if (!value->empty()) return fail(options, fmt::format("{} is of a station in a TDMA; add --tdma FILE, its schedule", name));
+            if (!value->empty()) return fail(options, fmt::format("{} needs a TDMA schedule; add --tdma FILE", name));
     std::vector<std::pair<canopen::Fault, canopen::FaultSetting>> faults(options.faults.size());
     for (std::size_t n = 0; n < faults.size(); ++n)
         if (!canopen::parse_fault(options.faults[n], faults[n].first, faults[n].second, problem)) return fail(options, problem);
@@ -240,8 +241,8 @@ int run_node(const NodeOptions& options, const NodeKind& kind, canopen::Program&
     const std::vector<std::string> known = program.settable();
     for (const Setting& s : settings)
         if (std::find(known.begin(), known.end(), s.name) == known.end())
-            return fail(options, known.empty() ? fmt::format("nothing can be set of a {}", kind.name)
-                                               : fmt::format("there is no '{}' to set; there are {}", s.name, listed(known)));
+            return fail(options, known.empty() ? fmt::format("invalid --set: a {} has no settable values", kind.name)
+                                               : fmt::format("unknown value '{}' in --set; write one of: {}", s.name, listed(known)));
     std::stable_sort(settings.begin(), settings.end(), [](const Setting& a, const Setting& b) { return a.at_ns < b.at_ns; });
     try {
         return turn_until_ended(options, kind, program, std::move(settings), id, faults);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One device as a process: opens the bus, turns the node until somebody ends it, says what happens.
+// A device as a process: opens the bus, turns the node until a signal arrives, prints events.
 #pragma once
 
 #include <functional>
@@ -10,15 +10,15 @@
 
 namespace hal::tools {
 
-/// What kind of device it is, in words.
+/// Description of a kind of device.
 struct NodeKind {
     std::string name;     ///< "drive"
     std::string what;     ///< "CiA 402, 2 axes"
-    std::uint8_t id = 0;  ///< node-id when none is given; 0: one must be given
-    std::function<std::string()> keep = {};  ///< called in every turn: writes to disk what shall outlast the process. What is wrong, or nothing
+    std::uint8_t id = 0;  ///< default node ID; 0: --id is required
+    std::function<std::string()> keep = {};  ///< called in every turn to save persistent state; returns the problem, or ""
 };
 
-/// Runs it, or prints its EDS, as the options say. Returns the exit code.
+/// Runs the device, or prints its EDS, as in the options. Returns the exit code.
 int run_node(const NodeOptions&, const NodeKind&, canopen::Program&);
 
 }  // namespace hal::tools

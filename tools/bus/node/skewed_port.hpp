@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A station whose quartz is not that of this machine: its own clock, and a port that tells all times on it.
+// Simulates a station with another quartz than this machine's: a clock, and a port with all times on that clock.
 #pragma once
 
 #include <cmath>
@@ -11,14 +11,14 @@
 
 namespace hal::tools {
 
-/// local = true + skew t + drift t²/2, t since the beginning. [realtime]
+/// local = true + skew t + drift t²/2, t since the start. [realtime]
 class SkewedClock {
 public:
     SkewedClock(std::int64_t began_ns, double skew, double drift_per_s) noexcept : began_(began_ns), skew_(skew), drift_(drift_per_s) {}
     std::int64_t local(std::int64_t true_ns) const noexcept { return true_ns + ahead(true_ns); }
     std::int64_t from_local(std::int64_t local_ns) const noexcept {
         auto guess = local_ns;
-        for (int n = 0; n < 4; ++n) guess = local_ns - ahead(guess);  // each time a thousand times nearer
+        for (int n = 0; n < 4; ++n) guess = local_ns - ahead(guess);  // each step is a thousand times closer
         return guess;
     }
     std::int64_t ahead(std::int64_t true_ns) const noexcept {
@@ -31,7 +31,7 @@ private:
     const double skew_, drift_;
 };
 
-/// A port on that clock: what it is told and what it tells, time stamps in frames included.
+/// A port on that clock, including the timestamps in frames.
 class SkewedPort final : public ethernet::Port {
 public:
     SkewedPort(std::unique_ptr<ethernet::Port> port, const SkewedClock& clock) : port_(std::move(port)), clock_(clock) {}
@@ -59,7 +59,7 @@ private:
     const SkewedClock& clock_;
 };
 
-/// A discipline whose station has that clock, for links whose ports tell the machine's.
+/// A discipline on that clock, for links whose ports use the machine's clock.
 class SkewedDiscipline final : public ethernet::Discipline {
 public:
     SkewedDiscipline(ethernet::Discipline& its, const SkewedClock& clock) noexcept : its_(its), clock_(clock) {}

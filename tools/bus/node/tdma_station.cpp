@@ -18,9 +18,9 @@ namespace hal::tools {
 namespace {
 
 constexpr int priority = 70;
-constexpr tdma::Time spin_ns = 200'000;  // a frame that is due so soon behind the thread needs no pacer
+constexpr tdma::Time spin_ns = 200'000;  // a frame due so soon after the thread needs no pacer
 
-/// Somebody who may be that station has a slot farther behind his thread.
+/// Returns true when a station that may be this one has a slot further after its thread.
 bool has_far_slot(const tdma::config::Schedule& schedule, const std::string& station) {
     const auto which = tdma::config::find(schedule, station);
     for (std::size_t n = 0; n < schedule.stations.size(); ++n) {
@@ -32,7 +32,7 @@ bool has_far_slot(const tdma::config::Schedule& schedule, const std::string& sta
     return false;
 }
 
-/// "200ppm", "-35.5ppm", or nothing.
+/// Parses "200ppm", "-35.5ppm"; nullopt when invalid.
 std::optional<double> parts_per_million(std::string_view text) {
     double value = 0;
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -47,12 +47,12 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
                               std::unique_ptr<TdmaStation>& made) {
     const auto question = link.find('?');
     const std::string segment = can::describe(link).segment;
-    if (segment.empty()) return "TDMA is on Ethernet; write --link cane:eth0 with --tdma, or leave --tdma out";
+    if (segment.empty()) return "--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma";
     const auto skew = parts_per_million(options.skew.empty() ? "0ppm" : options.skew);
     const auto drift = parts_per_million(options.drift.empty() ? "0ppm" : options.drift);
-    if (!skew) return fmt::format("'{}' is no skew of a clock; write --skew 200ppm, at most 500ppm", options.skew);
+    if (!skew) return fmt::format("invalid --skew '{}'; write --skew 200ppm, at most 500ppm", options.skew);
     if (!drift)
-        return fmt::format("'{}' is no drift of a clock; write --drift 0.1ppm, which is how its skew changes in a second", options.drift);
+        return fmt::format("invalid --drift '{}'; write --drift 0.1ppm, the change of the skew per second", options.drift);
     const bool by_rtcfg = options.tdma == "auto";
     std::string text;
     if (!by_rtcfg && !tdma::config::read_from_disk(options.tdma, text)) return fmt::format("cannot read '{}': {}", options.tdma, text);
@@ -66,7 +66,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
     auto opened = ethernet::open(segment, how);
     if (!opened) return opened.problem;
     if (opened.port->description().simulated)
-        return segment + " is in memory, and this process alone on it; write an interface, as in cane:eth0";
+        return segment + " is a segment in memory of this process only; write an interface, as in cane:eth0";
     const tdma::config::StationEntry* entry = nullptr;
     if (by_rtcfg) {
         tdma::StationSetup unknown;
@@ -78,14 +78,14 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
         const std::string who = options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station;
         const auto which = tdma::config::find(reading.schedule, who);
         if (!which)
-            return fmt::format("{} has no station '{}'; write --station with one of {}", options.tdma, who,
+            return fmt::format("{} has no station '{}'; write --station with one of: {}", options.tdma, who,
                                tdma::config::names(reading.schedule));
         entry = &reading.schedule.stations[*which];
         if (entry->mac && *entry->mac != opened.port->address())
-            return fmt::format("{} has the address {}, {} gives {} {}; mend the line 'mac' of its block", segment,
+            return fmt::format("{} has the address {}, but {} gives {} {}; correct the line 'mac' of its block", segment,
                                ethernet::to_string(opened.port->address()), options.tdma, entry->name, ethernet::to_string(*entry->mac));
         if (entry->slots.empty())
-            return fmt::format("station '{}' of {} has no slot to answer in; add one: slot 0 300", entry->name, options.tdma);
+            return fmt::format("station '{}' of {} has no slot to send in; add one: slot 0 300", entry->name, options.tdma);
         made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which), reading.schedule, segment, std::move(opened.port), *skew,
                                    *drift));
     }
@@ -93,7 +93,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link, con
         made->slot_ = entry->slots.front().setup.id;
         link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', *made->slot_);
     }
-    if (!ethernet::offer_discipline(made->port_, &made->discipline_)) return segment + " has a TDMA station already";
+    if (!ethernet::offer_discipline(made->port_, &made->discipline_)) return segment + " already has a TDMA station";
     return options.tunnel.empty() ? std::string{} : made->open_tunnel(options, *entry);
 }
 
@@ -101,17 +101,17 @@ std::string TdmaStation::take_schedule(const NodeOptions& options, const std::fu
     tdma::rtcfg::Logical own;
     if (!options.station.empty()) {
         const auto ip = tdma::config::parse_ip(options.station);
-        if (!ip) return "with --tdma auto, --station is the station's IP address, as in 10.0.0.3; without it its MAC address counts";
+        if (!ip) return "invalid --station; with --tdma auto it is the station's IP address, as in 10.0.0.3; without it the MAC address is used";
         own = {true, *ip};
     }
     applicant_ = std::make_unique<tdma::rtcfg::Applicant>("hal node", station_, own, "", static_cast<tdma::Events&>(*this));
     station_.accompany(&applicant_->client(), nullptr);
     const std::string who = own.by_ip ? "ip " + options.station : "mac " + ethernet::to_string(station_.address());
     fmt::print(stderr,
-               "hal node: waits for the master of {} to send it its schedule (RTcfg); the master's file must have a block with '{}'\n",
+               "hal node: waiting for the master of {} to send the schedule (RTcfg); the master's file must have a block with '{}'\n",
                segment_, who);
     while (applicant_->accepted() == nullptr) {
-        if (ended()) return fmt::format("no master on {} had a schedule for '{}'", segment_, who);
+        if (ended()) return fmt::format("no master on {} sent a schedule for '{}'", segment_, who);
         station_.receive(clock_.local(link::monotonic_ns()));
         look();
         applicant_->cycle();
@@ -122,7 +122,7 @@ std::string TdmaStation::take_schedule(const NodeOptions& options, const std::fu
 std::string TdmaStation::open_tunnel(const NodeOptions& options, const tdma::config::StationEntry& entry) {
     tunnel_ = std::make_unique<tdma::Tunnel>(station_);
     if (tunnel_->mtu() == 0)
-        return fmt::format("--tunnel {}: ordinary packets leave in slot 1, and {} has none; write slot 1 OFFSET into its block of {}",
+        return fmt::format("--tunnel {}: ordinary packets need slot 1, and {} has none; add slot 1 OFFSET to its block of {}",
                            options.tunnel, entry.name, options.tdma);
     auto opened = tdma::open_tap(*tunnel_, {options.tunnel, station_.address(), entry.ip}, "hal node");
     if (!opened.tap) return "--tunnel: " + opened.problem;
@@ -140,8 +140,8 @@ TdmaStation::TdmaStation(const tdma::StationSetup& setup, tdma::config::Schedule
 
 TdmaStation::~TdmaStation() { ethernet::withdraw_discipline(&discipline_); }
 
-/// Does not look at the clock for the last microseconds as the runtime's threads do: what has to be exact is when the frame leaves, and
-/// for that the port waits. Six nodes that look for 40 us each would take a quarter of a CPU.
+/// Does not spin before its wake-up as the runtime's threads do: only the departure of the frame must be exact, and for that the port waits. Six
+/// nodes that spin for 40 us each would take a quarter of a CPU.
 std::int64_t TdmaStation::sleep_until(std::int64_t local_ns) const noexcept {
     const auto due = clock_.from_local(local_ns);
     const timespec at{due / 1'000'000'000, due % 1'000'000'000};
@@ -161,7 +161,7 @@ void TdmaStation::look() noexcept {
     for (tdma::Happened h; told_.pop(h);)
         if (const std::string sentence = words_(h); !sentence.empty()) log_.print(tdma::subject(h), sentence, now);
     if (lacks_slot_.exchange(false))
-        log_.print("the new schedule has no slot " + std::to_string(*slot_) + " for this station, in which it sends; start it again, or write one", now);
+        log_.print("the new schedule has no slot " + std::to_string(*slot_) + " for this station, which sends in it; add one, or restart this node", now);
     log_.flush(now);
 }
 
@@ -175,7 +175,7 @@ void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
     });
     mlockall(MCL_CURRENT | MCL_FUTURE);
     const sched_param real_time{priority};
-    sched_setscheduler(0, SCHED_FIFO, &real_time);  // without the right to it it runs all the same, with more jitter
+    sched_setscheduler(0, SCHED_FIFO, &real_time);  // without permission it runs with more jitter
     auto due = clock_.local(link::monotonic_ns()) + station_.setup().cycle;
     for (bool goes_on = true; goes_on; ++cycles_) {
         if (applicant_ && applicant_->cycle()) take_over();
@@ -186,7 +186,7 @@ void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
         goes_on = turn(due, station_.status().synchronous);
         station_.transmit(due);
         due += cycle;
-        // From the first sync on: being in phase is a part of becoming synchronous.
+        // From the first sync on: being in phase is part of synchronising.
         const bool beat = station_.status().state != tdma::State::listening;
         if (beat) due += beat_.follow(station_.error(), cycle);
         else if (had_beat_) beat_.lose();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A device as a TDMA station of its own: its clock, its place in the schedule, its real-time loop.
+// A device as a TDMA station: its clock, its entry in the schedule, its real-time loop.
 #pragma once
 
 #include <atomic>
@@ -23,38 +23,38 @@ namespace hal::tools {
 class TdmaStation : private tdma::Events {
 public:
     ~TdmaStation() override;
-    /// The station that the options and the schedule name, on the interface of the link; offers its slots to `cane:` links. What is wrong,
-    /// or nothing. `link` gets the slot behind it when it names none. With `--tdma auto` the master sends the station's block: it waits for
-    /// that, and asks `ended`, which takes some milliseconds, whether it is to give up. [setup]
+    /// Creates the station named by options and schedule on the interface of the link, and offers its slots to `cane:` links. Adds its slot to `link` if
+    /// it names none. With `--tdma auto` it waits for the schedule from the master and calls `ended` every few milliseconds to see whether to give
+    /// up. Returns the problem, or "". [setup]
     static std::string make(const NodeOptions&, std::string& link, const std::function<bool()>& ended, std::unique_ptr<TdmaStation>& made);
 
-    /// Turns until `turn` says false: once a cycle, a little before the slot, with the time on the station's clock. What happens on the segment
-    /// is said on standard error.
+    /// Turns until `turn` returns false: once a cycle, shortly before the slot, with the time of the station's clock. Prints the events of the
+    /// segment on standard error.
     void run(const std::function<bool(std::int64_t local_ns, bool synchronous)>& turn);
-    std::string summary() const;  ///< a line on what became of the cycles
+    std::string summary() const;  ///< Returns a line with the statistics of the cycles.
 
 private:
     TdmaStation(const tdma::StationSetup&, tdma::config::Schedule, std::string segment, std::unique_ptr<ethernet::Port>, double skew,
                 double drift);
-    std::string take_schedule(const NodeOptions&, const std::function<bool()>& ended);  ///< what is wrong, or nothing
-    std::string open_tunnel(const NodeOptions&, const tdma::config::StationEntry&);  ///< what is wrong, or nothing
-    std::int64_t sleep_until(std::int64_t local_ns) const noexcept;  ///< what time it is then
-    void take_over() noexcept;  ///< another schedule than the first. [realtime]
-    void look() noexcept;       ///< beside the loop: what is to be read, and to be said
+    std::string take_schedule(const NodeOptions&, const std::function<bool()>& ended);  ///< Returns the problem, or "".
+    std::string open_tunnel(const NodeOptions&, const tdma::config::StationEntry&);  ///< Returns the problem, or "".
+    std::int64_t sleep_until(std::int64_t local_ns) const noexcept;  ///< Returns the time after it.
+    void take_over() noexcept;  ///< Switches to a new schedule. [realtime]
+    void look() noexcept;       ///< Reads files and prints messages, outside the loop.
     void on_event(tdma::Event event, const tdma::Address& who, tdma::Time value) noexcept override { told_.push({event, who, value}); }
 
-    const tdma::config::Schedule schedule_;  // empty of a station that has its own from the master
+    const tdma::config::Schedule schedule_;  // empty if received from the master
     const tdma::EventWords words_{schedule_, "start this node again"};
-    hal::Queue<tdma::Happened> told_{64};  // by the loop
+    hal::Queue<tdma::Happened> told_{64};  // filled by the loop
     hal::MessageLog log_{"hal node"};
-    std::optional<unsigned> slot_;  // that its frames leave in, when nobody named one
+    std::optional<unsigned> slot_;  // slot of its frames, if chosen by the station
     std::atomic<bool> lacks_slot_{false};
     const SkewedClock clock_;
     const std::string segment_;
     SkewedPort port_;
     tdma::Station station_;
     SkewedDiscipline discipline_{station_, clock_};
-    std::unique_ptr<tdma::rtcfg::Applicant> applicant_;  // of a station that has its schedule from the master
+    std::unique_ptr<tdma::rtcfg::Applicant> applicant_;  // if the schedule is received from the master
     std::unique_ptr<tdma::Tunnel> tunnel_;  // before tap_, which uses it
     std::unique_ptr<tdma::Tap> tap_;
     hal::Discipline beat_;

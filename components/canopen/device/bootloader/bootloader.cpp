@@ -21,8 +21,8 @@ constexpr std::array<std::uint32_t, 256> crc_table = [] {
 
 enum Control : std::uint8_t { stop = 0, start = 1, reset = 2, clear = 3 };
 
-constexpr const char* words[] = {"no error", "no valid program", "format of the program not known", "program damaged",
-                                 "not cleared before it was written", "write error", "program too long", "secured"};
+constexpr const char* words[] = {"no error", "no valid program", "unknown program format", "program damaged",
+                                 "not cleared before writing", "write error", "program too long", "secured"};
 
 }  // namespace
 
@@ -48,7 +48,8 @@ std::vector<std::uint8_t> program_image(std::uint32_t product, std::uint32_t ver
 Bootloader::Bootloader(BootloaderSettings settings) : settings_(std::move(settings)), flash_(settings_.flash) {
     auto image = settings_.image.value_or(std::vector<std::uint8_t>{});
     if (!settings_.image && settings_.version != 0) image = program_image(settings_.product, settings_.version, 4096);
-    if (image.size() > flash_.size()) throw std::invalid_argument("the image is longer than the flash");
+    if (image.size() > flash_.size())
+        throw std::invalid_argument("the image is longer than the flash of " + std::to_string(flash_.size()) + " bytes");
     std::copy(image.begin(), image.end(), flash_.begin());
     used_ = image.size();
     examine();
@@ -85,7 +86,7 @@ void Bootloader::boot(Time now) noexcept {
     Program::boot(now);
 }
 
-/// What is in the flash: header_, identification_ and error_.
+/// Examines the flash and sets header_, identification_ and error_.
 void Bootloader::examine() noexcept {
     header_ = {};
     identification_ = 0;
@@ -102,7 +103,7 @@ void Bootloader::examine() noexcept {
     identification_ = crc32({at, used_});
 }
 
-/// Identity and version of what runs now.
+/// Shows identity and version of what runs now in the object dictionary.
 void Bootloader::show() noexcept {
     auto& dictionary = device_->dictionary();
     dictionary.set(0x1018, 3, running_ ? header_.version : std::uint32_t{0});
@@ -116,7 +117,7 @@ void Bootloader::show() noexcept {
 }
 
 void Bootloader::on_reset(bool application) noexcept {
-    if (application && !wants_reset_) running_ = valid();  // power-on and NMT: the program, where there is one
+    if (application && !wants_reset_) running_ = valid();  // power-on and NMT reset start a valid program
     wants_reset_ = false;
     if (!running_) writing_ = erasing_ = false;
     show();
@@ -132,7 +133,7 @@ void Bootloader::step(Time now) noexcept {
         auto& dictionary = device_->dictionary();
         dictionary.set(0x2000, 0, dictionary.get<std::uint32_t>(0x2000, 0) + 1);
     }
-    if (!wants_reset_ || device_->out().size() != 0) return;  // the answer to the command goes first
+    if (!wants_reset_ || device_->out().size() != 0) return;  // send the response to the command first
     running_ = starts_;
     device_->command(NmtCommand::reset_node, now);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A device whose program is changed over the bus: CiA 302's program download (1F50h), program control (1F51h), software identification
-// (1F56h) and flash status (1F57h). After an update its revision number and software version are those of the new program.
+// A device with a boot loader (CiA 302): program download (1F50h), program control (1F51h), software identification (1F56h) and flash
+// status (1F57h). After an update its revision number and software version are those of the new program.
 #pragma once
 
 #include <optional>
@@ -10,41 +10,46 @@
 
 namespace hal::canopen {
 
-/// How a program looks that such a device takes: 20 bytes, then the program. All numbers little endian.
+/// Header of an image, 20 bytes before the program. All numbers are little endian.
 struct ProgramHeader {
     static constexpr std::size_t size = 20;
     static constexpr std::uint32_t signature = 0x50434c48;  ///< "HLCP"
-    std::uint32_t product = 0, version = 0, length = 0, crc = 0;  ///< CRC-32 of the bytes behind the header
+    std::uint32_t product = 0, version = 0, length = 0, crc = 0;  ///< `length` in bytes, CRC-32 of the bytes after the header
 };
-/// CRC-32 as in Ethernet and zip; object 1F56h has it of the whole image. [any]
+/// Returns the CRC-32 of Ethernet and zip; object 1F56h is that of the whole image. [any]
 std::uint32_t crc32(std::span<const std::uint8_t>) noexcept;
-/// An image with `length` bytes of program; version 0x00020001 is 2.1. [any, not real time]
+/// Returns an image with `length` bytes of program; version 0x00020001 is 2.1. [any, not real time]
 std::vector<std::uint8_t> program_image(std::uint32_t product, std::uint32_t version, std::size_t length);
 
 struct BootloaderSettings {
     std::uint32_t product = 0x302, serial = 1;
-    std::uint32_t version = 0x00010000;           ///< of the program it comes with; 0: its flash is empty
-    std::size_t flash = 1 << 20;                  ///< bytes there is room for
-    Time erase = 20 * millisecond;                ///< how long clearing takes
+    std::uint32_t version = 0x00010000;           ///< of the initial program; 0: the flash is empty
+    std::size_t flash = 1 << 20;                  ///< capacity in bytes
+    Time erase = 20 * millisecond;                ///< time to clear the flash, ns
     std::uint16_t heartbeat_ms = 0;
-    std::optional<std::vector<std::uint8_t>> image{};  ///< content of the flash instead of the program it comes with
+    std::optional<std::vector<std::uint8_t>> image{};  ///< initial content of the flash, instead of a program
 };
 
-/// Error codes in bits 1–7 of 1F57h; bit 0: busy.
+/// Error codes in bits 1..7 of 1F57h (CiA 302); bit 0 is busy.
 enum class FlashError : std::uint8_t {
     none = 0, no_program = 1, unknown_format = 2, wrong_data = 3, not_cleared = 4, write_error = 5, address = 6, secured = 7,
 };
 
+/// The device. All functions are called by the thread that turns its Node.
 class Bootloader final : public Program {
 public:
-    explicit Bootloader(BootloaderSettings);  // [setup]
+    /// Creates the device. Throws std::invalid_argument when the image is longer than the flash. [setup]
+    explicit Bootloader(BootloaderSettings);
 
-    /// The program runs; otherwise the bootloader does, which is what takes a new one. [realtime]
+    /// Returns true while the program runs, false while the boot loader runs, which accepts a new program. [realtime]
     bool running() const noexcept { return running_; }
+    /// Returns the version of the program in the flash, 0 without a valid one. [realtime]
     std::uint32_t version() const noexcept { return running_ || valid() ? header_.version : 0; }
+    /// Returns the error of 1F57h. [realtime]
     FlashError error() const noexcept { return error_; }
+    /// Returns the content of the flash. [realtime]
     std::span<const std::uint8_t> flash() const noexcept { return {flash_.data(), used_}; }
-    /// Counts what was changed in the flash: time to keep it in a file. [any]
+    /// Counts the changes of the flash; when it has changed, write_flash() is due. [realtime]
     unsigned changes() const noexcept { return changes_; }
 
     Description description() const override;

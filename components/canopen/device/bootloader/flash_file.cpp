@@ -24,17 +24,17 @@ std::string read_flash(const std::string& path, std::size_t most, std::optional<
     image.reset();
     errno = 0;
     const File file(std::fopen(path.c_str(), "rbe"));
-    if (!file && errno == ENOENT) {  // it is made when there is an image: that needs its folder
+    if (!file && errno == ENOENT) {  // created later, with the first image; that needs its folder
         const auto slash = path.rfind('/');
         const auto folder = path.substr(0, slash == std::string::npos ? 0 : slash);
         if (folder.empty() || ::access(folder.c_str(), F_OK) == 0) return {};
-        return "there is no folder for '" + path + "'; type: mkdir -p " + folder;
+        return "cannot create '" + path + "': missing folder; type: mkdir -p " + folder;
     }
     if (!file) return problem("cannot read", path);
     std::vector<std::uint8_t> room(most + 1);
     const auto size = std::fread(room.data(), 1, room.size(), file.get());
     if (std::ferror(file.get()) != 0) return problem("cannot read", path);
-    if (size > most) return "'" + path + "' is longer than the flash, which has " + std::to_string(most) + " bytes";
+    if (size > most) return "'" + path + "' is longer than the flash of " + std::to_string(most) + " bytes";
     room.resize(size);
     image = std::move(room);
     return {};

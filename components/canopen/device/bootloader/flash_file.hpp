@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The flash of a device, kept in a file.
+// The flash of a simulated device, kept in a file.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace hal::canopen {
 
-/// What is wrong, or nothing. No file is no image. [setup]
+/// Reads an image of at most `most` bytes; a file that does not exist leaves `image` empty. Returns the problem, or "". [setup]
 std::string read_flash(const std::string& path, std::size_t most, std::optional<std::vector<std::uint8_t>>& image);
-/// The file has the whole image or what it had before. [setup]
+/// Replaces the file atomically: it has the new image or the old one. Returns the problem, or "". [setup]
 std::string write_flash(const std::string& path, std::span<const std::uint8_t> image);
 
 }  // namespace hal::canopen

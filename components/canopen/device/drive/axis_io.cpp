@@ -18,7 +18,7 @@ constexpr std::uint16_t set_point = 0x2100, count = 0x2101, second_count = 0x210
 }  // namespace object
 
 constexpr std::uint16_t encoder_lost = 0x7305, input_opened = 0x9000, sync_missing = 0x8700, heartbeat_lost = 0x8130;
-constexpr Time longest_step = 20 * millisecond;  // a process that was not run for longer does not make the plant jump
+constexpr Time longest_step = 20 * millisecond;  // a process suspended for longer does not make the plant jump
 
 std::uint8_t register_bits(std::uint16_t code) noexcept {
     return code == heartbeat_lost || code == sync_missing ? error_communication : code == encoder_lost ? error_profile : error_manufacturer;
@@ -26,7 +26,7 @@ std::uint8_t register_bits(std::uint16_t code) noexcept {
 
 }  // namespace
 
-const char* word(AxisIo::State state) noexcept {
+const char* to_string(AxisIo::State state) noexcept {
     constexpr const char* words[] = {"stopped", "ready", "on", "fault"};
     return words[static_cast<std::size_t>(state)];
 }
@@ -90,7 +90,7 @@ AxisIo::State AxisIo::state() const noexcept {
 
 double AxisIo::duty() const noexcept { return statusword_ == enabled ? std::max(-1.0, set_point_ / 32767.0) : 0.0; }
 
-/// The state machine of CiA 402-2, 6.2, without ramps: a motor that nobody commands carries no current.
+/// The state machine of CiA 402-2, 6.2, without ramps: a motor that is not commanded carries no current.
 void AxisIo::take_controlword() noexcept {
     using namespace cia402::control;
     const auto now = controlword_;
@@ -122,7 +122,7 @@ void AxisIo::stop_for(std::uint16_t code) noexcept {
     device_->emcy().raise(code, register_bits(code));
 }
 
-/// What the counters show now.
+/// Samples the counters.
 void AxisIo::sample(Time now) noexcept {
     if (stepped_once_ && now > stepped_) plant_->step(duty(), statusword_ == enabled, std::min(now - stepped_, longest_step));
     stepped_ = now, stepped_once_ = true;
@@ -132,7 +132,7 @@ void AxisIo::sample(Time now) noexcept {
     current_ma_ = static_cast<std::int16_t>(std::clamp(plant_->current() * 1000.0, -32767.0, 32767.0));
 }
 
-/// A motor is on only while SYNCs and set-points come.
+/// Switches the motor off when SYNCs or set-points fail to arrive.
 void AxisIo::watch(Time now) noexcept {
     if (statusword_ == failed) return;
     if (encoder_broken_) return stop_for(encoder_lost);
@@ -185,7 +185,7 @@ std::vector<std::string> AxisIo::settable() const {
 }
 
 std::string AxisIo::news() const {
-    std::string text = word(state());
+    std::string text = to_string(state());
     if (error_code_ != 0) text += std::string(", error ") + emergency_text(error_code_);
     text += ", outputs ";
     for (unsigned n = 4; n-- > 0;) text += output(n) ? '1' : '0';

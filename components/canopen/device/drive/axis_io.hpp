@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// An axis whose loop is closed over the bus: a motor amplifier set by pulse width, two encoder counters of 16 bits, four outputs and an
-// input, at the other end of the wire. Its states are those of CiA 402, with the words stopped, ready, on and fault for what they mean here.
+// An axis with its control loop closed over the bus: a node with a motor amplifier set by pulse width, two 16-bit encoder counters, four
+// outputs and an input. Its states are those of CiA 402, reduced to stopped, ready, on and fault.
 #pragma once
 
 #include <memory>
@@ -10,33 +10,35 @@
 
 namespace hal::canopen {
 
-/// What can be done to a plant from outside.
+/// An external influence on a plant.
 struct Influence {
-    enum Kind : std::uint8_t { value, flag, tap };  ///< a tap acts once
+    enum Kind : std::uint8_t { value, flag, tap };  ///< value and flag act continuously, a tap acts once
     const char *name, *doc, *unit;
     double initial;
     Kind kind;
 };
 
-/// What the device is wired to. [realtime] unless marked.
+/// The simulated machine behind the device. [realtime] unless marked.
 class Plant {
 public:
     virtual ~Plant() = default;
-    /// Moves on by `time_ns` with the amplifier at `duty`, -1 to 1 of its supply; `on` false: the motor carries no current.
+    /// Advances by `time_ns` with the amplifier at `duty`, -1..1 of its supply; with `on` false the motor carries no current.
     virtual void step(double duty, bool on, Time time_ns) noexcept = 0;
-    virtual std::int64_t count() const noexcept = 0;         ///< of the encoder, x4
-    virtual std::int64_t second_count() const noexcept = 0;  ///< of the other one
+    virtual std::int64_t count() const noexcept = 0;         ///< of the encoder, four per line
+    virtual std::int64_t second_count() const noexcept = 0;  ///< of the second encoder, four per line
     virtual bool input() const noexcept = 0;                 ///< the contact at the digital input is closed
     virtual double current() const noexcept = 0;             ///< A, in the motor
-    virtual double position() const noexcept = 0;            ///< rad, at the motor or the arm, as no encoder knows it
-    virtual double second_position() const noexcept = 0;     ///< rad, at the screw's end or the pendulum
+    virtual double position() const noexcept = 0;            ///< rad, true position of the motor or the arm
+    virtual double second_position() const noexcept = 0;     ///< rad, true position of the screw's end or the pendulum
+    /// Returns the influences put() accepts, by index.
     virtual std::span<const Influence> influences() const noexcept = 0;
-    /// Influence `n` takes that value; what is no number is passed over.
+    /// Sets influence `n`; a value that is not a number is ignored.
     virtual void put(std::size_t n, double value) noexcept = 0;
 };
 
-/// "axis": a motor, a screw and a slide, the second encoder on the slide's side. "furuta": the pendulum rig, the second encoder on the
-/// pendulum, the contact under the base at the input. Nothing when there is no plant of that name. [setup]
+/// Returns a plant, or nullptr for an unknown name. "axis": a motor, a screw and a slide, the second encoder at the end of the screw.
+/// "furuta": the pendulum rig, the second encoder on the pendulum, the contact under the base at the input. [setup]
+
 std::unique_ptr<Plant> make_plant(std::string_view name);
 inline constexpr const char* plant_names = "axis, furuta";
 
@@ -97,6 +99,6 @@ private:
     Time stepped_ = 0, synced_ = 0, commanded_ = 0;
     std::int16_t broken_at_ = 0;
 };
-const char* word(AxisIo::State) noexcept;
+const char* to_string(AxisIo::State) noexcept;
 
 }  // namespace hal::canopen

@@ -60,7 +60,7 @@ void Drive::set_encoder_broken(unsigned axis, bool broken) noexcept {
     if (axis < axes_.size()) axes_[axis]->set_encoder_broken(broken);
 }
 
-// The master is gone when the bus or its heartbeat is, and when it stops or resets the communication.
+// The master is lost with the bus or its heartbeat, and when it stops the node or resets the communication.
 
 void Drive::on_state(NmtState state) noexcept {
     if (state == NmtState::stopped)
@@ -76,7 +76,7 @@ void Drive::on_communication_error(Time now) noexcept {
     also_.on_communication_error(now);
 }
 
-// The others are of no concern to a drive.
+// Events a drive does not use.
 
 void Drive::on_sync(std::uint8_t counter, Time now) noexcept { also_.on_sync(counter, now); }
 void Drive::on_sync_lost(Time now) noexcept { also_.on_sync_lost(now); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What happens in one step, what is watched, and what the objects show.
+// One step of an axis: monitoring, touch probes, and the values of the objects.
 #include "drive_axis.hpp"
 
 #include <algorithm>
@@ -114,7 +114,7 @@ std::optional<double> DriveAxis::probed(unsigned n, bool rising, bool index) con
     if (index) return plant_.index_pulse();
     const auto mounted = plant_.probe(n);
     if (const auto place = mounted.edge(plant_.before(), plant_.place(), rising)) return place;
-    // The input from outside: where the axis is when it is seen.
+    // An external input latches the position at which it is sampled.
     const auto bit = input::probe_1 << n;
     const bool changed = ((inputs_ ^ inputs_before_) & bit) != 0 && ((inputs_ & bit) != 0) == rising;
     return changed && mounted.holds(plant_.place()) == mounted.holds(plant_.before()) ? std::optional(plant_.place()) : std::nullopt;
@@ -128,7 +128,7 @@ void DriveAxis::watch_probe(unsigned n, unsigned function, unsigned before, std:
         waits = 0;
         return;
     }
-    // An edge that is asked for anew waits again; one that was found does not, unless all are wanted.
+    // Requesting an edge again arms it; a captured edge rearms only in continuous mode.
     const unsigned asked = function & (positive_edge | negative_edge);
     const bool afresh = (before & enable) == 0 || ((function ^ before) & (continuous | index_pulse)) != 0;
     const unsigned anew = afresh ? asked : asked & ~before;
@@ -147,7 +147,7 @@ void DriveAxis::watch_probe(unsigned n, unsigned function, unsigned before, std:
     }
 }
 
-// What the objects show.
+// Values of the objects.
 
 std::uint16_t DriveAxis::mode_bits() const noexcept {
     using namespace status;
@@ -157,7 +157,7 @@ std::uint16_t DriveAxis::mode_bits() const noexcept {
     const bool idle = !active_ && ref_.velocity == 0 && standing();
     switch (mode_) {
     case Mode::profile_position:
-        // Of a set of set-points the last one counts.
+        // For a set of set-points the last one counts.
         bits = when(active_ ? reached_ && set_points_.count == 0 : idle, target_reached) | when(acknowledged_, set_point_acknowledge) |
                when(following_, following_error);
         break;
@@ -238,7 +238,7 @@ AxisStatus DriveAxis::status() const noexcept {
             .current = plant_.torque() / m.rated_torque * m.rated_current};
 }
 
-// What a master writes.
+// Writes of a master.
 
 Abort DriveAxis::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     const auto byte = static_cast<std::int8_t>(value[0]);
@@ -264,7 +264,7 @@ Abort DriveAxis::writing(Entry& e, std::span<const std::uint8_t> value) noexcept
     case object::feed_constant:
     case object::velocity_factor:
     case object::acceleration_factor:
-        return torque_state() ? Abort::device_state : Abort::none;  // the unit of what it follows would change
+        return torque_state() ? Abort::device_state : Abort::none;  // the unit of the set-point would change
     default: return Abort::none;
     }
 }
@@ -283,7 +283,7 @@ void DriveAxis::written(Entry& e) noexcept {
     case object::torque_offset: fresh_ = fresh_ || mode_ == Mode::cyclic_torque; break;
     case object::interpolation_data:
         if (mode_ != Mode::interpolated_position) break;
-        if (records_.full(objects_.buffer_size)) record_lost_ = true;  // by a PDO; an SDO was refused
+        if (records_.full(objects_.buffer_size)) record_lost_ = true;  // by a PDO; an SDO is rejected
         else records_.push(objects_.interpolation_record);
         break;
     case object::interpolation_configuration:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One axis of a drive: state machine, modes, position, velocity and torque loops, monitoring. Inside, positions are encoder increments
 // counted from power-on, not rounded: the loops see the encoder as one that interpolates; the objects show whole numbers.
-// drive_state.cpp has the state machine and faults, drive_modes.cpp and drive_cyclic.cpp the modes, drive_servo.cpp the loops,
-// drive_axis.cpp what is watched and shown.
+// drive_state.cpp has the state machine and faults, drive_modes.cpp, drive_profiles.cpp and drive_cyclic.cpp the modes, drive_servo.cpp the
+// loops, drive_axis.cpp monitoring and the values of the objects.
 #pragma once
 
 #include <cmath>
@@ -14,22 +14,27 @@
 
 namespace hal::canopen::cia402 {
 
-/// The next whole number; what is beyond any counter stays there. [any]
+/// Rounds to the next integer; clamps what is beyond any counter. [any]
 inline std::int64_t whole(double value) noexcept {
     constexpr double most = 1LL << 52;
     return value >= -most && value <= most ? std::llround(value) : value > 0 ? 1LL << 52 : -(1LL << 52);
 }
 
+/// Converts 1/min to 1/s. [any]
+constexpr double per_second(double per_minute) noexcept { return per_minute / 60; }
+
+/// The axis. [realtime] unless marked.
 class DriveAxis final : public Handler {
 public:
-    DriveAxis(unsigned number, const AxisSettings&);  // [setup]
-    /// Its values lie here from now on. [setup]
+    /// Creates axis `number`, counted from 0. [setup]
+    DriveAxis(unsigned number, const AxisSettings&);
+    /// Binds its values to the object dictionary. [setup]
     void attach(Device&);
-    /// Power comes on, or the application is reset: the encoder counts from 0. [realtime]
+    /// Handles power-on and the reset of the application: the encoder counts from 0.
     void power_up() noexcept;
-    /// At most 1 ms. [realtime]
+    /// Advances by `dt` s, at most 1 ms.
     void step(double dt) noexcept;
-    /// The master is gone: 6007h. [realtime]
+    /// Handles the loss of the master as configured in 6007h.
     void lose_connection() noexcept;
 
     AxisStatus status() const noexcept;
@@ -148,11 +153,11 @@ private:
 
     State state_ = State::not_ready_to_switch_on;
     std::uint16_t control_ = 0, edges_ = 0;
-    bool enable_next_ = false;              // 3 was done because of "enable operation"; 4 follows
+    bool enable_next_ = false;              // transition 3 was made by "enable operation"; 4 follows
     bool stopping_ = false;
     Stop stop_ = Stop::disable;
     State after_stop_ = State::unknown;
-    double stop_time_ = 0, still_time_ = 0;  // since the demand is 0, and since it stands
+    double stop_time_ = 0, still_time_ = 0;  // since the demand is 0, and since standstill
     std::uint16_t faults_ = 0;              // a bit for each Cause
     double release_left_ = 0, engage_left_ = 0;
     bool connected_ = true;
@@ -162,7 +167,7 @@ private:
     Motion ref_;                            // at the end of this step
     double demand_before_ = 0;              // position at its beginning
     double torque_ref_ = 0;                 // N·m
-    double wanted_ = 0;                     // its sign is the direction the set-point asks for
+    double wanted_ = 0;                     // its sign is the commanded direction
     double integral_ = 0, velocity_wanted_ = 0, torque_demand_ = 0;
     bool limited_ = false, saturated_ = false;
 

@@ -42,7 +42,7 @@ void DriveAxis::cyclic_position(double dt) noexcept {
         has_target_ = true;
     }
     fresh_ = false;
-    // Until the master has spoken nothing moves: what stands in 607Ah may be old.
+    // The axis holds until the first set-point after enabling: the value in 607Ah may be stale.
     if (!has_target_) return ramp(ref_, 0, stop_rate(Stop::slow_down), stop_rate(Stop::slow_down), dt);
     interpolator_.step(ref_, dt);
     const double inside = within_limits(ref_.position);

@@ -49,7 +49,7 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
         return result;
     };
     for (unsigned n = 1; n <= 7; ++n) {
-        // Words go out when they change, what changes all the time goes out with the SYNC.
+        // Status is sent on change; values that change continuously are sent with the SYNC.
         add_rpdo(d, pdo_of_axis(n, axis), {.mapping = mapping(controlword, received[n - 1])});
         const std::uint8_t transmission = n <= 2 ? 255 : 1;
         add_tpdo(d, pdo_of_axis(n, axis), {.transmission = transmission, .mapping = mapping(statusword, sent[n - 1])});

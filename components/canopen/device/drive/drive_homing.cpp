@@ -61,7 +61,7 @@ bool HomingSearch::begin(int method, const Plant& plant) noexcept {
 }
 
 void HomingSearch::pass(double place, Region to, bool wanted, double speed, double slow, int direction) noexcept {
-    // The last passage: from the right side and slow enough. Else it only tells where the edge is.
+    // The last passage counts in the required direction and slow enough; any other only locates the edge.
     if (wanted && direction == rule_.last && edge_found_ && std::abs(speed) <= slow * 1.001) {
         edge_ = place;
         if (index_) searching_index_ = true, direction_ = direction;
@@ -96,7 +96,7 @@ HomingSearch::Order HomingSearch::order(const Plant& plant) noexcept {
     const bool negative = plant.negative_limit().holds(plant.place()), positive = plant.positive_limit().holds(plant.place());
     const auto blocked = [&](int direction) { return direction < 0 ? negative : positive; };
     if (searching_index_) {
-        const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;  // a whole turn without a pulse
+        const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;  // a full revolution without a pulse
         return gone || blocked(direction_) ? Order{Act::failed, 0} : Order{Act::slow, direction_};
     }
     if (region_ == unknown && blocked(rule_.first)) {
@@ -105,7 +105,7 @@ HomingSearch::Order HomingSearch::order(const Plant& plant) noexcept {
     }
     const auto start = before_edge();
     const int direction = region_ == unknown ? rule_.first : region_ == start ? rule_.last : region_ < start ? 1 : -1;
-    // A limit switch in the way is an error, unless it is the one that is looked for.
+    // A limit switch in the path is an error, unless it is the one searched for.
     const bool own = rule_.which == (direction < 0 ? Switch::negative : Switch::positive);
     if (blocked(direction) && !own) return {Act::failed, 0};
     return {edge_found_ && region_ != unknown && std::abs(region_ - start) <= 1 ? Act::slow : Act::fast, direction};

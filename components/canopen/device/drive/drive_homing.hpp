@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Homing methods 1–37: which way to go next, until the home position is found.
+// Homing methods 1 to 37 (CiA 402): the direction of the next motion, until the home position is found.
 //
-// A method is a last passage: over one edge of one switch, in one direction, slowly; then, for methods 1–14, on to the next index
-// pulse. Before that the edge is searched fast. A home switch in the middle of the travel has places left of it, inside, and right of
-// it; a switch at an end has inside and one other. Which of them one is in follows from its level and the direction of each passage;
-// outside a home switch at the start it is unknown: then the method's first direction is taken until the switch, or the limit switch.
+// A method ends with a last passage: over one edge of one switch, in one direction, slowly; then, for methods 1 to 14, on to the next index
+// pulse. Before that the edge is searched at high speed. A home switch in the middle of the travel divides it into regions left of it,
+// inside, and right of it; a switch at an end into inside and one other. The region follows from the level of the switch and the direction
+// of each passage. Outside a home switch it is unknown at the start: then the axis moves in the method's first direction until it meets the
+// switch or a limit switch.
 #pragma once
 
 #include <cstdint>
@@ -16,20 +17,21 @@ namespace hal::canopen::cia402 {
 
 class HomingSearch {
 public:
-    /// What the axis should do now.
+    /// What the axis must do now.
     enum class Act : std::uint8_t { fast, slow, stop_at_home, failed };
     struct Order {
         Act act = Act::failed;
         int direction = 0;  ///< of fast and slow
     };
-    /// [any]
+    /// Returns true for methods this search implements. [any]
     static bool supports(int method) noexcept;
 
-    /// False: that method does not exist here. [realtime]
+    /// Starts a search. Returns false for an unsupported method. [realtime]
     bool begin(int method, const Plant&) noexcept;
-    /// Looks at what the last step of the plant passed. `speed` is the present demand, `slow` the speed of the search for zero. [realtime]
+    /// Evaluates the last step of the plant. `speed` is the present demand, `slow` the speed of the search for zero, increments/s.
+    /// [realtime]
     Order step(const Plant&, double speed, double slow) noexcept;
-    /// Along the travel, once the order is stop_at_home.
+    /// Returns the home position along the travel, valid once the order is stop_at_home.
     double home() const noexcept { return home_; }
 
 private:
@@ -40,7 +42,7 @@ private:
         Switch which;
         Edge edge;
         std::int8_t last;   // direction of the last passage
-        std::int8_t first;  // direction while the region is unknown; 0: the level tells
+        std::int8_t first;  // direction while the region is unknown; 0: known by the level
     };
     static const Rule rules[15];
     static Range range(const Plant&, Switch) noexcept;

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What the axis shall do next: stops, limits, and the modes whose set-points it makes itself. drive_cyclic.cpp has the others.
+// The next motion of the axis: stops, limits, and the selection of the mode. drive_profiles.cpp has the profile modes, drive_cyclic.cpp the
+// modes that follow set-points of the master.
 #include <algorithm>
 #include <cmath>
 
 #include "drive_axis.hpp"
 
 namespace hal::canopen::cia402 {
-
-namespace {
-constexpr double turns(double per_minute) noexcept { return per_minute / 60; }
-}  // namespace
 
 void DriveAxis::read_units() noexcept {
     const double increments = objects_.position_encoder.value() * objects_.gear.value() / objects_.feed.value();
@@ -22,7 +19,7 @@ void DriveAxis::read_units() noexcept {
 double DriveAxis::highest_speed() const noexcept {
     const double limit = objects_.max_motor_speed != 0 ? std::min<double>(objects_.max_motor_speed, settings_.motor.highest_speed)
                                                        : settings_.motor.highest_speed;
-    return turns(limit) * settings_.motor.resolution;
+    return per_second(limit) * settings_.motor.resolution;
 }
 double DriveAxis::acceleration(std::uint32_t wanted) const noexcept {
     const auto limit = objects_.max_acceleration;
@@ -38,13 +35,13 @@ Profile::Limits DriveAxis::profile_limits() const noexcept {
     return {std::min(speed * units_.speed, highest_speed()), acceleration(objects_.profile_acceleration),
             deceleration(objects_.profile_deceleration), 0};
 }
-/// Over which time the corners of a ramp are taken off, so that the steeper one keeps the jerk of 60A4h:1; 0: corners stay.
+/// Returns the time over which the corners of a ramp are smoothed so that the steeper one keeps the jerk of 60A4h:1; 0: not smoothed.
 double DriveAxis::corner_time() const noexcept {
     const double jerk = objects_.profile_jerk * units_.acceleration;
     if (objects_.motion_profile_type != jerk_limited || !(jerk > 0)) return 0;
     return std::max(acceleration(objects_.profile_acceleration), deceleration(objects_.profile_deceleration)) / jerk;
 }
-/// What a ramp or profile is to move on. Where something else moved the reference meanwhile it begins anew from there.
+/// Returns the motion that a ramp or profile advances. Restarts it where something else has moved the reference in between.
 Motion& DriveAxis::unsmoothed(bool position_matters) noexcept {
     Motion now = ref_;
     if (!position_matters) now.position = 0;
@@ -59,7 +56,7 @@ double DriveAxis::period() const noexcept {
     return result;
 }
 
-// Positions of the user have 32 bits, or the range of 607Bh, and go round; the axis goes on.
+// User positions have 32 bits, or the range of 607Bh, and wrap; the position of the axis does not.
 
 std::int32_t DriveAxis::shown(double encoder) const noexcept {
     const auto value = whole(user(encoder));
@@ -76,7 +73,7 @@ double DriveAxis::absolute(std::int32_t target, double near) const noexcept {
     const double low = objects_.range_min, at = user(near);
     double wanted = turn_start + low + std::fmod(target - low, span);
     if (target < low) wanted += span;
-    switch (objects_.positioning_option >> 6 & 3) {  // how a rotary axis goes there
+    switch (objects_.positioning_option >> 6 & 3) {  // direction of a rotary axis
     case 1: wanted -= wanted > at ? span : 0; break;
     case 2: wanted += wanted < at ? span : 0; break;
     case 3: wanted -= span * std::round((wanted - at) / span); break;
@@ -110,7 +107,7 @@ bool DriveAxis::blocked(int direction) const noexcept {
     return (direction > 0 ? plant_.positive_limit() : plant_.negative_limit()).holds(plant_.place());
 }
 
-// What every mode uses.
+// Common to all modes.
 
 void DriveAxis::follow() noexcept {
     loop_ = Control::off;
@@ -138,7 +135,7 @@ bool DriveAxis::standing() const noexcept {
 }
 
 double DriveAxis::stop_rate(Stop stop) const noexcept {
-    const auto vl = [&](const Ramp& r) { return turns(r.speed) / std::max<double>(r.time, 1) * settings_.motor.resolution; };
+    const auto vl = [&](const Ramp& r) { return per_second(r.speed) / std::max<double>(r.time, 1) * settings_.motor.resolution; };
     double rate = 0;
     if (stop == Stop::quick_stop)
         rate = mode_ == Mode::velocity ? vl(objects_.vl_quick_stop) : deceleration(objects_.quick_stop_deceleration);
@@ -149,7 +146,7 @@ double DriveAxis::stop_rate(Stop stop) const noexcept {
 }
 
 bool DriveAxis::stop_step(Stop stop, double dt) noexcept {
-    if (stop == Stop::current_limit || stop == Stop::voltage_limit) {  // as fast as the torque allows
+    if (stop == Stop::current_limit || stop == Stop::voltage_limit) {  // limited by the torque only
         take(Control::velocity);
         ref_ = {measured_, 0, 0};
     } else {
@@ -164,7 +161,7 @@ bool DriveAxis::stop_step(Stop stop, double dt) noexcept {
 
 void DriveAxis::select_mode() noexcept {
     const auto wanted = static_cast<Mode>(objects_.mode);
-    // An SDO cannot ask for another; of a PDO it is not heard.
+    // An SDO with another mode is rejected; a PDO with one is ignored.
     if (wanted == mode_ || (wanted != Mode::none && (objects_.supported_modes & bit_of(wanted)) == 0)) return;
     mode_ = wanted;
     objects_.mode_display = objects_.mode;
@@ -188,13 +185,13 @@ void DriveAxis::make_reference(double dt) noexcept {
     demand_before_ = ref_.position;
     limited_ = false;
     if (!powered() || (state_ == State::fault_reaction_active && !stopping_)) return follow();
-    if (release_left_ > 0) {  // the brake still holds
+    if (release_left_ > 0) {  // the brake is still closed
         take(Control::position);
         ref_ = {measured_, 0, 0};
         last_target_ = measured_;
     } else if (stopping_) {
         if (stop_step(stop_, dt)) {
-            stopping_ = after_stop_ != State::unknown;  // enter() looks whether there was a ramp
+            stopping_ = after_stop_ != State::unknown;  // enter() checks whether there was a ramp
             if (stopping_) enter(after_stop_);
             stop_time_ = 0;
             if (!powered()) follow();
@@ -245,7 +242,7 @@ void DriveAxis::guard_limits(const Motion& before, double dt) noexcept {
     const double rate = stop_rate(Stop::quick_stop);
     if (loop_ == Control::position) wanted_ = ref_.position - (guard_ != 0 ? guarded_.position : before.position);
     if (guard_ == 0) {
-        // A set-point that is a position is within the software limits already; the others stop in time.
+        // Position set-points are within the software limits already; the other modes stop in time.
         const auto limits = loop_ == Control::position ? Range{-HUGE_VAL, HUGE_VAL} : software_limits();
         const double speed = now_speed(), way = 0.5 * speed * speed / rate;
         for (const int direction : {1, -1}) {
@@ -260,7 +257,7 @@ void DriveAxis::guard_limits(const Motion& before, double dt) noexcept {
         }
         if (guard_ == 0) return;
     } else if (wanted_ * guard_ <= 0 && guarded_.velocity == 0 && (loop_ != Control::position || wanted_ != 0)) {
-        guard_ = 0;  // the set-point has gone back
+        guard_ = 0;  // the set-point has reversed
         return;
     }
     limited_ = true;
@@ -268,138 +265,6 @@ void DriveAxis::guard_limits(const Motion& before, double dt) noexcept {
     ramp(guarded_, 0, rate, rate, dt);
     loop_ = Control::position;
     ref_ = guarded_;
-}
-
-// Profile position.
-
-void DriveAxis::accept_set_point() noexcept {
-    if (acknowledged_) return;
-    const bool immediately = (control_ & control::change_immediately) != 0, pending = active_ || set_points_.count != 0;
-    if (!immediately && pending && set_points_.full()) return;
-    SetPoint next{0, profile_limits()};
-    next.limits.end_velocity = objects_.end_velocity * units_.speed;
-    if ((control_ & control::relative) != 0) {
-        const int option = objects_.positioning_option & 3;
-        const double base = option == 1 ? ref_.position : option == 2 ? measured_ : last_target_;
-        next.target = base + objects_.target_position * units_.position;
-    } else {
-        next.target = absolute(objects_.target_position, pending && !immediately ? last_target_ : ref_.position);
-    }
-    next.target = within_limits(next.target);
-    last_target_ = next.target;
-    acknowledged_ = true;
-    if (immediately) set_points_.clear();
-    if (immediately || !pending) {
-        start_set_point(next);
-        return;
-    }
-    set_points_.push(next);
-    if ((control_ & control::change_on_set_point) == 0 || set_points_.count != 1 || halted_) return;
-    // Through the present one without a stop, as fast as the next allows, if it goes on in the same direction.
-    const double ahead = active_set_point_.target - unsmoothed(true).position, further = next.target - active_set_point_.target;
-    if (ahead * further <= 0 || profile_.done()) return;
-    active_set_point_.limits.end_velocity = std::min({active_set_point_.limits.velocity, next.limits.velocity,
-                                                      std::sqrt(2 * next.limits.deceleration * std::abs(further))});
-    profile_.plan(unsmoothed(true), active_set_point_.target, active_set_point_.limits);
-}
-
-void DriveAxis::start_set_point(const SetPoint& next) noexcept {
-    active_set_point_ = next;
-    active_ = true;
-    reached_ = false;
-    reached_time_ = 0;
-    take(Control::position);
-    profile_.plan(unsmoothed(true), next.target, next.limits);
-}
-
-void DriveAxis::profile_position(double dt) noexcept {
-    if ((edges_ & control::new_set_point) != 0) accept_set_point();
-    if ((control_ & control::new_set_point) == 0 && !set_points_.full()) acknowledged_ = false;
-    take(Control::position);
-    const int direction = ref_.velocity > 0 ? 1 : -1;
-    if (ref_.velocity != 0 && blocked(direction)) {
-        profile_.clear();
-        set_points_.clear();
-        active_ = false;
-        limited_ = true;
-    }
-    if (!active_) {
-        const auto stop = limited_ ? Stop::quick_stop : Stop::slow_down;
-        ramp(ref_, 0, stop_rate(stop), stop_rate(stop), dt);
-        return;
-    }
-    const auto start_next = [&] {
-        const SetPoint next = set_points_.front();
-        set_points_.pop();
-        start_set_point(next);
-    };
-    if (reached_ && set_points_.count != 0) start_next();
-    Motion& raw = unsmoothed(true);
-    double left = profile_.step(raw, dt);
-    while (profile_.done() && active_set_point_.limits.end_velocity > 0 && set_points_.count != 0 && left > 0) {
-        start_next();
-        left = profile_.step(raw, left);
-    }
-    if (profile_.done()) raw.position += raw.velocity * left;  // with an end velocity and nothing after it, it goes on
-    ref_ = smoother_.step(dt);
-    if (!profile_.done() || (raw.velocity == 0 && !smoother_.settled())) return;
-    const bool there = objects_.position_window == no_window ||
-                       std::abs(active_set_point_.target - measured_) <= objects_.position_window * std::abs(units_.position);
-    if (ref_.velocity == 0 && !there) reached_time_ = 0;
-    else reached_time_ += dt;
-    reached_ = reached_time_ * 1000 >= objects_.position_window_time || ref_.velocity != 0;
-}
-
-// Profile velocity, vl, profile torque.
-
-void DriveAxis::profile_velocity(double dt) noexcept {
-    take(Control::velocity);
-    auto limits = profile_limits();
-    limits.velocity = highest_speed();
-    if (objects_.max_profile_velocity != 0) limits.velocity = std::min(limits.velocity, objects_.max_profile_velocity * units_.speed);
-    const double target = std::clamp(objects_.target_velocity * units_.velocity, -limits.velocity, limits.velocity);
-    if (target != objects_.target_velocity * units_.velocity) limited_ = true;
-    wanted_ = target;
-    ramp(unsmoothed(false), target, limits.acceleration, limits.deceleration, dt);
-    const Motion from = ref_;
-    ref_ = smoother_.step(dt);
-    ref_.position = from.position + (from.velocity + ref_.velocity) / 2 * dt;
-    const double window = objects_.velocity_window * units_.speed;
-    reached_time_ = std::abs(target - now_speed()) <= window ? reached_time_ + dt : 0;
-    reached_ = reached_time_ * 1000 >= objects_.velocity_window_time && reached_time_ > 0;
-}
-
-void DriveAxis::vl_velocity(double dt) noexcept {
-    take(Control::velocity);
-    const auto rate = [&](const Ramp& r) { return turns(r.speed) / std::max<double>(r.time, 1) * settings_.motor.resolution; };
-    double wanted = static_cast<double>(objects_.vl_target) * objects_.vl_set_point_numerator / objects_.vl_set_point_denominator *
-                    objects_.vl_dimension_numerator / objects_.vl_dimension_denominator;
-    if (wanted != 0) {
-        const double amount = std::clamp<double>(std::abs(wanted), objects_.vl_min, std::max(objects_.vl_min, objects_.vl_max));
-        if (amount != std::abs(wanted)) limited_ = true;
-        wanted = std::copysign(amount, wanted);
-    }
-    const double most = highest_speed();
-    double target = std::clamp(turns(wanted) * settings_.motor.resolution * ((objects_.polarity & 0x40) != 0 ? -1 : 1), -most, most);
-    if ((control_ & control::reference_ramp) == 0) target = 0;
-    wanted_ = target;
-    if ((control_ & control::enable_ramp) == 0) {
-        ramp(ref_, 0, rate(objects_.vl_quick_stop), rate(objects_.vl_quick_stop), dt);
-    } else if ((control_ & control::unlock_ramp) != 0) {
-        ramp(ref_, target, rate(objects_.vl_acceleration), rate(objects_.vl_deceleration), dt);
-    } else {
-        ref_.acceleration = 0;
-    }
-    reached_ = ref_.velocity == target;
-}
-
-void DriveAxis::profile_torque(double dt) noexcept {
-    take(Control::torque);
-    const double target = torque_of(objects_.target_torque), slope = torque_of(objects_.torque_slope);
-    wanted_ = target;
-    const double change = slope > 0 ? slope * dt : std::abs(target - torque_ref_);
-    torque_ref_ += std::clamp(target - torque_ref_, -change, change);
-    reached_ = torque_ref_ == target && std::abs(plant_.torque() - target) <= torque_of(20);
 }
 
 }  // namespace hal::canopen::cia402

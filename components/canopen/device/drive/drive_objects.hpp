@@ -10,7 +10,7 @@
 
 namespace hal::canopen::cia402 {
 
-/// Objects of ours, 0x800 further up for each axis: torque from outside in mN·m, and faults that can be made.
+/// Manufacturer-specific objects, 0x800 further up for each axis: external torque in mN·m, and simulated faults.
 inline constexpr std::uint16_t load_torque_simulated = 0x2010, faults_simulated = 0x2011;
 namespace simulated {
 inline constexpr std::uint16_t encoder_broken = 0x01, over_voltage = 0x02, under_voltage = 0x04, over_temperature = 0x08,
@@ -20,9 +20,9 @@ inline constexpr std::uint16_t encoder_broken = 0x01, over_voltage = 0x02, under
 inline constexpr std::array<std::int8_t, 32> homing_methods{1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 17, 18,
                                                             19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37};
 inline constexpr unsigned interpolation_room = 32;
-inline constexpr std::uint32_t no_window = 0xffffffff;  ///< of 6065h and 6067h: not watched
+inline constexpr std::uint32_t no_window = 0xffffffff;  ///< of 6065h and 6067h: not monitored
 
-/// With what a motor cannot be without: inertia, torque, speed, an encoder. [setup]
+/// Returns the settings with impossible values of the motor (inertia, torque, speed, encoder) replaced by possible ones. [setup]
 AxisSettings possible(AxisSettings);
 
 /// A numerator over a denominator.
@@ -36,7 +36,7 @@ struct Ramp {
     std::uint16_t time = 1;
 };
 
-/// Values as they lie in the dictionary. The dictionary writes them, the axis writes those of what is; both in one thread.
+/// The values of the objects. The dictionary writes command values, the axis writes actual values; both in one thread.
 struct Objects {
     std::int32_t load_torque = 0;
     std::uint16_t simulated_faults = 0;
@@ -99,11 +99,11 @@ struct Objects {
     std::uint32_t supported_modes = 0, type = servo_drive | profile_number;
     std::array<std::int8_t, homing_methods.size()> supported_homing = homing_methods;
 
-    /// First values for that motor: units are encoder increments. [setup]
+    /// Sets the initial values for a motor; units are encoder increments. [setup]
     explicit Objects(const AxisSettings&);
 };
 
-/// What a row says besides the value.
+/// Properties of an object besides its value.
 struct ObjectRow {
     enum Pdo : std::uint8_t { no_pdo, sent, received };
     std::uint16_t index;
@@ -111,7 +111,7 @@ struct ObjectRow {
     Access access;
     Pdo pdo;
     const char* name;
-    std::int64_t low = 0, high = 0;  ///< both 0: no limits but those of the type
+    std::int64_t low = 0, high = 0;  ///< both 0: the limits of the type
 };
 
 /// Calls f(row, value) for every object of the first axis. [setup]

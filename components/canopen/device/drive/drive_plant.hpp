@@ -4,7 +4,7 @@
 //     dT/dt = (T_demand − T) / τ                    closed current loop, first order; solved exactly
 //     J dω/dt = T + T_load − b ω − T_c sgn ω        rigid rotor and load with viscous and Coulomb friction, semi-implicit Euler
 //     dφ/dt = ω
-//     dθ/dt = ((T / T_rated)² − θ) / τ_thermal      heat of the winding, 1 at the rated torque for ever (I²t); solved exactly
+//     dθ/dt = ((T / T_rated)² − θ) / τ_thermal      heat of the winding, 1 at continuous rated torque (I²t); solved exactly
 //
 // T torque in N·m, J inertia in kg·m², ω speed in rad/s, φ angle in rad, b in N·m·s/rad, τ in s. At rest the Coulomb torque holds
 // against less than itself; a closed brake adds its torque to it. (The usual model of a servo axis, as in textbooks on motion control.)
@@ -16,19 +16,19 @@
 
 namespace hal::canopen::cia402 {
 
-/// Part of the travel from … to before.
+/// A range [from, to) of the travel.
 struct Range {
     double from = 0, to = 0;
     bool holds(double place) const noexcept { return place >= from && place < to; }
     bool exists() const noexcept { return from < to; }
-    /// Where a motion comes in or goes out of it; `rising`: in. The first such place. [realtime]
+    /// Returns the first place where a motion enters (`rising`) or leaves it. [realtime]
     std::optional<double> edge(double before, double after, bool rising) const noexcept;
 };
 
 class Plant {
 public:
     explicit Plant(const MotorSettings&) noexcept;  // [setup]
-    /// `torque`: demanded of the current loop; 0 when it is off. Any `dt` is stable. [realtime]
+    /// Advances by `dt` s; `torque` in N·m is the demand of the current loop, 0 when it is off. Stable for any `dt`. [realtime]
     void step(double dt, double torque, double load, bool brake_closed) noexcept;
 
     double place() const noexcept { return place_; }    ///< encoder increments
@@ -42,7 +42,7 @@ public:
     Range positive_limit() const noexcept;
     Range home() const noexcept { return {motor_.home_from, motor_.home_to}; }
     Range probe(unsigned n) const noexcept { return {motor_.probe_from[n], motor_.probe_to[n]}; }
-    /// The first index pulse beyond `from` that the last step passed, when it went in `direction`. [realtime]
+    /// Returns the first index pulse beyond `from` that the last step passed in `direction`. [realtime]
     std::optional<double> index_pulse(double from, int direction) const noexcept;
     std::optional<double> index_pulse() const noexcept { return index_pulse(before_, place_ < before_ ? -1 : 1); }
     const MotorSettings& motor() const noexcept { return motor_; }

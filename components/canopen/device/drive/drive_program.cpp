@@ -71,7 +71,7 @@ std::string parse_motor(std::string_view text, cia402::MotorSettings& motor) {
         if (number && set_motor(motor, part.substr(0, sign), value)) continue;
         std::string names = "resolution, endless";
         for (const auto& row : motor_rows) names += std::string(", ") + row.name;
-        return "'" + std::string(part) + "' says nothing of a motor; write NAME:VALUE, as in inertia:1e-4, of " + names;
+        return "invalid motor parameter '" + std::string(part) + "'; write NAME:VALUE, as in inertia:1e-4; names: " + names;
     }
     return {};
 }
@@ -106,8 +106,8 @@ std::string DriveProgram::summary() const {
     std::string text;
     for (unsigned n = 0; n < settings_.axes; ++n) {
         const auto s = drive_->status(n);
-        text += (n == 0 ? "" : "; ") + (settings_.axes == 1 ? std::string() : "axis " + std::to_string(n) + " ") + cia402::word(s.state);
-        if (s.mode != cia402::Mode::none) text += std::string(", ") + cia402::word(s.mode);
+        text += (n == 0 ? "" : "; ") + (settings_.axes == 1 ? std::string() : "axis " + std::to_string(n) + " ") + cia402::to_string(s.state);
+        if (s.mode != cia402::Mode::none) text += std::string(", ") + cia402::to_string(s.mode);
         if (s.error_code != 0) text += std::string(", error ") + cia402::error_word(s.error_code);
     }
     return text;

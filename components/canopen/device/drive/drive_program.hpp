@@ -21,7 +21,7 @@ public:
     std::vector<std::string> settable() const override;
     std::string summary() const override;
 
-    /// After the Node was made. [realtime]
+    /// Returns the drive, once the Node exists. [realtime]
     cia402::Drive& drive() noexcept { return *drive_; }
 
 private:
@@ -29,9 +29,9 @@ private:
     std::unique_ptr<cia402::Drive> drive_;
 };
 
-/// Sets one value of a motor by name, as in "inertia" and 1e-4. False: there is none of that name. [setup]
+/// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name. [setup]
 bool set_motor(cia402::MotorSettings&, std::string_view name, double value);
-/// Reads "inertia:1e-4,resolution:8192"; empty is good. What is wrong, or nothing. [setup]
+/// Parses "inertia:1e-4,resolution:8192"; empty is valid. Returns the problem, or "". [setup]
 std::string parse_motor(std::string_view text, cia402::MotorSettings&);
 
 }  // namespace hal::canopen

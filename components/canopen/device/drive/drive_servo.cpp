@@ -2,8 +2,8 @@
 // The loops:
 //     v* = v_ref + k_p (x_ref − x)                              position, P with feed-forward
 //     a  = k_v (v* − v) + ∫ k_i k_v (v* − v) dt                 velocity, PI
-//     T  = J (a + a_ref) + b v_ref + T_c sgn v* + offset        within the torque limits; the integral waits while they act
-// x_ref is the demand at the beginning of the step, v_ref and a_ref those of the step. Around 0 sgn is a slope, or it would chatter.
+//     T  = J (a + a_ref) + b v_ref + T_c sgn v* + offset        within the torque limits; the integral is frozen while they act
+// x_ref is the demand at the beginning of the step, v_ref and a_ref those of the step. Around 0 sgn is a slope, to avoid chatter.
 #include <algorithm>
 #include <cmath>
 
@@ -31,7 +31,7 @@ double DriveAxis::servo(double dt) noexcept {
     double torque = torque_ref_;
     if (loop_ == Control::torque) {
         velocity_wanted_ = speed * increments;
-        // At the highest speed no torque drives it faster.
+        // At the highest speed no torque accelerates it further.
         const double room = gain.velocity * motor.inertia;
         torque = std::clamp(torque, std::min(0.0, (-most - speed) * room), std::max(0.0, (most - speed) * room));
         if (torque != torque_ref_) limited_ = true;

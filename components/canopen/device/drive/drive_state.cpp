@@ -23,7 +23,7 @@ constexpr CauseRow cause_rows[] = {
     {error::heartbeat, error_communication, true},
     {error::following_error, error_profile, true},
 };
-constexpr double hottest = 1.1;  // of what the rated torque heats
+constexpr double hottest = 1.1;  // times the heat of the rated torque
 }  // namespace
 
 bool DriveAxis::torque_state() const noexcept {
@@ -43,7 +43,7 @@ void DriveAxis::enter(State state) noexcept {
         restart_mode();
         follow();
     } else if (!torque_state() && was) {
-        // Torque stays until the brake holds, unless the motor shall be without torque at once.
+        // Torque is kept until the brake holds, unless it must be removed at once.
         engage_left_ = has_brake && gently && stop_ != Stop::disable ? settings_.motor.brake_engage : 0;
         restart_mode();
     }
@@ -92,7 +92,7 @@ void DriveAxis::take_controlword() noexcept {
             return stop_then(static_cast<Stop>(option >= stay_in_quick_stop ? option - 4 : option),
                              option >= stay_in_quick_stop ? State::unknown : State::switch_on_disabled);
         }
-        if (enable) {  // as it is; a stop on the way to another state is called off
+        if (enable) {  // stays enabled; a stop for another transition is cancelled
             if (stopping_) stopping_ = false, after_stop_ = State::unknown, restart_mode();
             break;
         }
@@ -156,7 +156,7 @@ void DriveAxis::watch_causes() noexcept {
     for (unsigned n = 0; n < causes; ++n) {
         const auto cause = static_cast<Cause>(n);
         if (cause == Cause::connection || cause == Cause::following_error) continue;
-        // Without voltage a drive that is off is just off.
+        // Missing voltage is not a fault while the drive is off.
         if (cause == Cause::under_voltage && state_ != State::switched_on && !torque_state()) continue;
         if (present(cause)) raise(cause);
     }
@@ -180,7 +180,7 @@ void DriveAxis::raise(Cause cause, std::int32_t detail) noexcept {
         if (!row.controllable) enter(State::fault);
         return;
     }
-    // 13; without anything to brake, or without the means to, 14 follows with the next step.
+    // 13; if there is nothing to brake, or no way to, 14 follows with the next step.
     const auto reaction = static_cast<Stop>(objects_.fault_reaction_option);
     state_ = State::fault_reaction_active;
     stopping_ = enable_next_ = false;

@@ -49,7 +49,7 @@ void Profile::plan(const Motion& from, double target, const Limits& limits) noex
     double end = std::min(std::abs(limits.end_velocity), highest);
     double way = target - from.position, v = from.velocity;
     const auto ahead = [&] { return v * way > 0; };
-    // Away from the target, or too fast to be at the end velocity there: stop first.
+    // Moving away from the target, or too fast to reach it at the end velocity: stop first.
     if (v != 0 && (!ahead() || v * v - end * end > 2 * down * std::abs(way) * (1 + 1e-12))) {
         const double time = std::abs(v) / down;
         add(time, v > 0 ? -down : down);
@@ -123,7 +123,7 @@ Motion Smoother::step(double dt) noexcept {
         held_ -= pieces_[head_].time, area_ -= pieces_[head_].area;
         head_ = (head_ + 1) % room, --count_;
     }
-    // Of the oldest piece only its end belongs to the last `time_`.
+    // Only the end of the oldest segment belongs to the last `time_`.
     const Piece& oldest = pieces_[head_];
     const double out = std::max(held_ - time_, 0.0), share = oldest.time > 0 ? out / oldest.time : 0;
     const double position = oldest.from + (oldest.to - oldest.from) * share;

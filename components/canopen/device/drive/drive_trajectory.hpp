@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Set-points made from set-points: a ramp, a trapezoidal profile to a place, and the line between two set-points of a master.
+// Trajectories: a ramp, a trapezoidal profile to a place, and the interpolation between two set-points of a master.
 #pragma once
 
 #include <array>
@@ -7,25 +7,25 @@
 
 namespace hal::canopen::cia402 {
 
-/// Where a motion shall be and how it gets there; one unit of length throughout, seconds.
+/// State of a motion; one unit of length throughout, seconds.
 struct Motion {
     double position = 0, velocity = 0, acceleration = 0;
 };
 
-/// The velocity goes towards `target`: faster by `acceleration`, slower by `deceleration`, through 0 if need be. The position follows
-/// exactly. [realtime]
+/// Moves the velocity towards `target`, speeding up by `acceleration`, slowing down by `deceleration`, through 0 if necessary. The position
+/// is integrated exactly. [realtime]
 void ramp(Motion&, double target, double acceleration, double deceleration, double dt) noexcept;
 
-/// A motion of constant accelerations from where one is, at whatever velocity, to a place, there with velocity 0 or another one.
+/// A motion of constant accelerations from any state to a place, arriving with a given velocity, 0 by default.
 class Profile {
 public:
     struct Limits {
         double velocity = 0, acceleration = 0, deceleration = 0;  ///< amounts
         double end_velocity = 0;                                  ///< at the target, in the direction of the motion
     };
-    /// What cannot stop in time goes past the target and comes back. [realtime]
+    /// Plans the motion; if it cannot stop in time, it passes the target and returns. [realtime]
     void plan(const Motion& from, double target, const Limits&) noexcept;
-    /// Moves on; what is left of `dt` when it arrives is returned. [realtime]
+    /// Advances by `dt` s. Returns the remaining part of `dt` after arrival. [realtime]
     double step(Motion&, double dt) noexcept;
     void clear() noexcept { count_ = next_ = 0; }
     bool done() const noexcept { return next_ == count_; }
@@ -41,21 +41,21 @@ private:
     double elapsed_ = 0, target_ = 0, end_velocity_ = 0;
 };
 
-/// Takes the corners off a motion: what it gives is the mean of the motion over the last `time` seconds, so an acceleration a grows and
-/// falls with the jerk a/time, the motion ends at the same place, `time` later, and no velocity or acceleration is exceeded.
+/// Limits the jerk of a motion: its output is the mean of the motion over the last `time` seconds. An acceleration a grows and falls with
+/// the jerk a/time; the motion ends at the same place, `time` later, and exceeds no velocity or acceleration.
 class Smoother {
 public:
     static constexpr double longest = 1.0;  ///< s
-    /// The motion goes on from `now` with its velocity, as if it had always had it. [realtime]
+    /// Starts from `now`, as if the motion had always had its velocity. [realtime]
     void begin(const Motion& now, double time) noexcept;
-    /// The motion before its corners are off; whoever makes it moves it on, then calls step(). [realtime]
+    /// Returns the motion before smoothing; the caller advances it, then calls step(). [realtime]
     Motion& raw() noexcept { return raw_; }
-    /// `dt` after the last. [realtime]
+    /// Returns the smoothed motion `dt` s after the last call. [realtime]
     Motion step(double dt) noexcept;
-    /// The last step() gave that.
+    /// Returns true when `m` is the result of the last step().
     bool gave(const Motion& m) const noexcept { return m.position == given_.position && m.velocity == given_.velocity; }
     bool gave_velocity(const Motion& m) const noexcept { return m.velocity == given_.velocity; }
-    /// The motion has not changed its velocity for `time`. [realtime]
+    /// Returns true when the motion has not changed its velocity for `time`. [realtime]
     bool settled() const noexcept { return steady_ >= time_; }
     double time() const noexcept { return time_; }
 
@@ -64,15 +64,15 @@ private:
         double time, from, to, velocity_from, velocity_to, area;
     };
     static constexpr unsigned room = 1024;
-    static constexpr double shortest = 0.00105;  // pieces of less are put together
+    static constexpr double shortest = 0.00105;  // shorter segments are merged
     std::array<Piece, room> pieces_{};
     unsigned head_ = 0, count_ = 0;
-    double time_ = 0, held_ = 0, area_ = 0, steady_ = 0;  // time and area of all pieces
-    double origin_ = 0;                                   // positions of the pieces count from here, so that no digit is lost
+    double time_ = 0, held_ = 0, area_ = 0, steady_ = 0;  // time and area of all segments
+    double origin_ = 0;                                   // origin of the positions of the segments, to keep precision
     Motion raw_, before_, given_;
 };
 
-/// From where one is to the next set-point in the time between two of them; then it waits there.
+/// Interpolates from the present position to the next set-point over the time between two of them, then waits there.
 class Interpolator {
 public:
     void hold(double position) noexcept { from_ = to_ = position, left_ = period_ = 0; }
@@ -80,7 +80,7 @@ public:
     void next(double position, double target, double period) noexcept {
         from_ = position, to_ = target, period_ = left_ = period > 0 ? period : 0;
     }
-    /// Moves on; what is left of `dt` when it arrives is returned. The velocity is the mean one over `dt`. [realtime]
+    /// Advances by `dt` s. Returns the remaining part of `dt` after arrival. The velocity is the mean one over `dt`. [realtime]
     double step(Motion&, double dt) noexcept;
     bool arrived() const noexcept { return left_ <= 0; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What stands at the other end of the wire, behind an axis_io.
+// The plants behind an axis_io.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -13,7 +13,7 @@ namespace {
 
 /// A brushed motor turns a screw that moves a slide; the second encoder is at the end of the screw, behind a coupling with backlash.
 ///   (J + m (p/2pi)^2) w' = k i - viscous w - Coulomb(w) - p/2pi F;   L i' = u - R i - k w
-/// 300 W, 48 V; 2000 counts per turn; 5 mm pitch; 20 kg. Numbers of a usual machine of this size.
+/// 300 W, 48 V; 2000 counts per turn; 5 mm pitch; 20 kg. Typical values of a machine of this size.
 class Slide final : public Plant {
 public:
     void step(double duty, bool on, Time time_ns) noexcept override {
@@ -78,9 +78,9 @@ public:
     double second_position() const noexcept override { return rig_.state().pendulum; }
     std::span<const Influence> influences() const noexcept override {
         static constexpr Influence rows[] = {
-            {"push", "a tap on the pendulum: the speed it gives to its centre of mass; goes back to 0 when done", "m/s", 0.0, Influence::tap},
+            {"push", "a tap on the pendulum: speed given to its centre of mass; reset to 0 when done", "m/s", 0.0, Influence::tap},
             {"supply", "voltage of the amplifier's supply", "V", rig.supply, Influence::value},
-            {"lift", "somebody lifts the base off the table", "", 0.0, Influence::flag},
+            {"lift", "the base is lifted off the table", "", 0.0, Influence::flag},
         };
         return rows;
     }

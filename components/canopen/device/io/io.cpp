@@ -16,7 +16,7 @@ constexpr std::int32_t justified(std::int16_t counts) noexcept { return std::int
 
 Io::Io(const IoSettings& settings) : settings_(settings) {}
 
-/// The values of an object lie in `image` from now on, `each` bytes apart; they keep what they are.
+/// Binds the values of an object to `image`, `each` bytes apart, and keeps them.
 void Io::lay(std::uint16_t index, void* image, std::size_t each) {
     for (auto& e : device_->dictionary().object(index)) {
         if (e.sub == 0 && device_->dictionary().object(index).size() > 1) continue;
@@ -83,7 +83,7 @@ void Io::sample_digital(Time now) noexcept {
         auto taken = static_cast<std::uint8_t>(differs & ~filter_[block]);
         for (unsigned bit = 0; bit < 8 && (filter_[block] != 0); ++bit) {
             auto& since = differs_since_[block * 8 + bit];
-            if ((differs >> bit & 1) == 0) since = now;  // as it was, so far
+            if ((differs >> bit & 1) == 0) since = now;  // unchanged so far
             else if ((filter_[block] >> bit & 1) != 0 && now - since >= filter_time) taken = static_cast<std::uint8_t>(taken | 1U << bit);
         }
         filtered_[block] ^= taken;
@@ -102,10 +102,10 @@ void Io::sample_digital(Time now) noexcept {
     }
 }
 
-/// A limit that is met lets every change through that no delta holds back; a delta alone needs no limit.
+/// Limits that are met send every change that no delta holds back; a delta alone needs no limit.
 bool Io::interrupts(unsigned n, std::int32_t value) const noexcept {
     const auto by = triggers_[n];
-    const auto change = std::int64_t{value} - said_[n];
+    const auto change = std::int64_t{value} - sent_[n];
     const bool limit = ((by & 1) != 0 && value >= upper_[n]) || ((by & 2) != 0 && value < lower_[n]);
     const bool delta = ((by & 4) != 0 && std::abs(change) > std::int64_t{delta_[n]}) ||
                        ((by & 8) != 0 && -change > std::int64_t{negative_delta_[n]}) ||
@@ -118,7 +118,7 @@ void Io::sample_analog() noexcept {
         analog_in_[n] = analog_terminals_[n];
         const auto value = justified(analog_in_[n]);
         if (analog_interrupts_on_ == 0 || !interrupts(n, value)) continue;
-        said_[n] = value;
+        sent_[n] = value;
         interrupted_ |= 1U << n;
         for (const std::uint16_t view : {std::uint16_t{0x6400}, std::uint16_t{0x6401}, std::uint16_t{0x6402}, std::uint16_t{0x6403}})
             trigger(view, n + 1U);
@@ -141,7 +141,7 @@ Abort Io::reading(Entry& e) noexcept {
         break;
     case 0x6422:
         store(e.data, interrupted_);
-        interrupted_ = 0;  // reading takes it
+        interrupted_ = 0;  // cleared by reading
         break;
     default: break;
     }
@@ -196,7 +196,7 @@ void Io::take_error_values() noexcept {
     safe_ = true;
 }
 
-// The world, by name.
+// The simulated environment, by name.
 
 bool Io::set(std::string_view name, double value) {
     const auto place = [&](std::string_view before, unsigned count, unsigned& n) {

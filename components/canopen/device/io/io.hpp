@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A device of CiA 401: terminals on one side, objects 6000h–64FFh on the other.
+// A device of CiA 401: terminals on one side, objects 6000h..64FFh on the other.
 #pragma once
 
 #include <array>
@@ -10,26 +10,27 @@
 namespace hal::canopen {
 
 struct IoSettings {
-    unsigned digital_inputs = 64, digital_outputs = 64;  ///< 0–64
-    unsigned analog_inputs = 12, analog_outputs = 12;    ///< 0–12
+    unsigned digital_inputs = 64, digital_outputs = 64;  ///< 0..64
+    unsigned analog_inputs = 12, analog_outputs = 12;    ///< 0..12
     std::uint32_t serial = 1;
     std::uint16_t heartbeat_ms = 0;
 };
 
-/// The objects and default PDOs of such a device. Throws std::invalid_argument when it has more terminals than there can be. [setup]
+/// Returns the objects and default PDOs of the device (CiA 401). Throws std::invalid_argument for too many terminals. [setup]
 Description io_description(const IoSettings&);
 
+/// The device. Outputs take their error values when it is stopped, on a communication error and on bus off, until they are written again.
 class Io final : public Program {
 public:
     explicit Io(const IoSettings& = {});  // [setup]
 
-    // The terminals, counted from 0; a number that does not exist does nothing. [realtime]
+    // Terminals, counted from 0; an invalid number is ignored. [realtime]
     void set_input(unsigned n, bool on) noexcept;
     bool output(unsigned n) const noexcept { return n < settings_.digital_outputs && (terminals_out_[n / 8] >> n % 8 & 1) != 0; }
-    /// -1 to 1 of the range.
+    /// Sets an input to -1..1 of its range.
     void set_analog_input(unsigned n, double fraction) noexcept;
     double analog_output(unsigned n) const noexcept { return n < settings_.analog_outputs ? analog_out_[n] / 32767.0 : 0.0; }
-    /// Outputs took their error values, and nobody wrote one since. [realtime]
+    /// Returns true while outputs are at their error values and have not been written since. [realtime]
     bool safe() const noexcept { return safe_; }
 
     Description description() const override { return io_description(settings_); }
@@ -62,13 +63,13 @@ private:
     void lay(std::uint16_t index, void* image, std::size_t each);
 
     const IoSettings settings_;
-    // What the objects show, and what is at the terminals.
+    // Values of the objects, and of the terminals.
     alignas(8) Block inputs_{}, outputs_{}, input_polarity_{}, filter_{}, any_change_{}, rising_{}, falling_{}, output_polarity_{},
         error_mode_{}, error_value_{}, output_mask_{};
     Block terminals_in_{}, terminals_out_{}, filtered_{};
     std::array<Time, most_bits> differs_since_{};
     std::array<std::int16_t, most_analog> analog_in_{}, analog_out_{}, analog_terminals_{};
-    std::array<std::int32_t, most_analog> upper_{}, lower_{}, error_analog_{}, said_{};
+    std::array<std::int32_t, most_analog> upper_{}, lower_{}, error_analog_{}, sent_{};
     std::array<std::uint32_t, most_analog> delta_{}, negative_delta_{}, positive_delta_{};
     std::array<std::uint8_t, most_analog> triggers_{}, analog_error_mode_{};
     std::uint8_t interrupts_on_ = 1, analog_interrupts_on_ = 0;

@@ -9,7 +9,7 @@ namespace hal::canopen {
 
 namespace {
 
-/// A row of sub-indices 1…count, and its sub-index 0.
+/// Describes sub-indices 1…count, and sub-index 0.
 struct Row {
     std::uint16_t index;
     const char *object, *each;  ///< "Input block" gives "Input block 1" …
@@ -108,7 +108,7 @@ void add_analog_outputs(Description& d, unsigned n) {
     for (unsigned sub = 1; sub <= n; ++sub) d.find(0x6443, static_cast<std::uint8_t>(sub))->limited(0, 1);
 }
 
-/// PDO 1 carries the digital blocks, 2–4 four analogue values each.
+/// Adds the default PDOs: PDO 1 carries the digital blocks, PDOs 2 to 4 four analogue values each.
 void add_pdos(Description& d, void (*add_pdo)(Description&, unsigned, const PdoDescription&), std::uint16_t blocks, unsigned digital,
               std::uint16_t values, unsigned analog) {
     PdoDescription first;
@@ -127,8 +127,10 @@ void add_pdos(Description& d, void (*add_pdo)(Description&, unsigned, const PdoD
 }  // namespace
 
 Description io_description(const IoSettings& s) {
-    if (s.digital_inputs > 64 || s.digital_outputs > 64) throw std::invalid_argument("at most 64 digital inputs and 64 outputs can be had");
-    if (s.analog_inputs > 12 || s.analog_outputs > 12) throw std::invalid_argument("at most 12 analogue inputs and 12 outputs can be had");
+    if (s.digital_inputs > 64 || s.digital_outputs > 64)
+        throw std::invalid_argument("too many digital terminals; at most 64 inputs and 64 outputs");
+    if (s.analog_inputs > 12 || s.analog_outputs > 12)
+        throw std::invalid_argument("too many analogue terminals; at most 12 inputs and 12 outputs");
     const std::uint32_t kinds = (s.digital_inputs != 0 ? 1U : 0U) | (s.digital_outputs != 0 ? 2U : 0U) | (s.analog_inputs != 0 ? 4U : 0U) |
                                 (s.analog_outputs != 0 ? 8U : 0U);
     Description d = basic_device({.device_type = kinds << 16 | 0x191, .vendor = example_vendor, .product = 0x401, .revision = 0x00010000,

@@ -128,7 +128,7 @@ float* AnalogInputs::value(Channel& c, std::uint8_t part) noexcept {
 }
 
 void AnalogInputs::reset() noexcept {
-    for (auto& c : channels_) c.sampled = c.changed = false, c.said = 0, c.said_zone = 0;
+    for (auto& c : channels_) c.sampled = c.changed = false, c.sent = 0, c.sent_zone = 0;
 }
 
 double AnalogInputs::process(unsigned n) const noexcept {
@@ -154,18 +154,18 @@ void AnalogInputs::sample(unsigned n, double field, std::int32_t counts, std::ui
     c.field = field, c.counts = counts, c.status = status;
     show(n);
     const double value = process(n), delta = c.delta;
-    const bool limits = c.lower < c.upper;  // both 0: there are none
+    const bool limits = c.lower < c.upper;  // both 0: no limits
     c.zone = static_cast<std::int8_t>(!limits ? 0 : value < double{c.lower} ? -1 : value > double{c.upper} ? 1 : 0);
-    // As whole numbers of the digits that are shown, so that noise below them is no change.
+    // Compared in units of the last displayed digit, so that noise below it is not a change.
     const double scale = power(c.digits);
-    const double moved = std::abs(std::round(value * scale) - std::round(c.said * scale));
-    c.changed = c.changed || c.zone != c.said_zone || moved > std::round(delta * scale);
+    const double moved = std::abs(std::round(value * scale) - std::round(c.sent * scale));
+    c.changed = c.changed || c.zone != c.sent_zone || moved > std::round(delta * scale);
 }
 
-void AnalogInputs::said(unsigned n) noexcept {
+void AnalogInputs::mark_sent(unsigned n) noexcept {
     auto& c = channels_[n];
     c.changed = false;
-    c.said = process(n), c.said_zone = c.zone;
+    c.sent = process(n), c.sent_zone = c.zone;
 }
 
 Abort AnalogInputs::reading(Entry& e) noexcept {
@@ -191,7 +191,7 @@ Abort AnalogInputs::writing(Entry& e, std::span<const std::uint8_t> value) noexc
     if (e.index == autotare) return load<std::uint32_t>(value.data()) == tare_command ? Abort::none : Abort::cannot_store;
     if (e.index == mode) return value[0] <= 1 ? Abort::none : Abort::value;
     if (e.type == Type::real32 && !std::isfinite(load<float>(value.data()))) return Abort::value;
-    // The sign of all four types is the highest bit.
+    // The most significant bit of all four types is the sign.
     if (static_cast<std::uint8_t>(e.index) == delta_part && (value.back() & 0x80) != 0) return Abort::too_low;
     return Abort::none;
 }

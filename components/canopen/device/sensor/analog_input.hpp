@@ -3,8 +3,8 @@
 //
 //     field value 6100h -> process value 6130h = field · factor + scaling offset + offset -> net value 6140h = process - tare
 //
-// Each value has four objects: 61xxh REAL32, 71xxh INTEGER16, 81xxh INTEGER24, 91xxh INTEGER32. The whole numbers are the real one times
-// ten to the decimal digits (6132h), cut off at the ends of their type; what is written by one is seen by all.
+// Each value has four objects: 61xxh REAL32, 71xxh INTEGER16, 81xxh INTEGER24, 91xxh INTEGER32. The integers are the real value times
+// 10^digits (6132h), clamped to their type; a write to one of the four changes all.
 #pragma once
 
 #include <cstdint>
@@ -15,34 +15,35 @@
 
 namespace hal::canopen {
 
-/// What a channel is at power-on.
+/// Initial values of a channel at power-on.
 struct AnalogChannel {
     const char* name = "";
     std::uint16_t sensor_type = 0;  ///< 6110h
-    std::uint32_t unit = 0;         ///< 6131h, as CiA 303-2 has it; 0: not said
-    std::uint8_t digits = 0;        ///< 6132h, 0 to 6
+    std::uint32_t unit = 0;         ///< 6131h, coded as in CiA 303-2; 0: not specified
+    std::uint8_t digits = 0;        ///< 6132h, 0..6
 };
 
-/// Objects 6100h to 6150h and those of the families 71xxh, 81xxh and 91xxh. [setup]
+/// Adds objects 6100h to 6150h and those of the families 71xxh, 81xxh and 91xxh. [setup]
 void add_analog_inputs(Description&, std::span<const AnalogChannel>);
 
+/// Implements the objects. Channels `n` are counted from 0.
 class AnalogInputs final : public Handler {
 public:
     static constexpr std::uint8_t not_valid = 0x01, too_high = 0x02, too_low = 0x04;  // of 6150h
 
-    /// As many channels as were described. The values lie here from now on. [setup]
+    /// Binds the values of `channels` channels, as many as were described. [setup]
     void attach(Device&, unsigned channels);
-    /// The application was reset: what was said of before is not known any more. [realtime]
+    /// Resets the application: forgets the values sent before. [realtime]
     void reset() noexcept;
 
-    /// A new field value, `counts` as the converter gave it. A channel that is off (6112h = 0), or whose sample is not due (6114h),
-    /// keeps its values. [realtime]
+    /// Processes a new field value; `counts` is the raw reading of the converter. Ignored for a channel that is off (6112h = 0) or whose
+    /// sample is not due (6114h). [realtime]
     void sample(unsigned n, double field, std::int32_t counts, std::uint8_t status, Time now) noexcept;
-    /// The process value is further from where it was when that was last said than its delta (6133h), or passed a limit (6134h,
-    /// 6135h) since. [realtime]
+    /// Returns true when the process value has moved by more than its delta (6133h), or passed a limit (6134h, 6135h), since it was last
+    /// sent. [realtime]
     bool changed(unsigned n) const noexcept { return channels_[n].changed; }
-    /// It is said now. [realtime]
-    void said(unsigned n) noexcept;
+    /// Marks the process value as sent. [realtime]
+    void mark_sent(unsigned n) noexcept;
 
     double field(unsigned n) const noexcept { return channels_[n].field; }
     double process(unsigned n) const noexcept;
@@ -58,9 +59,9 @@ private:
         float process = 0, field_shown = 0, net_shown = 0;
         std::uint32_t period_us = 0;
         std::uint8_t digits = 0, mode = 1, status = 0;
-        double field = 0, said = 0;
+        double field = 0, sent = 0;
         std::int32_t counts = 0;
-        std::int8_t zone = 0, said_zone = 0;  // below the lower limit, between, above the upper one
+        std::int8_t zone = 0, sent_zone = 0;  // below the lower limit, between, above the upper one
         bool changed = false, sampled = false;
         Time last = 0;
     };

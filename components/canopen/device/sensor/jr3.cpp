@@ -11,10 +11,10 @@
 namespace hal::canopen {
 
 namespace {
-constexpr Time silence = 10 * millisecond;             // no packet for that long: no sensor
-constexpr Time most_at_once = 100 * millisecond;       // of a line that was not looked at, the rest is gone
+constexpr Time silence = 10 * millisecond;             // without a packet: no sensor
+constexpr Time most_at_once = 100 * millisecond;       // bits of the line older than this are lost
 constexpr double overload_over_below = 0.95;           // of the limit
-constexpr std::int16_t supply_low = 22937, supply_high = 26214;  // 70 % and 80 %; 75 % is right
+constexpr std::int16_t supply_low = 22937, supply_high = 26214;  // 70 % and 80 %; nominal 75 %
 
 template <class T>
 T rounded(double value) noexcept {
@@ -24,7 +24,7 @@ T rounded(double value) noexcept {
 }  // namespace
 
 Jr3::Jr3(Jr3Settings settings) : settings_(std::move(settings)), calibration_(settings_.calibration) {
-    if (!settings_.calibration.invert(inverse_)) throw std::invalid_argument("the decoupling matrix has no inverse");
+    if (!settings_.calibration.invert(inverse_)) throw std::invalid_argument("singular decoupling matrix in the calibration");
     settings_.calibration.write(sensor_memory_);
     sensor_.set_memory(sensor_memory_);
 }
@@ -143,17 +143,17 @@ void Jr3::publish() noexcept {
     ++counter_;
 }
 
-/// The PDOs of forces and of torques, each when one of its three values is further off than its delta or passed a limit.
+/// Triggers the PDO of the forces or torques when one of its three values has moved by more than its delta or passed a limit.
 void Jr3::trigger_changes() noexcept {
     for (unsigned group = 0; group < 2; ++group) {
-        bool changed = status_ != said_status_;
+        bool changed = status_ != sent_status_;
         for (unsigned n = group * 3; n < group * 3 + 3; ++n) changed = changed || inputs_.changed(n);
         if (!changed) continue;
-        for (unsigned n = group * 3; n < group * 3 + 3; ++n) inputs_.said(n);
+        for (unsigned n = group * 3; n < group * 3 + 3; ++n) inputs_.mark_sent(n);
         device_->pdos().trigger(group * 2 + 1);
         device_->pdos().trigger(group * 2 + 2);
     }
-    said_status_ = status_;
+    sent_status_ = status_;
 }
 
 void Jr3::step(Time now) noexcept {
@@ -183,7 +183,8 @@ Abort Jr3::Memory::read(Entry&, std::uint32_t offset, std::span<std::uint8_t> ro
     return Abort::none;
 }
 
-// The world, by name.
+// The simulated environment, by name.
+
 
 bool Jr3::set(std::string_view name, double value) {
     constexpr std::string_view names[] = {"fx", "fy", "fz", "mx", "my", "mz"};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A force/torque node after CiA 404: a JR3 sensor's bit stream on one side, three forces and three torques on the bus on the other.
-// TPDO 1 and 2 carry the forces, 3 and 4 the torques; 1 and 3 are sent when a value changes, 2 and 4 at each SYNC. All four have two
-// bytes more: status (2201h) and a counter of samples (2202h), by which the PDOs of one SYNC are known to belong together.
+// A force/torque node after CiA 404: it decodes the bit stream of a JR3 sensor and serves three forces and three torques on the bus.
+// TPDOs 1 and 2 carry the forces, 3 and 4 the torques; 1 and 3 are sent when a value changes, 2 and 4 at each SYNC. Each has two more
+// bytes: status (2201h) and sample counter (2202h), which identifies the PDOs of the same SYNC.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@
 namespace hal::canopen {
 
 struct Jr3Settings {
-    jr3::Calibration calibration{};      ///< what is in the sensor's memory
-    std::vector<std::uint8_t> recording; ///< the line, eight clocks to a byte, over and over; empty: the sensor is simulated
+    jr3::Calibration calibration{};      ///< contents of the sensor's memory
+    std::vector<std::uint8_t> recording; ///< recorded line, eight clocks per byte, repeated; empty: the sensor is simulated
     std::uint32_t serial = 1;
     std::uint16_t heartbeat_ms = 0;
 };
@@ -23,29 +23,30 @@ struct Jr3Settings {
 namespace jr3_status {
 inline constexpr std::uint8_t overload = 0x01, no_signal = 0x02, supply = 0x04, not_calibrated = 0x08, saturated = 0x10;
 }
-/// EMCY codes of the node; of the overload the first manufacturer byte has a bit for each channel.
+/// EMCY codes of the node; with `overload`, the first manufacturer byte has one bit per channel.
 namespace jr3_error {
 inline constexpr std::uint16_t overload = 0xff01, no_signal = 0x5010, supply = 0x3210, calibration = 0x6310;
 }
 
-/// [setup]
+/// Returns the objects of the node. [setup]
 Description jr3_description(const Jr3Settings&);
 
+/// The node, with its sensor simulated or recorded.
 class Jr3 final : public Program {
 public:
-    /// Throws std::invalid_argument when the calibration's matrix has no inverse. [setup]
+    /// Throws std::invalid_argument when the calibration matrix is singular. [setup]
     explicit Jr3(Jr3Settings);
 
-    // The world around the sensor, of no effect on a recording. [realtime]
+    // The simulated environment of the sensor; no effect on a recording. [realtime]
     void set_wrench(const jr3::Six& wrench) noexcept { applied_ = wrench; }  ///< N and N·m
-    void set_supply(double share) noexcept { supply_ = share; }             ///< of full scale; 0.75 is right
-    void set_noise(unsigned counts) noexcept { noise_ = counts; }            ///< readings are off by up to so many
+    void set_supply(double share) noexcept { supply_ = share; }             ///< fraction of full scale; nominal 0.75
+    void set_noise(unsigned counts) noexcept { noise_ = counts; }            ///< amplitude on raw readings
     void set_cable(bool joined) noexcept { cable_ = joined; }               ///< false: the line is idle
 
-    /// What the node makes of the stream, N and N·m: before offset, scaling and tare. [realtime]
+    /// Returns the decoded wrench in N and N·m, before offset, scaling and tare. [realtime]
     const jr3::Six& wrench() const noexcept { return field_; }
     std::uint8_t status() const noexcept { return status_; }
-    /// Off in stopped, blinking in pre-operational, on in operational. [realtime]
+    /// Returns the status LED: off in stopped, blinking in pre-operational, on in operational. [realtime]
     bool led() const noexcept { return led_; }
     const jr3::Decoder& decoder() const noexcept { return decoder_; }
     bool calibrated() const noexcept { return calibrated_; }
@@ -95,17 +96,17 @@ private:
     std::uint32_t random_ = 0x4a5233;
     bool cable_ = true;
     std::size_t recorded_bit_ = 0;
-    double clocks_ = 0;  // clocks of the line that are due and did not come yet, below 1
+    double clocks_ = 0;  // fraction of a clock of the line that is due, below 1
     // the node
     jr3::Decoder decoder_;
     jr3::MemoryReader memory_reader_;
-    jr3::Calibration calibration_;  // of the last whole memory, until then the usual one
+    jr3::Calibration calibration_;  // from the last complete memory, until then the default
     AnalogInputs inputs_;
     std::array<std::int16_t, 6> raw_{};
     std::array<float, 6> limits_{};
     jr3::Six field_{};
     std::int16_t supply_raw_ = 0;
-    std::uint8_t status_ = jr3_status::no_signal | jr3_status::not_calibrated, said_status_ = 0, counter_ = 0;
+    std::uint8_t status_ = jr3_status::no_signal | jr3_status::not_calibrated, sent_status_ = 0, counter_ = 0;
     bool calibrated_ = false, led_ = false, started_ = false;
     Time last_ = 0, heard_ = 0, began_ = 0;
     Memory memory_stream_{*this};

@@ -49,7 +49,7 @@ void add_own(Description& d, const jr3::Calibration& c) {
     d.add(0x2204, 0, Type::unsigned32, Access::read_only, 0, "Packets with errors");
 }
 
-constexpr std::uint32_t newton = 0x00210000;  // CiA 303-2; none is said for the torques
+constexpr std::uint32_t newton = 0x00210000;  // CiA 303-2; torques have no unit code
 constexpr AnalogChannel channels[] = {{"Fx", 0, newton, 2}, {"Fy", 0, newton, 2}, {"Fz", 0, newton, 2},
                                       {"Mx", 0, 0, 3}, {"My", 0, 0, 3}, {"Mz", 0, 0, 3}};
 

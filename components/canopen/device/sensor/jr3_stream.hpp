@@ -3,7 +3,7 @@
 //
 //     idle 0 … | start pulse: ten 1, one 0 | 20 bits, most significant first: 4 address, 16 data | at least two 0
 //
-// Packets come without a pause, 34 clocks each at 2.2 MHz, addresses 0 to 15 one after the other: 64 705 a second, 4 044 of each.
+// Packets follow without a gap, 34 clocks each at 2.2 MHz, addresses 0 to 15 one after the other: 64 705 a second, 4 044 of each.
 // Address 0 is the supply voltage, 1–6 the raw readings Fx Fy Fz Mx My Mz, 7 the calibration memory, 8–15 are reserved.
 #pragma once
 
@@ -23,17 +23,17 @@ struct Packet {
     std::int16_t value = 0;
 };
 
-/// Finds the packets in the stream, from wherever it begins. The first good one only shows where packets begin; a bit that does not
-/// fit loses that again.
+/// Finds the packets in a stream, starting at any point of it. The first valid packet only establishes the framing and is not returned;
+/// a bit that violates the framing discards it again.
 class Decoder {
 public:
-    /// True: packet() is a new one. [realtime]
+    /// Takes one bit. Returns true when packet() is a new one. [realtime]
     bool take(bool bit) noexcept;
     const Packet& packet() const noexcept { return packet_; }
-    /// The last packet was where it had to be. [realtime]
+    /// Returns true while the framing is established. [realtime]
     bool locked() const noexcept { return locked_; }
     std::uint32_t packets() const noexcept { return packets_; }
-    std::uint32_t errors() const noexcept { return errors_; }  ///< pulses of a wrong length, gaps that are none
+    std::uint32_t errors() const noexcept { return errors_; }  ///< pulses of a wrong length, missing gaps
     void reset() noexcept { *this = {}; }
 
 private:
@@ -47,16 +47,17 @@ private:
     Packet packet_;
 };
 
-/// A sensor's side of the line.
+/// Generates the line as a sensor does.
 class Generator {
 public:
-    /// The value of address 0–6 or 8–15 from its next packet on. [realtime]
+    /// Sets the value of address 0..6 or 8..15 from its next packet on. [realtime]
     void set(unsigned address, std::int16_t value) noexcept { values_[address % addresses] = value; }
-    /// What address 7 tells byte by byte: address in the high byte (its low eight bits), content in the low byte. It stays where it is.
+    /// Sets the memory sent on address 7, one byte per word: low eight bits of its address in the high byte, content in the low byte. The
+    /// memory is not copied. [setup]
     void set_memory(std::span<const std::uint8_t, memory_size> memory) noexcept { memory_ = memory.data(); }
-    /// The line at the next clock. [realtime]
+    /// Returns the line at the next clock. [realtime]
     bool next() noexcept;
-    /// The next clocks, eight to a byte, the first in the highest bit: how a recording is kept. [any]
+    /// Writes the next clocks, eight per byte, the first in the most significant bit: the format of a recording. [any]
     void fill(std::span<std::uint8_t> room) noexcept;
 
 private:
@@ -67,17 +68,18 @@ private:
     std::uint32_t word_ = 0;
 };
 
-/// Puts the calibration memory together from the words of address 7. A word has only the low eight bits of its address; the pages
-/// follow one another, and the memory begins where its signature comes by.
+/// Assembles the calibration memory from the words of address 7. A word has only the low eight bits of its address; pages follow one
+/// another, and the memory begins at its signature.
+
 class MemoryReader {
 public:
-    /// True: the last byte came and the memory is whole; it may still be nonsense. [realtime]
+    /// Takes a word. Returns true when the memory is complete; its contents are not validated. [realtime]
     bool take(std::uint16_t word) noexcept;
     std::span<const std::uint8_t, memory_size> memory() const noexcept { return memory_; }
 
 private:
     std::array<std::uint8_t, memory_size> memory_{};
-    std::size_t next_ = 0;  // bytes in a row from the beginning
+    std::size_t next_ = 0;  // consecutive bytes from the beginning
 };
 
 }  // namespace hal::canopen::jr3

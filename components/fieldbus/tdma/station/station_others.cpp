@@ -93,7 +93,7 @@ ethernet::Discipline::Origin Station::origin(const Address& from, std::int64_t a
     const auto may_be = [&](const Other& o) {
         return named ? o.mac == from : o.mac == Address{} && (o.role != Role::slave || from != status_.master);
     };
-    if (std::none_of(setup_.others.begin(), setup_.others.end(), may_be)) return Origin::stranger;
+    if (std::none_of(setup_.others.begin(), setup_.others.end(), may_be)) return Origin::unknown_station;
     if (status_.state != State::running || !based_) return Origin::plausible;
     std::uint32_t cycle = 0;
     const Time    at = left_at(arrived, length, cycle);

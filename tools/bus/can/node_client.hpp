@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The master's side of a bus, by hand: nodes are asked and this thread waits for the answers.
+// A client of the nodes on a bus, for commands: blocking requests in this thread.
 #pragma once
 
 #include <functional>
@@ -10,26 +10,26 @@
 
 namespace hal::tools {
 
-class Station final : private canopen::Events {
+class NodeClient final : private canopen::Events {
 public:
-    /// `timeout_ns`: of one answer; 0: the usual one.
-    explicit Station(const Options&, std::int64_t timeout_ns);
+    /// `timeout_ns`: of one response; 0: the default.
+    explicit NodeClient(const Options&, std::int64_t timeout_ns);
 
-    /// False after saying why.
+    /// Opens the bus. Returns false after printing the reason.
     bool open(const std::string& address);
-    /// Sends and takes what there is, and waits at most `wait_ns` when there is nothing. False: somebody ended it.
+    /// Sends and receives what is pending, and waits at most `wait_ns` when nothing is. Returns false after a signal.
     bool turn(std::int64_t wait_ns = 1'000'000);
-    /// Turns until `done`, or for so long; what `done` says then. Negative: no limit.
+    /// Turns until `done` or for `for_ns` (negative: no limit). Returns the last result of `done`.
     bool until(const std::function<bool()>& done, std::int64_t for_ns = -1);
-    /// One SDO transfer to its end. False when there is no value; `fail_transfer` says why.
+    /// Runs one SDO transfer. Returns false when there is no value; fail_transfer() prints the reason.
     bool transfer(std::uint8_t node, canopen::SdoRequest&);
     int fail_transfer(std::uint8_t node, const canopen::SdoRequest&, const std::string& object) const;
 
-    /// Every frame of others, after the nodes have seen it.
+    /// Called with every received frame, after the nodes.
     std::function<void(const can::Frame&)> on_frame;
-    /// Before each look at the bus: for what is sent periodically.
+    /// Called before each turn, to send periodic frames.
     std::function<void(std::int64_t now_ns)> on_turn;
-    /// A signal does not end turn(): whoever asks for the end here has something to do on the bus first.
+    /// A signal does not end turn(): the owner of the flag has to act on the bus first.
     bool outlasts_stop = false;
     Bus bus;
     canopen::FrameQueue out{1024};
@@ -42,9 +42,9 @@ private:
     std::vector<can::Frame> room_;
 };
 
-/// `5` or `0x05`; false when it is no node id.
+/// Parses `5` or `0x05`. Returns false for an invalid node ID.
 bool parse_node(const std::string& text, std::uint8_t& node);
-/// Says so on stderr when it is none.
+/// The same, printing the problem on stderr.
 bool node_of(const Options&, const std::string& text, std::uint8_t& node);
 
 }  // namespace hal::tools

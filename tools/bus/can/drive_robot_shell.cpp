@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The words of the robot shell: NAME, the letter of the axis, `:` to command or `?` to ask, integers. `ONA:`, `GB: -1000`, `PFA:4096,360`.
+// The commands of the robot shell: NAME, the letter of the axis, `:` for a command or `?` for a query, integers. `ONA:`, `GB: -1000`, `PFA:4096,360`.
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -14,12 +14,12 @@ namespace hal::tools {
 
 using namespace canopen::cia402;
 
-struct DriveShell::LetterWord {
+struct DriveShell::RobotCommand {
     const char* name;
-    unsigned values;        ///< behind `:`
-    bool commands, asks;    ///< `:` and `?` are possible
+    unsigned values;        ///< after `:`
+    bool commands, asks;    ///< allows `:`, `?`
     std::int64_t least, most;
-    const char* value;      ///< a setting or factor of our own words
+    const char* value;      ///< the parameter or factor it stands for
     const char* what;
 };
 
@@ -34,7 +34,7 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(from, text.find_last_not_of(" \t\r\n") - from + 1);
 }
 
-/// Integers with commas between. False: something else.
+/// Parses integers separated by commas. Returns false for anything else.
 bool parse_integers(std::string_view text, std::vector<std::int64_t>& values) {
     while (!text.empty()) {
         const auto comma = text.find(',');
@@ -53,8 +53,8 @@ bool parse_integers(std::string_view text, std::vector<std::int64_t>& values) {
 
 }  // namespace
 
-std::optional<bool> DriveShell::letter_line(std::string_view line) {
-    static constexpr LetterWord words[] = {
+std::optional<bool> DriveShell::robot_line(std::string_view line) {
+    static constexpr RobotCommand words[] = {
         {"ON", 0, true, false, 0, 0, nullptr, "switch the axis on"},
         {"OFF", 0, true, false, 0, 0, nullptr, "switch the axis off"},
         {"G", 1, true, false, least_i32, most_i32, nullptr, "go to a position; done when the drive has accepted it"},
@@ -69,8 +69,8 @@ std::optional<bool> DriveShell::letter_line(std::string_view line) {
     };
     line = trimmed(line);
     if (line == "HELP") {
-        std::string text = "  the letter behind a word is the axis, A to H; ':' commands, '?' asks\n";
-        for (const LetterWord& w : words) {
+        std::string text = "  the last letter is the axis, A to H; ':' is a command, '?' a query\n";
+        for (const RobotCommand& w : words) {
             const std::string typed = !w.commands ? fmt::format("{}A?", w.name)
                                                   : fmt::format("{0}A:{1}{2}", w.name,
                                                                 w.values == 2   ? "n,d"
@@ -79,7 +79,7 @@ std::optional<bool> DriveShell::letter_line(std::string_view line) {
                                                                 w.asks ? fmt::format("   {}A?", w.name) : "");
             text += fmt::format("  {:16} {}\n", typed, w.what);
         }
-        return print(text + "  HELP             this list; help lists the other commands\n");
+        return print(text + "  HELP             print this list; help lists the other commands\n");
     }
     const auto end = static_cast<std::size_t>(
         std::find_if_not(line.begin(), line.end(), [](unsigned char c) { return std::isalnum(c) != 0; }) - line.begin());
@@ -91,39 +91,39 @@ std::optional<bool> DriveShell::letter_line(std::string_view line) {
     const std::string stem = name.substr(0, name.size() - 1);
     const char letter = name.back();
     const auto named = [&](const std::string& text) {
-        return std::find_if(std::begin(words), std::end(words), [&](const LetterWord& w) { return text == w.name; });
+        return std::find_if(std::begin(words), std::end(words), [&](const RobotCommand& w) { return text == w.name; });
     };
-    const LetterWord* const word = named(stem);
+    const RobotCommand* const word = named(stem);
     if (word == std::end(words) || letter < 'A' || letter > 'H') {
-        if (!shouted) return std::nullopt;  // one of our own words
-        if (named(name) != std::end(words)) return wrong(fmt::format("'{0}{1}' has no axis; write {0}A{1} to {0}H{1}", name, behind[0]));
+        if (!shouted) return std::nullopt;  // a command of the other kind
+        if (named(name) != std::end(words)) return wrong(fmt::format("missing axis in '{0}{1}'; write {0}A{1} to {0}H{1}", name, behind[0]));
         if (word != std::end(words))
             return wrong(fmt::format("'{}' is not an axis; write {}A{} to {}H{}", letter, stem, behind[0], stem, behind[0]));
         std::vector<std::string> names;
-        for (const LetterWord& w : words) names.push_back(std::string(w.name) + letter);
+        for (const RobotCommand& w : words) names.push_back(std::string(w.name) + letter);
         const std::string hint = did_you_mean(name, names);
         return wrong(fmt::format("unknown command '{}'; {}", name, hint.empty() ? "type: HELP" : hint));
     }
     const bool query = behind[0] == '?';
     if (query ? !word->asks : !word->commands)
-        return wrong(fmt::format("{0} cannot be {1}; type: {0}{2}", name, query ? "asked" : "set", query ? ":" : "?"));
+        return wrong(fmt::format("{0} cannot be {1}; type: {0}{2}", name, query ? "queried" : "set", query ? ":" : "?"));
     std::vector<std::int64_t> values;
     const unsigned wanted = query ? 0 : word->values;
     if (!parse_integers(trimmed(behind.substr(1)), values) || values.size() != wanted)
         return wrong(wanted == 0
-                         ? fmt::format("nothing is expected behind {}{}", name, behind[0])
+                         ? fmt::format("unexpected argument after {}{}", name, behind[0])
                          : fmt::format("{0}: takes {1} from {2} to {3}; type: {0}:{4}", name, wanted == 1 ? "one integer" : "two integers",
                                        word->least, word->most, wanted == 1 ? "1000" : "4096,360"));
     for (const std::int64_t value : values)
         if (value < word->least || value > word->most)
             return wrong(fmt::format("{}: {} is out of range; write {} to {}", name, value, word->least, word->most));
-    HandAxis& a = axis(static_cast<unsigned>(letter - 'A'));
+    SdoAxis& a = axis(static_cast<unsigned>(letter - 'A'));
     a.allow(settings_.within_ns > 0 ? settings_.within_ns : step_limit);
-    if (!letter_command(a, *word, values, query)) return false;
+    if (!robot_command(a, *word, values, query)) return false;
     return query || !settings_.prompt || print("ok\n");
 }
 
-bool DriveShell::letter_command(HandAxis& a, const LetterWord& word, const std::vector<std::int64_t>& values, bool query) {
+bool DriveShell::robot_command(SdoAxis& a, const RobotCommand& word, const std::vector<std::int64_t>& values, bool query) {
     const std::string_view name = word.name;
     const auto answer = [&](const std::string& value) { return print(fmt::format("{}{}={}\n", name, a.letter(), value)); };
     if (name == "AP") return a.look() && answer(fmt::format("{}", std::llround(a.position())));
