@@ -150,7 +150,7 @@ private:
         if (count >= least && count <= most) return true;
         const std::string wants = least == most ? std::to_string(most) : std::to_string(least) + " to " + std::to_string(most);
         say(words[0].begin, words.back().end,
-            name + " has " + counted(count, "number") + ", expected " + wants,
+            name + " has " + hal::counted(count, "number") + ", expected " + wants,
             std::string("write ") + example);
         return false;
     }

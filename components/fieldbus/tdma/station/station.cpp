@@ -127,7 +127,7 @@ ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot,
     using enum ethernet::Sent;
     Slot*          s = const_cast<Slot*>(find(slot));
     ethernet::Sent result = queued;
-    if (s == nullptr || frame.size() < ethernet::header_bytes || frame.size() > ethernet::header_bytes + s->room()) result = refused;
+    if (s == nullptr || frame.size() < ethernet::header_bytes || frame.size() > ethernet::header_bytes + s->room()) result = rejected;
     else if (!ready()) result = down;
     else if (!s->push(frame, std::min(priority, last_priority), finisher)) result = full;
     if (result != queued && result != full) ++status_.count.dropped;  // full: the sender keeps it
