@@ -75,7 +75,7 @@ TEST(Segment, a_slower_switch_keeps_a_frame_longer) {
     ASSERT_EQ(got.size(), 1U);
     EXPECT_EQ(got[0].time_ns, ms + 2 * minimum_ns + 12'500);
     EXPECT_EQ(open(net + "?forward=2us").problem,
-              net + "?forward=2us: a frame takes 12500 ns in the switch already; open the segment with the "
+              net + "?forward=2us: the switch already has a delay of 12500 ns; use the "
                                                         "same forward everywhere, or give it in the first place only");
     EXPECT_TRUE(open(net + "?forward=12500ns"));
 }
@@ -128,7 +128,7 @@ TEST(Segment, users_of_one_station_share_its_line_and_its_address) {
     EXPECT_TRUE(all(*bus, 3 * ms).empty());
     EXPECT_EQ(firsts(all(*can, 3 * ms)), "3");
     const auto problem = open(net + "/slave?mac=02:00:00:00:00:07").problem;
-    EXPECT_NE(problem.find("station slave has the address 02:48:41:4c:00:02 already"), problem.npos);
+    EXPECT_NE(problem.find("station slave already has the address 02:48:41:4c:00:02"), problem.npos);
 }
 
 TEST(Segment, a_frame_leaves_at_its_time_and_is_stamped_then) {

@@ -60,7 +60,7 @@ class Sdo(Node):
         self.assertEqual("6411:1 = D4 FE (2 bytes; u32 has 4)\n", self.read("6411:1", "--type", "u32"))
         self.can("sdo", "write", self.bus, "5", "6411:1", "-301")
         self.assertEqual("6411:1 = -301 (0xFED3)\n", self.read("6411:1", "--type", "i16"))
-        self.can("sdo", "write", self.bus, "5", "0x6200:2", "0x5A")  # as wide as the node says it is
+        self.can("sdo", "write", self.bus, "5", "0x6200:2", "0x5A")  # with the length that the node reports
         self.assertEqual("6200:2 = 0x5A (90)\n", self.read("6200sub2"))
         self.assertRegex(self.read("1008"), r'^1008:0 = "[^"]+" \(\d+ bytes\)\n$')
 
@@ -71,7 +71,7 @@ class Sdo(Node):
         self.assertEqual("hal can sdo read: unknown object 'serial-nomber' in io.eds; did you mean 'serial-number'?\n",
                          self.bad_can("sdo", "read", self.bus, "5", "serial-nomber", "--eds", "io.eds"))
         self.assertRegex(self.bad_can("sdo", "read", self.bus, "5", "event timer", "--eds", "io.eds"),
-                         r"^hal can sdo read: 'event timer' is the name of \d+ objects \(1400:5, 1401:5, .*; write which, such as 1400:5\n$")
+                         r"^hal can sdo read: ambiguous name 'event timer' of \d+ objects \(1400:5, 1401:5, .*; write the index, such as 1400:5\n$")
         self.assertEqual("hal can sdo read: invalid object 'serial'; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, or add --eds FILE for names\n",
                          self.bad_can("sdo", "read", self.bus, "5", "serial"))
 
@@ -128,9 +128,9 @@ class ReadAll(Node):
         self.assertEqual(0, done.returncode, done.stderr)
         self.assertIn("1018:4 Identity object, Serial, number = 0x00000001 (1)\n", done.stdout)
         self.assertIn("1000:0 Device type = ", done.stdout)
-        self.assertIn("2FF0:0 Not in the device: refused: object does not exist in the object dictionary (0x06020000)\n", done.stdout)
+        self.assertIn("2FF0:0 Not in the device: rejected: object does not exist in the object dictionary (0x06020000)\n", done.stdout)
         self.assertRegex(done.stderr, r"^\d+ objects of node 5 read, 1 rejected, \d+ write-only\n$")
-        self.assertRegex(self.can("read-all", self.bus, "5", "--eds", "more.eds", "-o", "all.csv"), r"^all\.csv: \d+ objects of node 5 read, 1 refused")
+        self.assertRegex(self.can("read-all", self.bus, "5", "--eds", "more.eds", "-o", "all.csv"), r"^all\.csv: \d+ objects of node 5 read, 1 rejected")
         with open(self.folder / "all.csv", newline="") as file:
             rows = {(row["index"], row["sub"]): row for row in csv.DictReader(file)}
         self.assertEqual(("Identity object, Serial, number", "u32", "ro", "1", "01000000", ""),
@@ -143,7 +143,7 @@ class ReadAll(Node):
     def test_wrong_words(self):
         self.assertEqual("hal can read-all: missing --eds FILE: the description lists the objects of the node\n",
                          self.bad_can("read-all", self.bus, "5"))
-        self.assertIn("hal can read-all: node 9 did not answer within ", self.bad_can("read-all", self.bus, "9", "--eds", "io.eds", "--timeout", "50ms"))
+        self.assertIn("hal can read-all: node 9 did not respond within ", self.bad_can("read-all", self.bus, "9", "--eds", "io.eds", "--timeout", "50ms"))
 
 
 class Dcf(Node):
@@ -156,9 +156,9 @@ class Dcf(Node):
         self.assertRegex(self.can("dcf", "read", self.bus, "5", "--eds", "io.eds", "-o", "io.dcf"), r"^io\.dcf: \d+ settings of node 5\n$")
         self.assertRegex(self.run_program("can", "eds", "check", "io.dcf").stderr, r"^io\.dcf: configuration of node 5; .*; 0 warnings, 0 notes\n$")
         text = (self.folder / "io.dcf").read_text()
-        self.assertTrue("ParameterValue=$NODEID+0x00000180\n" in text, "what is as the EDS has it serves another node, too")
+        self.assertTrue("ParameterValue=$NODEID+0x00000180\n" in text, "a default value of the EDS suits another node, too")
         self.assertTrue("\nNodeID=5\n" in text)
-        self.assertFalse(re.search(r"\[6411sub1\][^[]*ParameterValue", text), "what moves something is no setting")
+        self.assertFalse(re.search(r"\[6411sub1\][^[]*ParameterValue", text), "an object that moves the device is not a setting")
         done = self.dcf("--check")
         self.assertRegex(done.stdout, r"^node 5: 0 of \d+ settings differ\n$")
         self.assertEqual((0, ""), (done.returncode, done.stderr))
@@ -190,8 +190,8 @@ class Dcf(Node):
                          self.bad_can("dcf", "write", self.bus, "5", "none.dcf"))
         self.assertEqual("hal can dcf write: 'io.eds' has no settings: no ParameterValue to write; to create such a file: hal can dcf read\n",
                          self.bad_can("dcf", "write", self.bus, "5", "io.eds"))
-        self.assertEqual(f"hal can dcf read: node 9 did not answer within 0.15 s (asked for 1005:0 COB-ID SYNC); the bus is active; "
-                         f"hal can scan {self.bus} shows who is there\n",
+        self.assertEqual(f"hal can dcf read: node 9 did not respond within 0.15 s (object 1005:0 COB-ID SYNC); the bus is active; "
+                         f"to list the nodes: hal can scan {self.bus}\n",
                          self.bad_can("dcf", "read", self.bus, "9", "--eds", "io.eds", "--timeout", "50ms"))
 
 
@@ -217,10 +217,10 @@ class Pdo(Node):
         self.can("pdo", "map", self.bus, "5", "tpdo1", "--id", "1A5")  # the mapping stays
         self.assertEqual((0x1A5, 2), (self.shown()["TPDO1"]["id"], len(self.shown()["TPDO1"]["mapping"])))
 
-    def test_a_mapping_the_node_refuses_leaves_the_old_one(self):
+    def test_a_mapping_rejected_by_the_node_leaves_the_old_one(self):
         before = self.shown()["RPDO1"]
-        self.assertEqual("hal can pdo map: node 5, 1600:2 (to map 6000:1/8): object cannot be mapped to a PDO (0x06040041); the device's EDS says which objects can be: "
-                         "PDOMapping=1\nhal can pdo map: RPDO1 restored\n",
+        self.assertEqual("hal can pdo map: node 5, 1600:2 (to map 6000:1/8): object cannot be mapped to a PDO (0x06040041); mappable objects "
+                         "have PDOMapping=1 in the EDS of the device\nhal can pdo map: RPDO1 restored\n",
                          self.bad_can("pdo", "map", self.bus, "5", "rpdo1", "6200:1", "6000:1"))
         self.assertEqual(before, self.shown()["RPDO1"])
 
@@ -280,7 +280,7 @@ class Lss(Node):
         self.assertEqual("hal can lss: invalid node ID '128'; write 1..127, or none\n", self.bad_can("lss", self.bus, "node-id", "128"))
         self.assertEqual("hal can lss: unknown command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
         self.assertEqual("wrong arguments of hal can lss: select; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
-        self.assertEqual("hal can lss: 'x' is no vendor id; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
+        self.assertEqual("hal can lss: invalid vendor ID 'x'; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
 
 
 class Watch(Node):
@@ -347,8 +347,8 @@ class Flash(Node):
         self.assertRegex(text, r"^node 6: stopping the program\nnode 6: erasing the flash\nnode 6: downloading \d+ bytes\nnode 6: starting the program\n"
                                r"node 6: program running, software identification 0x[0-9A-F]{8}\n$")
         (self.folder / "bad.bin").write_bytes(b"not a program at all, and long enough")
-        self.assertEqual("hal can flash: node 6, 1F50:1: data cannot be transferred or stored to the application (0x08000020); the device does not take "
-                         "this image, and may have no usable program now: is it made for this device?\n", self.bad("can", "flash", self.bus, 6, "bad.bin"))
+        self.assertEqual("hal can flash: node 6, 1F50:1: data cannot be transferred or stored to the application (0x08000020); the device rejected "
+                         "the image and may have no valid program now; check that the image is for this device\n", self.bad("can", "flash", self.bus, 6, "bad.bin"))
         self.assertIn("runs, software identification", self.good("can", "flash", self.bus, 6, "new.bin"))
 
     def test_a_node_without_one_and_wrong_files(self):

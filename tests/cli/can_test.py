@@ -109,9 +109,9 @@ class Dump(Can):
                          self.bad_can("dump", "replay:c.log", "--filter", "xyz"))
         self.assertEqual("hal can dump: 'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
                          "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE\n", self.bad_can("dump", "bus"))
-        self.assertEqual("hal can dump: 'sim:arm' lives in the memory of its machine, where no other program reaches it; while that machine runs, join it to "
-                         "one that they do: hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and "
-                         "here udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))
+        self.assertEqual("hal can dump: 'sim:arm' is a bus in memory, which other programs cannot open; while its machine runs, bridge it to one that they can: "
+                         "hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and here "
+                         "udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))
         self.assertIn("hal can dump: 'more' is not the address of a CAN bus; ", self.bad_can("dump", "replay:c.log", "more"))
         self.assertEqual("hal can dump: invalid --time 'utc'; write relative, delta or absolute\n",
                          self.bad_can("dump", "replay:c.log", "--time", "utc"))
@@ -198,7 +198,7 @@ class Send(Can):
                 ("12#00", "invalid frame '12#00': invalid identifier '12'; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one"),
                 ("800#00", "invalid frame '800#00': invalid identifier '800'; write three hex digits up to 7FF, or eight up to 1FFFFFFF for an extended one"),
                 ("123#1", "invalid frame '123#1': after #, write up to 8 bytes of two hex digits, or R and the requested length; CAN FD is written ##"),
-                ("123##0" + "00" * 9, f"invalid frame '123##0{'00' * 9}': behind ## stand one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, "
+                ("123##0" + "00" * 9, f"invalid frame '123##0{'00' * 9}': after ##, write one digit of flags (1: data at the data rate) and 0-8, 12, 16, 20, "
                                       "24, 32, 48 or 64 bytes")):
             self.assertEqual(f"hal can send: {text}\n", self.bad_can("send", self.bus, "080#", frame))
         self.assertEqual("hal can send: missing frame; type: hal can send ADDRESS 123#1122AABB\n", self.bad_can("send", self.bus))
@@ -334,17 +334,17 @@ class Plan(Case):
 
     def test_a_bus_in_Ethernet_frames_has_another_plan(self):
         self.write("arm.canopen", AXES.replace("sim:arm", "cane:sim:arm") + "[node 1 x]\ntype = drive\n")
-        self.assertEqual("hal canopen plan: the frames of arm.canopen travel on Ethernet (cane:sim:arm), where no identifier waits for another; who sends "
-                         "when says: hal tdma plan FILE.tdma\n", self.bad("canopen", "plan", "arm.canopen"))
+        self.assertEqual("hal canopen plan: arm.canopen uses Ethernet (cane:sim:arm), where identifiers do not arbitrate; for its schedule type: "
+                         "hal tdma plan FILE.tdma\n", self.bad("canopen", "plan", "arm.canopen"))
 
     def test_all_wrong_lines_are_named(self):
         self.write("plan.canopen", "[bus]\n[messages]\n0x100 = 9, 1ms\n0x100 = 8, soon\nxyz = 8, 1ms\n0x101 = 8\n0x102 = 8, 1ms\n0x102 = 4, 2ms\n0x103 = 8, 5\n")
         said = self.bad("canopen", "plan", "plan.canopen")
-        for line in ("plan.canopen:3:9: error: '9' is no length [canopen-value]", "plan.canopen:4:12: error: 'soon' is no period [canopen-value]",
-                     "plan.canopen:5:1: error: 'xyz' is no identifier [canopen-value]",
-                     "plan.canopen:6:9: error: a message has BYTES, PERIOD, DEADLINE, JITTER [canopen-value]",
-                     "plan.canopen:8:1: error: this identifier is used in line 7, too [canopen-node]",
-                     "plan.canopen:9:12: error: '5' is no period [canopen-value]"):
+        for line in ("plan.canopen:3:9: error: invalid length '9' [canopen-value]", "plan.canopen:4:12: error: invalid period 'soon' [canopen-value]",
+                     "plan.canopen:5:1: error: invalid identifier 'xyz' [canopen-value]",
+                     "plan.canopen:6:9: error: invalid message: expected BYTES, PERIOD, DEADLINE, JITTER [canopen-value]",
+                     "plan.canopen:8:1: error: duplicate identifier: also used in line 7 [canopen-node]",
+                     "plan.canopen:9:12: error: invalid period '5' [canopen-value]"):
             self.assertIn(line, said.splitlines())
         self.assertEqual("hal canopen plan: cannot read 'none.canopen': No such file or directory\n", self.bad("canopen", "plan", "none.canopen"))
 
@@ -368,7 +368,7 @@ class Plan(Case):
         self.assertGreaterEqual(len(names), 12)
         for name in sorted(names):
             self.write("arm.canopen", arm + f"controlword.name = {name}\n")
-            self.assertIn(f"arm.canopen:5:9: error: every node has a pin '{name}' of its own [canopen-object]", self.bad("canopen", "check", "arm.canopen"))
+            self.assertIn(f"arm.canopen:5:9: error: pin '{name}' exists on every node [canopen-object]", self.bad("canopen", "check", "arm.canopen"))
         self.write("arm.canopen", arm + "tpdo1 = statusword, target-position\n")
         self.assertIn("  tpdo1 185, 6 bytes, when changed\n    u32   out elbow.statusword  6041 Statusword\n"
                       "    s32   out elbow.target-position-feedback  607A Target position\n", self.good("canopen", "check", "arm.canopen"))

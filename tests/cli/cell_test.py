@@ -226,9 +226,9 @@ class Namespaces(Case):
 
     def test_each_kind_of_node_is_killed_and_a_cable_taken_out(self):
         said = self.bring_up("2", "--kill", "cell", "--kill", "robot2", "--kill", "camera", "--cut", "robot1")
-        self.assertIn("the robots that are left stand still; node robot2 starts again", said)
-        self.assertIn("both robots stand still; the cable of node robot1 is put in again", said)
-        self.assertEqual(4, said.count("all are there again"), said)
+        self.assertIn("the remaining robots have stopped; node robot2 is restarted", said)
+        self.assertIn("both robots have stopped; the cable of node robot1 is reconnected", said)
+        self.assertEqual(4, said.count("all nodes are online again"), said)
         self.assertIn("cell/robot2", said)
 
     def test_names_unexpected_words(self):

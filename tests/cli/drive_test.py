@@ -39,7 +39,7 @@ class Drive(Case):
         return process
 
     def left_moving(self, *words):
-        """A command that succeeds and leaves the axis in motion says so."""
+        """A command that succeeds and leaves the axis moving prints a warning."""
         done = self.run_program("can", "drive", self.bus, "--node", 2, *words)
         self.assertEqual(0, done.returncode, done.stderr)
         self.assertEqual(f"hal can drive: A: still moving, no longer supervised; to stop it: hal can drive {self.bus} --node 2 A stop\n",
@@ -76,7 +76,7 @@ class OneShot(Drive):
         self.assertEqual("A: speed 2000\n", self.left_moving("A", "speed", 2000))
         self.assertIn("A: mode pv\n", self.drive("A", "mode?"))
         self.assertEqual("A: state operation enabled\n", self.drive("A", "state?"))
-        self.assertRegex(self.drive("A", "stop"), r"^A: stands at ")
+        self.assertRegex(self.drive("A", "stop"), r"^A: stopped at ")
         first = self.drive("A", "position?")
         self.assertRegex(self.drive("A", "status"), r"^A: operation enabled, mode pv, statusword 0x\w{4}, voltage enabled, remote, target reached\n"
                                                     r"   position \S+, speed \S+, torque \S+\n$")
@@ -146,7 +146,7 @@ class OneShot(Drive):
         self.left_moving("A", "speed", 100)
         node.kill()
         node.wait()
-        self.assertRegex(self.refused("--timeout", "50ms", "A", "stop"), r"^node 2 did not answer within 0.15 s \(asked for \w{4}:0\)")
+        self.assertRegex(self.refused("--timeout", "50ms", "A", "stop"), r"^node 2 did not respond within 0.15 s \(object \w{4}:0\)")
 
 
 class Script(Drive):
@@ -303,7 +303,7 @@ class EveryEnd(Drive):
         self.node("--motor", "endless:1", "--without", "1016", "--without", "100C")
         done = self.run_program("can", "drive", self.bus, "--node", 2, "A", "on")
         self.assertEqual((0, "A: on\n"), (done.returncode, done.stdout))
-        self.assertEqual("hal can drive: warning: node 2 does not watch this program (it has no heartbeat consumer, 1016h; it has no life guarding, "
+        self.assertEqual("hal can drive: warning: node 2 does not supervise this program (it has no heartbeat consumer, 1016h; it has no life guarding, "
                          "100Ch and 100Dh): if this program is killed or the bus is cut, the axis keeps moving\n", done.stderr)
         self.assertEqual("A: on\n", self.drive("--supervise", "off", "A", "on"))
 

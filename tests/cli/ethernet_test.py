@@ -73,7 +73,7 @@ class Segment(Case):
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
             if done.returncode == 77:
                 self.skipTest("no network namespaces here")
-            self.assertEqual((1, True), (done.returncode, f"'fast' means nothing; write bring-up [{option}] [SECONDS]" in done.stdout), done.stdout)
+            self.assertEqual((1, True), (done.returncode, f"invalid argument 'fast'; write bring-up [{option}] [SECONDS]" in done.stdout), done.stdout)
 
     def test_a_station_prints_what_to_type(self):
         tdma = self.folder / "one.tdma"
@@ -89,10 +89,10 @@ class Segment(Case):
         with_mac.write_text(tdma.read_text().replace("name x\n", "name x\nmac 02:00:00:00:00:07\n"))
         refusal = node("--link", "cane:lo", "--tdma", str(with_mac), "--station", "x")
         if "CAP_NET_RAW" not in refusal:
-            self.assertEqual(f"hal node axis-io: eth:lo has the address 00:00:00:00:00:00, {with_mac} gives x 02:00:00:00:00:07; mend the line 'mac' "
+            self.assertEqual(f"hal node axis-io: eth:lo has the address 00:00:00:00:00:00, but {with_mac} gives x 02:00:00:00:00:07; correct the line 'mac' "
                              "of its block\n", refusal)
         self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
-        self.assertIn("there are axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
+        self.assertIn("write one of: axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
         self.assertIn("cannot read 'none.tdma'", node("--link", "cane:lo", "--tdma", "none.tdma"))
 
     def test_the_description_beside_the_machines_is_the_devices(self):

@@ -163,7 +163,7 @@ class Tunnel(Segment):
                          "hal%d for the first free number [bad-argument]", self.refused("tunnel=a/b"))
         self.assertEqual("component 'tdma': invalid netmask=255.0.255.0; write 24 or 255.255.255.0 [bad-argument]",
                          self.refused("tunnel=hal0 netmask=255.0.255.0"))
-        self.assertEqual("slot 1 is that of ordinary packets, and 71 bytes are too few: IP needs 68 and the RTmac header 4 [tdma-schedule]",
+        self.assertEqual("slot 1 carries IP packets, but its 71 bytes are too few: IP needs 68 and the RTmac header 4 [tdma-schedule]",
                          self.refused("tunnel=hal0", cell=CELL.replace("1/1 1500", "1/1 71")))
 
     def test_a_device_of_hal_node_has_one_too(self):
