@@ -12,6 +12,6 @@ for case in xml.parse(sys.argv[1]).iter("testcase"):
         continue
     said = (case.findtext("system-out") or "").strip()
     googletest = re.search(r": Skipped\n(.*?)\n\[  SKIPPED ", said, re.S)
-    reasons[googletest[1].strip() if googletest else said.splitlines()[-1] if said else "it does not say why"] += 1
+    reasons[googletest[1].strip() if googletest else said.splitlines()[-1] if said else "no reason given"] += 1
 for reason, count in sorted(reasons.items()):
     print(f"    {count:>4}  {reason}")

@@ -32,7 +32,7 @@ bool SessionState::make_threads(Diagnostics& diagnostics) {
                 place = &executor->add(wanted, pins);
             } catch (const std::runtime_error& e) {
                 cores.erase(thread.get());
-                diagnostics.error("thread-refused", thread->made, "thread '" + thread->name + "' cannot be made: " + e.what());
+                diagnostics.error("thread-refused", thread->made, "thread '" + thread->name + "' cannot be created: " + e.what());
                 return false;
             } catch (const std::bad_alloc&) {
                 cores.erase(thread.get());

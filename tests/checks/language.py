@@ -3,7 +3,8 @@
 """language.py ROOT [PATH...]: no string, page or comment uses a paraphrase where the field has a term.
 
 Each rule is a pattern and the term to use. Checked are string literals and comments of sources, whole pages, netlists and expected outputs.
-Identifiers are not. A line that quotes somebody else's output ends with the comment `language: quoted`."""
+Not checked are identifiers: in code, in backticks, with a hyphen (thread-refused), or as the only word of a string (a key, a pin).
+A line that quotes somebody else's output ends with the comment `language: quoted`."""
 import re
 import sys
 from pathlib import Path
@@ -78,6 +79,13 @@ def texts(path, source):
         yield from ((m.start(), m.group()) for m in LUA_TEXT.finditer(source))
 
 
+def is_identifier(text, match):
+    """Returns whether the match is a name and not prose: in backticks, part of a hyphenated name, or the only word of a string."""
+    before, after = text[:match.start()][-1:], text[match.end():][:1]
+    alone = before == after and before in ("`", '"', "'") and " " not in match.group()
+    return alone or before == "-" or after == "-"
+
+
 def violations(root, only=()):
     for path in tracked(root):
         name = path.as_posix()
@@ -92,7 +100,7 @@ def violations(root, only=()):
             for pattern, term in COMPILED:
                 for match in pattern.finditer(text):
                     number = source.count("\n", 0, offset + match.start()) + 1
-                    if "language: quoted" not in lines[number - 1]:
+                    if "language: quoted" not in lines[number - 1] and not is_identifier(text, match):
                         yield name, number, " ".join(match.group().split()), term
 
 

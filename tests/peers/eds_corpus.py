@@ -32,7 +32,7 @@ def ours(hal, path):
     found = SUMMARY.search(lines[-1]) if lines else None
     if done.returncode == 0 and found:
         return (*map(int, found.groups()), took)
-    if done.returncode == 1 and lines and re.search("refused|rejected", lines[-1]):
+    if done.returncode == 1 and lines and "rejected" in lines[-1]:
         return next((line for line in lines if " error: " in line), "rejected without a reason")
     return f"CRASH: status {done.returncode}"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Discipline against a beat of another clock, simulated: the clock's phase is what its steps and the drift make of it.
+// Discipline against a simulated reference clock: the phase results from the adjustments and the drift.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,10 +10,10 @@
 namespace hal::test {
 namespace {
 
-/// A beat whose period is `drift` longer than the clock's, seen with normal noise.
-struct Beat {
+/// Reference whose period is `drift` longer than the clock's, measured with normally distributed noise.
+struct Reference {
     double period_ns = 1e6, drift = 200e-6, noise_ns = 2000;
-    double phase_ns = 0;  ///< of the beat, by the clock; what a perfect discipline would bring to 0
+    double phase_ns = 0;  ///< of the reference, by the clock; a perfect discipline brings it to 0
     std::mt19937 random{1};
 
     std::int64_t seen() { return std::llround(phase_ns + (noise_ns > 0 ? std::normal_distribution<>(0, noise_ns)(random) : 0.0)); }
@@ -23,24 +23,24 @@ struct Beat {
         pass(step);
         return step;
     }
-    /// Root mean square of the true phase over `beats`.
-    double rms(Discipline& discipline, int beats) {
+    /// Returns the root mean square of the true phase over `periods`.
+    double rms(Discipline& discipline, int periods) {
         double sum = 0;
-        for (int i = 0; i < beats; ++i) {
+        for (int i = 0; i < periods; ++i) {
             turn(discipline);
             sum += phase_ns * phase_ns;
         }
-        return std::sqrt(sum / beats);
+        return std::sqrt(sum / periods);
     }
 };
 
-TEST(Discipline, Holds_a_beat_200_ppm_off_with_2_us_of_noise_to_a_quarter_of_that) {
+TEST(Discipline, Holds_a_reference_200_ppm_off_with_2_us_of_noise_to_a_quarter_of_that) {
     for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {
-        Beat beat{.phase_ns = 300'000};
-        beat.random.seed(seed);
+        Reference reference{.phase_ns = 300'000};
+        reference.random.seed(seed);
         Discipline discipline;
-        beat.rms(discipline, 200);
-        EXPECT_LT(beat.rms(discipline, 5000), 700) << seed;
+        reference.rms(discipline, 200);
+        EXPECT_LT(reference.rms(discipline, 5000), 700) << seed;
         EXPECT_TRUE(discipline.locked());
         EXPECT_NEAR(discipline.rate(), 200e-6, 100e-6);
         EXPECT_NEAR(discipline.scatter_ns(), 1700, 900);
@@ -48,40 +48,40 @@ TEST(Discipline, Holds_a_beat_200_ppm_off_with_2_us_of_noise_to_a_quarter_of_tha
 }
 
 TEST(Discipline, Does_the_same_at_100_us) {
-    Beat beat{.period_ns = 1e5, .phase_ns = -40'000};
+    Reference reference{.period_ns = 1e5, .phase_ns = -40'000};
     Discipline discipline;
-    beat.rms(discipline, 200);
-    EXPECT_LT(beat.rms(discipline, 5000), 700);
+    reference.rms(discipline, 200);
+    EXPECT_LT(reference.rms(discipline, 5000), 700);
 }
 
-TEST(Discipline, Finds_an_exact_beat_exactly) {
-    Beat beat{.noise_ns = 0, .phase_ns = -450'000};
+TEST(Discipline, Converges_exactly_to_an_exact_reference) {
+    Reference reference{.noise_ns = 0, .phase_ns = -450'000};
     Discipline discipline;
-    for (int i = 0; i < 300; ++i) beat.turn(discipline);
-    EXPECT_LE(beat.rms(discipline, 100), 1.0);
+    for (int i = 0; i < 300; ++i) reference.turn(discipline);
+    EXPECT_LE(reference.rms(discipline, 100), 1.0);
     EXPECT_NEAR(discipline.rate(), 200e-6, 1e-6);
 }
 
-TEST(Discipline, Brings_a_fraction_of_a_nanosecond_per_beat_to_account) {
-    Beat beat{.drift = 3e-10, .noise_ns = 0};  // 0.3 ns in ten beats: far below one step
+TEST(Discipline, Brings_a_fraction_of_a_nanosecond_per_period_to_account) {
+    Reference reference{.drift = 3e-10, .noise_ns = 0};  // 0.3 ns in ten periods: far below one adjustment
     Discipline discipline;
-    for (int i = 0; i < 100'000; ++i) beat.turn(discipline);
-    EXPECT_LT(std::abs(beat.phase_ns), 5.0) << "there is no dead band";
+    for (int i = 0; i < 100'000; ++i) reference.turn(discipline);
+    EXPECT_LT(std::abs(reference.phase_ns), 5.0) << "there is no dead band";
 }
 
 TEST(Discipline, Acquires_the_phase_in_steps_of_its_limit_and_overshoots_by_no_more_than_noise) {
-    Beat beat{.phase_ns = 450'000};
+    Reference reference{.phase_ns = 450'000};
     Discipline discipline;
-    int beats = 0;
-    for (double before = beat.phase_ns; beat.phase_ns > 5000; before = beat.phase_ns, ++beats) {
-        ASSERT_LE(std::abs(beat.turn(discipline)), 100'000);
-        ASSERT_LT(beat.phase_ns, before);
+    int periods = 0;
+    for (double before = reference.phase_ns; reference.phase_ns > 5000; before = reference.phase_ns, ++periods) {
+        ASSERT_LE(std::abs(reference.turn(discipline)), 100'000);
+        ASSERT_LT(reference.phase_ns, before);
         ASSERT_FALSE(discipline.locked());
     }
-    EXPECT_LE(beats, 6);
+    EXPECT_LE(periods, 6);
     for (int i = 0; i < 50; ++i) {
-        beat.turn(discipline);
-        ASSERT_GT(beat.phase_ns, -8000);
+        reference.turn(discipline);
+        ASSERT_GT(reference.phase_ns, -8000);
     }
 }
 
@@ -91,59 +91,59 @@ TEST(Discipline, A_step_obeys_the_limit_it_is_given) {
     EXPECT_EQ(discipline.follow(-350'000, 4'000'000, 100'000), -100'000);
 }
 
-TEST(Discipline, A_beat_that_was_held_up_hardly_counts) {
-    Beat beat{.noise_ns = 200};
+TEST(Discipline, Delayed_references_hardly_count) {
+    Reference reference{.noise_ns = 200};
     Discipline discipline;
-    beat.rms(discipline, 500);
+    reference.rms(discipline, 500);
     for (int i = 0; i < 100; ++i) {
-        beat.phase_ns += 130'000;  // behind a long frame of lower priority; three in a row at most
+        reference.phase_ns += 130'000;  // behind a long frame of lower priority; three in a row at most
         for (int k = 0; k < 1 + i % 3; ++k) {
-            const std::int64_t step = discipline.follow(beat.seen(), 1'000'000);
-            beat.pass(step);
+            const std::int64_t step = discipline.follow(reference.seen(), 1'000'000);
+            reference.pass(step);
         }
-        beat.phase_ns -= 130'000;
-        beat.rms(discipline, 20);
-        ASSERT_LT(std::abs(beat.phase_ns), 1000) << i;
+        reference.phase_ns -= 130'000;
+        reference.rms(discipline, 20);
+        ASSERT_LT(std::abs(reference.phase_ns), 1000) << i;
         ASSERT_NEAR(discipline.rate(), 200e-6, 20e-6);
     }
 }
 
-TEST(Discipline, A_beat_in_a_new_place_is_taken_over_at_once_with_the_rate_kept) {
-    Beat beat{.noise_ns = 200};
+TEST(Discipline, A_reference_with_a_new_phase_is_adopted_at_once_with_the_rate_kept) {
+    Reference reference{.noise_ns = 200};
     Discipline discipline;
-    beat.rms(discipline, 500);
-    beat.phase_ns += 300'000;
-    for (int i = 0; i < 4 + 3; ++i) beat.turn(discipline);
-    beat.rms(discipline, 20);
-    EXPECT_LT(std::abs(beat.phase_ns), 1000);
+    reference.rms(discipline, 500);
+    reference.phase_ns += 300'000;
+    for (int i = 0; i < 4 + 3; ++i) reference.turn(discipline);
+    reference.rms(discipline, 20);
+    EXPECT_LT(std::abs(reference.phase_ns), 1000);
     EXPECT_NEAR(discipline.rate(), 200e-6, 100e-6);
 }
 
 TEST(Discipline, Coasts_at_the_rate_it_has_found) {
-    Beat beat{.noise_ns = 200};
+    Reference reference{.noise_ns = 200};
     Discipline discipline;
     EXPECT_EQ(discipline.coast(1'000'000), 0) << "nothing is known yet";
-    beat.rms(discipline, 2000);
-    for (int i = 0; i < 100; ++i) beat.pass(discipline.coast(1'000'000));
-    EXPECT_LT(std::abs(beat.phase_ns), 1500) << "without it the clock would be 20 us off";
+    reference.rms(discipline, 2000);
+    for (int i = 0; i < 100; ++i) reference.pass(discipline.coast(1'000'000));
+    EXPECT_LT(std::abs(reference.phase_ns), 1500) << "without it the clock would be 20 us off";
 }
 
-TEST(Discipline, Forgets_the_phase_and_keeps_the_rate_when_the_beat_is_lost) {
-    Beat beat{.noise_ns = 200};
+TEST(Discipline, Forgets_the_phase_and_keeps_the_rate_when_the_reference_is_lost) {
+    Reference reference{.noise_ns = 200};
     Discipline discipline;
-    beat.rms(discipline, 500);
+    reference.rms(discipline, 500);
     discipline.lose();
     EXPECT_FALSE(discipline.locked());
-    beat.phase_ns = -80'000;
+    reference.phase_ns = -80'000;
     for (int i = 0; i < 20; ++i) {
-        beat.turn(discipline);
+        reference.turn(discipline);
         ASSERT_NEAR(discipline.rate(), 200e-6, 50e-6);
     }
-    EXPECT_LT(beat.rms(discipline, 100), 200);
+    EXPECT_LT(reference.rms(discipline, 100), 200);
     EXPECT_TRUE(discipline.locked());
 }
 
-TEST(Discipline, Is_locked_by_sixteen_near_beats_and_no_longer_when_they_are_twice_as_far) {
+TEST(Discipline, Is_locked_by_sixteen_near_periods_and_no_longer_when_they_are_twice_as_far) {
     Discipline discipline({.lock_ns = 1000});
     for (int i = 0; i < 15; ++i) discipline.follow(0, 1'000'000);
     EXPECT_FALSE(discipline.locked());
@@ -155,10 +155,10 @@ TEST(Discipline, Is_locked_by_sixteen_near_beats_and_no_longer_when_they_are_twi
     EXPECT_FALSE(discipline.locked());
 }
 
-TEST(Discipline, Gives_up_on_a_beat_that_moves_with_the_clock) {
+TEST(Discipline, Gives_up_on_a_reference_that_moves_with_the_clock) {
     Discipline discipline;
     std::int64_t sum = 0;
-    for (int i = 0; i < 10'000; ++i) sum += discipline.follow(250'000, 1'000'000);  // whatever it steps, the beat is as late as before
+    for (int i = 0; i < 10'000; ++i) sum += discipline.follow(250'000, 1'000'000);  // no adjustment changes the phase of the reference
     EXPECT_TRUE(discipline.in_vain());
     EXPECT_LT(sum, 3'000'000);
     EXPECT_FALSE(discipline.locked());
@@ -166,18 +166,18 @@ TEST(Discipline, Gives_up_on_a_beat_that_moves_with_the_clock) {
     EXPECT_FALSE(discipline.in_vain());
 }
 
-TEST(Discipline, Does_not_give_up_on_a_beat_with_much_noise) {
-    Beat beat{.noise_ns = 80'000};
+TEST(Discipline, Does_not_give_up_on_a_reference_with_much_noise) {
+    Reference reference{.noise_ns = 80'000};
     Discipline discipline({.lock_ns = 10'000});
-    for (int i = 0; i < 100'000; ++i) beat.turn(discipline);
+    for (int i = 0; i < 100'000; ++i) reference.turn(discipline);
     EXPECT_FALSE(discipline.locked());
     EXPECT_FALSE(discipline.in_vain());
 }
 
 TEST(Discipline, A_rate_that_no_clock_has_is_not_followed) {
-    Beat beat{.drift = 5e-3, .noise_ns = 0};
+    Reference reference{.drift = 5e-3, .noise_ns = 0};
     Discipline discipline;
-    beat.rms(discipline, 500);
+    reference.rms(discipline, 500);
     EXPECT_LE(std::abs(discipline.rate()), 1e-3);
 }
 

@@ -32,7 +32,7 @@ class Machine {
 public:
     explicit Machine(Clock clock = Clock::virtual_time) : session(options(clock)) {}
 
-    /// One transaction of all lines. True when it took effect; what it said is in `said`.
+    /// Executes all lines as one transaction. Returns true when it was applied; its messages are in `said`.
     bool edit(const std::string& text) {
         Diagnostics diagnostics;
         Transaction transaction = session.begin();
@@ -48,7 +48,7 @@ public:
     }
     /// A transaction that must take effect.
     void must(const std::string& text) { ASSERT_TRUE(edit(text)) << text << "\n" << said; }
-    /// A transaction that must be refused with this code and change nothing.
+    /// Expects the transaction to be rejected with this code and to change nothing.
     void refused(const std::string& text, const std::string& code) {
         const std::string before = dump();
         EXPECT_FALSE(edit(text)) << text;
@@ -73,7 +73,7 @@ public:
     void stop() { session.threads().stop(); }
     void cycles(std::uint64_t count) { session.threads().advance_cycles(count); }
 
-    /// The whole model as text: everything a transaction may change and an undone one must not.
+    /// The whole model as text: everything that a transaction may change and a rolled back one must not.
     std::string dump(bool values = true) {
         std::ostringstream out;
         const Model& model = session.model();

@@ -5,7 +5,7 @@ namespace {
 
 class Expansion : public netlist_text::Netlist {
 protected:
-    /// What is said about a text after it was expanded; it must give no command.
+    /// Returns the diagnostics of a text that must be rejected after expansion, without any command.
     std::string refused(std::string text) {
         EXPECT_EQ(expanded(std::move(text)), "");
         return render(found, sources);

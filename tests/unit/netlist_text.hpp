@@ -44,7 +44,7 @@ protected:
         return out;
     }
 
-    /// What is said about a text.
+    /// Returns the diagnostics of a text.
     std::string said(std::string text) {
         parse(std::move(text));
         return render(found, sources);

@@ -25,15 +25,15 @@ TEST_F(MessageLogTest, First_message_of_each_subject_is_printed_at_once) {
 }
 
 TEST_F(MessageLogTest, Storm_is_one_line_per_second_with_the_newest_message_and_a_count) {
-    for (int i = 0; i < 3000; ++i) log.print("storm", "late by " + std::to_string(i) + " us", i * ms);
-    EXPECT_EQ(lines, (Lines{"it.0: late by 0 us\n", "it.0: late by 999 us (999 times in 1.0 s)\n",
-                            "it.0: late by 1999 us (1000 times in 1.0 s)\n"}));
+    for (int i = 0; i < 3000; ++i) log.print("storm", "latency " + std::to_string(i) + " us", i * ms);
+    EXPECT_EQ(lines, (Lines{"it.0: latency 0 us\n", "it.0: latency 999 us (999 times in 1.0 s)\n",
+                            "it.0: latency 1999 us (1000 times in 1.0 s)\n"}));
     log.flush(3000 * ms);
     EXPECT_EQ(lines.size(), 4u);
-    EXPECT_EQ(lines.back(), "it.0: late by 2999 us (1000 times in 1.0 s)\n");
+    EXPECT_EQ(lines.back(), "it.0: latency 2999 us (1000 times in 1.0 s)\n");
     log.flush(4000 * ms);
-    log.print("storm", "late by 1 us", 4500 * ms);
-    EXPECT_EQ(lines.back(), "it.0: late by 1 us\n") << "after a quiet second it is printed at once again";
+    log.print("storm", "latency 1 us", 4500 * ms);
+    EXPECT_EQ(lines.back(), "it.0: latency 1 us\n") << "after a quiet second it is printed at once again";
     EXPECT_EQ(lines.size(), 5u);
 }
 
@@ -72,7 +72,7 @@ TEST_F(MessageLogTest, Without_a_subject_numbers_do_not_count) {
 }
 
 TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
-    for (int i = 0; i < 100'000; ++i) log.print(std::to_string(i), "stranger " + std::to_string(i), 0);
+    for (int i = 0; i < 100'000; ++i) log.print(std::to_string(i), "subject " + std::to_string(i), 0);
     EXPECT_EQ(lines.size(), MessageLog::most_subjects);
     log.flush(1000 * ms);
     ASSERT_EQ(lines.size(), MessageLog::most_subjects + 1);

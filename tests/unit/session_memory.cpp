@@ -143,7 +143,7 @@ TEST(A_thread_that_the_system_cannot_create, rolls_back_the_edit) {
     refuse_threads = true;
     machine.refused("newthread second 2000000\nloadrt test-life names=x\naddf x second\nsetp c.step 4", "thread-refused");
     refuse_threads = false;
-    EXPECT_NE(machine.said.find("thread 'second' cannot be made: the system gives no thread: Resource temporarily unavailable"), std::string::npos) << machine.said;
+    EXPECT_NE(machine.said.find("thread 'second' cannot be created: the system gives no thread: Resource temporarily unavailable"), std::string::npos) << machine.said;
     machine.must("newthread second 2000000\nloadrt test-counter names=d\naddf d second");
     EXPECT_TRUE(eventually([&] { return machine.number("d.count") > 3 && machine.number("c.count") > 3; }));
 }

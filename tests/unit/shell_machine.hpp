@@ -51,7 +51,7 @@ public:
     explicit ShellMachine(ShellOptions options = {}, SessionOptions session_options = shell_session())
         : session(std::move(session_options)), shell(session, std::move(options)) {}
 
-    /// One line, as typed. The status; what was said is in out and err.
+    /// Executes one line as typed. Returns its status; its output is in out and err.
     int line(const std::string& text) { return keep([&](Output& output) { return shell.execute(text, output); }); }
     int file(const std::string& text, const std::string& name = "test.hal") {
         return keep([&](Output& output) { return shell.run_text(name, text, output); });

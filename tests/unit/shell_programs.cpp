@@ -166,7 +166,7 @@ TEST_F(Programs, one_that_declares_a_rate_and_misses_it_does_not_respond) {
     EXPECT_TRUE(says("show comp p", " not responding since ")) << machine.out;
     EXPECT_EQ(machine.says("gets a"), "-1\n");
     ask({{"exchange", "p"}, {"write", {1, 4.5}}, {"alive", false}});
-    EXPECT_EQ(machine.says("gets a"), "-1\n") << "values that a thread of its library sends are no sign of life";
+    EXPECT_EQ(machine.says("gets a"), "-1\n") << "values sent by a thread of its library do not count as a sign of life";
     ask({{"component", "p"}, {"every_ms", 0}});
     EXPECT_EQ(machine.says("gets a"), "4.5\n") << "what it wrote meanwhile";
     EXPECT_NE(machine.says("show comp p").find(" ready\n"), std::string::npos) << machine.out;

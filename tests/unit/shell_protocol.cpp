@@ -109,7 +109,7 @@ TEST_F(Protocol, a_subscription_sends_values_when_due) {
     // a late one keeps the grid
     EXPECT_EQ(published(due + 35'000'000).size(), 1U);
     EXPECT_EQ(connection.next_due_ns(), due + 40'000'000);
-    // a client that does not read is told later how many it missed
+    // a client that does not read gets the number of skipped events later
     EXPECT_TRUE(published(due + 40'000'000, true).empty());
     EXPECT_TRUE(published(due + 50'000'000, true).empty());
     EXPECT_EQ(published(due + 60'000'000)[0]["skipped"], 2);

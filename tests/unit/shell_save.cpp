@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// save: LinuxCNC's text, and a machine that comes back from it.
+// save: LinuxCNC's text, and a machine restored from it.
 #include "shell_machine.hpp"
 
 namespace hal::test {

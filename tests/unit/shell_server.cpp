@@ -165,7 +165,7 @@ TEST_F(ServerTest, a_subscriber_that_sleeps_misses_values_but_stays) {
     for (int i = 0; i < 5000; ++i) names += ",\"a.in0\"";
     wire.send("{\"subscribe\":[" + names + "],\"every_ms\":1}\n");
     EXPECT_EQ(Json::parse(wire.line())["subscription"], 1);
-    // Nothing is read while others are served; then it goes on, and some event says how many were skipped.
+    // The client reads nothing while others are served; then it resumes, and an event has the number of skipped ones.
     for (int i = 0; i < 100; ++i) EXPECT_TRUE(alive());
     EXPECT_TRUE(eventually([&] { return Json::parse(wire.line()).contains("skipped"); }));
     EXPECT_EQ(server->counts().dropped, 0U);

@@ -27,7 +27,7 @@ TEST(Transactions, a_living_program_is_terminated_only_by_what_takes_effect) {
     }
     EXPECT_EQ(world.machine.file("begin\nnewsig new bit\nunload prog\ncommit\n"), 0) << world.machine.err;
     world.state();  // when it has ended
-    EXPECT_EQ(world.machine.session.model().find_component("prog"), nullptr) << "it was told to end: nothing of it stays";
+    EXPECT_EQ(world.machine.session.model().find_component("prog"), nullptr) << "it was asked to end: nothing of it remains";
 }
 
 TEST(Transactions, what_cannot_be_part_of_one_is_rejected_and_leaves_it_open) {

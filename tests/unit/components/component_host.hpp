@@ -44,7 +44,7 @@ public:
     enum class Life { created, started };
 
     /// Creates and starts an instance of `component`, found in HALCYON_PLUGIN_PATH or the build tree; with
-    /// Life::created it is left for start(). Throws the component's own reason when it refuses.
+    /// Life::created it is left for start(). Throws the component's own reason when it rejects its arguments.
     explicit Instance(const std::string& component, Arguments arguments = {}, Extensions extensions = {}, Life life = Life::started);
     ~Instance();
     Instance(const Instance&) = delete;
@@ -118,7 +118,7 @@ private:
     hal_host host_{};
     Arguments arguments_;
     Extensions extensions_;
-    std::string reason_;  // why the component refused
+    std::string reason_;  // why the component rejected its arguments
     void* library_ = nullptr;
     const hal_component* component_ = nullptr;
     void* self_ = nullptr;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a netlist cannot say of the supervising components and the plants: the host's safe values, random states, random
+// What a netlist cannot test of the supervising components and the plants: the host's safe values, random states, random
 // parameters.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// netlist_process PLUGINS real|virtual NETLIST: loads the netlist, starts the threads, runs 200 cycles. Status 3: refused.
+// netlist_process PLUGINS real|virtual NETLIST: loads the netlist, starts the threads, runs 200 cycles. Status 3: the netlist was rejected.
 #include <iostream>
 #include <string_view>
 

@@ -10,7 +10,7 @@ struct Counter : hal::Component {
     hal::Out<double> sum{*this, "sum", "all steps so far"};
     hal::Out<std::int64_t> count{*this, "count", "runs so far"};
     hal::Out<std::int64_t> twin{*this, "twin", "the same as count, always"};
-    hal::Out<double> period{*this, "period", "what the function is told, ns"};
+    hal::Out<double> period{*this, "period", "period passed to the function, ns"};
     hal::Out<bool> on{*this, "on", "TRUE while it runs", {.safe = false}};
     hal::Function run{*this, "", &Counter::advance, "counts"};
 

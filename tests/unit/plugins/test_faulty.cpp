@@ -23,7 +23,7 @@ struct Faulty : hal::Component {
     hal::Out<double> value{*this, "value", "the number of the run", {.safe = -5.0, .finite = true}};
     hal::Out<bool> on{*this, "on", "TRUE", {.safe = false}};
     hal::Function run{*this, "run", &Faulty::misbehave, "misbehaves"};
-    hal::Emergency emergency{*this, &Faulty::make_safe, "says so on stderr"};
+    hal::Emergency emergency{*this, &Faulty::make_safe, "prints a line on stderr"};
 
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");

@@ -49,4 +49,4 @@ struct Life : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Life, "test-life", "Tells of every step of its life")
+HAL_COMPONENT(Life, "test-life", "Reports every step of its life")

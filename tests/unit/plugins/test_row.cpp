@@ -14,7 +14,7 @@ struct Row : hal::Component {
     hal::Function          run{*this, "", hal::step<&Row::update>, "counts"};
 
     void update(hal::Cycle) noexcept {
-        if (throws) throw std::runtime_error("as told");  // out of a function that promised not to
+        if (throws) throw std::runtime_error("requested by the test");  // out of a noexcept function
         out = in + 1;
     }
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a test lets a component tell: its address is a load argument (watch=ADDRESS), 0 for none.
+// The record that a test lets a component fill: its address is a load argument (watch=ADDRESS), 0 for none.
 #pragma once
 
 #include <atomic>

@@ -83,7 +83,7 @@ std::string eds_text(const NodeKind& kind, const canopen::Program& program) {
     return canopen::eds::write_eds(eds);
 }
 
-/// Prints the changes of a node. It stops when `say` returns false when standard output is closed.
+/// Prints the changes of a node until `say` returns false because standard output is closed.
 class Reporter {
 public:
     Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began, std::function<bool(const std::string&)> say)
