@@ -10,6 +10,7 @@ from pathlib import Path
 
 import files
 import includes
+import language
 import symbols
 
 SPDX = "// SPDX-License-Identifier: MIT\n"
@@ -100,6 +101,14 @@ def check_files(root):
            "tools: missing README.md")
 
 
+def check_language(root):
+    write(root, {"runtime/a.cpp": SPDX + 'int refused = 1;\nconst char* good = "rejected; connection refused";\n', "a.md": "The node is offline.\n"})
+    expect("texts in the terms of the field", run(language, root), 0)
+    write(root, {"runtime/a.cpp": SPDX + '// it says so\nconst char* bad = "the value is refused";\n', "a.md": "The node is silent.\nPatience.\n",
+                 "b.py": "refused = 1  # mend it\nprint('it refused')\n", "c.hal": "# a pin that is none\n", "e.expected": "error: x lacks y\n"})
+    expect("paraphrases", run(language, root), 1, "a.md:1:", "a.md:2:", "b.py:1:", "b.py:2:", "c.hal:1:", "e.expected:1:", "runtime/a.cpp:2:", "runtime/a.cpp:3:")
+
+
 def check_symbols(root):
     write(root, {"components/logic/good.cpp": "int hal_plugin;\n", "components/logic/leaky.cpp": "int hal_plugin; int other;\n",
                  "components/logic/absent.cpp": "", "build/components/placeholder": ""})
@@ -129,7 +138,7 @@ def check_clean_tree(root):
 
 
 def main():
-    for check in (check_includes, check_files, check_symbols, check_clean_tree):
+    for check in (check_includes, check_files, check_language, check_symbols, check_clean_tree):
         with tempfile.TemporaryDirectory() as folder:
             check(Path(folder).resolve())
     print("\n".join(failures) or "every planted violation was found")
