@@ -135,7 +135,7 @@ TEST(Marker, in_blur_and_noise_is_followed_rather_than_judged_frame_by_frame) {
             unannounced += error > 8 && found[0].ambiguity < 0.6;
         }
     }
-    std::printf("more than 8 degrees off in %d frames: %d judged alone; %d followed, of these %d with an ambiguity below 0.6\n", frames,
+    std::printf("more than 8 degrees off in %d frames: %d from single frames; %d tracked, of these %d with an ambiguity below 0.6\n", frames,
                 alone_off, off, unannounced);
     EXPECT_LT(off, alone_off);
     EXPECT_EQ(unannounced, 0);

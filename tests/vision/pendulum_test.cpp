@@ -118,7 +118,7 @@ TEST(Pendulum, two_attitudes_that_look_the_same_are_not_told_apart_by_luck) {
         ++found;
         EXPECT_LT(std::fabs(std::remainder(seen.pendulum - pendulum, 2.0 * std::numbers::pi)), 0.02) << arm << ' ' << pendulum;
     }
-    std::printf("arm at 77 to 100 degrees: %d of 60 told, all right\n", found);
+    std::printf("arm at 77 to 100 degrees: %d of 60 found, all correct\n", found);
     for (const double pendulum : {-2.5, -1.0, 0.8, 2.0}) {
         const auto edge = rig_state(std::acos(0.2 / 1.2), pendulum);  // the camera is in the plane
         EXPECT_FALSE(find_pendulum(frame_of(settings, edge, edge, 1), {}, {}).found) << pendulum;

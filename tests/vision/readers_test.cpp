@@ -48,12 +48,12 @@ TEST(Pnm, is_written_as_it_was_read) {
 
 TEST(Pnm, that_cannot_be_read_says_why) {
     Frame f;
-    EXPECT_EQ(pnm("GIF89a", f), "damaged: it begins with none of P2, P3, P5, P6: that is no PGM or PPM");
-    EXPECT_EQ(pnm("P5 640", f), "damaged: its header ends before width, height and largest value");
-    EXPECT_EQ(pnm("P5 0 4 255 ", f), "damaged: its header has a 0, or a largest value above 65535");
-    EXPECT_EQ(pnm("P5 4 4 255 abc", f), "damaged: it ends early: 4 of 17 bytes are there");
-    EXPECT_EQ(pnm("P2 2 1 9 1 10", f), "damaged: a sample is larger than its header says");
-    EXPECT_EQ(pnm("P2 2 1 9 1   ", f), "damaged: sample 2 of 2 is no number");
+    EXPECT_EQ(pnm("GIF89a", f), "damaged: invalid PGM or PPM: it does not begin with P2, P3, P5 or P6");
+    EXPECT_EQ(pnm("P5 640", f), "damaged: its header is truncated before width, height and maximum");
+    EXPECT_EQ(pnm("P5 0 4 255 ", f), "damaged: invalid header: a value is 0, or the maximum exceeds 65535");
+    EXPECT_EQ(pnm("P5 4 4 255 abc", f), "damaged: truncated: 4 of 17 bytes");
+    EXPECT_EQ(pnm("P2 2 1 9 1 10", f), "damaged: a sample exceeds the maximum given in the header");
+    EXPECT_EQ(pnm("P2 2 1 9 1   ", f), "damaged: sample 2 of 2 is not a number");
     EXPECT_EQ(pnm("P5 60000 60000 255 ", f), "huge: a frame of 60000 x 60000 is larger than 8192 x 8192 or 22 million pixels");
     EXPECT_EQ(pnm("P5 99999999999999999999 1 255 ", f), "huge: a frame of 65536 x 1 is larger than 8192 x 8192 or 22 million pixels");
 }
@@ -77,7 +77,7 @@ TEST(Address, that_is_wrong_says_what_to_type) {
     EXPECT_EQ(refusal("v4l2:/dev/video0?width=99.5"),
               "source=v4l2:/dev/video0?width=99.5: width=99.5 is not a whole number; write width=640");
     EXPECT_EQ(refusal("frames:a?loop=yes"), "source=frames:a?loop=yes: 'loop=yes' is neither 0 nor 1; write loop alone");
-    EXPECT_EQ(refusal("frames:?loop"), "source=frames:?loop names no folder; write frames:FOLDER");
+    EXPECT_EQ(refusal("frames:?loop"), "source=frames:?loop has no folder; write frames:FOLDER");
 }
 
 struct Folder : testing::Test {
@@ -110,7 +110,7 @@ TEST_F(Folder, of_frames_is_shown_in_the_order_of_names_at_its_rate) {
     EXPECT_EQ(at(*from, {0, 5, 10, 19, 20, 29, 30, 31}), (std::vector<int>{10, -1, 20, -1, 30, -1, -2, -1}));
     EXPECT_EQ(from->problem().kind, Trouble::ended);
     EXPECT_EQ(from->problem().text,
-              "all frames of " + path.string() + " were shown; to begin anew, write frames:" + path.string() + "?loop");
+              "all frames of " + path.string() + " were shown; to repeat them, write frames:" + path.string() + "?loop");
 }
 
 TEST_F(Folder, of_frames_begins_anew_and_skips_what_is_too_old) {
@@ -128,7 +128,7 @@ TEST_F(Folder, with_a_damaged_file_goes_on_with_the_next) {
     const auto from = source("?fps=100");
     ASSERT_TRUE(from->open(0));
     EXPECT_EQ(at(*from, {0, 10, 20}), (std::vector<int>{10, -2, 30}));
-    EXPECT_EQ(from->problem().text, path.string() + "/b.pgm: it ends early: 1 of 82 bytes are there");
+    EXPECT_EQ(from->problem().text, path.string() + "/b.pgm: truncated: 1 of 82 bytes");
 }
 
 TEST_F(Folder, that_is_not_there_or_empty_is_absent) {

@@ -170,7 +170,7 @@ TEST_F(V4l2, frame_that_is_damaged_or_short_is_bad_and_the_next_is_good) {
     ASSERT_TRUE(camera->open(0));
     kernel.shoot(0, 50, V4L2_BUF_FLAG_ERROR);
     EXPECT_EQ(camera->next(0, 0, frame), Got::bad);
-    EXPECT_EQ(camera->problem().text, "/dev/video0 gives a frame that it says is damaged");
+    EXPECT_EQ(camera->problem().text, "/dev/video0 marks a frame as damaged");
     kernel.bytes = 100;
     kernel.shoot(1, 50);
     EXPECT_EQ(camera->next(0, 0, frame), Got::bad);
@@ -207,14 +207,14 @@ TEST_F(V4l2, stamp_is_the_arrival_where_the_driver_has_another_clock) {
 TEST_F(V4l2, rate_that_a_camera_does_not_have_is_said_and_counts) {
     ASSERT_TRUE(camera->open(0));
     EXPECT_EQ(camera->remark(), "");
-    EXPECT_DOUBLE_EQ(camera->patience_s(), 1.1);
+    EXPECT_DOUBLE_EQ(camera->timeout_s(), 1.1);
     camera->close();
     kernel.gives_period = {2, 1};  // a frame in two seconds: it is not silent before three did not come
     ASSERT_TRUE(camera->open(0));
     EXPECT_EQ(
         camera->remark(),
-        "/dev/video0 gives 0.5 frames per second, not 30; those that it has at each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
-    EXPECT_DOUBLE_EQ(camera->patience_s(), 7.0);
+        "/dev/video0 gives 0.5 frames per second, not 30; to list the rates of each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    EXPECT_DOUBLE_EQ(camera->timeout_s(), 7.0);
     camera->close();
     kernel.gives_period = {1001, 30'000};  // 29.97: what is called 30
     ASSERT_TRUE(camera->open(0));
@@ -222,8 +222,8 @@ TEST_F(V4l2, rate_that_a_camera_does_not_have_is_said_and_counts) {
     camera->close();
     kernel.rate_error = ENOTTY;
     ASSERT_TRUE(camera->open(0));
-    EXPECT_EQ(camera->remark(), "/dev/video0 has no choice of its rate; fps=30 does nothing");
-    EXPECT_DOUBLE_EQ(camera->patience_s(), 1.1);
+    EXPECT_EQ(camera->remark(), "/dev/video0 has a fixed frame rate; fps=30 has no effect");
+    EXPECT_DOUBLE_EQ(camera->timeout_s(), 1.1);
     camera = make("v4l2:/dev/video0?width=16&height=4");
     ASSERT_TRUE(camera->open(0));
     EXPECT_EQ(camera->remark(), "") << "nobody asked for one";
@@ -231,13 +231,13 @@ TEST_F(V4l2, rate_that_a_camera_does_not_have_is_said_and_counts) {
 
 TEST_F(V4l2, refusals_say_what_to_do) {
     kernel.open_error = ENOENT;
-    EXPECT_EQ(refusal(), "there is no camera /dev/video0; those that there are: ls -l /dev/v4l/by-id");
+    EXPECT_EQ(refusal(), "missing camera /dev/video0; to list cameras: ls -l /dev/v4l/by-id");
     EXPECT_EQ(camera->problem().kind, Trouble::absent);
     kernel.open_error = EACCES;
-    EXPECT_EQ(refusal(), "/dev/video0 may not be opened by this user; type: sudo usermod -aG video $USER, and log in anew");
+    EXPECT_EQ(refusal(), "/dev/video0: permission denied; type: sudo usermod -aG video $USER, and log in again");
     kernel.open_error = 0;
     kernel.no_camera = true;
-    EXPECT_EQ(refusal(), "/dev/video0 is no camera; those that there are: ls -l /dev/v4l/by-id");
+    EXPECT_EQ(refusal(), "/dev/video0 is not a camera; to list cameras: ls -l /dev/v4l/by-id");
     kernel.no_camera = false;
     kernel.capabilities = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING;
     EXPECT_EQ(refusal(), "/dev/video0 gives no frames; a camera has several devices, and often the even ones do");
@@ -309,8 +309,8 @@ TEST_F(SharedCamera, is_opened_in_one_way_only) {
     b = make("v4l2:/dev/video0?width=16&height=4&grey");
     EXPECT_FALSE(b->open(0));
     EXPECT_EQ(b->problem().text,
-              "another component has opened v4l2:/dev/video0?width=16&height=4; a camera is opened in one way: give both "
-              "that source=");
+              "another component has opened v4l2:/dev/video0?width=16&height=4; a camera has one set of options: use "
+              "the same source= for both");
     a->close();
     EXPECT_TRUE(b->open(0));
 }
@@ -339,15 +339,15 @@ TEST_F(SharedCamera, says_what_the_camera_says) {
     EXPECT_EQ(a->remark(), "");
     ASSERT_TRUE(a->open(0));
     EXPECT_EQ(a->remark(),
-              "/dev/video0 gives 5 frames per second, not 30; those that it has at each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
-    EXPECT_DOUBLE_EQ(a->patience_s(), 1.6);
+              "/dev/video0 gives 5 frames per second, not 30; to list the rates of each size: v4l2-ctl -d /dev/video0 --list-formats-ext");
+    EXPECT_DOUBLE_EQ(a->timeout_s(), 1.6);
 }
 
 TEST_F(SharedCamera, that_cannot_be_opened_says_why_to_each) {
     kernel.open_error = ENOENT;
     EXPECT_FALSE(a->open(0));
     EXPECT_FALSE(b->open(0));
-    EXPECT_EQ(b->problem().text, "there is no camera /dev/video0; those that there are: ls -l /dev/v4l/by-id");
+    EXPECT_EQ(b->problem().text, "missing camera /dev/video0; to list cameras: ls -l /dev/v4l/by-id");
     EXPECT_EQ(kernel.open_now, 0);
 }
 

@@ -87,11 +87,11 @@ TEST_F(Rig, Worker_takes_the_newest_and_counts_those_it_missed) {
 TEST_F(Rig, Worker_looks_for_an_absent_camera_every_second_and_says_it_once) {
     camera->there = false;
     run(5 * second);
-    EXPECT_EQ(lines, std::vector<std::string>{"eye: there is no camera /dev/video9; it is tried again every second"});
+    EXPECT_EQ(lines, std::vector<std::string>{"eye: there is no camera /dev/video9; retrying every second"});
     EXPECT_EQ(status().trouble, Trouble::absent);
     camera->there = true;
     run(second + 10 * ms);
-    EXPECT_EQ(lines.back(), "eye: frames come, after 5.0 s");
+    EXPECT_EQ(lines.back(), "eye: first valid frame after 5.0 s");
     EXPECT_TRUE(status().ok);
     EXPECT_EQ(status().openings, 1u);
 }
@@ -101,12 +101,12 @@ TEST_F(Rig, Worker_goes_on_by_itself_after_the_camera_was_unplugged) {
     camera->cut = true, camera->there = false;
     run(3 * second);
     EXPECT_FALSE(status().ok);
-    EXPECT_EQ(lines, (std::vector<std::string>{"eye: /dev/video9 was unplugged; it is tried again every second",
-                                               "eye: there is no camera /dev/video9; it is tried again every second"}));
+    EXPECT_EQ(lines, (std::vector<std::string>{"eye: /dev/video9 was unplugged; retrying every second",
+                                               "eye: there is no camera /dev/video9; retrying every second"}));
     EXPECT_EQ(camera->closed, 1);
     camera->cut = false, camera->there = true;
     run(second + 10 * ms);
-    EXPECT_EQ(lines.back(), "eye: frames are good again, after 3.0 s");
+    EXPECT_EQ(lines.back(), "eye: frames are valid again after 3.0 s");
     EXPECT_TRUE(status().ok);
     EXPECT_EQ(status().openings, 2u);
     EXPECT_EQ(status().trouble, Trouble::none);
@@ -121,21 +121,21 @@ TEST_F(Rig, Worker_says_once_what_the_camera_does_other_than_it_was_told) {
     run(second + 10 * ms);
     EXPECT_EQ(status().openings, 2u);
     EXPECT_EQ(lines, (std::vector<std::string>{"eye: /dev/video9 gives 15 frames per second, not 30",
-                                               "eye: /dev/video9 was unplugged; it is tried again every second",
-                                               "eye: frames are good again, after 1.0 s"}));
+                                               "eye: /dev/video9 was unplugged; retrying every second",
+                                               "eye: frames are valid again after 1.0 s"}));
 }
 
 TEST_F(Rig, Worker_says_once_that_frames_are_black_and_counts_them) {
     run(second);
     camera->brightness = 3;
     run(5 * second);
-    EXPECT_EQ(lines, std::vector<std::string>{"eye: frames are black; is there light, and no lid on the lens?"});
+    EXPECT_EQ(lines, std::vector<std::string>{"eye: frames are black; check the light and the lens cap"});
     EXPECT_EQ(status().bad, 500u);
     EXPECT_EQ(seen, 100);
     EXPECT_FALSE(status().ok);
     camera->brightness = 100;
     run(10 * ms);
-    EXPECT_EQ(lines.back(), "eye: frames are good again, after 5.0 s");
+    EXPECT_EQ(lines.back(), "eye: frames are valid again after 5.0 s");
 }
 
 TEST_F(Rig, Worker_takes_equal_frames_for_a_frozen_camera_if_it_is_told) {
@@ -144,7 +144,7 @@ TEST_F(Rig, Worker_takes_equal_frames_for_a_frozen_camera_if_it_is_told) {
     EXPECT_TRUE(status().ok);
     worker.freeze_after(10);
     run(second);
-    EXPECT_EQ(lines, std::vector<std::string>{"eye: 10 frames in a row are equal to the last bit; the camera is frozen"});
+    EXPECT_EQ(lines, std::vector<std::string>{"eye: 10 frames in a row are identical; the camera is frozen"});
     EXPECT_EQ(status().trouble, Trouble::frozen);
     EXPECT_EQ(status().bad, 91u);
     camera->still = false;
@@ -177,7 +177,7 @@ TEST_F(Rig, Worker_says_that_no_frames_come) {
 TEST_F(Rig, Worker_outlives_a_detector_that_throws) {
     throws = true;
     run(second);
-    EXPECT_EQ(lines, std::vector<std::string>{"eye: a frame could not be worked on: no memory"});
+    EXPECT_EQ(lines, std::vector<std::string>{"eye: cannot process a frame: no memory"});
     EXPECT_EQ(status().bad, 100u);
     throws = false;
     run(10 * ms);
@@ -188,7 +188,7 @@ TEST_F(Rig, Worker_outlives_a_source_that_finds_no_memory) {
     run(second);
     camera->starved = true;
     run(3 * second);
-    EXPECT_EQ(lines, std::vector<std::string>{"eye: no frames can be taken: std::bad_alloc; it is tried again every second"});
+    EXPECT_EQ(lines, std::vector<std::string>{"eye: cannot read frames: std::bad_alloc; retrying every second"});
     EXPECT_FALSE(status().ok);
     EXPECT_FALSE(published.back().ok);
     camera->starved = false;
@@ -202,8 +202,8 @@ TEST_F(Rig, Worker_does_not_flood_when_every_second_frame_is_damaged) {
         run(10 * ms);
     }
     EXPECT_EQ(status().bad, 750u);
-    EXPECT_EQ(lines, (std::vector<std::string>{"eye: half of a frame", "eye: frames are good again, after 0.0 s", "eye: half of a frame",
-                                               "eye: frames are good again, after 0.0 s"}));
+    EXPECT_EQ(lines, (std::vector<std::string>{"eye: half of a frame", "eye: frames are valid again after 0.0 s", "eye: half of a frame",
+                                               "eye: frames are valid again after 0.0 s"}));
 }
 
 TEST_F(Rig, Worker_publishes_each_frame_and_each_change) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where frames come from, as a user writes it: DRIVER:PLACE?OPTION=VALUE&OPTION
+// Parses the address of a frame source: DRIVER:PLACE?OPTION=VALUE&OPTION
 #pragma once
 
 #include <string>
@@ -9,26 +9,26 @@
 
 namespace hal::vision {
 
-/// "v4l2:/dev/video0?width=640&fps=30" in its parts. Every reader of an option marks it as known; what is left over is refused.
+/// Parsed address such as "v4l2:/dev/video0?width=640&fps=30". Reading an option marks it as known; finish() rejects unknown ones.
 class Address {
 public:
-    /// Throws std::invalid_argument, with what is wrong and what to type. [setup]
+    /// Throws std::invalid_argument with the reason and a correction. [setup]
     explicit Address(std::string_view text);
 
     const std::string& text() const { return text_; }
     const std::string& driver() const { return driver_; }  ///< "v4l2", "frames", "sim"
     const std::string& place() const { return place_; }
 
-    bool has(const char* name) const;  ///< the option is written
-    /// The option's number, `fallback` without it. Throws when it is no number or outside of the limits. [setup]
+    bool has(const char* name) const;  ///< the option is present
+    /// Returns the option's number, or `fallback` without it. Throws if it is not a number or out of range. [setup]
     double number(const char* name, double fallback, double least, double most);
-    /// The same, a whole number.
+    /// Returns an integer option, like number().
     int whole(const char* name, int fallback, int least, int most);
     /// `?loop` and `?loop=1` are true, `?loop=0` is not.
     bool flag(const char* name);
-    /// A word; `fallback` without it.
+    /// Returns the option's text, or `fallback` without it.
     std::string word(const char* name, const char* fallback);
-    /// After all options were asked for: throws when there is another one, and names those that there are. [setup]
+    /// Call after reading all options: throws if an unknown one is present, and lists the known ones. [setup]
     void finish() const;
 
 private:

@@ -9,21 +9,21 @@ namespace hal::vision {
 
 enum class Format : std::uint8_t { grey, bgr };  ///< 1 or 3 bytes per pixel
 
-/// The most a frame may have: 64 MiB of colour.
+/// Maximum number of pixels: 64 MiB in colour.
 constexpr int         most_wide = 8192, most_high = 8192;
 constexpr std::size_t most_pixels = 22'000'000;
 
-/// A picture and when it was taken. Owned by whoever made it; its memory is used again for the next one.
+/// A picture and its exposure time. Owned by its creator, which reuses its memory for the next frame.
 struct Frame {
     int                       width = 0, height = 0;
     Format                    format = Format::grey;
-    std::int64_t              stamp_ns = 0;  ///< when it was exposed, on the runtime's clock
-    std::uint64_t             number = 0;    ///< counted by the source, those that nobody took included
+    std::int64_t              stamp_ns = 0;  ///< exposure time on the runtime's clock
+    std::uint64_t             number = 0;    ///< frame number of the source; skipped frames count
     std::vector<std::uint8_t> pixels;        ///< rows without a gap, top left first
 
     int         channels() const { return format == Format::grey ? 1 : 3; }
     std::size_t stride() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(channels()); }
-    /// Another size, pixels undefined. False, and nothing done, when it is empty or larger than a frame may be. [any]
+    /// Resizes the frame; its pixels are undefined. Returns false, without effect, if the size is empty or too large. [any]
     bool resize(int w, int h, Format f) {
         if (!fits(w, h)) return false;
         width = w, height = h, format = f;

@@ -42,12 +42,13 @@ std::uint8_t scaled(unsigned sample, unsigned most) {
 
 std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Frame& frame) {
     if (count < 2 || bytes[0] != 'P' || (bytes[1] != '2' && bytes[1] != '3' && bytes[1] != '5' && bytes[1] != '6'))
-        return damaged("it begins with none of P2, P3, P5, P6: that is no PGM or PPM");
+        return damaged("invalid PGM or PPM: it does not begin with P2, P3, P5 or P6");
     const bool colour = bytes[1] == '3' || bytes[1] == '6', plain = bytes[1] < '5';
     Reader     reader(bytes + 2, count - 2);
     const int  width = reader.number(), height = width < 0 ? -1 : reader.number(), most = height < 0 ? -1 : reader.number();
-    if (most < 0) return damaged("its header ends before width, height and largest value");
-    if (width == 0 || height == 0 || most == 0 || most > 65535) return damaged("its header has a 0, or a largest value above 65535");
+    if (most < 0) return damaged("its header is truncated before width, height and maximum");
+    if (width == 0 || height == 0 || most == 0 || most > 65535)
+        return damaged("invalid header: a value is 0, or the maximum exceeds 65535");
     if (!Frame::fits(width, height))
         return Problem{Trouble::huge, "a frame of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than " +
                                           std::to_string(most_wide) + " x " + std::to_string(most_high) + " or 22 million pixels"};
@@ -56,7 +57,7 @@ std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Fr
     // binary: one white space, then the samples; plain: at least a digit and a space each
     const std::size_t needed = plain ? 2 * samples : 1 + samples * wide;
     if (reader.left() < needed)
-        return damaged("it ends early: " + std::to_string(reader.left()) + " of " + std::to_string(needed) + " bytes are there");
+        return damaged("truncated: " + std::to_string(reader.left()) + " of " + std::to_string(needed) + " bytes");
     frame.resize(width, height, colour ? Format::bgr : Format::grey);
     if (!plain) reader.take(1);
     for (std::size_t i = 0; i < samples; ++i) {
@@ -67,8 +68,8 @@ std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Fr
             const std::uint8_t* const p = reader.take(wide);
             sample = wide == 2 ? p[0] << 8 | p[1] : p[0];
         }
-        if (sample < 0) return damaged("sample " + std::to_string(i + 1) + " of " + std::to_string(samples) + " is no number");
-        if (sample > most) return damaged("a sample is larger than its header says");
+        if (sample < 0) return damaged("sample " + std::to_string(i + 1) + " of " + std::to_string(samples) + " is not a number");
+        if (sample > most) return damaged("a sample exceeds the maximum given in the header");
         // files have red first, frames blue
         frame.pixels[colour ? i + 2 - 2 * (i % 3) : i] = scaled(static_cast<unsigned>(sample), static_cast<unsigned>(most));
     }

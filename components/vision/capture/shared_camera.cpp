@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One camera for all components of the process that name it: the kernel gives its frames to one taker only.
+// Shares one camera between all components of the process that name it: the kernel delivers its frames to one reader only.
 #include <map>
 #include <mutex>
 
@@ -8,7 +8,7 @@
 namespace hal::vision {
 namespace {
 
-/// An open camera. Whoever finds no newer frame takes one from it, for all; meanwhile the others wait for that same frame.
+/// An open camera. The first component that finds no newer frame reads one for all; meanwhile the others wait for the same frame.
 struct Hub {
     std::string             address;
     std::unique_ptr<Source> camera;
@@ -44,7 +44,7 @@ public:
                 const std::string other = hub_->address;
                 hub_.reset();
                 return fail(Trouble::refused,
-                            "another component has opened " + other + "; a camera is opened in one way: give both that source=");
+                            "another component has opened " + other + "; a camera has one set of options: use the same source= for both");
             }
         } else {
             auto made = std::make_shared<Hub>();
@@ -85,7 +85,7 @@ public:
     }
     void          close() noexcept override { hub_.reset(); }
     std::string   remark() const override { return hub_ ? hub_->camera->remark() : std::string(); }
-    double        patience_s() const override { return hub_ ? hub_->camera->patience_s() : model_->patience_s(); }
+    double        timeout_s() const override { return hub_ ? hub_->camera->timeout_s() : model_->timeout_s(); }
     std::uint32_t frozen_after() const override { return model_->frozen_after(); }
 
 private:
@@ -96,7 +96,7 @@ private:
     const Address address_;
     VideoSystem&  system_;
     const std::unique_ptr<Source>
-                         model_;  // never opened: refuses wrong options when the netlist is checked, and knows the camera's constants
+                         model_;  // never opened: rejects invalid options when the netlist is checked, and has the camera's constants
     std::shared_ptr<Hub> hub_;
     std::uint64_t        seen_ = 0, last_ = 0;
     bool                 any_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where frames come from. An address picks the driver: v4l2:/dev/video0, frames:FOLDER, sim:SCENE.
+// Frame sources. The address selects the driver: v4l2:/dev/video0, frames:FOLDER, sim:SCENE.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +12,17 @@
 
 namespace hal::vision {
 
-/// What keeps frames from being of use. The numbers are those of the pin `trouble`.
+/// Reason why frames are invalid. The numbers are those of the pin `error-code`.
 enum class Trouble : std::uint8_t {
     none,
-    absent,       ///< there is no such camera or folder
-    refused,      ///< it is there and cannot be used: permission, busy, no camera, no usable format
-    unplugged,    ///< it was there and went away
-    silent,       ///< it gives no frames
-    damaged,      ///< a frame or file that cannot be read
-    huge,         ///< a frame larger than a frame may be
-    black,        ///< nothing is seen
-    frozen,       ///< always the same picture
+    absent,       ///< missing camera or folder
+    refused,      ///< unusable: permission denied, busy, not a camera, no supported format
+    unplugged,    ///< disconnected
+    silent,       ///< no frames
+    damaged,      ///< unreadable frame or file
+    huge,         ///< frame larger than the limit
+    black,        ///< black frames
+    frozen,       ///< identical frames
     wrong_size,   ///< frames are not of the calibration's size
     ended,        ///< all frames of a folder were shown
 };
@@ -32,34 +32,34 @@ const char* word(Trouble);
 
 struct Problem {
     Trouble     kind = Trouble::none;
-    std::string text;  ///< a sentence without its end: "/dev/video0 was unplugged"
+    std::string text;  ///< message without a full stop: "/dev/video0 was unplugged"
 };
 
 enum class Got : std::uint8_t {
     frame,    ///< it is in `frame`
-    nothing,  ///< none until the time-out
-    bad,      ///< one came and is of no use: problem(); the next may be good
-    lost,     ///< the source is of no use any more: problem(); close it, open it again
+    nothing,  ///< none until the timeout
+    bad,      ///< an invalid frame: problem(); the next may be valid
+    lost,     ///< the source failed: problem(); close and reopen it
 };
 
-/// One camera, or what stands in for one. Used by one thread at a time. The constructor reads the address and touches nothing.
+/// A camera or a substitute. Used by one thread at a time. The constructor parses the address and opens nothing.
 class Source {
 public:
     virtual ~Source() = default;
-    /// False: problem() says why. May be tried again. [setup, or the helper thread]
+    /// Opens the source. Returns false with the reason in problem(); may be retried. [setup, or the helper thread]
     virtual bool open(std::int64_t now_ns) = 0;
-    /// The newest frame that there is at `now_ns` and was not given yet; older ones are skipped and counted. Waits for it at most
-    /// `timeout_ns`; 0: not at all, so that what comes depends on `now_ns` alone where a source can do that.
+    /// Reads the newest unread frame at `now_ns`; older ones are skipped and counted. Waits at most `timeout_ns`; with 0 it does not
+    /// wait, so that the result depends on `now_ns` alone where the source supports it.
     virtual Got    next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) = 0;
     virtual void   close() noexcept = 0;
     const Problem& problem() const { return problem_; }
-    /// Of the source that is open: what it does other than its address says, a sentence without its end; empty when there is nothing.
+    /// Returns how the open source deviates from its address, without a full stop; empty: it does not.
     virtual std::string remark() const { return {}; }
-    /// Frames that were there and were not given, since open(). What the sender lost counts too.
+    /// Returns the number of frames skipped since open(), including those lost by the camera.
     std::uint64_t skipped() const { return skipped_; }
-    /// How long no frame may come before that is worth a line, s.
-    virtual double patience_s() const { return 1.0; }
-    /// So many equal frames in a row are a frozen camera; 0: they are no such sign, as pictures have no noise.
+    /// Returns the time without a frame after which it is logged, s.
+    virtual double timeout_s() const { return 1.0; }
+    /// Returns the number of identical frames that count as a frozen camera; 0: never, for pictures without noise.
     virtual std::uint32_t frozen_after() const { return 0; }
 
 protected:
@@ -73,11 +73,11 @@ private:
     Problem problem_;
 };
 
-/// Throws std::invalid_argument when the address is wrong. `find` gives the place of a file or folder that is named relative to the
-/// netlist (hal::Texts::find). [setup]
+/// Creates the source of an address. Throws std::invalid_argument if it is invalid. `find` returns the path of a file or folder named
+/// relative to the netlist (hal::Texts::find). [setup]
 std::unique_ptr<Source> make_source(const std::string& address, const std::function<std::string(const std::string&)>& find);
 
-std::unique_ptr<Source> v4l2_source(Address);  ///< shared by all that name the camera
+std::unique_ptr<Source> v4l2_source(Address);  ///< shared by all components that name the camera
 std::unique_ptr<Source> frames_source(Address, const std::function<std::string(const std::string&)>& find);
 std::unique_ptr<Source> sim_source(Address);  ///< scene/source_sim.cpp
 

@@ -57,7 +57,7 @@ public:
         }
         if (!loop_ && next_ >= files_.size()) {
             told_end_ = true;
-            fail(Trouble::ended, "all frames of " + shown_ + " were shown; to begin anew, write frames:" + shown_ + "?loop");
+            fail(Trouble::ended, "all frames of " + shown_ + " were shown; to repeat them, write frames:" + shown_ + "?loop");
             return Got::bad;
         }
         std::uint64_t newest = std::max(next_, due(now));
@@ -75,7 +75,7 @@ public:
         return Got::frame;
     }
     void   close() noexcept override {}
-    double patience_s() const override { return 1.0 + 2e-9 * static_cast<double>(period_ns_); }
+    double timeout_s() const override { return 1.0 + 2e-9 * static_cast<double>(period_ns_); }
 
 private:
     std::int64_t at(std::uint64_t k) const { return begin_ns_ + delay_ns_ + static_cast<std::int64_t>(k) * period_ns_; }
@@ -94,7 +94,7 @@ private:
         const auto      size = fs::file_size(path, error);
         if (error) return bad(error.message().c_str());
         if (size > most_bytes)
-            return fail(Trouble::huge, shown_ + "/" + name + " has " + std::to_string(size) + " bytes, more than a frame may have");
+            return fail(Trouble::huge, shown_ + "/" + name + " has " + std::to_string(size) + " bytes, more than the limit for a frame");
         bytes_.resize(static_cast<std::size_t>(size));
         bytes_.resize(std::fread(bytes_.data(), 1, bytes_.size(), file.get()));
         return true;
@@ -111,7 +111,7 @@ private:
 }  // namespace
 
 std::unique_ptr<Source> frames_source(Address address, const std::function<std::string(const std::string&)>& find) {
-    if (address.place().empty()) throw hal::ArgumentError("source", "source=" + address.text() + " names no folder; write frames:FOLDER");
+    if (address.place().empty()) throw hal::ArgumentError("source", "source=" + address.text() + " has no folder; write frames:FOLDER");
     return std::make_unique<Frames>(std::move(address), find);
 }
 

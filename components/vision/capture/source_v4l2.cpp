@@ -75,7 +75,7 @@ public:
         fps_ = given_fps_ = address.number("fps", 30.0, 0.1, 1000.0);
         grey_ = address.flag("grey");
         address.finish();
-        if (device_.empty()) throw hal::ArgumentError("source", "source=" + address.text() + " names no camera; write v4l2:/dev/video0");
+        if (device_.empty()) throw hal::ArgumentError("source", "source=" + address.text() + " has no device; write v4l2:/dev/video0");
     }
     ~V4l2() override { close(); }
 
@@ -124,7 +124,7 @@ public:
         fd_ = -1;
     }
     std::string   remark() const override { return remark_; }
-    double        patience_s() const override { return 1.0 + 3.0 / given_fps_; }
+    double        timeout_s() const override { return 1.0 + 3.0 / given_fps_; }
     std::uint32_t frozen_after() const override { return 10; }
 
 private:
@@ -149,9 +149,9 @@ private:
     }
     bool not_opened(int error) {
         if (error == ENOENT || error == ENODEV || error == ENXIO)
-            return fail(Trouble::absent, "there is no camera " + device_ + "; those that there are: ls -l /dev/v4l/by-id");
+            return fail(Trouble::absent, "missing camera " + device_ + "; to list cameras: ls -l /dev/v4l/by-id");
         if (error == EACCES || error == EPERM)
-            return fail(Trouble::refused, device_ + " may not be opened by this user; type: sudo usermod -aG video $USER, and log in anew");
+            return fail(Trouble::refused, device_ + ": permission denied; type: sudo usermod -aG video $USER, and log in again");
         if (error == EBUSY) return busy();
         return fail(Trouble::refused, device_ + " cannot be opened: " + std::strerror(error));
     }
@@ -166,7 +166,7 @@ private:
     bool start() {
         v4l2_capability able{};
         if (system_.control(fd_, VIDIOC_QUERYCAP, &able) == -1)
-            return fail(Trouble::refused, device_ + " is no camera; those that there are: ls -l /dev/v4l/by-id");
+            return fail(Trouble::refused, device_ + " is not a camera; to list cameras: ls -l /dev/v4l/by-id");
         const std::uint32_t can = (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
         if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
             return fail(Trouble::refused, device_ + " gives no frames; a camera has several devices, and often the even ones do");
@@ -195,7 +195,7 @@ private:
         format.fmt.pix.pixelformat = yuyv && !(grey && grey_) ? V4L2_PIX_FMT_YUYV : V4L2_PIX_FMT_GREY;
         format.fmt.pix.field = V4L2_FIELD_NONE;
         const std::uint32_t wanted = format.fmt.pix.pixelformat;
-        if (system_.control(fd_, VIDIOC_S_FMT, &format) == -1) return failed("the format is refused");
+        if (system_.control(fd_, VIDIOC_S_FMT, &format) == -1) return failed("format rejected");
         const v4l2_pix_format& is = format.fmt.pix;
         if (is.pixelformat != wanted)
             return fail(Trouble::refused, device_ + " gives " + four_letters(is.pixelformat) + " and not " + four_letters(wanted) +
@@ -212,7 +212,7 @@ private:
                         "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
         return true;
     }
-    /// A camera may have other rates, or no choice of them: that is said, and the frames are taken as they come.
+    /// The camera may have other rates, or a fixed one: this is logged, and frames are used at its rate.
     bool choose_rate() {
         v4l2_streamparm parameters{};
         parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -222,8 +222,8 @@ private:
         given_fps_ = chosen ? std::clamp(static_cast<double>(period.denominator) / period.numerator, 0.1, 1000.0) : fps_;
         if (chosen && std::fabs(given_fps_ - fps_) > 0.01 * fps_)
             remark_ = device_ + " gives " + rate(given_fps_) + " frames per second, not " + rate(fps_) +
-                      "; those that it has at each size: v4l2-ctl -d " + device_ + " --list-formats-ext";
-        else if (!chosen && asked_) remark_ = device_ + " has no choice of its rate; fps=" + rate(fps_) + " does nothing";
+                      "; to list the rates of each size: v4l2-ctl -d " + device_ + " --list-formats-ext";
+        else if (!chosen && asked_) remark_ = device_ + " has a fixed frame rate; fps=" + rate(fps_) + " has no effect";
         else remark_.clear();
         return true;
     }
@@ -254,14 +254,14 @@ private:
     }
 
     bool take(const v4l2_buffer& buffer, std::int64_t now, Frame& frame) {
-        // The driver counts frames that it lost, too; those that were taken and given back unread are missing in the same way.
+        // The driver also counts frames that it lost; frames skipped here leave the same gap in the sequence.
         if (any_) skipped_ += buffer.sequence - last_ - 1u;
         last_ = buffer.sequence;
         any_ = true;
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         const std::size_t needed = line_ * static_cast<std::size_t>(height_ - 1) + row;
         const Map&        map = maps_[buffer.index];
-        if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return fail(Trouble::damaged, device_ + " gives a frame that it says is damaged");
+        if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return fail(Trouble::damaged, device_ + " marks a frame as damaged");
         if (std::min<std::size_t>(buffer.bytesused, map.bytes) < needed)
             return fail(Trouble::damaged,
                         device_ + " gives " + std::to_string(buffer.bytesused) + " bytes of a frame of " + std::to_string(needed));

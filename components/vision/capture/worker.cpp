@@ -10,8 +10,8 @@
 namespace hal::vision {
 namespace {
 constexpr std::int64_t second = 1'000'000'000, most_wait = second / 10;
-constexpr std::int64_t again_after = second;           // between two tries to open a source
-constexpr std::int64_t quiet_for = 10 * second;        // the same trouble is worth a line so often at most
+constexpr std::int64_t again_after = second;           // retry interval of opening a source
+constexpr std::int64_t quiet_for = 10 * second;        // minimum interval of messages about the same problem
 constexpr std::int64_t long_ago = INT64_MIN / 2;
 
 std::string seconds(std::int64_t ns) {
@@ -21,7 +21,7 @@ std::string seconds(std::int64_t ns) {
 }
 
 Problem tried_again(Problem problem) {
-    problem.text += "; it is tried again every second";
+    problem.text += "; retrying every second";
     return problem;
 }
 
@@ -68,13 +68,13 @@ void Worker::turn(std::int64_t now, bool may_wait) noexcept {
     try {
         log_->flush(now);
         step(now, may_wait);
-    } catch (const std::exception& e) {  // a source that finds no memory is opened anew
+    } catch (const std::exception& e) {  // a source that runs out of memory is reopened
         close();
         try_again_ns_ = now + again_after;
         try {
-            trouble(tried_again({Trouble::silent, std::string("no frames can be taken: ") + e.what()}), now);
+            trouble(tried_again({Trouble::silent, std::string("cannot read frames: ") + e.what()}), now);
             publish();
-        } catch (const std::exception&) {  // nor for a sentence
+        } catch (const std::exception&) {  // no memory for the message either
         }
     }
 }
@@ -105,7 +105,7 @@ void Worker::step(std::int64_t now, bool may_wait) {
         try_again_ns_ = now + again_after;
         return publish();
     case Got::nothing:
-        if (static_cast<double>(now - last_frame_ns_) * 1e-9 > source_->patience_s() && status_.trouble == Trouble::none) {
+        if (static_cast<double>(now - last_frame_ns_) * 1e-9 > source_->timeout_s() && status_.trouble == Trouble::none) {
             trouble({Trouble::silent, "no frame for " + seconds(now - last_frame_ns_)}, now);
             return publish();
         }
@@ -121,7 +121,7 @@ void Worker::open(std::int64_t now) {
         dropped_before_ = status_.dropped;
         equal_ = 0;
         if (status_.trouble == Trouble::absent && !told_) status_.trouble = Trouble::none;  // nothing was wrong so far
-        if (std::string remark = source_->remark(); remark != remark_) {  // once, not each time that it is plugged in
+        if (std::string remark = source_->remark(); remark != remark_) {  // once, not at each reconnection
             remark_ = std::move(remark);
             if (!remark_.empty()) say(remark_);
         }
@@ -146,8 +146,8 @@ void Worker::take(const Frame& frame, std::int64_t now) {
         problem = {Trouble::wrong_size, "frames are " + size(frame.width, frame.height) + " and the calibration " + file_ + " is for " +
                                             size(width_, height_) + "; take the file of this camera, or set the source's width and height"};
     else if (frozen(frame))
-        problem = {Trouble::frozen, std::to_string(frozen_after_) + " frames in a row are equal to the last bit; the camera is frozen"};
-    else if (black(frame)) problem = {Trouble::black, "frames are black; is there light, and no lid on the lens?"};
+        problem = {Trouble::frozen, std::to_string(frozen_after_) + " frames in a row are identical; the camera is frozen"};
+    else if (black(frame)) problem = {Trouble::black, "frames are black; check the light and the lens cap"};
     if (problem.kind != Trouble::none) {
         ++status_.bad;
         trouble(std::move(problem), now);
@@ -159,7 +159,7 @@ void Worker::take(const Frame& frame, std::int64_t now) {
         well(now);
     } catch (const std::exception& e) {
         ++status_.bad;
-        trouble({Trouble::damaged, std::string("a frame could not be worked on: ") + e.what()}, now);
+        trouble({Trouble::damaged, std::string("cannot process a frame: ") + e.what()}, now);
     }
     publish();
 }
@@ -196,9 +196,9 @@ void Worker::trouble(Problem problem, std::int64_t now) {
 
 void Worker::well(std::int64_t now) {
     const bool again = told_ && status_.trouble != Trouble::none;
-    // not after a trouble that was kept quiet: lines come in pairs
+    // only after a problem that was logged: messages come in pairs
     if (again && said_ns_[static_cast<std::size_t>(status_.trouble)] >= since_ns_)
-        say((ever_ ? "frames are good again, after " : "frames come, after ") + seconds(now - since_ns_));
+        say((ever_ ? "frames are valid again after " : "first valid frame after ") + seconds(now - since_ns_));
     status_.trouble = Trouble::none;
     status_.ok = ever_ = true;
     told_ = false;

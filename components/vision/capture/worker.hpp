@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a source to a detector: opens, takes the newest frame, looks whether it is of use, has it worked on; says what is wrong and
-// tries again.
+// From a source to a detector: opens the source, takes the newest frame, validates it, passes it on; logs errors and retries.
 #pragma once
 
 #include <functional>
@@ -12,35 +11,34 @@
 
 namespace hal::vision {
 
-/// How the source does; goes to the cycle with every result and whenever it changes.
+/// Status of the source; sent to the cycle with every result and whenever it changes.
 struct Status {
-    std::uint32_t frames = 0;  ///< that came and were of use
-    std::uint32_t dropped = 0;  ///< that were not looked at, since a newer one was there or the sender lost them
-    std::uint32_t bad = 0;  ///< that were of no use: damaged, huge, black, frozen, of the wrong size
-    std::uint32_t openings = 0;  ///< times that the source was opened
+    std::uint32_t frames = 0;  ///< valid frames
+    std::uint32_t dropped = 0;  ///< skipped for a newer one or lost by the camera
+    std::uint32_t bad = 0;  ///< invalid frames: damaged, too large, black, frozen, wrong size
+    std::uint32_t openings = 0;  ///< number of times the source was opened
     Trouble       trouble = Trouble::absent;
-    bool          ok = false;  ///< it is open and nothing is wrong
+    bool          ok = false;  ///< it is open without an error
 };
 
-/// Not real time and without a thread: hal::Background calls turn().
+/// Neither real-time nor with a thread of its own: hal::Background calls turn().
 class Worker {
 public:
-    /// `detect` is called with each frame that is of use, `publish` after it and after each change of the status without one. Lines are
-    /// about `instance`. [setup]
+    /// Calls `detect` with each valid frame, and `publish` after it and after each change of the status. Messages name `instance`. [setup]
     Worker(std::string instance, std::unique_ptr<Source> source, std::function<void(const Frame&)> detect,
            std::function<void(const Status&)> publish);
 
-    /// Only frames of this size are of use, because `file` (a calibration) is about such. [setup]
+    /// Accepts frames of this size only, the size of the calibration `file`. [setup]
     void expect(int width, int height, std::string file);
-    /// Equal frames in a row that are a frozen camera; 0: never. [helper thread]
+    /// Sets the number of identical frames that count as a frozen camera; 0: never. [helper thread]
     void          freeze_after(std::uint32_t frames) { frozen_after_ = frames; }
     std::uint32_t source_frozen_after() const { return source_->frozen_after(); }
-    /// Where lines go instead of standard error: for tests. [setup]
+    /// Sends messages to `say` instead of standard error, for tests. [setup]
     void say_to(const std::function<void(const std::string&)>& say);
 
-    /// A piece of work at `now_ns`; waits for a frame, at most 0.1 s, if it may. [helper thread]
+    /// Does the work due at `now_ns`; waits for a frame, at most 0.1 s, if `may_wait`. [helper thread]
     void turn(std::int64_t now_ns, bool may_wait) noexcept;
-    /// Closes the source. No turn runs, and the next one opens it again. [setup]
+    /// Closes the source while no turn runs; the next one reopens it. [setup]
     void          close() noexcept;
     const Status& status() const { return status_; }
 
@@ -65,11 +63,11 @@ private:
     std::string                              file_, remark_;
     int                                      width_ = 0, height_ = 0;  // 0: any
     std::uint32_t                            frozen_after_ = 0, equal_ = 0, dropped_before_ = 0;
-    std::uint64_t                            picture_ = 0;  // a hash of the last one
+    std::uint64_t                            picture_ = 0;  // hash of the last frame
     bool                                     open_ = false, told_ = false, ever_ = false;
     std::int64_t                             now_ = 0;  // of this turn
     std::int64_t                             try_again_ns_ = INT64_MIN, last_frame_ns_ = 0, since_ns_ = 0;
-    std::int64_t                             said_ns_[trouble_count];  // when a line was last said about it
+    std::int64_t                             said_ns_[trouble_count];  // time of the last message about it
 };
 
 }  // namespace hal::vision

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Coloured things that stand on the ground, and where.
+// Detects coloured objects on the ground and their positions.
 #pragma once
 
 #include <span>
@@ -26,8 +26,8 @@ struct BlobRules {
     double most_distance = 3;  ///< m: maximum distance of objects
 };
 
-/// What of each kind stands in the picture: its axis is `radius` behind the place where it ends below. One that goes beyond the picture's
-/// lower edge is not told, for where it stands is not seen. [any] takes memory
+/// Detects the objects of each kind: the axis is `radius` behind the lower end. An object cut by the picture's lower edge is skipped,
+/// since its position on the ground is not visible. [any] allocates memory
 std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground, std::span<const BlobKind> kinds, const BlobRules& rules);
 
 }  // namespace hal::vision

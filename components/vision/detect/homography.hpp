@@ -32,15 +32,14 @@ GroundText read_ground(std::string_view text);
 /// without the lens's distortion.
 class Ground {
 public:
-    /// The one that fits the points best. Points in a line, or two at one place, are problems, which are added to `text`; then the result
-    /// is of no use. [setup]
+    /// Computes the best fit. Collinear or coinciding points are problems, which are added to `text`; then the result is invalid. [setup]
     Ground(GroundText& text, const std::optional<Camera>& camera);
     Ground() = default;
 
-    /// The place that is seen at the pixel. False: the pixel is no number, or shows the horizon or what is above it; `x`, `y` are left
-    /// as they are. [realtime]
+    /// Maps a pixel to a position on the plane. Returns false, leaving `x` and `y` unchanged, if the pixel is NaN, or at or above the
+    /// horizon. [realtime]
     bool map(double u, double v, double& x, double& y) const noexcept;
-    /// How far the points lie from where they should, root of the mean square, in their unit.
+    /// Returns the root mean square error of the points, in their unit.
     double error() const { return error_; }
 
 private:

@@ -76,8 +76,8 @@ double angle_between(const cv::Matx33d& a, const cv::Matx33d& b) {
 }
 
 /// The two candidates of one marker over its last frames. Corner noise differs from frame to frame, so the sums of their errors, of which
-/// older ones count less, tell the pose from its mirror image when one frame cannot. A frame counts by the candidates' shares of its squared
-/// error, so that a single bad frame does not outweigh the others.
+/// older ones count less, distinguish the pose from its mirror image where a single frame does not. A frame counts by the candidates' shares
+/// of its squared error, so that a single bad frame does not outweigh the others.
 struct Track {
     std::array<cv::Matx33d, 2> rotation;
     std::array<double, 2>      shares{};
@@ -185,7 +185,7 @@ void MarkerDetector::Inside::refine(const cv::Mat& picture, std::vector<cv::Poin
     for (std::size_t i = 0; i < 4; ++i) shortest = std::min(shortest, cv::norm(corners[(i + 1) % 4] - corners[i]));
     const double cell = shortest / (dictionary->markerSize + 2);
     const int    reach = std::clamp(static_cast<int>(std::lround(0.9 * cell)), 2, 12);
-    const int    across = 2 * reach + 6;  // cornerSubPix wants some room
+    const int    across = 2 * reach + 6;  // margin for cornerSubPix
     if (picture.cols < across || picture.rows < across) return;
     cv::cornerSubPix(picture, corners, {reach, reach}, {-1, -1}, {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.005});
 }

@@ -23,7 +23,7 @@ struct Spot {
     double mass = 0.0;  ///< sum of weights / 255: px of full colour
     int    area = 0;  ///< px beyond the threshold
     int    left = 0, top = 0, right = 0, bottom = 0;  ///< first and last px
-    double foot_u = 0.0, foot_v = 0.0;  ///< where it ends below: the middle of its last rows, and where half of its usual width is left
+    double foot_u = 0.0, foot_v = 0.0;  ///< where it ends below: the middle of its last rows, and the row where its width falls to half
 };
 
 /// Weights of a colour frame; a grey one has none. [any] takes memory

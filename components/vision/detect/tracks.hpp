@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Things on the ground that are seen in frame after frame.
+// Tracks objects on the ground over successive frames.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ public:
     /// [any]
     void                   see(std::span<const Sighting> sightings, std::int64_t stamp_ns, const TrackRules& rules);
     std::span<const Track> all() const noexcept { return {tracks_.data(), count_}; }
-    /// Sightings that no place was left for. [any]
+    /// Returns the number of detections dropped because all tracks were in use. [any]
     std::uint32_t crowded() const noexcept { return crowded_; }
 
 private:

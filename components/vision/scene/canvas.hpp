@@ -35,12 +35,12 @@ public:
     void capsule(std::span<const Capsule> moments, Colour colour);
     /// A convex shape, corners clockwise as seen.
     void polygon(std::span<const Point> corners, Colour colour);
-    /// `cover(u, v)` says how much of a pixel takes the colour, 0 to 1, for all pixels of a rectangle.
+    /// Fills a rectangle; `cover(u, v)` returns the covered part of a pixel, 0 to 1.
     template <class Cover>
     void paint(double left, double top, double right, double bottom, Colour colour, Cover cover) {
         shade(left, top, right, bottom, [&](double u, double v, Colour& taken) { return taken = colour, cover(u, v); });
     }
-    /// The same where each pixel has a colour of its own: `cover(u, v, colour)` says which.
+    /// Like above with a colour per pixel, which `cover(u, v, colour)` returns.
     template <class Cover>
     void shade(double left, double top, double right, double bottom, Cover cover) {
         Colour    colour{};

@@ -12,7 +12,7 @@ namespace hal::vision {
 
 namespace {
 
-constexpr std::int64_t patience_for_scene = 200'000'000;
+constexpr std::int64_t timeout_for_scene = 200'000'000;
 
 std::int64_t nanoseconds(double seconds) noexcept {
     return std::isfinite(seconds) ? static_cast<std::int64_t>(std::clamp(seconds, 0.0, 10.0) * 1e9 + 0.5) : 0;
@@ -53,8 +53,8 @@ private:
         due_ns_ = now_ns + 10'000'000;
         scene::State newest;
         if (!stage) {
-            if (now_ns - opened_ns_ < patience_for_scene) return Got::nothing;
-            fail(Trouble::absent, "there is no scene sim:" + name_ + ": loadrt vision_scene camera=" + name_);
+            if (now_ns - opened_ns_ < timeout_for_scene) return Got::nothing;
+            fail(Trouble::absent, "missing scene sim:" + name_ + ": loadrt vision_scene camera=" + name_);
             return Got::lost;
         }
         if (!stage->newest(newest)) return Got::nothing;

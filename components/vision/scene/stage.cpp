@@ -62,7 +62,7 @@ std::map<std::string, std::shared_ptr<Stage>> stages;
 void open(const std::string& name, std::shared_ptr<Stage> stage) {
     const std::lock_guard lock(mutex);
     if (!stages.emplace(name, std::move(stage)).second)
-        throw std::invalid_argument("there is a scene sim:" + name + " already; give this one camera=ANOTHER");
+        throw std::invalid_argument("duplicate scene sim:" + name + "; use another name in camera=");
 }
 
 void close(const std::string& name) noexcept {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a simulated camera looks at: the newest states of a plant, written by the cycle, read by whoever renders them.
+// The newest states of a plant for a simulated camera: written by the cycle, read by renderers.
 #pragma once
 
 #include <array>
@@ -53,16 +53,16 @@ struct State {
 /// The newest states. One writer, any number of readers.
 ///
 /// Each slot is a sequence lock: (1) the writer makes its number odd, (2) writes, (3) makes it even; a reader that sees an odd number, or
-/// another one after it has copied than before, takes the slot as gone. All words are atomic, so a copy that is thrown away is no data
-/// race.
+/// another one after it has copied than before, discards the slot. All words are atomic, so discarding a copy is free of data
+/// races.
 class Stage {
 public:
     explicit Stage(const Settings& settings) : settings_(settings) {}
     const Settings& settings() const noexcept { return settings_; }
 
-    /// A state, not older than the one before. [realtime] one writer
+    /// Writes a state, not older than the previous one. [realtime] one writer
     void put(std::int64_t stamp_ns, std::span<const double> values) noexcept;
-    /// The newest state. False: there is none yet. [any]
+    /// Reads the newest state. Returns false if there is none yet. [any]
     bool newest(State& to) const noexcept;
     /// The state at `stamp_ns`, between its two neighbours in a straight line; the oldest or the newest that is known where it lies
     /// outside. Only the first poses (at::smooth) lie between; of all else the earlier is taken. False: there is none yet. [any]
@@ -82,11 +82,11 @@ private:
     std::atomic<std::uint64_t>              count_{0};  // states so far; written by put()
 };
 
-/// Makes the stage known to sim:NAME. Throws std::invalid_argument when there is one of this name. [setup]
+/// Registers the stage as sim:NAME. Throws std::invalid_argument if the name is in use. [setup]
 void open(const std::string& name, std::shared_ptr<Stage> stage);
 /// [setup]
 void close(const std::string& name) noexcept;
-/// Null when there is none. [setup] and helper threads
+/// Returns the stage, or null if the name is unknown. [setup] and helper threads
 std::shared_ptr<const Stage> find(const std::string& name);
 
 }  // namespace hal::vision::scene
