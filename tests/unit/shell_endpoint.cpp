@@ -70,7 +70,7 @@ TEST_F(ServerTest, a_folder_of_another_user_is_rejected) {
     std::filesystem::remove(folder.path + "/halcyon");
     folder.write("halcyon", "a file");
     EXPECT_NE(said("x").find("[no-socket]"), std::string::npos);
-    for (const char* name : {"../x", "", ".x", "a b", "x/y"}) EXPECT_NE(said(name).find("no name for an instance"), std::string::npos) << name;
+    for (const char* name : {"../x", "", ".x", "a b", "x/y"}) EXPECT_NE(said(name).find("is not a valid instance name"), std::string::npos) << name;
     EXPECT_NE(said(std::string(65, 'x')).find("[no-socket]"), std::string::npos);
     setenv("XDG_RUNTIME_DIR", (folder.path + "/" + std::string(100, 'd')).c_str(), 1);
     EXPECT_NE(said("x").find("too long"), std::string::npos);
