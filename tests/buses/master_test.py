@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """master_test.py BUS_TESTS: halfiles/canopen-axis with its link on a real SocketCAN interface and `hal node drive` as the drive, in
-user-mode-linux where the machine has no vcan0: boots, moves, the drive is killed and comes back, the interface goes down and up, the end."""
+user-mode-linux where the machine has no vcan0: boots, moves, the drive is killed and reconnects, the interface goes down and up, the end."""
 import re
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from vcan import on_vcan0
 
-# In a guest every system call is a hundred times dearer, and the host may be busy: a set-point every 10 ms, slower strokes, patience.
+# In a guest every system call is a hundred times dearer, and the host may be busy: a set-point every 10 ms, slower strokes, longer timeouts.
 SLOW = """setp x.max-following-error 50
 setp x-trajectory.maxv 40
 """

@@ -33,7 +33,7 @@ def contents(frame):
 
 
 def exchange(bus, program, address, frames):
-    """Every frame comes back with 1 added to its identifier."""
+    """Every frame returns with 1 added to its identifier."""
     ours = subprocess.Popen([program, "--echo", address], stdout=subprocess.PIPE, text=True)
     wrong = []
     try:
@@ -88,7 +88,7 @@ def main():
         except OSError as error:
             print(f"{name} is left out: {error}")
             continue
-        print(f"{name}: {'; '.join(found) or 'all frames came back'}")
+        print(f"{name}: {'; '.join(found) or 'all frames returned'}")
         wrong += found
         ran += 1
     return 1 if wrong else 0 if ran else 77

@@ -264,7 +264,7 @@ TEST(Segment, a_cut_cable_isolates_its_station_and_heals) {
     a->send(f, {}, 2 * ms);
     EXPECT_EQ(firsts(all(*c, 4 * ms)), "1");
     EXPECT_TRUE(all(*b, 4 * ms).empty());
-    EXPECT_EQ(b->statistics().dropped, 2U);  // the one refused, and the one whose time came
+    EXPECT_EQ(b->statistics().dropped, 2U);  // the rejected frame, and the one whose time came
     EXPECT_EQ(b->statistics().downs, 1U);
     a->segment()->cut(b->segment()->port(), false);
     a->send(f, {}, 5 * ms);

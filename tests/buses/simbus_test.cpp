@@ -153,7 +153,7 @@ TEST(Simbus, a_node_alone_is_not_acknowledged_and_becomes_passive_but_not_bus_of
     EXPECT_EQ(a->state(), State::passive);
     EXPECT_EQ(a->statistics().queued, 1U);
     auto b = open_or_fail(bus);
-    EXPECT_EQ(all(*b, 1'000'001 * ms).size(), 1U);  // repeated until somebody is there
+    EXPECT_EQ(all(*b, 1'000'001 * ms).size(), 1U);  // repeated until another node is on the bus
 }
 
 TEST(Simbus, a_cut_wire_isolates_and_heals) {
@@ -305,7 +305,7 @@ TEST(Simbus, many_threads_lose_nothing) {
                 std::size_t sent = 0;
                 bool complete = false;
                 std::vector<std::uint32_t> next(threads);
-                // One clock for all, as in the runtime; whoever is done keeps it going for the others.
+                // One clock for all, as in the runtime; a finished thread keeps it going for the others.
                 while (finished < threads && now < 1'000'000 * ms) {
                     now = clock.fetch_add(50'000);
                     if (sent < frames) {

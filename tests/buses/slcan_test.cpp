@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A serial line that is pulled out and comes back: a pseudo-terminal behind a name that stays.
+// A serial line that disconnects and reconnects: a pseudo-terminal behind a name that stays.
 #include <gtest/gtest.h>
 
 #include <fcntl.h>

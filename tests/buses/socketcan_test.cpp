@@ -125,7 +125,7 @@ TEST_F(Socketcan, waiting_takes_what_comes_one_by_one_and_in_bursts_and_keeps_th
             ASSERT_TRUE(b->wait(2'000'000'000));
             const auto before = got;
             take(burst % 2 == 0 ? unclocked : link::monotonic_ns());
-            ASSERT_GT(got, before) << "there was something to receive, said wait()";
+            ASSERT_GT(got, before) << "wait() reported a frame to receive";
         }
     }
     EXPECT_EQ(b->statistics().received, sent);
@@ -140,7 +140,7 @@ TEST_F(Socketcan, waiting_ends_when_nothing_comes) {
         Frame f;
         EXPECT_FALSE(b->receive(f, link::monotonic_ns()));
     }
-    const auto before = link::monotonic_ns();  // a cycle that found nothing, then waited, is told in the same cycle
+    const auto before = link::monotonic_ns();  // a cycle that found nothing, then waited, is reported in the same cycle
     Frame f;
     EXPECT_FALSE(b->receive(f, before));
     a->send({0x7, {}}, unclocked), a->flush(unclocked);
@@ -193,7 +193,7 @@ TEST_F(Socketcan, an_interface_is_removed_and_comes_back) {
     run("ip link del vcan7; ip link del vcan8");
 }
 
-/// What a controller's driver tells of it, here by hand: a virtual interface has no controller.
+/// The state that a controller's driver reports, here by hand: a virtual interface has no controller.
 struct Controller {
     Controller() : socket(::socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW)) {
         sockaddr_can address{};
@@ -257,7 +257,7 @@ TEST_F(Socketcan, bus_off_is_told_nothing_is_sent_meanwhile_and_it_ends_when_the
     EXPECT_EQ(a->send({0x1, {}}, unclocked), Sent::bus_off);
     EXPECT_EQ(a->statistics().bus_offs, 1U);
     EXPECT_EQ(a->statistics().dropped, 1U);
-    a->restart();  // a virtual interface cannot be told to; the controller of a real one can, as it does here
+    a->restart();  // a virtual interface cannot restart; the controller of a real one can, as it does here
     EXPECT_FALSE(a->wait(50'000'000));
     EXPECT_EQ(a->state(), State::bus_off);
     controller.tell(CAN_ERR_RESTARTED);

@@ -17,7 +17,7 @@ Frame fd(std::uint32_t id, std::vector<std::uint8_t> bytes, bool switched = true
     return f;
 }
 
-/// The frame spelled out as a text of bits, stuffed by a rule written a second time: the longest way round, and easy to believe.
+/// The frame spelled out as a text of bits, stuffed by a rule written a second time: slow, but simple to check.
 std::string spelled(const Frame& f) {
     std::string s = "0";
     const auto put = [&](std::uint32_t v, int width) {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""udp_gone_test.py BUS_TESTS: the interface below a `udp:` bus goes down, is taken away and comes back; in a network namespace of its own.
-The link says that it is down and goes on by itself. 77: namespaces are not allowed here."""
+"""udp_gone_test.py BUS_TESTS: the interface below a `udp:` bus goes down, is removed and created again; in a network namespace of its own.
+The link reports that it is down and recovers by itself. 77: namespaces are not allowed here."""
 import os
 import socket
 import struct

@@ -11,7 +11,7 @@ from harness import HAL, TIMEOUT, Case
 
 
 class Client:
-    """What a script of somebody else does: write a line, read until its answer."""
+    """A client script: writes a line and reads until its response."""
 
     def __init__(self, place):
         family = socket.AF_UNIX if isinstance(place, str) else socket.AF_INET

@@ -37,7 +37,7 @@ class Node(Case):
         wait_until(lambda: text in self.said[process].read_text(), f"{text!r} in {self.said[process].read_text()!r}")
 
     def ended(self, process):
-        """Ctrl-C, and all it has said."""
+        """Sends Ctrl-C and returns the whole output."""
         process.send_signal(signal.SIGINT)
         error = process.communicate(timeout=60)[1]
         self.assertEqual((0, ""), (process.returncode, error))

@@ -33,7 +33,7 @@ std::string enter() {
             !write_file("/proc/self/gid_map", "0 " + std::to_string(group) + " 1"))
             return "the user namespace cannot be set up";
     }
-    if (!command("ip link set lo up")) return "`ip` of iproute2 is not there, or may do nothing";
+    if (!command("ip link set lo up")) return "`ip` of iproute2 is missing or not permitted";
     if (!command("ip link add probe0 type veth peer name probe1")) return "the kernel has no veth";
     command("ip link del probe0");
     return {};

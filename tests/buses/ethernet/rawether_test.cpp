@@ -42,7 +42,7 @@ TEST_F(Raw, a_frame_arrives_whole_with_the_time_of_its_arrival) {
     EXPECT_EQ(here->statistics().sent, 1U);
     EXPECT_EQ(there->statistics().received_bytes, 60U);
     EXPECT_EQ(there->statistics().mtu, 1500U);
-    EXPECT_EQ(there->statistics().speed, 10000U);  // what veth says of itself
+    EXPECT_EQ(there->statistics().speed, 10000U);  // the speed that veth reports
 }
 
 TEST_F(Raw, frames_go_there_and_back_with_every_policy) {
@@ -86,7 +86,7 @@ TEST_F(Raw, types_and_stations_are_chosen_by_the_kernel) {
     send(broadcast, type, 1);
     send(one->address(), 0x9021, 2);
     send(broadcast, 0x9022, 3);
-    send({2, 0, 0, 0, 0, 9}, 0x9021, 4);  // somebody else's
+    send({2, 0, 0, 0, 0, 9}, 0x9021, 4);  // for another station
     EXPECT_EQ(firsts(*one, 1), "1");
     EXPECT_EQ(firsts(*several, 2), "23");
     EXPECT_EQ(firsts(*all, 3), "123");
@@ -179,7 +179,7 @@ TEST_F(Raw, what_warms_the_way_is_on_no_wire) {
         auto here = a({.types = {type}, .spin_ns = 10 * ms, .pacer = pacer});
         for (std::uint8_t mark = 1; mark < 9; ++mark) {
             EXPECT_EQ(here->send(frame(broadcast, *here, type, {mark}), {.at_ns = link::monotonic_ns() + ms}, 0), Sent::queued);
-            for (bool ours = false; !ours;) {  // the kernel may have something to say on a new interface
+            for (bool ours = false; !ours;) {  // the kernel may send on a new interface
                 ASSERT_TRUE(there->wait(link::monotonic_ns() + 5000 * ms));
                 const auto arrival = there->receive(0);
                 ASSERT_TRUE(arrival);
@@ -274,7 +274,7 @@ TEST_F(Raw, a_frame_stays_until_the_next_is_asked_for) {
 TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
     auto here = a(), there = b({.types = {type}, .policy = Policy::block, .receive_capacity = 2048});
     if (!command("tc qdisc add dev " + a_ + " root netem loss 20% duplicate 10% delay 1ms 1ms"))
-        GTEST_SKIP() << "this kernel has no netem, or `tc` is not there";
+        GTEST_SKIP() << "this kernel has no netem, or `tc` is missing";
     // Ours go past the queueing discipline; these are sent by a socket that does not.
     const link::Descriptor plain(::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0));
     sockaddr_ll place{};

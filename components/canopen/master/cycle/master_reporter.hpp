@@ -192,7 +192,7 @@ private:
     const config::MasterConfig& config_;
     const MasterSetup           setup_;
     const std::string           file_, instance_;
-    Time                        operational_told_ = -1;  // of which start it was said that the network is operational
+    Time                        operational_told_ = -1;  // start whose operational network was reported
     hal::Reporter<Event>        told_;                   // the last: its thread uses the others
 };
 

@@ -13,7 +13,7 @@
 
 namespace hal::canopen::gateway {
 
-/// Answers `ERROR:n` that are no SDO abort codes.
+/// Lists the gateway's own codes of `ERROR:n`; the others are SDO abort codes.
 enum class Error : std::uint16_t {
     none = 0,
     not_supported = 100,
@@ -109,7 +109,7 @@ Parsed parse(std::string_view line);
 /// What can be typed, a line each.
 std::string_view help_text();
 
-/// Transmission types of PDO commands that are no number: `event`, `rtr`, `sync0` … `sync240`.
+/// Transmission types of PDO commands that are written as a word: `event`, `rtr`, `sync0` … `sync240`.
 inline constexpr std::uint32_t on_event = 255, on_request = 253;
 
 }  // namespace hal::canopen::gateway

@@ -46,7 +46,7 @@ void Gateway::start_lss(int client, Command&& c, Net& net, Time now) {
                                               : Error::syntax);
 }
 
-/// False: not yet, the bus has no room.
+/// Returns false while the transmit queue is full.
 bool Gateway::begin_lss(Pending& p, Net& net, Time now) {
     LssMaster&  lss = net.lss;
     const auto& n = p.command.numbers;

@@ -20,9 +20,9 @@ public:
     Error configure(bool received, const Command&);
     /// `r p N`: "pdo 1 2 17 -5". Error::state: nothing has come yet.
     Error read(unsigned number, std::string& text) const;
-    /// `w p N`: sends it, now or as its transmission type says.
+    /// `w p N`: sends it, now or by its transmission type.
     Error write(const Command&, std::string& why);
-    /// Asks for a PDO of type `rtr`; false when it is none.
+    /// Requests a PDO of type `rtr`; returns false for another type.
     bool request(unsigned number);
     bool arrived(unsigned number) const;
 

@@ -26,7 +26,7 @@ const Format* format(Type type);
 
 /// The value in one word, quoted where it needs to be; two words for times. Bytes of another length than the type's come as `hex`.
 std::string text_of(std::span<const std::uint8_t> bytes, const Format& format);
-/// How many words its value has.
+/// Returns the number of words of its value.
 constexpr std::size_t words_of(const Format& format) {
     return format.type == Type::time_of_day || format.type == Type::time_difference ? 2 : 1;
 }
@@ -37,7 +37,7 @@ bool bytes_of(std::span<const std::string> words, const Format& format, std::vec
 bool read_number(std::string_view text, bool& negative, std::uint64_t& magnitude);
 
 std::string base64(std::span<const std::uint8_t> bytes);
-/// False when it is none; blanks and a missing end are not.
+/// Returns false for invalid base64; blanks and missing padding are accepted.
 bool base64(std::string_view text, std::vector<std::uint8_t>& bytes);
 
 }  // namespace hal::canopen::gateway

@@ -50,7 +50,7 @@ Analysis analyse(std::span<const Message>, const Bus&);
 /// How often message `other` goes first while `late` waits at its worst.
 std::int64_t times_before(const Message& other, std::int64_t queued, const Bus&);
 
-/// The message that wins arbitration; equal identifiers cannot be told apart.
+/// The message that wins arbitration; equal identifiers have no order.
 bool before(const Message&, const Message&) noexcept;
 
 /// The lowest of the customary bit rates (10 kbit/s … 1 Mbit/s) above the given one with which all is in time.
