@@ -175,7 +175,7 @@ A on
         self.assertEqual(["A: position-factor 4096/360", "A: velocity-factor 4096/360", "A: position-factor 4096/360", "A: on", "B: on"], lines[:5])
         self.assertAlmostEqual(1800, float(lines[5].split()[-1]), delta=0.1)
         self.assertAlmostEqual(90, float(lines[6].split()[-1]), delta=1)
-        self.assertEqual(["A: moves", "A: moves"], lines[7:9])
+        self.assertEqual(["A: moving", "A: moving"], lines[7:9])
         self.assertAlmostEqual(150, float(lines[9].split()[-1]), delta=1)
         self.assertEqual(["A: off", "B: off"], lines[11:])
 
