@@ -84,6 +84,7 @@ robot's centre. Gaps, shadows and objects beside the line are bands that disagre
 The mapping from pixels to the ground follows from the mounting of the camera (`focal`, `camera_height`, `pitch`, `forward`), or from measured
 points (`ground=`, a file as for vision_homography). A robot with the turning speed k1 offset + k2 heading follows the line.
 
+    loadrt vision_scene show=floor
     loadrt vision_line source=sim:floor camera_height=0.3 pitch=0.6
     addf vision-scene.0.update servo
     addf vision-line.0.update servo

@@ -131,7 +131,7 @@ class Stranger(Segment):
         self.send([packed(LOWEST, [(0x080, b""), (0x206, b"\xff")], 100 + n) for n in range(20)])  # SYNC and a set-point
         self.stays_operational()
         self.assertRegex(self.said("x"), rf"rejected NMT command \(000h\) from {LOWEST}: not in a slot of that station|"
-                                         rf"rejected NMT command \(000h\) from {LOWEST}: it is not the master")
+                                         rf"rejected NMT command \(000h\) from {LOWEST}: not the master")
         self.assertNotIn("stopped", self.said("x"))
 
     def test_status_shows_the_stations(self):
