@@ -80,10 +80,10 @@ def texts(path, source):
 
 
 def is_identifier(text, match):
-    """Returns whether the match is a name and not prose: in backticks, part of a hyphenated name, or the only word of a string."""
+    """Returns whether the match is a name and not prose: in backticks, part of a hyphenated name, an attribute, or the only word of a string."""
     before, after = text[:match.start()][-1:], text[match.end():][:1]
     alone = before == after and before in ("`", '"', "'") and " " not in match.group()
-    return alone or before == "-" or after == "-"
+    return alone or before == "-" or after == "-" or text[:match.start()].endswith("self.")
 
 
 def violations(root, only=()):
