@@ -166,7 +166,7 @@ TEST_F(AnalogInput, Change_beyond_the_delta_sends_the_PDO_and_nothing_else_does)
     field(0.2);
     EXPECT_EQ(sent(), 0U);
     field(0.0);
-    EXPECT_EQ(sent(), 1U) << "counted from what was said last";
+    EXPECT_EQ(sent(), 1U) << "the delta counts from the value sent last";
     EXPECT_EQ(bench.write<float>(0x6133, 1, -1.0F), Abort::too_low);
     EXPECT_EQ(bench.write<std::int16_t>(0x7133, 1, -1), Abort::too_low);
 }

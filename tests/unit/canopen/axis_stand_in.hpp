@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A drive that does what the state diagram of CiA 402 says, a transition per cycle, and refuses what a test wants refused.
+// Simulates a drive with the CiA 402 state machine, one transition per cycle, and rejects the transitions that a test selects.
 #pragma once
 
 #include <deque>

@@ -193,7 +193,7 @@ TEST(Axis, Sees_that_the_drive_left_by_itself_or_failed) {
 }
 
 TEST(Axis, Off_and_on_again_while_the_drive_is_slow_to_obey_is_no_failure) {
-    for (const unsigned off : {1U, 2U, 3U, 5U, 8U, 13U, 21U}) {  // cycles; what the drive says and is told is on its way for five
+    for (const unsigned off : {1U, 2U, 3U, 5U, 8U, 13U, 21U}) {  // cycles; statusword and controlword are each delayed by five
         Pair p;
         p.delay = 5;
         ASSERT_TRUE(p.enable()) << p.why();
@@ -354,7 +354,7 @@ TEST(Axis, Set_points_wait_while_the_drive_has_no_room) {
     const std::uint16_t busy = 0x0237, full = busy | status::set_point_acknowledge;
     for (int i = 0; i < 16; ++i) EXPECT_TRUE(s.push({.target = i}));
     EXPECT_FALSE(s.push({.target = 16}));
-    for (int i = 0; i < 10; ++i) EXPECT_EQ(0, s.step(full, now += second, second, target)) << "it moves and has no room: no failure";
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(0, s.step(full, now += second, second, target)) << "the set-point buffer of the drive is full: no failure";
     EXPECT_FALSE(s.failure());
     EXPECT_EQ(0, s.step(busy, now += millisecond, second, target));
     EXPECT_EQ(control::new_set_point, s.step(busy, now += millisecond, second, target));

@@ -58,7 +58,7 @@ struct Station : Recorder {
     std::size_t heard = 0;
 };
 
-/// Refuses or changes what an object does.
+/// Rejects or overrides the accesses to an object.
 struct Spoil : Handler {
     std::function<Abort(Entry&)> read;
     std::function<Abort(Entry&, std::span<const std::uint8_t>)> write;

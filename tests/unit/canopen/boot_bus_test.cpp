@@ -144,7 +144,7 @@ TEST(BootBus, Survives_errors_loss_repetition_and_delay_together) {
             if (b.master.status().state != NetworkState::operational) down += b.dt;
         }
         EXPECT_LE(down, 20 * second) << "seed " << seed;
-        // A node is cut off, and comes back by itself.
+        // A node is disconnected and recovers without help.
         const auto node = b.nodes[1]->link->simulation()->node();
         simulation->cut(node, true);
         for (int n = 0; n < 4000; ++n) b.step();

@@ -176,7 +176,7 @@ TEST(Configure, Is_skipped_when_date_and_time_match) {
 TEST(Configure, Waits_for_a_slow_node_up_to_its_SDO_timeout) {
     const auto boots = [](Time own, int resends) {
         Configured b([&](NodeSetup& n) { n.sdo_timeout = own, n.sdo_resends = resends, n.heartbeat_limit = -1; });
-        b.station.delay = 700 * millisecond;  // longer than the master's own patience
+        b.station.delay = 700 * millisecond;  // longer than the master's own SDO timeout
         b.start();
         return b.operational(20 * second);
     };
@@ -192,7 +192,7 @@ TEST(Configure, Restores_defaults_first_and_saves_last) {
         n.restore = n.save = true;
     });
     b.station.device.dictionary().set<std::uint32_t>(0x2000, 0, 1);
-    b.station.device.dictionary().keep(0x2000, 0x2fff, false);  // spoilt by somebody
+    b.station.device.dictionary().keep(0x2000, 0x2fff, false);  // changed by another program
     b.start();
     ASSERT_TRUE(b.operational());
     EXPECT_EQ(b.value(0, 0x2000, 0), 0x12345678U);

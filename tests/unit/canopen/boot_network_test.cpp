@@ -57,7 +57,7 @@ TEST(BootNetwork, Leaves_the_start_to_others_when_so_configured) {
     EXPECT_EQ(b.status(6).step, Step::running);
     EXPECT_FALSE(b.status(6).operational);
     EXPECT_EQ(b.master->status().state, NetworkState::booting);
-    b.bus.inject({0, {1, 6}}, b.now);  // somebody does
+    b.bus.inject({0, {1, 6}}, b.now);  // another NMT master sends the command
     ASSERT_TRUE(b.operational(second));
     EXPECT_EQ(b.master->status().foreign_commands, 1U);
 }

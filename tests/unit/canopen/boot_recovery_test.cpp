@@ -10,7 +10,7 @@ TEST(BootNetwork, Reboots_a_power_cycled_node_while_the_others_run) {
     b.power();
     b.start();
     ASSERT_TRUE(b.operational());
-    // Quickly: only its boot-up message tells.
+    // A short power loss: only the boot-up message reveals it.
     b.stations[1]->plug(false, b.now);
     b.run(10 * millisecond);
     b.stations[1]->plug(true, b.now);

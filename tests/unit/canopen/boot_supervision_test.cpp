@@ -72,7 +72,7 @@ TEST(Supervision, Lets_devices_enter_their_safe_state_when_the_master_stops) {
     b.run(149 * millisecond + 51 * millisecond);
     EXPECT_EQ(b.station.communication_errors, 1);
     EXPECT_EQ(b.state(0), NmtState::pre_operational);
-    // The master comes back: it sees that the node left operational and brings it in again.
+    // The master resumes, detects that the node left the operational state, and boots it again.
     b.alive = true;
     ASSERT_TRUE(b.until([&] { return b.status(5).losses >= 1 && b.status(5).operational; }));
     EXPECT_EQ(b.state(0), NmtState::operational);

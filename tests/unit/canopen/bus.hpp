@@ -90,7 +90,7 @@ private:
     std::optional<std::pair<std::size_t, Frame>> held_;
 };
 
-/// What a device told, to be looked at.
+/// Records the events of a device for inspection.
 struct Recorder : Events {
     std::vector<NmtState> states;
     std::vector<unsigned> rpdos, late;

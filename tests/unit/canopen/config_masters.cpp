@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What [bus] says of following a SYNC and of several masters.
+// The [bus] settings for SYNC following and for several masters.
 #include <gtest/gtest.h>
 
 #include "canopen/master/config/bus_schedule.hpp"

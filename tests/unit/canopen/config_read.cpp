@@ -32,7 +32,7 @@ TEST(CanopenConfig, a_profile_gives_objects_names_types_and_safe_values) {
     ASSERT_NE(in, nullptr);
     EXPECT_EQ(in->cob, 0x185U);
     EXPECT_EQ(in->objects[0].pin, "status");
-    EXPECT_EQ(in->objects[0].safe, 0U) << "nobody may believe in it";
+    EXPECT_EQ(in->objects[0].safe, 0U) << "a status input reads 0 while the node is lost";
     EXPECT_EQ(in->objects[1].as, PinType::s32);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SRDOs in a configuration: what is written to the node, and what is said of wrong ones.
+// SRDOs in a configuration: the objects written to the node, and the messages for invalid SRDOs.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -9,7 +9,7 @@ using enum NmtCommand;
 
 struct ConformanceNmt : Conformance {
     static constexpr std::uint32_t save = 0x65766173, load_defaults = 0x64616f6c, wrong_save = 0x6e6f7277;
-    /// What the node says in its heartbeat.
+    /// Returns the NMT state in the last heartbeat of the node.
     int said() {
         const auto beats = (bus.log.clear(), run(25), since(0x705));
         return beats.empty() ? -1 : beats.back().data[0];
@@ -184,7 +184,7 @@ TEST_F(ConformanceNmt, Other_10_restricted_identifiers_are_refused_everywhere) {
     };
     for (const Place& p :
          {Place{0x1005, 0}, {0x1012, 0}, {0x1014, 0}, {0x1201, 1}, {0x1201, 2}, {0x1280, 1}, {0x1280, 2}, {0x1400, 1}, {0x1800, 1}}) {
-        // 1012h in use and channels of SDO that are on refuse any other identifier, too: they are off here.
+        // 1012h and SDO channels reject any new identifier while they are enabled; they are disabled here.
         write(p.index, p.sub, cob_invalid | (p.index == 0x1014 ? 0x85 : p.index >= 0x1800 ? 0x185 : p.index >= 0x1400 ? 0x205 : 0), 4);
         for (const auto id : ids) {
             if ((p.index == 0x1201 || p.index == 0x1280) && ((id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f)))

@@ -5,7 +5,7 @@
 namespace hal::canopen::test {
 namespace {
 
-/// A plant that does what the test says.
+/// A plant whose inputs the test sets.
 struct Terminals final : Plant {
     double duty = 0.0;
     bool on = false, closed = true;

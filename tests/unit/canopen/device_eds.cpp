@@ -13,7 +13,7 @@
 namespace hal::canopen::test {
 namespace {
 
-/// What a description says, each entry under its key; the file and back must not change it.
+/// Returns all entries of a description by key; writing and reading the file must not change them.
 std::map<std::uint32_t, EntryDescription> all_of(const Description& d) {
     std::map<std::uint32_t, EntryDescription> entries;
     for (const auto& e : d.entries) entries.emplace(std::uint32_t{e.index} << 8 | e.sub, e);

@@ -144,7 +144,7 @@ TEST(FaultyTransfers, end_as_the_protocol_wants) {
     set("block-crc");
     EXPECT_EQ(bench.read(0x2000, 0, back, SdoMode::block), Abort::crc);
     EXPECT_EQ(bench.write(0x2000, 0, data, SdoMode::block), Abort::crc);
-    std::vector<std::uint8_t> many(1000, 0x5a);  // goes by blocks if nobody says otherwise, and by segments when they break
+    std::vector<std::uint8_t> many(1000, 0x5a);  // block transfer by default, segmented transfer when blocks fail
     EXPECT_EQ(bench.write(0x2000, 0, many), Abort::none);
     EXPECT_EQ(bench.read(0x2000, 0, back), Abort::none);
     EXPECT_EQ(back, many);
@@ -269,7 +269,7 @@ TEST(BusOff, is_told_by_every_device_when_the_bus_is_back) {
     run(30 * millisecond);
     ASSERT_EQ(node.link().state(), can::State::bus_off);
     EXPECT_EQ(node.device().emcy().error_register(), error_generic | error_communication);
-    EXPECT_EQ(node.device().state(), NmtState::pre_operational);  // as 1029h says
+    EXPECT_EQ(node.device().state(), NmtState::pre_operational);  // as configured in 1029h
     EXPECT_TRUE(told.empty());
     run(200 * millisecond);
     ASSERT_EQ(node.link().state(), can::State::active);

@@ -152,7 +152,7 @@ TEST_F(IoDevice, takes_its_error_values_when_the_master_falls_silent) {
     EXPECT_EQ(bench.remote().emergency(0).code, 0x8130);
     bench.send(Frame(0x701, {5}));
     bench.command(NmtCommand::start);
-    EXPECT_TRUE(io.safe() && !io.output(1));  // until somebody writes
+    EXPECT_TRUE(io.safe() && !io.output(1));  // until an RPDO writes the outputs
     bench.send(Frame(0x205, {0x02, 0, 0, 0, 0, 0, 0, 0}));
     bench.run(2 * millisecond);
     EXPECT_TRUE(!io.safe() && io.output(1));

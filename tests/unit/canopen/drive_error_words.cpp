@@ -33,7 +33,7 @@ TEST(DriveErrorWords, Master_says_them_of_drives_only) {
         n.setup.id = id;
         n.name = "n" + std::to_string(id);
         if (id == 5) n.setup.device_type = 0x00020192;
-        if (id == 6) {  // nothing says what it is, but it has a statusword, of its second axis
+        if (id == 6) {  // no device type, but a mapped statusword of its second axis
             config::Pdo pdo;
             config::Object word;
             word.index = 0x6841;

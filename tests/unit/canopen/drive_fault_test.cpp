@@ -433,7 +433,7 @@ TEST_F(DriveAxes, Pdos_move_it) {
     send(0x205, {0x0f, 0});
     EXPECT_EQ(state(), State::operation_enabled);
     EXPECT_EQ(get<std::int8_t>(object::modes_of_operation_display), 8);
-    // The statusword tells each change by itself.
+    // Each state change sends its own statusword.
     std::vector<State> told;
     for (const auto& f : sent)
         if (f.id == 0x185) told.push_back(state_of(load<std::uint16_t>(f.data.data())));

@@ -44,7 +44,7 @@ TEST(EdsRead, A_commissioning_makes_it_a_dcf) {
 struct Defect {
     const char* name;
     std::string added, optional, manufacturer;  ///< what is put into the file
-    std::string at, message;                    ///< the line's text, and what is said of it
+    std::string at, message;                    ///< the text of the line, and the message about it
 };
 class EdsDefect : public testing::TestWithParam<Defect> {};
 

@@ -61,8 +61,8 @@ TEST_F(Gate, Reads_and_writes_in_all_types) {
     EXPECT_EQ(ask("[5] 5 r 0x2001 0 i16"), "[5] -7");
     EXPECT_EQ(ask("[6] 5 w 0x2009 0 r32 -2.5"), "[6] OK");
     EXPECT_EQ(ask("[7] 5 r 0x2009 0 r32"), "[7] -2.5");
-    EXPECT_EQ(ask("[8] 5 w 0x2005 0 vs \"say \"\"hi\"\"\""), "[8] OK");
-    EXPECT_EQ(ask("[9] 5 r 0x2005 0 vs"), "[9] \"say \"\"hi\"\"\"");
+    EXPECT_EQ(ask("[8] 5 w 0x2005 0 vs \"yes \"\"hi\"\"\""), "[8] OK");
+    EXPECT_EQ(ask("[9] 5 r 0x2005 0 vs"), "[9] \"yes \"\"hi\"\"\"");
     EXPECT_EQ(ask("[10] 5 w 0x2006 0 d aGFsY3lvbg=="), "[10] OK");
     EXPECT_EQ(ask("[11] 5 r 0x2006 0 d"), "[11] aGFsY3lvbg==");
     EXPECT_EQ(ask("[12] 5 w 0x2004 0 u64 0xFFFFFFFFFFFFFFFF"), "[12] OK");

@@ -36,7 +36,7 @@ TEST_F(Mpdo, Destination_and_object_go_out_with_the_value) {
     ASSERT_EQ(f.length, 8);
     EXPECT_TRUE(std::equal(std::begin(wanted), std::end(wanted), f.data.begin()));
     EXPECT_TRUE(device->pdos().send_dam(1, 0, 0x6200, 2, 1));
-    EXPECT_FALSE(device->pdos().send_sam(1, 0x2008, 1)) << "this one says destinations";
+    EXPECT_FALSE(device->pdos().send_sam(1, 0x2008, 1)) << "TPDO 1 is in destination addressing mode";
 }
 
 TEST_F(Mpdo, Own_node_and_object_go_out_with_the_value) {
@@ -47,7 +47,7 @@ TEST_F(Mpdo, Own_node_and_object_go_out_with_the_value) {
     EXPECT_EQ(load<std::uint16_t>(f.data.data() + 1), 0x2001);
     EXPECT_FALSE(device->pdos().send_sam(1, 0x200a, 0)) << "cannot be mapped";
     EXPECT_FALSE(device->pdos().send_sam(1, 0x5555, 0));
-    EXPECT_FALSE(device->pdos().send_dam(1, 9, 0x2001, 0, 1)) << "this one says sources";
+    EXPECT_FALSE(device->pdos().send_dam(1, 9, 0x2001, 0, 1)) << "TPDO 1 is in source addressing mode";
 }
 
 /// With a scanner list: two of the four values of 2008h, and 2001h.
@@ -93,7 +93,7 @@ TEST_F(Scanner, Tells_what_is_in_its_list_once_and_then_what_changes) {
     bus.log.clear();
     run(1);
     EXPECT_EQ(told(), (Told{{0x2008, 1, 1}, {0x2008, 2, 0x55}, {0x2001, 0, 0xfffe}, {0x2008, 3, 0x66}}))
-        << "a list that is new is told anew";
+        << "a new scanner list sends all its objects";
     nmt(NmtCommand::enter_pre_operational);
     device->dictionary().set<std::uint8_t>(0x2008, 1, 9);
     run(1);

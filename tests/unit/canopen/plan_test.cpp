@@ -127,7 +127,7 @@ TEST(Plan, no_bus_does_worse_than_predicted) {
         }
     }
     EXPECT_GT(checked, 300U);
-    EXPECT_GT(met, checked * 9 / 10);  // and the prediction is no looser than it must be
+    EXPECT_GT(met, checked * 9 / 10);  // and the predicted bound is tight
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The master at work on the bus in memory: what it does when the wire does not take what it has to say.
+// The master on the simulated bus: its behaviour when the link does not accept its frames.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -150,9 +150,9 @@ TEST(Runner, Sends_and_takes_no_process_data_before_a_node_is_configured) {
         EXPECT_TRUE(w.runner.operational(0));
         EXPECT_GE(w.rpdos, 18U);
         EXPECT_GE(w.syncs, 18U);
-        EXPECT_TRUE(w.cut.empty()) << "its first PDOs are laid out otherwise, which is no fault";
+        EXPECT_TRUE(w.cut.empty()) << "a different PDO mapping before the configuration does not count as a fault";
 
-        // It loses its power and comes back with its own layout.
+        // The node loses power and restarts with its default mapping.
         w.node->power(false);
         for (int n = 0; n < 10; ++n) w.step();
         w.node->power(true);
@@ -207,7 +207,7 @@ TEST(Runner, Set_points_that_a_dead_wire_kept_back_are_not_sent_when_it_is_back)
 
     auto* simulation = w.link->simulation();
     simulation->cut(simulation->node(), true);  // the master's own plug
-    for (int n = 0; n < 100; ++n) w.step();  // not so long that the node counts as lost
+    for (int n = 0; n < 100; ++n) w.step();  // too short for the node to count as lost
     EXPECT_GT(w.runner.withheld(), 140U);    // SYNC and set-point of 80 cycles, but for a few
 
     w.heard.clear();

@@ -270,7 +270,7 @@ TEST(SdoClient, Waits_for_queue_space_while_other_clients_are_served) {
     for (Frame f; out.pop(f);) {}
     client.handle({0x589, {0xa4, 0x06, 0x20, 0, 127, 0, 0, 0}}, 0);
     while (out.push(make_frame(0x123, 0))) {}
-    for (Time t = 0; t < second; t += millisecond) {  // a frame leaves, and somebody else was quicker
+    for (Time t = 0; t < second; t += millisecond) {  // a frame leaves, and another sender takes its slot
         Frame f;
         out.pop(f), out.push(make_frame(0x123, 0));
         client.poll(t);

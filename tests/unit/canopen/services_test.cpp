@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A device on a wire: what each service of CiA 301 sends, takes and refuses. Names follow the public list of conformance cases.
+// A device on a bus: what each CiA 301 service sends, accepts and rejects. Names follow the public list of conformance cases.
 #include "node.hpp"
 
 namespace hal::canopen::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SRDOs of EN 50325-5: what is sent, what is believed, and what is not.
+// SRDOs of EN 50325-5: the frames sent, and which received data is valid.
 #include "canopen/protocol/srdo_description.hpp"
 #include "node.hpp"
 
@@ -101,7 +101,7 @@ TEST_F(Srdo, Sender_whose_objects_do_not_match_sends_nothing_and_says_so) {
     EXPECT_EQ(heard.faults[0], std::pair(1U, SrdoFault::own_data));
     device->dictionary().set(0x2301, 0, std::uint8_t{0xfe});
     run(100);
-    EXPECT_TRUE(since(sent_id).empty()) << "not before somebody has seen to it";
+    EXPECT_TRUE(since(sent_id).empty()) << "not before the fault is acknowledged";
     device->srdos().acknowledge(1, now);
     run(100);
     EXPECT_FALSE(since(sent_id).empty());
@@ -351,7 +351,7 @@ TEST_F(Srdo, Reset_of_communication_brings_the_valid_configuration_of_power_on_b
 }
 
 TEST_F(Srdo, Every_lost_doubled_or_overtaken_frame_ends_belief_or_changes_nothing) {
-    // The sender of one node is the receiver of another: with every n-th frame disturbed no value is believed that was not sent.
+    // The sender of one node is the receiver of another: with every n-th frame disturbed no value is accepted that was not sent.
     for (const unsigned every : {2U, 3U, 5U, 7U}) {
         for (int kind = 0; kind < 3; ++kind) {
             Bus wire;
