@@ -23,14 +23,14 @@ is() { # VALUE COMMAND...: waits until the machine answers it
     echo "$* $value"
 }
 drive() {
-    "$hal" node drive --link can:vcan0 --id 2 >drive.said & drive=$!
-    until grep -q pre-operational drive.said; do sleep 0.1; done
+    "$hal" node drive --link can:vcan0 --id 2 >drive.output & drive=$!
+    until grep -q pre-operational drive.output; do sleep 0.1; done
 }
 drive
-"$hal" run axis.hal slow.hal >machine.said 2>&1 & machine=$!
+"$hal" run axis.hal slow.hal >machine.output 2>&1 & machine=$!
 is TRUE getp canopen.0.x.operational
 is TRUE gets x-active
-until grep -q "operation enabled" drive.said; do sleep 0.1; done
+until grep -q "operation enabled" drive.output; do sleep 0.1; done
 until "$hal" shell gets x-position | grep -Eq '^-?[1-9]'; do sleep 0.1; done
 echo it moves
 kill -9 $drive
@@ -54,7 +54,7 @@ is TRUE getp canopen.0.x.operational
 kill -TERM $machine
 wait $machine
 echo machine ended
-until tail -n 4 drive.said | grep -q "pre-operational"; do sleep 0.1; done
+until tail -n 4 drive.output | grep -q "pre-operational"; do sleep 0.1; done
 kill -INT $drive
 wait $drive
 echo drive ended
@@ -90,8 +90,8 @@ def main(hal):
         print(done.stdout)
         print(f"{time.monotonic() - began:.1f} s")
         if done.returncode != 0:
-            for said in ("machine.said", "drive.said"):
-                print(f"--- {said}\n{Path(folder, said).read_text() if Path(folder, said).exists() else 'nothing'}")
+            for output in ("machine.output", "drive.output"):
+                print(f"--- {output}\n{Path(folder, output).read_text() if Path(folder, output).exists() else 'nothing'}")
             return done.returncode
         lines = done.stdout.splitlines()
         faults = {re.sub(r"(cycle|for) [\d.]+( \d{3})*", r"\1 #", line.split(" ago  ")[1]) for line in lines if " ago  " in line}

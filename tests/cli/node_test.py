@@ -227,8 +227,8 @@ class WrongWords(Node):
             ("jr3", "--link", self.bus, "--stream", "none.bin"): "cannot read 'none.bin': No such file or directory",
             ("io", "--link", self.bus, "--id", "5", "--fault", "mute:every=0"): "invalid property 'every=0' of fault mute; write every=3, from=5s or for=1s",
         }
-        for words, said in cases.items():
-            self.assertEqual(f"hal node {words[0]}: {said}\n", self.bad("node", *words))
+        for words, message in cases.items():
+            self.assertEqual(f"hal node {words[0]}: {message}\n", self.bad("node", *words))
         self.assertIn("--axes: Value 9 not in range 1 to 8", self.bad("node", "drive", "--axes", "9"))
         self.assertEqual("hal: unknown command 'node drve'; did you mean 'node drive'?\n", self.bad("node", "drve"))
         self.assertIn("unknown fault 'lat-sdo'; use one of: mute, deaf, ", self.bad("node", "io", "--link", self.bus, "--id", "5", "--fault", "lat-sdo"))
