@@ -279,7 +279,7 @@ class Lss(Node):
         self.assertEqual("hal can lss: invalid bit rate '300k'; write 1M, 800k, 500k, 250k, 125k, 50k, 20k or 10k\n", self.bad_can("lss", self.bus, "bit-rate", "300k"))
         self.assertEqual("hal can lss: invalid node ID '128'; write 1..127, or none\n", self.bad_can("lss", self.bus, "node-id", "128"))
         self.assertEqual("hal can lss: unknown command 'scna'; did you mean 'scan'?\n", self.bad_can("lss", self.bus, "scna"))
-        self.assertEqual("wrong arguments of hal can lss: select; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
+        self.assertEqual("hal can lss: wrong arguments of select; type: hal can lss ADDRESS select VENDOR PRODUCT REVISION SERIAL\n", self.bad_can("lss", self.bus, "select", "1"))
         self.assertEqual("hal can lss: invalid vendor ID 'x'; write a number up to 4294967295, or 0x…\n", self.bad_can("lss", self.bus, "select", "x", "1", "1", "1"))
 
 
@@ -349,7 +349,7 @@ class Flash(Node):
         (self.folder / "bad.bin").write_bytes(b"not a program at all, and long enough")
         self.assertEqual("hal can flash: node 6, 1F50:1: data cannot be transferred or stored to the application (0x08000020); the device rejected "
                          "the image and may have no valid program now; check that the image is for this device\n", self.bad("can", "flash", self.bus, 6, "bad.bin"))
-        self.assertIn("runs, software identification", self.good("can", "flash", self.bus, 6, "new.bin"))
+        self.assertIn("program running, software identification", self.good("can", "flash", self.bus, 6, "new.bin"))
 
     def test_a_node_without_one_and_wrong_files(self):
         self.assertIn("hal can flash: node 5 has no program control 1F51:1", self.bad("can", "flash", self.bus, 5, "/proc/version"))

@@ -212,7 +212,7 @@ class Send(Can):
         self.assertEqual(["0100", "8205", "807F"], [json.loads(line).get("data") for line in self.result(dump)[0].splitlines()[:3]])
         self.assertEqual("hal can nmt: unknown command 'strt'; did you mean 'start'?\n", self.bad_can("nmt", self.bus, "strt", "1"))
         self.assertEqual("hal can nmt: invalid node '128'; write 1..127, or all\n", self.bad_can("nmt", self.bus, "start", "128"))
-        self.assertEqual("hal can nmt: expected ADDRESS NODE FILE; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all\n",
+        self.assertEqual("hal can nmt: expected ADDRESS COMMAND NODE; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all\n",
                          self.bad_can("nmt", self.bus, "start"))
 
 

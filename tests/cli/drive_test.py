@@ -66,7 +66,7 @@ class OneShot(Drive):
     def test_a_command_per_process(self):
         """Each takes the axis over as the one before left it."""
         self.node("--motor", "endless:1", "--axes", 2)
-        self.assertEqual('A: is not on (drive is in "switch on disabled"); type: A on\n', self.refused("A", "go", 100))
+        self.assertEqual('A: not enabled (drive is in "switch on disabled"); type: A on\n', self.refused("A", "go", 100))
         self.assertEqual("A: on\n", self.drive("A", "on"))
         self.assertEqual("A: on\n", self.drive("A", "on"))
         self.assertEqual("A: max-speed 40000\n", self.drive("A", "set", "max-speed", 40000))
@@ -97,7 +97,7 @@ class OneShot(Drive):
         self.drive("A", "set", "home-offset", 500)
         self.assertRegex(self.drive("A", "home", 23), r"^A: homed, at ")
         self.assertRegex(self.drive("A", "go", 500), r"^A: at (49\d|50\d|510)\n$")
-        self.assertEqual("A: the drive does not support homing method 99; it has 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 17, 18, 19, 20, 21, 22, 23, "
+        self.assertEqual("A: the drive does not support homing method 99; it supports 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 17, 18, 19, 20, 21, 22, 23, "
                          "24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37\n",
                          self.refused("A", "home", 99))
 
@@ -190,7 +190,7 @@ A on
     def test_terminal(self):
         self.node()
         terminal = Terminal(self, "can", "drive", self.bus, "--node", 2)
-        terminal.expect("'help' lists the commands, Tab completes")
+        terminal.expect("type 'help' for the commands, Tab completes")
         terminal.expect("drive> ")
         terminal.send("A quicks\t\n")
         terminal.expect("A: stopped and off, at 0")
@@ -397,10 +397,10 @@ XYZA:
 GB:5
 """)
         self.assertEqual(1, done.returncode)
-        self.assertEqual("""A: is not on (drive is in "switch on disabled"); type: A on
+        self.assertEqual("""A: not enabled (drive is in "switch on disabled"); type: A on
 missing axis in 'ON:'; write ONA: to ONH:
 'I' is not an axis; write ONA: to ONH:
-ONA cannot be asked; type: ONA:
+ONA cannot be queried; type: ONA:
 APA cannot be set; type: APA?
 unexpected argument after ONA:
 GA: takes one integer from -2147483648 to 2147483647; type: GA:1000
@@ -442,7 +442,7 @@ A
         self.assertEqual("""unknown command 'foo'; type: help
 unknown command 'st'; did you mean 'set'?
 invalid number 'x'; type: A go POSITION [relative] [nowait]
-position A: 1e+12 is 1e+12 counts, out of the range -2147483648..2147483647 of the drive
+A: position 1e+12 is 1e+12 counts, out of the range -2147483648..2147483647 of the drive
 type: A go POSITION [relative] [nowait]
 unknown parameter 'max-sped'; did you mean 'max-speed'?
 max-speed -1 is -1 in drive units, out of the range 0..4294967295

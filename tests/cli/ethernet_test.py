@@ -80,7 +80,7 @@ class Segment(Case):
         tdma.write_text("master:\nname control\ncycle 1000\nslot 0 250 1/1 300\n\nslave:\nname x\nphase 330\nslot 0 450 1/1 250\n")
         node = lambda *words: subprocess.run(["hal", "node", "axis-io", "--id", "1", *words], executable=str(HAL), env=self.environment, text=True,
                                              stdout=subprocess.PIPE, stderr=subprocess.PIPE).stderr
-        self.assertIn("write --link cane:eth0 with --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
+        self.assertIn("--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
         self.assertIn("--skew needs a TDMA schedule; add --tdma FILE\n", node("--link", "cane:lo", "--skew", "200ppm"))
         self.assertIn("unknown option 'slots'; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue, "
                       "and of cane: format, order, slot, priority, learn, to, master, also, key, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",

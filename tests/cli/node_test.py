@@ -217,7 +217,7 @@ class WrongWords(Node):
                                                   "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE",
             ("io", "--link", self.bus, "--id", "5", "--set", "in-64=1"): "unknown value 'in-64' in --set; write one of: in-0 … in-63, analog-in-0 … analog-in-11",
             ("io", "--link", self.bus, "--id", "5", "--set", "in-6"): "invalid --set 'in-6'; write NAME=VALUE, or NAME=VALUE@2s for later",
-            ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "invalid --set: a b has no settable valuesootloader",
+            ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "invalid --set: a bootloader has no settable values",
             ("bootloader", "--make-image", "2"): "invalid version '2'; write 2.1",
             ("drive", "--link", self.bus, "--id", "5", "--motor", "weight:3"):
                 "invalid motor parameter 'weight:3'; write NAME:VALUE, as in inertia:1e-4; names: resolution, endless, inertia, viscous-friction, "

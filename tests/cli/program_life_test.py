@@ -169,7 +169,7 @@ os._exit(3)
         self.assertIn(f"'uc' (process {self.pid('uc')}, ready) did not end within 50 ms [program-timeout]", said)
         self.say("unload", "uc")
         self.say("waitusr", "-t", "60s", "uc")
-        self.assertIn("-t takes a time", self.refused("waitusr", "-t", "soon", "uc"))
+        self.assertIn("-t requires a duration of 1ms..24h, such as -t 10s", self.refused("waitusr", "-t", "soon", "uc"))
         self.assertIn("-t limits the wait of -W, -Wn or -w", self.refused("loadusr", "-t", "1s", "true"))
         self.assertIn("'sleep' did not end within 50 ms [program-timeout]", self.refused("loadusr", "-t", "50ms", "-w", "sleep", "1000"))
 

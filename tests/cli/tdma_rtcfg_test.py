@@ -76,7 +76,7 @@ class Rtcfg(Segment):
             node = subprocess.Popen(["ip", "netns", "exec", "x", HAL, "node", "axis-io", "--id", "1", "--link", "cane:wire0", "--tdma", "auto"],
                                     cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
         self.addCleanup(self.stop, node)
-        self.wait_for_words("node", "hal node: waits for the master of eth:wire0 to send it its schedule (RTcfg); the master's file must have a "
+        self.wait_for_words("node", "hal node: waiting for the master of eth:wire0 to send the schedule (RTcfg); the master's file must have a "
                                     f"block with 'mac {self.mac('x')}'\n")
         master = self.station("m", NETLIST.format("config=cell.tdma station=m").replace("5000000", "2000000"))
         self.wait_for_words("node", f"hal node: configured by {self.mac('m')} as station x: 1 slot, cycle 2000 us\n")
