@@ -83,7 +83,7 @@ class Segment(Case):
         self.assertIn("--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
         self.assertIn("--skew needs a TDMA schedule; add --tdma FILE\n", node("--link", "cane:lo", "--skew", "200ppm"))
         self.assertIn("unknown option 'slots'; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue, "
-                      "and of cane: format, order, slot, priority, learn, to, master, also, key, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
+                      "and for cane: format, order, slot, priority, learn, to, master, also, key, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
                       node("--link", "cane:lo?slots=3"))
         with_mac = self.folder / "mac.tdma"
         with_mac.write_text(tdma.read_text().replace("name x\n", "name x\nmac 02:00:00:00:00:07\n"))

@@ -170,7 +170,7 @@ os._exit(3)
         self.say("unload", "uc")
         self.say("waitusr", "-t", "60s", "uc")
         self.assertIn("-t requires a duration of 1ms..24h, such as -t 10s", self.refused("waitusr", "-t", "soon", "uc"))
-        self.assertIn("-t limits the wait of -W, -Wn or -w", self.refused("loadusr", "-t", "1s", "true"))
+        self.assertIn("-t requires -W, -Wn or -w, whose wait it limits", self.refused("loadusr", "-t", "1s", "true"))
         self.assertIn("'sleep' did not end within 50 ms [program-timeout]", self.refused("loadusr", "-t", "50ms", "-w", "sleep", "1000"))
 
     def test_a_program_that_does_not_end_keeps_its_name_and_is_named(self):
