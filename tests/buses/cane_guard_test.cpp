@@ -11,28 +11,10 @@
 
 #include "can/cane/command_guard.hpp"
 #include "can/cane/seal.hpp"
-#include "link/can.hpp"
-#include "link/segment.hpp"
+#include "cane_bench.hpp"
 
-namespace hal::can::cane {
+namespace hal::can::cane::test {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
-
-Frame message(std::uint32_t id, std::initializer_list<std::uint8_t> data) { return {id, data}; }
-constexpr Address a{2, 0, 0, 0, 0, 1}, b{2, 0, 0, 0, 0, 2}, c{2, 0, 0, 0, 0, 3};
-
-std::unique_ptr<Link> opened(const std::string& address) {
-    auto o = can::open(address);
-    EXPECT_TRUE(o) << o.problem;
-    return std::move(o.link);
-}
-
-std::vector<Frame> all_of(Link& link, std::int64_t now) {
-    std::vector<Frame> frames;
-    for (Frame f; link.receive(f, now);) frames.push_back(f);
-    return frames;
-}
 
 TEST(CaneSiphash, gives_the_tags_of_its_publication) {
     const Key key{0x0706050403020100, 0x0f0e0d0c0b0a0908};
@@ -190,4 +172,4 @@ TEST(CaneLink, a_frame_that_its_sender_dropped_is_no_loss_of_the_wire) {
 }
 
 }  // namespace
-}  // namespace hal::can::cane
+}  // namespace hal::can::cane::test

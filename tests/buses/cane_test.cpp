@@ -1,114 +1,14 @@
 // SPDX-License-Identifier: MIT
-// CAN in Ethernet frames: bytes worked out by hand, hostile ones, and links on a segment in memory.
+// CAN in Ethernet frames: which station has which node, what is lost, and links on a segment in memory.
 #include <gtest/gtest.h>
-
-#include <random>
 
 #include "can/cane/cane_format.hpp"
 #include "can/cane/cane_stations.hpp"
+#include "cane_bench.hpp"
 #include "discipline/discipline.hpp"
-#include "link/can.hpp"
-#include "link/segment.hpp"
 
-namespace hal::can::cane {
+namespace hal::can::cane::test {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
-
-Frame message(std::uint32_t id, std::initializer_list<std::uint8_t> data) { return {id, data}; }
-
-/// A packed Ethernet frame from one station to all.
-Bytes packed(std::initializer_list<Frame> messages, Stamp stamp = {}) {
-    Bytes whole(ethernet::largest_frame);
-    std::fill_n(whole.begin(), 6, std::uint8_t{0xff});
-    whole[6] = 2, whole[11] = 9, whole[12] = 0x90, whole[13] = 0x23;
-    std::size_t at = ethernet::header_bytes + packed_header;
-    for (const auto& f : messages) at += put_packed(f, std::span(whole).subspan(at));
-    whole.resize(at);
-    close_packed(whole, static_cast<std::uint8_t>(messages.size()), stamp);
-    return whole;
-}
-
-TEST(CaneSingle, is_what_the_source_system_sends) {
-    std::array<std::uint8_t, 64> room{};
-    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::big, room), 8U);
-    EXPECT_EQ(Bytes(room.begin(), room.begin() + 8), (Bytes{0, 0, 1, 0x81, 3, 1, 2, 3}));
-    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::little, room), 8U);
-    EXPECT_EQ(Bytes(room.begin(), room.begin() + 8), (Bytes{0x81, 1, 0, 0, 3, 1, 2, 3}));
-    ASSERT_EQ(put_single(Frame::request(0x1abcdef0, 4), Order::big, room), 5U);
-    EXPECT_EQ(Bytes(room.begin(), room.begin() + 5), (Bytes{0xda, 0xbc, 0xde, 0xf0, 4}));
-    Frame back;
-    EXPECT_EQ(get_single(std::span(room).first(46), Order::big, back), Wrong::none);
-    EXPECT_TRUE(back.same(Frame::request(0x1abcdef0, 4)));
-}
-
-TEST(CaneSingle, refuses_what_is_no_message) {
-    Frame f;
-    const auto wrong = [&](Bytes payload) { return get_single(payload, Order::big, f); };
-    EXPECT_EQ(wrong({0, 0, 1, 0x81}), Wrong::cut);
-    EXPECT_EQ(wrong({0, 0, 1, 0x81, 8, 1, 2}), Wrong::cut);
-    EXPECT_EQ(wrong({0, 0, 1, 0x81, 9, 1, 2, 3, 4, 5, 6, 7, 8, 9}), Wrong::form);
-    EXPECT_EQ(wrong({0, 0, 8, 0, 0}), Wrong::form);        // 0x800 has no 11 bits
-    EXPECT_EQ(wrong({0x20, 0, 1, 0x81, 0}), Wrong::form);  // an error frame
-    const auto other = packed({message(0x80, {})});
-    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::big, f), Wrong::version);
-    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::little, f), Wrong::version);
-}
-
-TEST(CanePacked, is_as_its_description_says) {
-    const auto whole = packed({message(0x080, {}), message(0x201, {0xaa, 0xbb}), Frame::request(0x1abcdef0, 3)}, {0x1234, 0x5678});
-    const Bytes payload(whole.begin() + 14, whole.end());
-    const Bytes head{0xec, 1, 3, 0xec, 0x34, 0x12, 0x78, 0x56};
-    EXPECT_EQ(Bytes(payload.begin(), payload.begin() + 8), head);
-    EXPECT_EQ(Bytes(payload.begin() + 10, payload.end()),
-              (Bytes{0x80, 0x00, 0x01, 0x22, 0xaa, 0xbb, 0x00, 0xf0, 0xf0, 0xde, 0xbc, 0xda, 3}));
-    const std::string known = "123456789";  // the check value of CRC-16 with this polynomial and beginning
-    EXPECT_EQ(crc16({reinterpret_cast<const std::uint8_t*>(known.data()), known.size()}), 0x29b1);
-    Unpacker u;
-    ASSERT_EQ(u.open(whole), Wrong::none);
-    EXPECT_EQ(u.stamp().session, 0x1234);
-    EXPECT_EQ(u.stamp().sequence, 0x5678);
-    Frame f;
-    ASSERT_TRUE(u.next(f) && f.same(message(0x080, {})));
-    ASSERT_TRUE(u.next(f) && f.same(message(0x201, {0xaa, 0xbb})));
-    ASSERT_TRUE(u.next(f) && f.same(Frame::request(0x1abcdef0, 3)));
-    EXPECT_FALSE(u.next(f));
-}
-
-TEST(CanePacked, takes_no_frame_with_a_byte_changed_or_cut_off) {
-    const auto whole = packed({message(0x080, {}), message(0x201, {1, 2, 3, 4, 5, 6, 7, 8}), message(0x601, {0x40})});
-    Unpacker u;
-    ASSERT_EQ(u.open(whole), Wrong::none);
-    for (std::size_t at = 0; at < whole.size(); ++at) {
-        for (unsigned change = 1; change < 256; ++change) {
-            auto other = whole;
-            other[at] = static_cast<std::uint8_t>(other[at] ^ change);
-            if (at == 12 || at == 13) continue;  // another Ethertype does not come here
-            EXPECT_NE(u.open(other), Wrong::none) << "byte " << at << " with " << change;
-        }
-        EXPECT_NE(u.open(std::span(whole).first(at)), Wrong::none) << "cut to " << at;
-    }
-    auto padded = whole;
-    padded.resize(60);
-    EXPECT_EQ(u.open(padded), Wrong::none);
-}
-
-TEST(CanePacked, survives_random_bytes_with_a_right_check_sequence) {
-    std::mt19937 random(1);
-    for (int n = 0; n < 20000; ++n) {
-        Bytes whole(ethernet::header_bytes + packed_header + random() % 64);
-        for (auto& b : whole) b = static_cast<std::uint8_t>(random());
-        close_packed(whole, static_cast<std::uint8_t>(random() % 12), {});
-        Unpacker u;
-        if (u.open(whole) != Wrong::none) continue;
-        Frame f;
-        unsigned count = 0;
-        for (; u.next(f); ++count) EXPECT_TRUE(f.valid());
-        EXPECT_EQ(count, u.messages());
-    }
-}
-
-constexpr Address a{2, 0, 0, 0, 0, 1}, b{2, 0, 0, 0, 0, 2}, c{2, 0, 0, 0, 0, 3};
 
 TEST(CaneNodes, where_a_node_lives_is_learnt_from_what_it_sends) {
     Nodes nodes;
@@ -168,18 +68,6 @@ TEST(CaneStreams, find_back_when_it_is_the_memory_that_is_wrong) {
     int refused = 0;
     for (std::uint16_t n = 0; n < 20; ++n) refused += s.take(a, true, {1, n}, 0).fresh ? 0 : 1;
     EXPECT_EQ(refused, 8);
-}
-
-std::unique_ptr<Link> opened(const std::string& address) {
-    auto o = can::open(address);
-    EXPECT_TRUE(o) << o.problem;
-    return std::move(o.link);
-}
-
-std::vector<Frame> all_of(Link& link, std::int64_t now) {
-    std::vector<Frame> frames;
-    for (Frame f; link.receive(f, now);) frames.push_back(f);
-    return frames;
 }
 
 TEST(CaneLink, carries_many_messages_in_one_frame_to_all_others) {
@@ -420,4 +308,4 @@ TEST(CaneOpen, reports_what_is_wrong_and_what_to_type) {
 }
 
 }  // namespace
-}  // namespace hal::can::cane
+}  // namespace hal::can::cane::test
