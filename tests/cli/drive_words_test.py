@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""hal can drive: the words of the robot shell, and what is said of wrong ones."""
+"""hal can drive: the words of the robot shell, and the messages about invalid ones."""
 import unittest
 
 from drive_harness import Drive
