@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "canopen/protocol/numbers.hpp"
 #include "cia402/axis.hpp"
 
 namespace hal::canopen::cia402::test {
