@@ -2,10 +2,9 @@
 // The actual times at which a function runs, for components that measure a thread.
 #pragma once
 
-#include <ctime>
-
 #include <cstdint>
 
+#include "hal/clock.hpp"
 #include "hal/component.hpp"
 
 namespace measure {
@@ -16,7 +15,7 @@ class RunTime {
 public:
     /// Returns the nanoseconds since the last run; negative in the first run. [realtime]
     std::int64_t since_last(hal::Cycle cycle) noexcept {
-        const std::int64_t clock = now();
+        const std::int64_t clock = hal::monotonic_ns();
         if (!started_) {
             constexpr std::int64_t minute = 60'000'000'000;
             real_ = clock - cycle.start_ns() < minute && cycle.start_ns() - clock < minute;
@@ -28,11 +27,6 @@ public:
     }
 
 private:
-    static std::int64_t now() noexcept {
-        timespec t{};
-        clock_gettime(CLOCK_MONOTONIC, &t);
-        return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-    }
     std::int64_t last_ = 0;
     bool started_ = false, real_ = false;
 };

@@ -17,6 +17,7 @@
 #include <string>
 
 #include "hal/background.hpp"
+#include "hal/clock.hpp"
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/queue.hpp"
@@ -130,21 +131,16 @@ private:
     }
     void work(const Frame& frame) {
         if (!orders_.get().given) return;  // no cycle has run so far
-        const std::int64_t begun = measures_ ? now() : 0;
+        const std::int64_t begun = measures_ ? monotonic_ns() : 0;
         next_.result = Result{};
         static_cast<Derived*>(this)->detect(frame, orders_.get().settings, next_.result);
         next_.stamp_ns = frame.stamp_ns;
-        next_.proc_ns = measures_ ? now() - begun : 0;
+        next_.proc_ns = measures_ ? monotonic_ns() - begun : 0;
         ++next_.seq;
     }
     void deliver(const Status& status) {
         next_.status = status;
         deliveries_.put(next_);
-    }
-    static std::int64_t now() noexcept {
-        timespec t;
-        clock_gettime(CLOCK_MONOTONIC, &t);
-        return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
     }
     void raise(Trouble now) noexcept {
         static constexpr const char* reasons[trouble_count] = {"",

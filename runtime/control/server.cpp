@@ -18,6 +18,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "hal/clock.hpp"
 #include "machine/session.hpp"
 #include "control/endpoint.hpp"
 #include "control/connection.hpp"
@@ -30,8 +31,6 @@ constexpr std::size_t read_at_once = 65536;
 constexpr std::int64_t no_files_ns = 100'000'000;          // before accept is tried again after the system had no file left
 constexpr int lines_at_once = 1000;                        // of one client before the others have a turn
 constexpr std::size_t slow_reader = std::size_t{64} << 10; // bytes waiting for a client that skip its subscriptions
-
-std::int64_t steady_ns() { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); }
 
 /// One connected client. Used by the server's thread only, but for `result`, `finished` and `events` while a worker runs.
 struct Client {
@@ -55,7 +54,7 @@ struct Client {
     std::string result;            ///< of the worker
     std::atomic<bool> finished{false};
     bool stop_after = false;
-    std::int64_t active_ns = steady_ns();  ///< when it connected or made its last request
+    std::int64_t active_ns = monotonic_ns();  ///< when it connected or made its last request
     bool reserved = false;         ///< came when all places were taken
     std::mutex events_mutex;
     std::string events;            ///< that the worker has for the client meanwhile
@@ -140,7 +139,7 @@ void Server::State::serve() {
     std::vector<pollfd> ready;
     while (!ending) {
         ready.clear();
-        const bool accepts = clients.size() < places() && steady_ns() >= accepts_from;
+        const bool accepts = clients.size() < places() && monotonic_ns() >= accepts_from;
         ready.push_back({endpoint.fd(), static_cast<short>(accepts ? POLLIN : 0), 0});
         ready.push_back({wake, POLLIN, 0});
         for (const auto& client : clients) {
@@ -164,7 +163,7 @@ void Server::State::serve() {
             if (client.gone) continue;
             if (client.busy()) look_for_cancel(client);
             execute(client);
-            if (const std::int64_t now = steady_ns(); client.connection.next_due_ns() <= now)
+            if (const std::int64_t now = monotonic_ns(); client.connection.next_due_ns() <= now)
                 client.connection.publish(now, client.waiting() > slow_reader, client.out);
             send_out(client);
         }
@@ -186,7 +185,7 @@ void Server::State::serve() {
 
 /// Time until the next subscription or client timeout is due; 0 while complete requests are pending.
 int Server::State::sleep_ms() const {
-    const std::int64_t now = steady_ns();
+    const std::int64_t now = monotonic_ns();
     std::int64_t until = accepts_from > now ? accepts_from : std::numeric_limits<std::int64_t>::max();
     for (const auto& client : clients) {
         if (client->gone) continue;
@@ -203,7 +202,7 @@ void Server::State::accept_clients() {
     while (clients.size() < places()) {
         const int fd = accept4(endpoint.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
         if (fd < 0) {
-            if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) accepts_from = steady_ns() + no_files_ns;
+            if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) accepts_from = monotonic_ns() + no_files_ns;
             return;
         }
         ucred peer{};
@@ -236,7 +235,7 @@ void Server::State::reclaim() {
         for (const auto& client : clients) client->reserved = false;
         return;
     }
-    const std::int64_t now = steady_ns(), idle_ns = std::int64_t{options.idle_ms} * 1'000'000;
+    const std::int64_t now = monotonic_ns(), idle_ns = std::int64_t{options.idle_ms} * 1'000'000;
     for (; living > options.max_clients; --living) {
         Client* longest = nullptr;
         for (const auto& client : clients) {
@@ -253,7 +252,7 @@ void Server::State::reclaim() {
 
 void Server::State::close_idle(Client& client) {
     ++reclaimed;
-    const std::string idle = std::to_string((steady_ns() - client.active_ns) / 1'000'000'000) + " s";
+    const std::string idle = std::to_string((monotonic_ns() - client.active_ns) / 1'000'000'000) + " s";
     client.out += "{\"event\":\"closed\",\"reason\":\"more than " + std::to_string(options.max_clients) +
                   " clients are connected, and this one sent no request for " + idle + "\"}\n";
     send_out(client);
@@ -319,7 +318,7 @@ void Server::State::execute_line(Client& client, std::string_view line) {
         rubbish += client.connection.rubbish() - rubbish_before;
     };
     const auto handled = client.connection.handle(line, client.out);
-    client.active_ns = steady_ns();
+    client.active_ns = monotonic_ns();
     count();
     if (handled == Connection::Handled::stop && options.stop) {
         send_out(client);
@@ -351,7 +350,7 @@ void Server::State::collect_worker(Client& client) {
     }
     if (!client.busy() || !client.finished.load(std::memory_order_acquire)) return;
     client.worker.join();
-    client.active_ns = steady_ns();
+    client.active_ns = monotonic_ns();
     client.connection.cancel(false);
     client.out += std::exchange(client.events, {});
     client.out += std::exchange(client.result, {});
@@ -376,10 +375,10 @@ void Server::State::send_out(Client& client) {
         client.sent = 0;
     }
     if (client.waiting() <= options.queue || moved) {
-        client.stalled_since = client.waiting() > options.queue ? steady_ns() : 0;
+        client.stalled_since = client.waiting() > options.queue ? monotonic_ns() : 0;
         return;
     }
-    const std::int64_t now = steady_ns();
+    const std::int64_t now = monotonic_ns();
     if (client.stalled_since == 0) client.stalled_since = now;
     if (now - client.stalled_since < std::int64_t{options.stall_ms} * 1'000'000) return;
     ++dropped;

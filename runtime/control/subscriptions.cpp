@@ -8,11 +8,10 @@
 #include <utility>
 
 #include "commands/describe.hpp"
+#include "hal/clock.hpp"
 
 namespace hal {
 namespace {
-
-std::int64_t steady_ns() { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); }
 
 bool same(const std::vector<std::optional<Reading>>& a, const std::vector<std::optional<Reading>>& b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
@@ -31,7 +30,7 @@ bool same(const std::vector<std::optional<Reading>>& a, const std::vector<std::o
 std::uint64_t Subscriptions::add(std::vector<std::string> names, std::int64_t every_ns, bool changes_only) {
     const std::scoped_lock lock(mutex_);
     if (all_.size() >= most) return 0;
-    all_.push_back({next_++, std::move(names), every_ns, steady_ns(), changes_only});
+    all_.push_back({next_++, std::move(names), every_ns, monotonic_ns(), changes_only});
     return all_.back().id;
 }
 

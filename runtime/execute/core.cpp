@@ -29,12 +29,6 @@ struct Guard {
 };
 }  // namespace
 
-std::int64_t monotonic_ns() noexcept {
-    timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return now.tv_sec * 1'000'000'000LL + now.tv_nsec;
-}
-
 Core* Core::current() noexcept { return current_core; }
 
 Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,

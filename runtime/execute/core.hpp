@@ -11,6 +11,7 @@
 #include "execute/histogram.hpp"
 #include "execute/timeline.hpp"
 #include "hal/abi.h"
+#include "hal/clock.hpp"
 #include "hal/queue.hpp"
 #include "plan/plan.hpp"
 
@@ -194,8 +195,5 @@ private:
 /// The step the compiler puts behind a function with a declared-finite output; `self` is a plan::FiniteCheck whose
 /// sink is the Core. [realtime]
 void check_finite(void* self, const hal_cycle* cycle);
-
-/// CLOCK_MONOTONIC in ns. [any]
-std::int64_t monotonic_ns() noexcept;
 
 }  // namespace hal

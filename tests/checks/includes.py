@@ -33,7 +33,7 @@ ROWS = {
     "drivers/discipline": ["drivers/link"],
     "drivers/capture": ["drivers/link"],
     "drivers/netlink": ["drivers/link"],
-    "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink", "runtime/text"],
+    "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "components/logic": ["components"],
     "components/math": ["components"],

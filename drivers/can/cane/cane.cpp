@@ -11,7 +11,7 @@
 #include "command_guard.hpp"
 #include "discipline/discipline.hpp"
 #include "link/filtering.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "link/segment.hpp"
 #include "link/system.hpp"
 #include "seal.hpp"
@@ -186,11 +186,11 @@ private:
         return sent;
     }
     /// Removes the first `count` messages of a queue and counts them as sent or lost.
-    void done(link::Ring<Frame>& queue, std::size_t count, ethernet::Sent sent) noexcept {
+    void done(hal::Queue<Frame>& queue, std::size_t count, ethernet::Sent sent) noexcept {
         if (sent == ethernet::Sent::queued)
             for (std::size_t n = 0; n < count; ++n) counting_.count_sent(*queue.at(n));
         else Counting::add(counting_.dropped, count);
-        queue.pop(count);
+        queue.drop(count);
     }
 
     void flush_single(std::int64_t now_ns) noexcept {
@@ -329,7 +329,7 @@ private:
     Nodes nodes_;
     std::atomic<bool> line_up_{true};  // written by the receiving thread
 
-    link::Ring<Frame> process_data_, service_data_;  // used by the sending thread, as the next four
+    hal::Queue<Frame> process_data_, service_data_;  // used by the sending thread, as the next four
     std::size_t held_ = 0;                     // at the front of process_data_: left by the last flush()
     std::shared_ptr<Seal> seal_;
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};

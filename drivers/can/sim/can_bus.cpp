@@ -120,7 +120,7 @@ std::int64_t Bus::earliest() noexcept {
     std::int64_t first = INT64_MAX;
     for (Node* n : nodes) {
         if (n->off) {
-            while (n->outgoing.front() != nullptr) n->outgoing.pop(), n->thrown_away.fetch_add(1, std::memory_order_relaxed);
+            while (n->outgoing.front() != nullptr) n->outgoing.drop(), n->thrown_away.fetch_add(1, std::memory_order_relaxed);
             continue;
         }
         if (const Frame* f = n->outgoing.front()) first = std::min(first, std::max(f->time_ns, n->hold_until));
@@ -160,7 +160,7 @@ void Bus::work_untimed(std::int64_t now) noexcept {
             auto time = std::max(c.frame->time_ns, now);
             if (n->off || n->cut.load(std::memory_order_relaxed)) {
                 n->thrown_away.fetch_add(1, std::memory_order_relaxed);
-                n->outgoing.pop();
+                n->outgoing.drop();
                 continue;
             }
             const Active* fault = struck(c, time);
@@ -287,7 +287,7 @@ void Bus::done(const Candidate& c, std::int64_t time) noexcept {
     if (n.tec > 0) --n.tec, publish(n);
     if (n.tec >= 128) n.hold_until = free_at_ + bits(8);
     n.delayed = n.doubled = n.counted = false;
-    if (!c.babbling) return n.outgoing.pop();
+    if (!c.babbling) return n.outgoing.drop();
     n.babble_at = std::max(n.babble_at + n.babble_period, time);
 }
 
@@ -297,7 +297,7 @@ void Bus::failed(Node& n, std::int64_t time) noexcept {
     n.back_at = n.restart_ms == 0 ? INT64_MAX : time + std::int64_t{n.restart_ms} * 1'000'000 + bits(128 * 11);
     n.wants_restart.store(false);
     n.delayed = n.doubled = n.counted = false;
-    for (; n.outgoing.front() != nullptr; n.outgoing.pop()) n.thrown_away.fetch_add(1, std::memory_order_relaxed);
+    for (; n.outgoing.front() != nullptr; n.outgoing.drop()) n.thrown_away.fetch_add(1, std::memory_order_relaxed);
     publish(n);
     event(n, error_bus_off, time);
 }

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "link/can.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "link/simulation.hpp"
 #include "link/timing.hpp"
 
@@ -27,8 +27,8 @@ namespace hal::can::simbus {
 struct Node {
     Node(const Options& options) : outgoing(options.send_capacity), incoming(options.receive_capacity) {}
 
-    link::Ring<Frame> outgoing;  ///< writer: the sending thread; `time_ns` is when it was queued
-    link::Ring<Frame> incoming;  ///< reader: the receiving thread; `time_ns` is when it is complete
+    hal::Queue<Frame> outgoing;  ///< writer: the sending thread; `time_ns` is when it was queued
+    hal::Queue<Frame> incoming;  ///< reader: the receiving thread; `time_ns` is when it is complete
     std::vector<Filter> filters;
     int number = 0;
     bool fd = false, own_frames = false, error_frames = false, listen_only = false;

@@ -55,7 +55,7 @@ public:
             const Frame* next = node_.incoming.front();
             if (next == nullptr || next->time_ns > now) break;
             room[count++] = *next;
-            node_.incoming.pop();
+            node_.incoming.drop();
         }
         return count;
     }

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "link/filtering.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "link/system.hpp"
 #include "slcan_line.hpp"
 
@@ -98,7 +98,7 @@ public:
                 std::copy_n(line.data(), size, text_ + text_size_);
                 text_size_ += size;
                 counting_.count_sent(*f);
-                outgoing_.pop();
+                outgoing_.drop();
             }
             if (text_size_ == 0) return;
             const auto written = ::write(line_.get(), text_, text_size_);
@@ -168,7 +168,7 @@ private:
     /// Discards queued frames, stale when the line returns, and a partial line, which would corrupt the next one. Sending thread.
     void forget() noexcept {
         text_size_ = 0;
-        for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
+        for (; outgoing_.front() != nullptr; outgoing_.drop()) Counting::add(counting_.dropped);
     }
     void lose() noexcept { counting_.state.store(State::down, std::memory_order_relaxed); }
 
@@ -189,7 +189,7 @@ private:
     const Options options_;
     const std::string device_;
     const link::Descriptor line_;
-    link::Ring<Frame> outgoing_;  // written and read by the sending thread
+    hal::Queue<Frame> outgoing_;  // written and read by the sending thread
 
     char text_[4096]{};  // sending thread: lines not written yet
     std::size_t text_size_ = 0;

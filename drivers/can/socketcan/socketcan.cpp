@@ -17,7 +17,7 @@
 #include "controller_monitor.hpp"
 #include "kernel_frames.hpp"
 #include "link/counting.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "link/system.hpp"
 
 namespace hal::can::socketcan {
@@ -117,7 +117,7 @@ public:
     void flush(std::int64_t) noexcept override {
         // Frames queued before the interface was lost must not be sent when it returns.
         if (state() == State::down)
-            for (; outgoing_.front() != nullptr; outgoing_.pop()) Counting::add(counting_.dropped);
+            for (; outgoing_.front() != nullptr; outgoing_.drop()) Counting::add(counting_.dropped);
         for (bool again = true;;) {
             std::size_t count = 0;
             for (; count < batch; ++count) {
@@ -129,7 +129,7 @@ public:
             const int sent = hand_over(count);
             const int error = errno;
             for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
-            if (sent > 0) outgoing_.pop(static_cast<std::size_t>(sent));
+            if (sent > 0) outgoing_.drop(static_cast<std::size_t>(sent));
             if (sent == static_cast<int>(count)) continue;
             if (sent > 0) continue;  // the next attempt reports the error
             if (error == EINTR) continue;
@@ -138,7 +138,7 @@ public:
                 if (std::exchange(again, false)) continue;  // the first may be a stale error
                 return lose_interface();
             }
-            outgoing_.pop();  // the kernel rejects this frame only
+            outgoing_.drop();  // the kernel rejects this frame only
             Counting::add(counting_.dropped);
         }
     }
@@ -333,7 +333,7 @@ private:
     const Options options_;
     const link::Descriptor socket_;
     Counting counting_;
-    link::Ring<Frame> outgoing_;  // written and read by the sending thread
+    hal::Queue<Frame> outgoing_;  // written and read by the sending thread
     Description description_;
     std::mutex mutex_;  // setup and the monitor: filters_
     std::vector<can_filter> filters_;

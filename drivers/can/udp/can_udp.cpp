@@ -13,7 +13,7 @@
 
 #include "datagram.hpp"
 #include "link/filtering.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "link/system.hpp"
 
 namespace hal::can::canudp {
@@ -159,7 +159,7 @@ public:
             }
             counting_.state.store(State::active, std::memory_order_relaxed);
             for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
-            outgoing_.pop(static_cast<std::size_t>(sent));
+            outgoing_.drop(static_cast<std::size_t>(sent));
         }
     }
 
@@ -245,7 +245,7 @@ private:
 
     const Options options_;
     const link::Descriptor in_, out_;
-    link::Ring<Frame> outgoing_;  // written and read by the sending thread
+    hal::Queue<Frame> outgoing_;  // written and read by the sending thread
     sockaddr_storage self_{};
 
     Datagram out_buffers_[batch];                             // used by the sending thread

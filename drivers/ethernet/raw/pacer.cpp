@@ -29,7 +29,7 @@ bool SpinBudget::is_needed() {
 
 Pacer::Pacer(Sender& sender, const Options& options)
     : sender_(sender), spin_ns_(options.policy == Policy::block ? 0 : options.policy == Policy::spin ? INT64_MAX : options.spin_ns),
-      places_(link::Ring<std::uint32_t>(options.send_capacity).capacity()), unused_(options.send_capacity), outgoing_(options.send_capacity),
+      places_(hal::Queue<std::uint32_t>(options.send_capacity).capacity()), unused_(options.send_capacity), outgoing_(options.send_capacity),
 
       budget_(SpinBudget::is_needed()) {
     for (std::uint32_t i = 0; i < places_.size(); ++i) unused_.push(i);
@@ -73,7 +73,7 @@ Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std:
     const std::uint32_t* unused = unused_.front();
     if (unused == nullptr) return sender_.drop(Sent::full);
     const auto number = *unused;
-    unused_.pop();
+    unused_.drop();
     Place& place = places_[number];
     std::memcpy(place.bytes.data(), frame.data(), place.length = frame.size());
     place.launch = launch;
@@ -104,7 +104,7 @@ void Pacer::sleep(std::int64_t until_ns) noexcept {
 bool Pacer::collect() noexcept {
     const std::uint32_t* number = outgoing_.front();
     if (number == nullptr) return false;
-    for (; number != nullptr; outgoing_.pop(), number = outgoing_.front()) {
+    for (; number != nullptr; outgoing_.drop(), number = outgoing_.front()) {
         waiting_.push_back({places_[*number].launch.at_ns, sequence_++, *number});
         std::push_heap(waiting_.begin(), waiting_.end());
     }

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "sender.hpp"
 
 namespace hal::ethernet::rawether {
@@ -50,7 +50,7 @@ private:
     Sender& sender_;
     const std::int64_t spin_ns_;
     std::vector<Place> places_;
-    link::Ring<std::uint32_t> unused_, outgoing_;
+    hal::Queue<std::uint32_t> unused_, outgoing_;
     std::vector<Waiting> waiting_;  ///< a heap, the next to leave first; the pacer's
     std::uint64_t sequence_ = 0;
     SpinBudget budget_;

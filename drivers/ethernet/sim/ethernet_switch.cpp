@@ -28,7 +28,7 @@ unsigned type_of(const Bytes& b) { return static_cast<unsigned>(b[12] << 8U | b[
 }  // namespace
 
 User::User(const Options& o)
-    : places(link::Ring<std::uint32_t>(o.send_capacity).capacity()),
+    : places(hal::Queue<std::uint32_t>(o.send_capacity).capacity()),
       unused(o.send_capacity),
       outgoing(o.send_capacity),
       incoming(o.receive_capacity),
@@ -153,7 +153,7 @@ void Switch::collect(std::int64_t now) noexcept {
     if (now == unclocked) return;
     for (auto& s : stations)
         for (User* u : s->users)
-            for (const std::uint32_t* place = nullptr; (place = u->outgoing.front()) != nullptr; u->outgoing.pop()) {
+            for (const std::uint32_t* place = nullptr; (place = u->outgoing.front()) != nullptr; u->outgoing.drop()) {
                 auto& at = u->places[*place].at_ns;
                 if (at == unclocked) at = now - 1;  // sent before a time was known
                 u->waiting.push_back({at, u->sequence++, *place});
@@ -202,7 +202,7 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
         const std::uint32_t* unused = from->unused.front();
         if (unused == nullptr) return;
         place = *unused;
-        from->unused.pop();
+        from->unused.drop();
         Outgoing& f = from->places[place];
         std::memcpy(f.bytes.data(), s.babble.data(), f.length = s.babble_length);
         f.launch = {};

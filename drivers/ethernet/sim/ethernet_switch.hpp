@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 #include "link/segment.hpp"
 
 namespace hal::ethernet::simbus {
@@ -47,9 +47,9 @@ struct User {
     explicit User(const Options&);
 
     std::vector<Outgoing> places;
-    link::Ring<std::uint32_t> unused;    ///< writer: the pump, reader: the sending thread
-    link::Ring<std::uint32_t> outgoing;  ///< writer: the sending thread, reader: the pump
-    link::Ring<Incoming> incoming;       ///< writer: the pump, reader: the receiving thread
+    hal::Queue<std::uint32_t> unused;    ///< writer: the pump, reader: the sending thread
+    hal::Queue<std::uint32_t> outgoing;  ///< writer: the sending thread, reader: the pump
+    hal::Queue<Incoming> incoming;       ///< writer: the pump, reader: the receiving thread
     struct Waiting {
         std::int64_t at_ns;
         std::uint64_t sequence;

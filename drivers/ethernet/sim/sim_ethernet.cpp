@@ -34,7 +34,7 @@ public:
         const std::uint32_t* unused = user_.unused.front();
         if (unused == nullptr) return count(user_.dropped), Sent::full;
         const auto place = *unused;
-        user_.unused.pop();
+        user_.unused.drop();
         Outgoing& f = user_.places[place];
         std::memcpy(f.bytes.data(), frame.data(), frame.size());
         if (launch.finisher != nullptr) launch.finisher->leaves({f.bytes.data(), frame.size()});  // frames of a station leave in order
@@ -47,7 +47,7 @@ public:
     }
 
     std::optional<Arrival> receive(std::int64_t now_ns) noexcept override {
-        if (held_) user_.incoming.pop(), held_ = false;
+        if (held_) user_.incoming.drop(), held_ = false;
         switch_->pump(now_ns);
         const Incoming* next = user_.incoming.front();
         if (next == nullptr || next->time_ns > switch_->time(now_ns)) return std::nullopt;

@@ -10,6 +10,7 @@
 #include <time.h>
 
 #include "hal/background.h"
+#include "hal/clock.hpp"
 #include "hal/component.hpp"
 
 namespace hal {
@@ -33,7 +34,7 @@ public:
         }
         ended_.store(false);
         thread_ = std::thread([this] {
-            while (!ended_.load()) turn_(now(), true);
+            while (!ended_.load()) turn_(monotonic_ns(), true);
         });
     }
     /// Call it in stop(). No turn is running when it returns. [setup]
@@ -45,11 +46,6 @@ public:
     }
 
 private:
-    static std::int64_t now() noexcept {
-        timespec t;
-        clock_gettime(CLOCK_MONOTONIC, &t);
-        return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
-    }
     const std::function<void(std::int64_t, bool)> turn_;
     const hal_background*                         host_ = nullptr;
     bool                                          attached_ = false;

@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "hal/clock.hpp"
+
 namespace hal {
 
 /// The first message about a subject is printed at once. Those that follow within a second are counted, and flush() prints the newest of
@@ -78,11 +80,6 @@ public:
             text += '#';
         }
         return text;
-    }
-    static std::int64_t monotonic_ns() noexcept {
-        timespec t;
-        clock_gettime(CLOCK_MONOTONIC, &t);
-        return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
     }
 
 private:

@@ -13,10 +13,10 @@ namespace hal {
 
 /// A first-in first-out queue. `T` must be trivially copyable.
 ///
-/// `head_` counts what was put in, `tail_` what was taken out, both for ever; index = count & mask.
+/// `head_` counts the items written, `tail_` those read, without wrapping; index = count & mask.
 ///   1. writer stores the item at head      2. writer publishes head + 1 (release)
 ///   3. reader sees head (acquire), copies   4. reader publishes tail + 1 (release)
-/// The writer reuses a place only after 4, the reader reads it only after 2.
+/// The writer reuses an entry only after 4, the reader accesses it only after 2.
 template <class T>
 class Queue {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -26,7 +26,7 @@ public:
     explicit Queue(std::size_t capacity)
         : mask_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity) - 1), items_(std::make_unique<T[]>(mask_ + 1)) {}
 
-    /// False, and nothing done, when full. [realtime] writer
+    /// Adds an item. Returns false when full. [realtime] writer
     bool push(const T& item) noexcept {
         const auto head = head_.load(std::memory_order_relaxed);
         if (head - tail_.load(std::memory_order_acquire) > mask_) return false;
@@ -42,7 +42,7 @@ public:
         head_.store(head + count, std::memory_order_release);
         return true;
     }
-    /// False when empty. [realtime] reader
+    /// Removes the oldest item. Returns false when empty. [realtime] reader
     bool pop(T& item) noexcept {
         const auto tail = tail_.load(std::memory_order_relaxed);
         if (tail == head_.load(std::memory_order_acquire)) return false;
@@ -50,8 +50,28 @@ public:
         tail_.store(tail + 1, std::memory_order_release);
         return true;
     }
-    /// Items waiting, as either side sees it. [any]
-    std::size_t size() const noexcept { return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_acquire); }
+    /// Returns the entry of the next item, to be filled and then added by commit(), or nullptr when full: saves copying a large, mostly
+    /// empty item. [realtime] writer
+    T* place() noexcept {
+        const auto head = head_.load(std::memory_order_relaxed);
+        return head - tail_.load(std::memory_order_acquire) > mask_ ? nullptr : &items_[head & mask_];
+    }
+    /// Adds the item filled in place(). [realtime] writer
+    void commit() noexcept { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+    /// Returns the oldest item, valid until it is dropped, or nullptr. [realtime] reader
+    T* front() noexcept { return at(0); }
+    /// Returns the item `n` after the oldest, or nullptr. [realtime] reader
+    T* at(std::size_t n) noexcept {
+        const auto tail = tail_.load(std::memory_order_relaxed);
+        return head_.load(std::memory_order_acquire) - tail > n ? &items_[(tail + n) & mask_] : nullptr;
+    }
+    /// Removes the oldest `count` items, which must exist. [realtime] reader
+    void drop(std::size_t count = 1) noexcept { tail_.store(tail_.load(std::memory_order_relaxed) + count, std::memory_order_release); }
+    /// Returns the number of waiting items, as seen by either side. [any]
+    std::size_t size() const noexcept {
+        const auto tail = tail_.load(std::memory_order_acquire);  // read first, or the reader could overtake the head that was read
+        return head_.load(std::memory_order_acquire) - tail;
+    }
     std::size_t capacity() const noexcept { return mask_ + 1; }
 
 private:

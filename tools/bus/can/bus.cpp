@@ -12,12 +12,6 @@
 
 namespace hal::tools {
 
-std::int64_t now_ns() {
-    timespec t{};
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
-}
-
 std::string out_of_reach(const can::Description& bus) {
     if (!bus.simulated || bus.transport == "capture") return {};
     return fmt::format(
@@ -80,12 +74,12 @@ void Bus::announce(const Options& options) const {
 void listen(Bus& bus, std::int64_t for_ns, const std::function<bool(std::span<const can::Frame>)>& take, std::int64_t slice_ns,
             const std::function<void()>& idle) {
     std::vector<can::Frame> room(256);
-    const std::int64_t end = for_ns >= 0 ? now_ns() + for_ns : INT64_MAX;
+    const std::int64_t end = for_ns >= 0 ? monotonic_ns() + for_ns : INT64_MAX;
     for (;;) {
         const std::size_t count = bus.link->receive(room, can::unclocked);
         if (count > 0 && !take(std::span(room).first(count))) return;
         if (idle) idle();
-        const std::int64_t now = now_ns();
+        const std::int64_t now = monotonic_ns();
         if (now >= end || bus.stop.requested()) return;
         if (count > 0) continue;
         if (bus.is_capture() && bus.link->state() == can::State::down) return;

@@ -12,6 +12,7 @@
 
 #include "cli/options.hpp"
 #include "cli/signals.hpp"
+#include "hal/clock.hpp"
 #include "link/can.hpp"
 
 namespace hal::tools {
@@ -50,7 +51,6 @@ std::string id_text(const can::Frame&);
 /// Returns the bytes, or `remote request, 4 bytes`.
 std::string data_text(const can::Frame&, const char* separator);
 
-std::int64_t now_ns();
 /// Returns why another process cannot open this bus (it is in memory) and what to type instead; empty: it can.
 std::string out_of_reach(const can::Description&);
 

@@ -83,7 +83,7 @@ bool SdoAxis::look() {
     const State state = state_of(feedback_.statusword);
     if ((state == State::fault || state == State::fault_reaction_active) && read(object::error_code, 0, value, false, &missing))
         feedback_.error_code = static_cast<std::uint16_t>(value);
-    const std::int64_t now = now_ns();
+    const std::int64_t now = monotonic_ns();
     if (feedback_.position != rest_position_ || rest_since_ == 0) rest_since_ = now;
     rest_position_ = feedback_.position;
     return true;
@@ -111,7 +111,7 @@ bool SdoAxis::adopt() {
 
 bool SdoAxis::cycle() {
     if (!look()) return false;
-    return tell(machine_.step(feedback_, command_, rules, now_ns()));
+    return tell(machine_.step(feedback_, command_, rules, monotonic_ns()));
 }
 
 /// Writes changed values; the controlword last, because it activates the others.
@@ -133,19 +133,19 @@ bool SdoAxis::tell(const AxisOrders& orders) {
     return put(told_.controlword, orders.controlword, object::controlword);
 }
 
-bool SdoAxis::standing() { return now_ns() - rest_since_ >= rest_ns; }
+bool SdoAxis::standing() { return monotonic_ns() - rest_since_ >= rest_ns; }
 
 /// Returns true when the axis has stalled before its target.
 bool SdoAxis::arrived() {
-    if (now_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
+    if (monotonic_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
     return refuse(
         fmt::format("drive stopped at {:.10g} without reporting target reached (statusword 0x{:04X})", position(), feedback_.statusword));
 }
 
 /// Reports why the state machine gave up; it has already disabled the axis.
 bool SdoAxis::report() {
-    const std::int64_t end = now_ns() + rules.limits.stop + rules.limits.step;
-    while (machine_.walking() && now_ns() < end && cycle()) {}
+    const std::int64_t end = monotonic_ns() + rules.limits.stop + rules.limits.step;
+    while (machine_.walking() && monotonic_ns() < end && cycle()) {}
     const Failure& failure = machine_.failure();
     std::string why = text(failure);
     if (failure.cause == Cause::not_enabled) why += fmt::format("; type: {} on", letter());
@@ -155,7 +155,7 @@ bool SdoAxis::report() {
 
 /// Runs cycles until `ready`; `still` reports when that is no longer possible.
 bool SdoAxis::until(const Ready& ready, bool (SdoAxis::*still)()) {
-    moved_at_ = now_ns();
+    moved_at_ = monotonic_ns();
     for (;;) {
         if (!cycle()) return false;
         if (machine_.failure()) return report();
@@ -169,7 +169,7 @@ bool SdoAxis::until(const Ready& ready, bool (SdoAxis::*still)()) {
             const bool stopped = machine_.enabled() && stop();
             return refuse(stopped ? "interrupted; axis stopped" : "interrupted");
         }
-        if (now_ns() >= deadline_) return overdue();
+        if (monotonic_ns() >= deadline_) return overdue();
         station_.until([&] { return is_interrupted(); }, pause_ns);
     }
 }
@@ -312,8 +312,8 @@ bool SdoAxis::set_mode(Mode mode) {
     if (!adopt()) return false;
     command_.velocity = command_.torque = 0.0;
     command_.mode = mode;
-    const std::int64_t end = now_ns() + rules.limits.step;
-    return until([&] { return feedback_.mode == mode || !feedback_.has_mode || now_ns() >= end; }) &&
+    const std::int64_t end = monotonic_ns() + rules.limits.step;
+    return until([&] { return feedback_.mode == mode || !feedback_.has_mode || monotonic_ns() >= end; }) &&
            (feedback_.mode == mode || !feedback_.has_mode ||
             refuse(fmt::format("drive does not accept mode {}, displays {}", abbreviation(mode), abbreviation(feedback_.mode))));
 }

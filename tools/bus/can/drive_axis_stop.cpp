@@ -9,7 +9,7 @@ namespace hal::tools {
 
 using namespace canopen::cia402;
 
-void SdoAxis::allow(std::int64_t ns) { allowed_ = ns, deadline_ = now_ns() + ns, in_motion_ = false; }
+void SdoAxis::allow(std::int64_t ns) { allowed_ = ns, deadline_ = monotonic_ns() + ns, in_motion_ = false; }
 
 /// Handles a timeout: stops what the command started.
 bool SdoAxis::overdue() {
@@ -33,7 +33,7 @@ bool SdoAxis::stop() {
     if (state_of(feedback_.statusword) != State::operation_enabled) return true;
     command_.enable = command_.halt = true, command_.home = command_.go = false;
     in_motion_ = false;
-    rest_since_ = now_ns();
+    rest_since_ = monotonic_ns();
     if (!until([&] { return standing(); })) return false;
     command_.velocity = command_.torque = 0.0;
     if (command_.mode == Mode::profile_position && machine_.active()) {
@@ -76,8 +76,8 @@ bool SdoAxis::secure(std::string& what) {
     const bool had_torque = has_torque();
     if (had_torque) {
         if (!write(object::controlword, 0, command::quick_stop, 2)) return false;
-        rest_since_ = now_ns();
-        for (const std::int64_t end = now_ns() + rules.limits.stop; has_torque() && now_ns() < end;) {
+        rest_since_ = monotonic_ns();
+        for (const std::int64_t end = monotonic_ns() + rules.limits.stop; has_torque() && monotonic_ns() < end;) {
             station_.until([] { return false; }, pause_ns);
             if (!look()) return false;
             state = state_of(feedback_.statusword);

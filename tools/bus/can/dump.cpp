@@ -83,7 +83,7 @@ std::int64_t shift_to_wall(const can::Link& link, const can::Frame& first) {
     }
     timespec real{};
     clock_gettime(CLOCK_REALTIME, &real);
-    return real.tv_sec * 1'000'000'000LL + real.tv_nsec - now_ns();
+    return real.tv_sec * 1'000'000'000LL + real.tv_nsec - monotonic_ns();
 }
 
 struct Heard {
@@ -93,7 +93,7 @@ struct Heard {
 
 /// Like `listen` for several buses: batches in the order of their times.
 void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns, const std::function<bool(std::span<const Heard>)>& take) {
-    const std::int64_t end = for_ns >= 0 ? now_ns() + for_ns : INT64_MAX;
+    const std::int64_t end = for_ns >= 0 ? monotonic_ns() + for_ns : INT64_MAX;
     std::vector<Heard> batch;
     std::vector<pollfd> descriptors{{bus.stop.fd(), POLLIN, 0}};
     bool polled = true;
@@ -111,7 +111,7 @@ void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns, 
         }
         std::stable_sort(batch.begin(), batch.end(), [](const Heard& a, const Heard& b) { return a.frame->time_ns < b.frame->time_ns; });
         if (!batch.empty() && !take(batch)) return;
-        const std::int64_t now = now_ns();
+        const std::int64_t now = monotonic_ns();
         if (now >= end || bus.stop.requested() || over) return;
         if (batch.empty()) ::poll(descriptors.data(), descriptors.size(), polled ? 20 : 1);
     }
@@ -155,7 +155,7 @@ int run_can_dump(const DumpOptions& options) {
     }
     std::uint64_t frames = 0;
     std::int64_t before = 0;
-    const std::int64_t began = now_ns();
+    const std::int64_t began = monotonic_ns();
     bool written = true;
     listen_to_all(bus, sources, options.for_ns, [&](std::span<const Heard> batch) {
         std::string text;
@@ -177,7 +177,7 @@ int run_can_dump(const DumpOptions& options) {
         return written && (options.count == 0 || frames < options.count);
     });
     if (!written) return 1;
-    const double seconds = static_cast<double>(now_ns() - began) / 1e9;
+    const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
     for (const Source& source : sources)
         if (!report(options, source, seconds)) return 1;
     return 0;

@@ -73,7 +73,7 @@ private:
     }
     /// Waits until 1F57h reports the flash ready. `allowed`: the error code that belongs to this step; any_error: ignores a stale one.
     bool settle(const char* step, std::uint32_t allowed) {
-        for (const std::int64_t end = now_ns() + patience; now_ns() < end && !station_.bus.stop.requested();) {
+        for (const std::int64_t end = monotonic_ns() + patience; monotonic_ns() < end && !station_.bus.stop.requested();) {
             std::uint32_t status = 0;
             switch (read(0x1f57, status)) {
             case Answer::refused: return true;  // an optional object: only the responses to the commands are known
@@ -92,7 +92,7 @@ private:
     }
     int look() {
         std::uint32_t running = 0, id = 0;
-        for (const std::int64_t end = now_ns() + patience; now_ns() < end && !station_.bus.stop.requested();) {
+        for (const std::int64_t end = monotonic_ns() + patience; monotonic_ns() < end && !station_.bus.stop.requested();) {
             station_.until([] { return false; }, between_looks);
             if (read(0x1f51, running) != Answer::value) continue;  // starting
             if ((running & 0xff) != start_program)

@@ -116,13 +116,13 @@ public:
         std::string settings, problem;
         if (!options_.state.empty() && ::access(options_.state.c_str(), F_OK) == 0) {
             if (!read_file(options_.state, settings)) return fail(options_, fmt::format("cannot read '{}': {}", options_.state, settings));
-            gateway_.configure(settings, now_ns());
+            gateway_.configure(settings, monotonic_ns());
         }
         while (!stop_.requested()) {
             wait(listener);
             carry();
             serve(listener);
-            gateway_.poll(now_ns());
+            gateway_.poll(monotonic_ns());
             carry();
             std::erase_if(connections_, [this](const Connection& c) { return !flush(c); });
         }
@@ -153,7 +153,7 @@ private:
             canopen::FrameQueue& out = gateway_.out(net);
             for (std::size_t count; (count = link.receive(room_, can::unclocked)) > 0;)
                 for (std::size_t n = 0; n < count; ++n)
-                    if (!room_[n].own) gateway_.handle(net, room_[n], now_ns());
+                    if (!room_[n].own) gateway_.handle(net, room_[n], monotonic_ns());
             for (const can::Frame* f; (f = out.front()) != nullptr && link.send(*f, can::unclocked) == can::Sent::queued;) out.drop();
             link.flush(can::unclocked);
         }
@@ -167,7 +167,7 @@ private:
         char bytes[65536];
         std::erase_if(connections_, [&](const Connection& c) {
             const ssize_t got = ::recv(c.fd, bytes, sizeof bytes, 0);
-            if (got > 0) gateway_.receive(c.client, {bytes, static_cast<std::size_t>(got)}, now_ns());
+            if (got > 0) gateway_.receive(c.client, {bytes, static_cast<std::size_t>(got)}, monotonic_ns());
             return (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) && end(c);
         });
     }

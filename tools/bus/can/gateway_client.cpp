@@ -191,7 +191,7 @@ private:
             if (now < 0) return lost();
             sent += static_cast<std::size_t>(now);
         }
-        for (const std::int64_t end = now_ns() + limit; now_ns() < end;) {
+        for (const std::int64_t end = monotonic_ns() + limit; monotonic_ns() < end;) {
             if (stop_.requested()) return fail(options_, fmt::format("interrupted while waiting for the response to '{}'", text)), false;
             if (!readable(100)) continue;
             if (take(number, answer)) return true;

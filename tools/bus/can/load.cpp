@@ -34,7 +34,7 @@ int run_can_load(const BusLoadOptions& options) {
     constexpr std::int64_t window_ns = 100'000'000;
     std::map<std::pair<bool, std::uint32_t>, Share> shares;
     std::map<std::int64_t, std::int64_t> windows;
-    const std::int64_t began = now_ns();
+    const std::int64_t began = monotonic_ns();
     listen(bus, options.for_ns >= 0 ? options.for_ns : 2'000'000'000, [&](std::span<const can::Frame> batch) {
         for (const can::Frame& f : batch) {
             if (f.error) continue;
@@ -49,7 +49,7 @@ int run_can_load(const BusLoadOptions& options) {
         }
         return true;
     });
-    const double seconds = static_cast<double>(now_ns() - began) / 1e9;
+    const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
     std::vector<const Share*> rows;
     Share all;
     for (const auto& [key, share] : shares) {

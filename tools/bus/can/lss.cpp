@@ -78,14 +78,14 @@ int switch_all(Lss& l) {
 int select(Lss& l) {
     Identity id{};
     if (!l.identity(0, id)) return 1;
-    l.station.lss.select(id, now_ns());
+    l.station.lss.select(id, monotonic_ns());
     return l.wait() ? 0 : l.silent("check the four numbers vendor, product, revision and serial on the label of the device or with hal can scan");
 }
 
 int inquire(Lss& l) {
     Identity id{};
     for (unsigned part = 0; part < 5; ++part) {
-        l.station.lss.inquire(part, now_ns());
+        l.station.lss.inquire(part, monotonic_ns());
         if (!l.wait()) return l.silent("one slave must be in the configuration state: see switch and select in: hal help can lss");
         if (part < 4) id[part] = l.station.lss.result().value;
     }
@@ -97,7 +97,7 @@ int node_id(Lss& l) {
     std::uint32_t id = canopen::unconfigured;
     if (l.arguments[0] != "none" && (!l.number(0, "node ID", 255, id) || (id != canopen::unconfigured && (id < 1 || id > 127))))
         return id > 127 ? fail(l.options, fmt::format("invalid node ID '{}'; write 1..127, or none", l.arguments[0])) : 1;
-    l.station.lss.configure_node_id(static_cast<std::uint8_t>(id), now_ns());
+    l.station.lss.configure_node_id(static_cast<std::uint8_t>(id), monotonic_ns());
     return l.configured("node ID out of range");
 }
 
@@ -113,7 +113,7 @@ int bit_rate(Lss& l) {
     if (index == 255)
         return fail(l.options,
                     fmt::format("invalid bit rate '{}'; write 1M, 800k, 500k, 250k, 125k, 50k, 20k or 10k", l.arguments[0]));
-    l.station.lss.configure_bit_timing(index, now_ns());
+    l.station.lss.configure_bit_timing(index, monotonic_ns());
     return l.configured("unsupported bit rate");
 }
 
@@ -127,19 +127,19 @@ int activate(Lss& l) {
 }
 
 int store(Lss& l) {
-    l.station.lss.store_configuration(now_ns());
+    l.station.lss.store_configuration(monotonic_ns());
     return l.configured("storing is unsupported");
 }
 
 int fastscan(Lss& l) {
-    l.station.lss.scan(now_ns());
+    l.station.lss.scan(monotonic_ns());
     if (!l.wait()) return l.silent("a scan finds unconfigured slaves in the waiting state only");
     return print(text_of(l.station.lss.result().identity, ", now in the configuration state")) ? 0 : 1;
 }
 
 int identify(Lss& l) {
     if (l.arguments.empty()) {
-        l.station.lss.identify_unconfigured(now_ns());
+        l.station.lss.identify_unconfigured(monotonic_ns());
         return l.wait() ? print("at least one unconfigured slave\n") ? 0 : 1
                         : l.silent("no unconfigured slave that supports LSS");
     }
@@ -158,7 +158,7 @@ int identify(Lss& l) {
             return 1;
         high = {low[0], low[1], revision, serial};
     }
-    l.station.lss.identify(low, high, now_ns());
+    l.station.lss.identify(low, high, monotonic_ns());
     return l.wait() ? print("slave identified\n") ? 0 : 1 : l.silent("no slave of this identity that supports LSS");
 }
 

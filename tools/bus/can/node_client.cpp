@@ -31,9 +31,9 @@ NodeClient::NodeClient(const Options& options, std::int64_t timeout_ns)
 bool NodeClient::open(const std::string& address) { return bus.open(options_, address, false); }
 
 bool NodeClient::turn(std::int64_t wait_ns) {
-    if (on_turn) on_turn(now_ns());
-    network.poll(now_ns());
-    lss.poll(now_ns());
+    if (on_turn) on_turn(monotonic_ns());
+    network.poll(monotonic_ns());
+    lss.poll(monotonic_ns());
     for (const can::Frame* f; (f = out.front()) != nullptr && bus.link->send(*f, can::unclocked) == can::Sent::queued;) out.drop();
     bus.link->flush(can::unclocked);
     std::size_t count = bus.link->receive(room_, can::unclocked);
@@ -44,17 +44,17 @@ bool NodeClient::turn(std::int64_t wait_ns) {
     for (std::size_t n = 0; n < count; ++n) {
         const can::Frame& f = room_[n];
         if (f.own || f.error) continue;
-        if (lss.listens_to(f)) lss.handle(f, now_ns());
-        else network.handle(f, now_ns());
+        if (lss.listens_to(f)) lss.handle(f, monotonic_ns());
+        else network.handle(f, monotonic_ns());
         if (on_frame) on_frame(f);
     }
     return outlasts_stop || !bus.stop.requested();
 }
 
 bool NodeClient::until(const std::function<bool()>& done, std::int64_t for_ns) {
-    const std::int64_t began = now_ns();
+    const std::int64_t began = monotonic_ns();
     while (!done())
-        if (!turn() || (for_ns >= 0 && now_ns() - began >= for_ns)) return done();
+        if (!turn() || (for_ns >= 0 && monotonic_ns() - began >= for_ns)) return done();
     return true;
 }
 

@@ -109,13 +109,13 @@ int run_can_nodes(const NodesOptions& options) {
     bool written = true;
     // A live list runs until Ctrl-C; a table takes as long as the slowest usual heartbeat.
     const std::int64_t for_ns = options.for_ns >= 0 || live ? options.for_ns : 2'000'000'000;
-    const auto now = [&] { return bus.is_capture() ? newest : now_ns(); };
+    const auto now = [&] { return bus.is_capture() ? newest : monotonic_ns(); };
     listen(bus, for_ns, [&](std::span<const can::Frame> batch) {
         for (const can::Frame& f : batch) take(nodes, f), newest = std::max(newest, f.time_ns);
         return written;
     }, redraw_ns, [&] {
-        if (!live || now_ns() - drawn < redraw_ns) return;
-        drawn = now_ns();
+        if (!live || monotonic_ns() - drawn < redraw_ns) return;
+        drawn = monotonic_ns();
         written = print("\x1b[H\x1b[J" + table(nodes, drawn) + (nodes.empty() ? "no node received yet\n" : ""));
         if (!written) bus.stop.request();
     });

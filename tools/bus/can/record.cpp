@@ -30,7 +30,7 @@ int run_can_record(const CanRecordOptions& options) {
     bus.announce(options);
     timespec real{};
     clock_gettime(CLOCK_REALTIME, &real);
-    const std::int64_t shift = real.tv_sec * 1'000'000'000LL + real.tv_nsec - now_ns();  // files have the time of day
+    const std::int64_t shift = real.tv_sec * 1'000'000'000LL + real.tv_nsec - monotonic_ns();  // files have the time of day
     std::uint64_t frames = 0;
     bool written = true;
     listen(bus, options.for_ns, [&](std::span<const can::Frame> batch) {
@@ -60,7 +60,7 @@ int run_can_replay(const CanReplayOptions& options) {
     Bus bus;
     if (!bus.open(options, options.words[1], fd)) return 1;
     if (bus.is_capture()) return fail(options, fmt::format("cannot send to '{}': it is a capture", options.words[1]));
-    const std::int64_t began = now_ns(), zero = capture.frames.front().time_ns;
+    const std::int64_t began = monotonic_ns(), zero = capture.frames.front().time_ns;
     std::uint64_t sent = 0, skipped = 0;
     for (const can::Frame& f : capture.frames) {
         if (f.error) {
@@ -68,7 +68,7 @@ int run_can_replay(const CanReplayOptions& options) {
             continue;
         }
         const double after = static_cast<double>(f.time_ns - zero) / options.speed;
-        const std::int64_t left = began + static_cast<std::int64_t>(after < 9e17 ? after : 9e17) - now_ns();
+        const std::int64_t left = began + static_cast<std::int64_t>(after < 9e17 ? after : 9e17) - monotonic_ns();
         if (left > 0) bus.link->flush(can::unclocked);
         if (left > 0 ? bus.stop.wait_ns(left) : bus.stop.requested()) break;
         send_with_timeout(bus, f);
@@ -77,7 +77,7 @@ int run_can_replay(const CanReplayOptions& options) {
     const int status = finish_sending(bus, options, sent);
     if (status == 0)
         write_all(STDERR_FILENO,
-                  fmt::format("{} frame{} in {:.2f} s{}\n", sent, sent == 1 ? "" : "s", static_cast<double>(now_ns() - began) / 1e9,
+                  fmt::format("{} frame{} in {:.2f} s{}\n", sent, sent == 1 ? "" : "s", static_cast<double>(monotonic_ns() - began) / 1e9,
                               skipped ? fmt::format(", {} error frames skipped", skipped) : ""));
     return status;
 }

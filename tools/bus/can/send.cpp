@@ -29,7 +29,7 @@ int run_can_send(const SendOptions& options) {
     Bus bus;
     if (!bus.open(options, options.words[0], fd)) return 1;
     std::uint64_t rounds = 0, wanted = 0;
-    const std::int64_t began = now_ns();
+    const std::int64_t began = monotonic_ns();
     for (std::int64_t due = began;;) {
         for (const can::Frame& f : frames) {
             send_with_timeout(bus, f);
@@ -39,10 +39,10 @@ int run_can_send(const SendOptions& options) {
         ++rounds;
         due += options.every_ns;
         if (options.every_ns == 0 || rounds == options.count || (options.for_ns >= 0 && due - began >= options.for_ns)) break;
-        const std::int64_t left = due - now_ns();
+        const std::int64_t left = due - monotonic_ns();
         if (left > 0 ? bus.stop.wait_ns(left) : bus.stop.requested()) break;
     }
-    const double seconds = static_cast<double>(now_ns() - began) / 1e9;
+    const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
     const int status = finish_sending(bus, options, wanted);
     if (status == 0 && options.every_ns != 0)
         write_all(STDERR_FILENO, fmt::format("{} frame{} in {:.2f} s\n", wanted, wanted == 1 ? "" : "s", seconds));

@@ -76,8 +76,8 @@ int run_can_sniff(const SniffOptions& options) {
         }
         return written;
     }, redraw_ns, [&] {
-        if (!live || now_ns() - drawn < redraw_ns) return;
-        drawn = now_ns();
+        if (!live || monotonic_ns() - drawn < redraw_ns) return;
+        drawn = monotonic_ns();
         written = print("\x1b[H\x1b[J" + table(rows, drawn, colours(STDOUT_FILENO)));
         if (!written) bus.stop.request();
     });

@@ -24,7 +24,7 @@ constexpr std::uint32_t no_reaction = 0, quick_stop = 3;  // 6007h
 }  // namespace
 
 Supervision::Supervision(const Options& options, NodeClient& station, std::uint8_t node, const SupervisionSettings& settings)
-    : options_(options), station_(station), node_(node), settings_(settings), began_(now_ns()) {
+    : options_(options), station_(station), node_(node), settings_(settings), began_(monotonic_ns()) {
     station_.on_frame = [this](const can::Frame& f) {
         if (f.extended || f.remote || f.length < 1 || f.id <= 0x700 || f.id >= 0x780) return;
         heard_[f.id & 0x7f] = true;
@@ -98,7 +98,7 @@ bool Supervision::by_heartbeat(std::string& why_not) {
     if (there == Read::failed) return false;
     count &= 0xff;
     if (there == Read::missing || count == 0) return why_not = "it has no heartbeat consumer, 1016h", true;
-    station_.until([] { return false; }, std::max<std::int64_t>(began_ + listening_ns - now_ns(), 0));  // receive other heartbeats
+    station_.until([] { return false; }, std::max<std::int64_t>(began_ + listening_ns - monotonic_ns(), 0));  // receive other heartbeats
     std::vector<std::uint32_t> entries(count + 1);
     for (unsigned sub = 1; sub <= count; ++sub)
         if (read(0x1016, static_cast<std::uint8_t>(sub), entries[sub]) == Read::failed) return false;
@@ -151,7 +151,7 @@ bool Supervision::by_guarding(std::string& why_not) {
         !change(0x100d, 0, 1, factor & 0xff, heartbeats_per_timeout, failed))
         return why_not = "it rejects life guarding, 100Ch and 100Dh", !failed;
     way_ = Way::guarding;
-    station_.network.add(node_).guard(period, heartbeats_per_timeout, now_ns());
+    station_.network.add(node_).guard(period, heartbeats_per_timeout, monotonic_ns());
     station_.turn(0);
     return true;
 }
@@ -193,7 +193,7 @@ bool Supervision::release() {
     bool failed = false;
     for (auto c = changed_.rbegin(); c != changed_.rend() && !failed; ++c) write(c->index, c->sub, c->bytes, c->was, failed);
     changed_.clear();
-    if (way_ == Way::guarding) station_.network.add(node_).guard(0, 0, now_ns());
+    if (way_ == Way::guarding) station_.network.add(node_).guard(0, 0, monotonic_ns());
     way_ = Way::none;
     tried_ = false, axes_done_ = 0;
     return !failed;

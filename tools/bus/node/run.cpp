@@ -165,8 +165,8 @@ int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::
     how.receive_capacity = 16384;
     std::string link = options.link;
     std::unique_ptr<TdmaStation> station;
-    const std::int64_t give_up = options.for_ns >= 0 ? now_ns() + options.for_ns : INT64_MAX;
-    const auto ended = [&] { return stop.wait_ns(5'000'000) || now_ns() >= give_up; };
+    const std::int64_t give_up = options.for_ns >= 0 ? monotonic_ns() + options.for_ns : INT64_MAX;
+    const auto ended = [&] { return stop.wait_ns(5'000'000) || monotonic_ns() >= give_up; };
     if (!options.tdma.empty()) {
         const std::string problem = TdmaStation::make(options, link, ended, station);
         if (!problem.empty()) return fail(options, problem);
@@ -180,7 +180,7 @@ int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::
 
     const std::string who = id == canopen::unconfigured ? "without node ID" : fmt::format("node {}", id);
     if (!print(fmt::format("{}, {} on {} ({}): {}; press Ctrl-C to end\n", kind.name, who, about.address, about.transport, kind.what))) return 1;
-    const std::int64_t began = now_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
+    const std::int64_t began = monotonic_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
     std::optional<BackgroundWriter> writer;
     if (station) writer.emplace();
     Reporter reporter(node, program, began, [&](const std::string& text) { return writer ? writer->write(text) : print(text); });
@@ -197,7 +197,7 @@ int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::
         station->run([&](std::int64_t local, bool) {
             change_world(now);
             node.turn(local, can::unclocked);
-            now = now_ns();
+            now = monotonic_ns();
             return !stop.requested() && now < end && (is_read = look(now));
         });
         writer.reset();
@@ -209,7 +209,7 @@ int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::
             is_read = look(now);
             if (!is_read) break;
             node.link().wait(1'000'000);
-            now = now_ns();
+            now = monotonic_ns();
         }
     }
     if (!problem.empty()) return fail(options, problem);

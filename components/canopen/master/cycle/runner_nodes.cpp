@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Opens and closes the process data of nodes, detects foreign senders, and serves the boot in slow threads.
 #include <algorithm>
-#include <time.h>
 #include <utility>
 
+#include "hal/clock.hpp"
 #include "runner.hpp"
 
 namespace hal::canopen {
@@ -61,14 +61,9 @@ void Runner::serve_boot(Time now, Time period) noexcept {
     if (period < slow || !active() || network.state != NetworkState::booting || network.booting == 0 || vain_waits_ >= most_vain_waits ||
         link_->description().simulated)
         return;
-    const auto clock = []() noexcept {
-        timespec t{};
-        clock_gettime(CLOCK_MONOTONIC, &t);
-        return Time{t.tv_sec} * second + t.tv_nsec;
-    };
-    const Time begun = clock();
+    const Time begun = monotonic_ns();
     bool       any = false;
-    for (Time at = begun, heard = begun; at - begun < period / 4 && at - heard < longest_wait; at = clock()) {
+    for (Time at = begun, heard = begun; at - begun < period / 4 && at - heard < longest_wait; at = monotonic_ns()) {
         const Time then = now + (at - begun);
         if (take_frames(then) == 0) continue;
         any = true, heard = at;

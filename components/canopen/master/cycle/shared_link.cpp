@@ -112,7 +112,7 @@ std::size_t SharedLink::receive(std::span<can::Frame> room, std::int64_t now_ns)
     if (bus_->count == 1 && incoming_.front() == nullptr) return bus_->link->receive(room, now_ns);
     for (can::Frame frame; bus_->link->receive(std::span(&frame, 1), now_ns) == 1;) bus_->deliver(frame, nullptr);
     std::size_t taken = 0;
-    for (const can::Frame* f; taken < room.size() && (f = incoming_.front()) != nullptr; incoming_.pop()) room[taken++] = *f;
+    for (const can::Frame* f; taken < room.size() && (f = incoming_.front()) != nullptr; incoming_.drop()) room[taken++] = *f;
     return taken;
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "link/can.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 
 namespace hal::canopen {
 
@@ -44,7 +44,7 @@ private:
     explicit SharedLink(std::shared_ptr<SharedBus>);
 
     const std::shared_ptr<SharedBus> bus_;
-    link::Ring<can::Frame> incoming_{2048};  // pushed and popped by the holder of the bus
+    hal::Queue<can::Frame> incoming_{2048};  // pushed and popped by the holder of the bus
 };
 
 }  // namespace hal::canopen

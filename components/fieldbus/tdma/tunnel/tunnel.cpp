@@ -60,10 +60,10 @@ void Tunnel::before_slots(Time now) noexcept {
     mtu_.store(tunnel_mtu(station_.setup()), std::memory_order_relaxed);
     // Called once a cycle while the station is running.
     if (now - last_ > 2 * station_.setup().cycle)
-        for (; out_.front() != nullptr; out_.pop()) count(dropped_old_);
+        for (; out_.front() != nullptr; out_.drop()) count(dropped_old_);
     last_ = now;
     if (mtu() == 0) return;
-    for (const Packet* p = nullptr; (p = out_.front()) != nullptr; out_.pop()) {
+    for (const Packet* p = nullptr; (p = out_.front()) != nullptr; out_.drop()) {
         const auto sent = station_.send({p->bytes.data(), p->length}, tunnel_slot, last_priority);
         if (sent == ethernet::Sent::full) break;  // until the next turn
         count(sent == ethernet::Sent::queued ? sent_ : dropped_old_);
@@ -85,7 +85,7 @@ std::size_t Tunnel::take(std::span<std::uint8_t> out) noexcept {
     const Packet* p = in_.front();
     if (p == nullptr) return 0;
     const std::size_t length = untunnel({p->bytes.data(), p->length}, out);
-    in_.pop();
+    in_.drop();
     return length;
 }
 

@@ -9,7 +9,7 @@
 #include <atomic>
 
 #include "fieldbus/tdma/station/station.hpp"
-#include "link/ring.hpp"
+#include "hal/queue.hpp"
 
 namespace hal::tdma {
 
@@ -63,7 +63,7 @@ private:
     static void          count(Counter& c) noexcept { c.store(read(c) + 1, std::memory_order_relaxed); }  // each has one writer
 
     Station&                 station_;
-    link::Ring<Packet>        out_{capacity}, in_{capacity};  // thread to cycle, cycle to thread; whole RTmac frames
+    hal::Queue<Packet>        out_{capacity}, in_{capacity};  // thread to cycle, cycle to thread; whole RTmac frames
     std::atomic<std::size_t> mtu_{0};                        // written by the cycle
     Time                     last_ = 0;                      // the cycle's: when the slots were filled
     Counter                  sent_{0}, received_{0}, dropped_old_{0}, dropped_in_{0}, rejected_{0};  // written by the cycle
