@@ -7,7 +7,7 @@ import subprocess
 import unittest
 
 from drive_harness import Drive
-from harness import TIMEOUT, Terminal, wait_until
+from harness import HAL, TIMEOUT, Terminal, wait_until
 
 
 class OneShot(Drive):
