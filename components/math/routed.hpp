@@ -89,8 +89,8 @@ public:
           elapsed{component, "elapsed", "time for which the selection has been stable", {.unit = "us"}},
           selected{component, "selected", "selection in use"} {}
 
-    /// Returns the selected channel, the last one for a selection above it; the number of channels if there is none yet or the
-    /// selection 0 is suppressed. [realtime]
+    /// Returns the selected channel, the last one for a selection above it; the number of channels if no channel was selected yet or if
+    /// the selection 0 is suppressed. [realtime]
     std::uint64_t update(const hal::Cycle& cycle) noexcept {
         std::uint64_t wanted = number;
         for (std::size_t i = 0; i < bit.size(); ++i) wanted += bit[i] ? std::uint64_t{1} << i : 0;

@@ -35,7 +35,7 @@ std::vector<std::uint8_t> concise(std::span<const Write> writes);
 /// Decodes a concise DCF. Returns nothing if the bytes are invalid.
 std::optional<std::vector<Write>> parse_concise(std::span<const std::uint8_t> bytes);
 
-/// Encodes the parameter value of an entry, else its default. Returns nothing if there is none or it is invalid.
+/// Encodes the parameter value of an entry, else its default. Returns nothing if the value is missing or invalid.
 std::vector<std::uint8_t> value_of(const Entry& entry, unsigned node_id);
 
 }  // namespace hal::canopen::eds

@@ -52,7 +52,7 @@ public:
     std::uint64_t wrong_toggles() const noexcept { return wrong_toggles_; }
 
     static constexpr std::size_t history = 16;  ///< emergencies kept
-    /// Returns emergency `n`, 0 being the newest; its time is 0 if there is none. [realtime]
+    /// Returns emergency `n`, 0 being the newest; time 0: not received. [realtime]
     const Emergency& emergency(std::size_t n) const noexcept {
         return emergencies_[(emergency_count_ + history * 2 - 1 - n % history) % history];
     }

@@ -81,9 +81,9 @@ public:
         std::uint64_t errors = 0;  ///< RPDO: wrong length or outside the synchronous window; TPDO: the queue was full
         Time last = 0;             ///< when the last one was sent or received
     };
-    /// Returns the state of an RPDO; `exists` is false if there is none with this number. [realtime]
+    /// Returns the state of an RPDO; `exists` is false for an unknown number. [realtime]
     Status rpdo(unsigned number) const noexcept;
-    /// Returns the state of a TPDO; `exists` is false if there is none with this number. [realtime]
+    /// Returns the state of a TPDO; `exists` is false for an unknown number. [realtime]
     Status tpdo(unsigned number) const noexcept;
 
     /// Checks a value that SDO writes to a parameter of a PDO, in the remapping order of CiA 301. [realtime]

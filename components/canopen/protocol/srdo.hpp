@@ -90,7 +90,7 @@ public:
         SrdoFault fault = SrdoFault::none;
         std::uint64_t count = 0;  ///< SRDOs sent, or received and valid
     };
-    /// Returns the state of an SRDO; `exists` is false if there is none with this number. [realtime]
+    /// Returns the state of an SRDO; `exists` is false for an unknown number. [realtime]
     Status status(unsigned number) const noexcept;
     /// Returns true if 13FEh marks the configuration as valid and all signatures match. [realtime]
     bool configuration_valid() const noexcept { return valid_; }

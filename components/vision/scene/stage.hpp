@@ -62,10 +62,11 @@ public:
 
     /// Writes a state, not older than the previous one. [realtime] one writer
     void put(std::int64_t stamp_ns, std::span<const double> values) noexcept;
-    /// Reads the newest state. Returns false if there is none yet. [any]
+    /// Reads the newest state. Returns false before the first state. [any]
     bool newest(State& to) const noexcept;
-    /// The state at `stamp_ns`, between its two neighbours in a straight line; the oldest or the newest that is known where it lies
-    /// outside. Only the first poses (at::smooth) lie between; of all else the earlier is taken. False: there is none yet. [any]
+    /// Reads the state at `stamp_ns`, interpolated linearly between its two neighbours; outside the known states, the oldest or the newest.
+    /// Only the first poses (at::smooth) are interpolated; all other values are those of the earlier neighbour. Returns false before the
+    /// first state. [any]
     bool when(std::int64_t stamp_ns, State& to) const noexcept;
 
 private:

@@ -64,7 +64,7 @@ public:
     const NetworkStatus& status() const noexcept { return status_; }
     /// Returns the state of a node; result A if it is not in the set-up. [realtime]
     const NodeStatus& status(std::uint8_t id) const noexcept;
-    /// Returns the set-up of a node; nullptr if there is none. [any]
+    /// Returns the set-up of a node, or nullptr for an unknown node. [any]
     const NodeSetup* setup(std::uint8_t id) const noexcept;
     /// Returns the set-up. [any]
     const MasterSetup& setup() const noexcept { return setup_; }

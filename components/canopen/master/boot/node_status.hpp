@@ -123,7 +123,7 @@ struct NodeStatus {
     Time begun = 0, booted = 0;            ///< start and end of the last boot
     Time last_heard = 0;                   ///< last frame received; 0: none yet
     Time next_try = 0;                     ///< in Step::waiting: when the next boot starts
-    Emergency emergency{};                 ///< the newest emergency; its time is 0 if there is none
+    Emergency emergency{};                 ///< the newest emergency; time 0: none received yet
     std::uint8_t error_register = 0;       ///< 1001h as the newest emergency carried it
 
     /// Returns the time since the last frame of the node in ns; -1: none received yet. [any]
