@@ -34,6 +34,16 @@ struct Disturbance {
     std::int64_t from_ns = INT64_MIN, until_ns = INT64_MAX;  ///< on the segment's clock
 };
 
+/// A device in line: it answers frames while they arrive, without a thread of its own. A segment with a responder is a cable instead of a
+/// switch: a frame takes its wire time once, and a reply may leave while the frame still arrives.
+class Responder {
+public:
+    virtual ~Responder() = default;
+    /// Takes a frame whose first bit arrived at `first_bit_ns`; replies by send() of any port, with Launch::at_ns from `first_bit_ns` on and
+    /// `first_bit_ns` as the time. `frame` may be changed; it is valid during the call only. [realtime] on the thread that works the segment
+    virtual void arrived(std::span<std::uint8_t> frame, std::int64_t first_bit_ns) noexcept = 0;
+};
+
 /// The segment behind a `sim:` port: full-duplex lines to one store-and-forward switch. A frame takes wire_bytes / speed on its
 /// sender's line, Options::forward_ns in the switch, and again its wire time on each receiver's line, where it waits its turn.
 /// [setup] unless marked; takes effect with the next frame that starts.
@@ -52,6 +62,9 @@ public:
     virtual void babble(int port, std::span<const std::uint8_t> frame, std::int64_t period_ns) = 0;
     virtual void cut(int port, bool is_cut) = 0;         ///< Cuts or reconnects the cable of a port.
     virtual std::int64_t time_ns() const noexcept = 0;   ///< Returns the time of the segment. [any]
+    /// Lets `responder` take the frames that arrive at this port, instead of receive(), until the port closes or nullptr is set. When this
+    /// returns, the previous responder is no longer called. Returns false if another port of the segment has one.
+    virtual bool respond(Responder* responder) = 0;
 };
 
 #pragma GCC visibility pop

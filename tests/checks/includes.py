@@ -52,6 +52,13 @@ ROWS = {
     "components/canopen/eds": ["components/canopen/protocol"],
     "components/canopen/master": ["components/canopen/eds"],
     "components/canopen/device": ["components/canopen/eds", "components/sim"],  # sim: the plants behind simulated devices
+    "components/ethercat/wire": ["runtime/text"],
+    "components/ethercat/esi": ["components/ethercat/wire"],
+    "components/ethercat/esc": ["components/ethercat/wire", "drivers/link"],
+    "components/ethercat/devices": ["components/ethercat/esc", "components/ethercat/esi", "components/sim", "components/cia402"],
+    "components/ethercat/master": ["components/ethercat/wire", "runtime/sdk", "drivers/link"],
+    "components/ethercat/config": ["components/ethercat/master", "components/ethercat/esi", "components/cia402"],
+    "components/ethercat/plugins": ["components/ethercat/config", "components/ethercat/devices"],
     "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
     "components/fieldbus/segment": ["runtime/sdk", "drivers/link"],
     "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
@@ -65,6 +72,10 @@ ROWS = {
 # The bans that carry the design, in words.
 BANS = {
     ("runtime/execute", "runtime/model"): "execute never includes model: real-time code cannot reach a name or a string",
+    ("components/ethercat/master", "components/ethercat/esc"): "master and emulated slaves share only wire/",
+    ("components/ethercat/master", "components/ethercat/devices"): "master and emulated slaves share only wire/",
+    ("components/ethercat/esc", "components/ethercat/master"): "master and emulated slaves share only wire/",
+    ("components/ethercat/devices", "components/ethercat/master"): "master and emulated slaves share only wire/",
     ("components/canopen/master", "components/canopen/device"): "master and device never include each other",
     ("components/canopen/device", "components/canopen/master"): "master and device never include each other",
     ("components", None): "components include only the sdk and text (bus components also drivers/link)",
@@ -79,7 +90,7 @@ LIBRARIES = {
     r"CLI/": ["tools/cli"],
     r"editline/|histedit": ["tools/cli"],
     r"fmt/": ["runtime", "tools"],
-    r"pugixml": ["components/canopen"],
+    r"pugixml": ["components/canopen", "components/ethercat"],
     r"nlohmann/": ["runtime/machine", "runtime/commands", "runtime/control", "tools"],
 }
 

@@ -116,6 +116,8 @@ void Switch::remove(std::unique_ptr<User> user) {
     std::erase_if(waiting, [&](const auto& w) { return w.at_ns > now; });
     std::make_heap(waiting.begin(), waiting.end());
     user->leaving = true;
+    user->responder = nullptr;
+    if (responding == user.get()) responding = nullptr;
     leaving_.push_back(std::move(user));
     sweep(gone, empty);
 }
@@ -182,6 +184,7 @@ void Switch::work(std::int64_t now) noexcept {
             events_.pop_back();
             pass_on(event);
             release(event);
+            if (responding != nullptr) collect(now);  // its replies
         } else {
             launch(*next, first);
         }
@@ -225,7 +228,7 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
     count(from->sent), count(from->sent_bytes, f.length);
     s.to_switch_free = start + wire_ns(f.length);
     f.references = 1;  // until all its events are created
-    Event e{s.to_switch_free + forward_ns, 0, from, place, -1, static_cast<std::uint32_t>(f.length), -1, 0};
+    Event e{s.to_switch_free + (responding != nullptr ? 0 : forward_ns), 0, from, place, -1, static_cast<std::uint32_t>(f.length), -1, 0};
     if (!disturbed(e, false)) add_event(e);
     release(e);
 }
@@ -255,9 +258,10 @@ void Switch::pass_on(const Event& e) noexcept {
 void Switch::deliver(const Event& e, Station& s) noexcept {
     const auto count = [](auto& counter, std::uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); };
     if (s.cut.load(std::memory_order_relaxed)) return;
-    const auto start = std::max(e.time_ns, s.from_switch_free);
+    const bool cable = responding != nullptr;
+    const auto start = cable ? e.time_ns : std::max(e.time_ns, s.from_switch_free);
     const bool crowded = start - e.time_ns > static_cast<std::int64_t>(egress_bytes * 8000 / speed);
-    if (!crowded) s.from_switch_free = start + wire_ns(e.length);
+    if (!crowded) s.from_switch_free = cable ? start : start + wire_ns(e.length);
     const Outgoing& f = e.from->places[e.place];
     Address to;
     std::memcpy(to.data(), f.bytes.data(), to.size());
@@ -266,6 +270,13 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
         if (!u->types.empty() && std::find(u->types.begin(), u->types.end(), type_of(f.bytes)) == u->types.end()) continue;
         if (e.length < header_bytes) {
             count(u->runts);
+            continue;
+        }
+        if (u->responder != nullptr) {
+            Bytes bytes = f.bytes;
+            if (e.garbled >= 0) bytes[static_cast<std::size_t>(e.garbled)] ^= e.mask;
+            count(u->received), count(u->received_bytes, e.length);
+            u->responder->arrived({bytes.data(), e.length}, e.time_ns - wire_ns(e.length));
             continue;
         }
         Incoming* in = crowded ? nullptr : u->incoming.place();

@@ -61,6 +61,7 @@ struct User {
     std::vector<std::uint16_t> types;
     bool promiscuous = false;
     bool leaving = false;          ///< its port is closed
+    Responder* responder = nullptr;///< takes its frames instead of the receiving thread
     const std::int64_t noise_ns;
     Station* station = nullptr;    ///< never changes
 
@@ -116,6 +117,7 @@ public:
     std::vector<Active> disturbances;
     std::vector<std::unique_ptr<Station>> stations;  ///< in order of their numbers
     std::uint64_t random = 1;
+    User* responding = nullptr;                      ///< the user with a responder; then the segment is a cable
 
     const std::string name;
     const std::uint32_t speed;  ///< Mbit/s

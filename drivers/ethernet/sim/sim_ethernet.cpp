@@ -132,6 +132,14 @@ public:
         });
     }
     std::int64_t time_ns() const noexcept override { return switch_->time(unclocked); }
+    bool respond(Responder* responder) override {
+        return switch_->exclusively([&] {
+            if (switch_->responding != nullptr && switch_->responding != &user_) return false;
+            switch_->responding = responder != nullptr ? &user_ : nullptr;
+            user_.responder = responder;
+            return true;
+        });
+    }
 
 private:
     static void count(std::atomic<std::uint64_t>& counter) noexcept { counter.fetch_add(1, std::memory_order_relaxed); }

@@ -50,8 +50,8 @@ struct DisciplineOptions {
 
 /// Tracks an external reference by its measured phase errors.
 ///
-/// A phase error is the arrival time of an event minus its expected time by this clock, which includes all adjustments so far; the caller
-/// A phase error is the arrival time of an event minus its expected time by this clock, all adjustments included; the caller
+/// A phase error is the arrival time of an event minus its expected time by this clock, all adjustments included; the caller folds it into
+/// half a period. With p the predicted phase error, r the drift of the reference per period, a and b gains, and m the limited residual:
 ///
 ///     m = clip(error - p, 4 s)        p += a m        r += b m        step = clip(p + r, limit)        p += r - step
 ///
