@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// What the start-up of a slave needs of CoE; the mailbox clients implement it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "ethercat/master/bus_slave.hpp"
+#include "ethercat/master/channel.hpp"
+#include "ethercat/master/task.hpp"
+
+namespace hal::ethercat::master {
+
+/// Result of an SDO transfer.
+struct SdoResult {
+    enum class Outcome : std::uint8_t {
+        done,
+        aborted,    ///< `abort` has the code
+        timed_out,  ///< no answer
+        lost,       ///< the slave does not answer datagrams
+        refused,    ///< no mailbox, a mailbox error, or an answer that does not fit
+    } outcome = Outcome::timed_out;
+    std::uint32_t abort = 0;  ///< SDO abort code, or the code of a mailbox error
+    std::size_t length = 0;   ///< bytes of an upload
+    explicit operator bool() const noexcept { return outcome == Outcome::done; }
+};
+
+/// SDO transfers with one slave (ETG.1000.6, clause 5.6.2). The buffers must outlive the task.
+class CoeAccess {
+public:
+    virtual ~CoeAccess() = default;
+    /// Reads an object into `to`; `complete`: all its sub-indexes. [realtime]
+    virtual Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete, std::span<std::uint8_t> to) noexcept = 0;
+    /// Writes an object. [realtime]
+    virtual Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
+                                     std::span<const std::uint8_t> from) noexcept = 0;
+};
+
+}  // namespace hal::ethercat::master
