@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// ADS over EtherCAT (ETG.1020): the AMS header and the services of ADS. All offsets are from the start of the payload of the mailbox.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "ethercat/wire/mailbox.hpp"
+
+namespace hal::ethercat::aoe {
+
+inline constexpr std::size_t header_bytes = 32;
+enum class Command : std::uint16_t { device_info = 1, read = 2, write = 3, read_state = 4, write_control = 5, add_notification = 6,
+    delete_notification = 7, notification = 8, read_write = 9 };
+inline constexpr std::uint16_t request_flags = 0x0004, response_flags = 0x0005;
+
+using NetId = std::array<std::uint8_t, 6>;
+struct Header {
+    NetId target{};
+    std::uint16_t target_port = 0;
+    NetId source{};
+    std::uint16_t source_port = 0;
+    Command command{};
+    std::uint16_t flags = request_flags;
+    std::uint32_t length = 0;  ///< of the data that follows
+    std::uint32_t error = 0;
+    std::uint32_t invoke = 0;  ///< id of the request, copied to the response
+    bool response() const noexcept { return (flags & 1) != 0; }
+};
+/// Reads the header; nullopt if the payload is too short for it or its data. [realtime]
+inline std::optional<Header> read(std::span<const std::uint8_t> payload) noexcept {
+    if (payload.size() < header_bytes) return std::nullopt;
+    const std::uint8_t* at = payload.data();
+    Header h;
+    std::memcpy(h.target.data(), at, 6), h.target_port = get<std::uint16_t>(at + 6);
+    std::memcpy(h.source.data(), at + 8, 6), h.source_port = get<std::uint16_t>(at + 14);
+    h.command = static_cast<Command>(get<std::uint16_t>(at + 16)), h.flags = get<std::uint16_t>(at + 18);
+    h.length = get<std::uint32_t>(at + 20), h.error = get<std::uint32_t>(at + 24), h.invoke = get<std::uint32_t>(at + 28);
+    if (h.length > payload.size() - header_bytes) return std::nullopt;
+    return h;
+}
+/// Writes the header. [realtime]
+inline void write(std::uint8_t* to, const Header& h) noexcept {
+    std::memcpy(to, h.target.data(), 6), put(to + 6, h.target_port);
+    std::memcpy(to + 8, h.source.data(), 6), put(to + 14, h.source_port);
+    put(to + 16, static_cast<std::uint16_t>(h.command)), put(to + 18, h.flags);
+    put(to + 20, h.length), put(to + 24, h.error), put(to + 28, h.invoke);
+}
+/// Returns the header of the response to a request, with `length` bytes of data. [realtime]
+inline Header response_to(const Header& request, std::uint32_t length, std::uint32_t error = 0) noexcept {
+    Header h = request;
+    h.target = request.source, h.target_port = request.source_port, h.source = request.target, h.source_port = request.target_port;
+    h.flags = response_flags, h.length = length, h.error = error;
+    return h;
+}
+
+// read: u32 group, u32 offset, u32 length; response u32 result, u32 length, data. write: u32 group, u32 offset, u32 length, data; response
+// u32
+// result. read_state: response u32 result, u16 ADS state, u16 device state. device_info: response u32 result, u8 major, u8 minor, u16
+// build, 16 characters.
+inline constexpr std::size_t address_bytes = 12, read_response_bytes = 8, write_response_bytes = 4;
+inline constexpr std::uint32_t group_sdo = 0xf302, group_soe = 0xf420;
+/// Returns the offset of an object in group_sdo. [any]
+constexpr std::uint32_t sdo_offset(std::uint16_t index, std::uint8_t sub, bool complete = false) noexcept {
+    return static_cast<std::uint32_t>(index) << 16 | (complete ? 0x100U : 0U) | sub;
+}
+
+namespace error {
+inline constexpr std::uint32_t none = 0, no_port = 6, no_machine = 7, unknown_command = 8, device = 0x700, unsupported = 0x701,
+    group = 0x702,
+                               offset = 0x703, access = 0x704, size = 0x705, data = 0x706, not_ready = 0x707, busy = 0x708, context = 0x709,
+                               memory = 0x70a, parameter = 0x70b, not_found = 0x70c, timeout = 0x745;
+}
+/// Returns the meaning of an ADS error; nullptr for others, which may be SDO abort codes. [any]
+constexpr const char* error_text(std::uint32_t code) noexcept {
+    switch (code) {
+    case error::none: return "ok";
+    case error::no_port: return "target port not found";
+    case error::no_machine: return "target machine not found";
+    case error::unknown_command: return "unknown command";
+    case error::device: return "device error";
+    case error::unsupported: return "service not supported";
+    case error::group: return "invalid index group";
+    case error::offset: return "invalid index offset";
+    case error::access: return "access denied";
+    case error::size: return "invalid size";
+    case error::data: return "invalid data";
+    case error::not_ready: return "device not ready";
+    case error::busy: return "device busy";
+    case error::context: return "invalid context";
+    case error::memory: return "out of memory";
+    case error::parameter: return "invalid parameter";
+    case error::not_found: return "not found";
+    case error::timeout: return "timeout";
+    default: return nullptr;
+    }
+}
+
+}  // namespace hal::ethercat::aoe
