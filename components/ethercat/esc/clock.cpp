@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/esc/clock.hpp"
+
+#include <cmath>
+
+namespace hal::ethercat::esc {
+
+std::int64_t Clock::at(std::int64_t now_ns) const noexcept {
+    const std::int64_t passed = now_ns - base_now_;
+    return base_local_ + passed + static_cast<std::int64_t>(std::floor(fraction_ + static_cast<double>(passed) * (drift_ + correction_)));
+}
+
+std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
+    const double       rate = drift_ + correction_;
+    const std::int64_t left = local_ns - base_local_;
+    std::int64_t       now = base_now_ + left - static_cast<std::int64_t>(std::floor((static_cast<double>(left) * rate + fraction_) / (1.0 + rate)));
+    for (int i = 0; i < 4 && at(now) < local_ns; ++i) ++now;
+    for (int i = 0; i < 4 && at(now - 1) >= local_ns; ++i) --now;
+    return now;
+}
+
+void Clock::rebase(std::int64_t now_ns) noexcept {
+    const std::int64_t passed = now_ns - base_now_;
+    const double       exact = fraction_ + static_cast<double>(passed) * (drift_ + correction_);
+    const double       whole = std::floor(exact);
+    base_local_ += passed + static_cast<std::int64_t>(whole);
+    fraction_ = exact - whole;
+    base_now_ = now_ns;
+}
+
+void Clock::shift(double ns, std::int64_t now_ns) noexcept {
+    rebase(now_ns);
+    const double exact = fraction_ + ns, whole = std::floor(exact);
+    base_local_ += static_cast<std::int64_t>(whole);
+    fraction_ = exact - whole;
+}
+
+}  // namespace hal::ethercat::esc

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/esc/responder.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+namespace hal::ethercat::esc {
+
+LineOnSegments::LineOnSegments(Line& line, ethernet::Port& primary, ethernet::Port* secondary) : line_(line), ports_{&primary, secondary} {
+    connected_ = true;
+    for (std::size_t i = 0; i < 2; ++i) {
+        sides_[i].owner = this;
+        sides_[i].end = static_cast<End>(i);
+        if (ports_[i] == nullptr) continue;
+        ethernet::Segment* segment = ports_[i]->segment();
+        connected_ &= segment != nullptr && segment->respond(&sides_[i]);
+    }
+}
+
+LineOnSegments::~LineOnSegments() {
+    if (!connected_) return;
+    for (ethernet::Port* port : ports_)
+        if (port != nullptr) port->segment()->respond(nullptr);
+}
+
+void LineOnSegments::Side::arrived(std::span<std::uint8_t> frame, std::int64_t first_bit_ns) noexcept {
+    const Line::Passage out = owner->line_.process(frame, end, first_bit_ns);
+    ethernet::Port*     port = owner->ports_[static_cast<std::size_t>(out.end)];
+    if (out.lost || port == nullptr) return;
+    for (unsigned i = 0; i < out.copies; ++i) port->send(frame, {.at_ns = out.first_bit_ns}, first_bit_ns);
+}
+
+namespace serve_facts {
+constexpr std::int64_t tick_ns = 1'000'000;
+constexpr std::size_t  frames_at_once = 32;
+
+std::int64_t now() noexcept {
+    timespec t{};
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * std::int64_t{1'000'000'000} + t.tv_nsec;
+}
+}  // namespace serve_facts
+
+void serve(Line& line, ethernet::Port& primary, ethernet::Port* secondary, const std::atomic<bool>& stop, ServeControl* control) noexcept {
+    const std::array<ethernet::Port*, 2> both{&primary, secondary};
+    std::array<std::uint8_t, ethernet::largest_frame> frame;
+    std::int64_t tick = 0;
+    while (!stop.load(std::memory_order_relaxed)) {
+        bool worked = false;
+        for (std::size_t side = 0; side < both.size(); ++side) {
+            if (both[side] == nullptr) continue;
+            for (std::size_t i = 0; i < serve_facts::frames_at_once; ++i) {
+                const auto arrival = both[side]->receive(serve_facts::now());
+                if (!arrival) break;
+                worked = true;
+                const std::size_t length = std::min(arrival->bytes.size(), frame.size());
+                std::memcpy(frame.data(), arrival->bytes.data(), length);
+                const std::int64_t first_bit_ns = serve_facts::now();
+                const auto         out = line.process({frame.data(), length}, static_cast<End>(side), first_bit_ns);
+                ethernet::Port*    port = both[static_cast<std::size_t>(out.end)];
+                if (out.lost || port == nullptr) continue;
+                for (unsigned copy = 0; copy < out.copies; ++copy) port->send({frame.data(), length}, {}, first_bit_ns);
+            }
+        }
+        const std::int64_t now = serve_facts::now();
+        if (now >= tick) {
+            line.advance(now);
+            if (control != nullptr) control->work(line, now);
+            tick = now + serve_facts::tick_ns;
+        }
+        if (worked) continue;
+        // With two ports one is polled while the other waits.
+        const std::int64_t until = secondary == nullptr ? tick : std::min(tick, now + 20'000);
+        primary.wait(until);
+    }
+}
+
+}  // namespace hal::ethercat::esc

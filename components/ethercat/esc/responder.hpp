@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Connects a line of emulated slaves to ports: on a `sim:` segment it answers frames while they arrive; on a real interface a loop serves it.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "ethercat/esc/line.hpp"
+#include "link/ethernet.hpp"
+#include "link/segment.hpp"
+
+namespace hal::ethercat::esc {
+
+/// Lets a line answer on one or two segments in memory, until it is destroyed. Both segments must be worked by the same thread.
+class LineOnSegments {
+public:
+    /// `secondary` may be nullptr. Line and ports must outlive this object. [setup]
+    LineOnSegments(Line& line, ethernet::Port& primary, ethernet::Port* secondary = nullptr);
+    ~LineOnSegments();
+    LineOnSegments(const LineOnSegments&) = delete;
+    LineOnSegments& operator=(const LineOnSegments&) = delete;
+
+    /// Returns false if a port is not on a segment in memory, or another device answers there. [setup]
+    bool connected() const noexcept { return connected_; }
+
+private:
+    struct Side final : ethernet::Responder {
+        LineOnSegments* owner = nullptr;
+        End end = End::primary;
+        void arrived(std::span<std::uint8_t> frame, std::int64_t first_bit_ns) noexcept override;
+    };
+
+    Line& line_;
+    ethernet::Port* ports_[2];
+    Side sides_[2];
+    bool connected_ = false;
+};
+
+/// Serves a line on one or two ports of any kind until `stop`; the options of the ports should be promiscuous, with all Ethertypes or those
+/// of EtherCAT. `control` runs between frames, at least every millisecond; it may be nullptr. [realtime] the thread waits for frames only
+struct ServeControl {
+    virtual ~ServeControl() = default;
+    /// Changes the line: power, cables, disturbances.
+    virtual void work(Line&, std::int64_t now_ns) noexcept = 0;
+};
+void serve(Line& line, ethernet::Port& primary, ethernet::Port* secondary, const std::atomic<bool>& stop, ServeControl* control = nullptr) noexcept;
+
+}  // namespace hal::ethercat::esc
