@@ -72,6 +72,33 @@ std::vector<std::string> flags(Language language, bool clang, bool program) {
     return all;
 }
 
+/// A source in runtime/sdk/linuxcnc, and which components are compiled with it.
+struct LinuxcncSource {
+    const char* file;
+    bool (*needed)(const PluginSource&);
+};
+constexpr bool always(const PluginSource&) { return true; }
+constexpr bool plugin(const PluginSource& source) { return !source.program; }
+constexpr bool program(const PluginSource& source) { return source.program; }
+constexpr bool plugin_from_c(const PluginSource& source) { return !source.program && !source.comp_instances; }
+constexpr bool plugin_from_comp(const PluginSource& source) { return !source.program && source.comp_instances; }
+constexpr bool program_from_comp(const PluginSource& source) { return source.program && source.comp_instances; }
+constexpr LinuxcncSource linuxcnc_sources[] = {
+    {"declare.c", always},
+    {"rtapi.c", always},
+    {"streams.c", always},
+    {"plugin.c", plugin},
+    {"arguments.c", plugin},
+    {"ports.c", plugin},
+    {"component.c", plugin_from_c},
+    {"restore.c", plugin_from_c},
+    {"comp_component.c", plugin_from_comp},
+    {"program.c", program},
+    {"program_protocol.c", program},
+    {"program_ports.c", program},
+    {"comp_program.c", program_from_comp},
+};
+
 std::string linuxcnc_folder() {
     for (const std::string& folder : sdk_includes())
         if (std::error_code none; fs::is_regular_file(folder + "/linuxcnc/component.c", none)) return folder + "/linuxcnc";
@@ -170,9 +197,9 @@ BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options
             return fail("the headers for LinuxCNC components (linuxcnc/hal.h) are not installed with Halcyon's others; install it again");
         words.insert(words.end(),
                      {"-I", shim, source.program ? "-DULAPI=1" : "-DRTAPI=1", fmt::format("-DHALCYON_COMPONENT=\"{}\"", source.name)});
-        for (const char* part : {"component.c", "rtapi.c", "ports.c"}) behind.push_back(shim + "/" + part);
-        if (source.program) words.push_back("-DHALCYON_PROGRAM=1"), behind.push_back(shim + "/program.c");
-        if (source.comp_main) behind.push_back(shim + "/comp_program.c");
+        if (source.program) words.push_back("-DHALCYON_PROGRAM=1");
+        for (const LinuxcncSource& part : linuxcnc_sources)
+            if (part.needed(source)) behind.push_back(shim + "/" + part.file);
     }
     add_from_environment(source.language == Language::cpp ? "CXXFLAGS" : "CFLAGS", words);
     words.push_back(file);

@@ -18,9 +18,9 @@ struct PluginSource {
     Language language = Language::cpp;
     std::vector<std::string> includes; ///< folders searched before Halcyon's headers; the folder of `path` is always searched
     std::vector<std::string> options;  ///< further words for the compiler
-    bool program = false;              ///< an executable beside the machine (its main() is in `path`, or `comp_main`), not a plugin
-    bool comp_main = false;            ///< main() of `option userspace`
-    bool linuxcnc = false;             ///< a LinuxCNC component in C: with hal.h, rtapi.h … and what stands behind them
+    bool program = false;              ///< an executable outside the machine, not a plugin
+    bool linuxcnc = false;             ///< a LinuxCNC component in C: compiled with hal.h, rtapi.h … and the sources behind them
+    bool comp_instances = false;       ///< its instances are those of a .comp file; else its rtapi_app_main(), or main(), declares the pins
 };
 
 struct BuiltPlugin;

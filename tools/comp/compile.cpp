@@ -56,8 +56,8 @@ bool prepare_comp(const Options& options, const std::string& path, PluginSource&
     source.language = Language::c;
     source.linuxcnc = true;
     source.options = made->compile_args;
-    source.program = source.comp_main = made->program;
-    if (!made->own_main) source.options.push_back("-DHALCYON_OF_COMP=1");
+    source.program = made->program;
+    source.comp_instances = made->program || !made->own_main;
     source.options.insert(source.options.end(), made->link_args.begin(), made->link_args.end());
     return true;
 }

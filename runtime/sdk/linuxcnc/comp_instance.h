@@ -19,9 +19,9 @@
 #include "rtapi_string.h"
 #include "hal.h"
 
-/* component.c, compiled with HALCYON_OF_COMP: what hal.h and rtapi.h need to know of an instance */
+/* What hal.h and rtapi.h need to know of an instance: comp_component.c, in a program comp_program.c. [setup] */
 bool halcyon_enter(const hal_host *of, const char *instance);
-bool halcyon_refuse(const char *name, int result);
+bool halcyon_fail_setup(const char *function, int result);
 bool halcyon_leave(bool good);
 bool halcyon_start(void *self, const hal_host *of);
 void halcyon_stop(void *self);
@@ -61,7 +61,7 @@ typedef struct __comp_context {
 } __comp_context;
 
 static inline bool __comp_fail(const __comp_context *context, const char *reason) { return context->host->fail(context->host, reason), false; }
-static inline bool __comp_refuse(const __comp_context *context, const char *argument, const char *reason) {
+static inline bool __comp_reject(const __comp_context *context, const char *argument, const char *reason) {
     const hal_rejection rejection = {sizeof rejection, HAL_SUBJECT_ARGUMENT, argument, 0, 0, "", reason, ""};
     if (context->host->size <= HAL_HOST_SIZE_1_1 || !context->host->reject) return __comp_fail(context, reason);
     return context->host->reject(context->host, &rejection), false;
@@ -77,7 +77,7 @@ static inline bool __comp_number(const __comp_context *context, const char *name
     const long long read = strtoll(text, &end, 0);
     if (end != text && !*end && !errno && read >= -2147483647 - 1 && read <= 4294967295LL) return *value = (int)read, true;
     snprintf(reason, sizeof reason, "%s=%.100s is not a whole number of 32 bits", name, text);
-    return __comp_refuse(context, name, reason);
+    return __comp_reject(context, name, reason);
 }
 
 static inline bool __comp_personality(const __comp_context *context, const char *fallback, int *value) {
@@ -112,8 +112,8 @@ static inline void __comp_begin_as(__comp_context *context, const char *prefix, 
     context->whole = true;
 }
 
-/* What EXTRA_SETUP or POST_EXPORT gave. */
-static inline bool __comp_called(const char *name, int result) { return result >= 0 || halcyon_refuse(name, result); }
+/* Checks what EXTRA_SETUP or POST_EXPORT returned. */
+static inline bool __comp_called(const char *name, int result) { return result >= 0 || halcyon_fail_setup(name, result); }
 
 /* Takes the number of instances from get_count(). */
 static inline bool __comp_counted(const __comp_context *context, int result) {
@@ -123,7 +123,7 @@ static inline bool __comp_counted(const __comp_context *context, int result) {
         if (naming) naming->count(context->host, "count", (uint64_t)result);
         return true;
     }
-    snprintf(reason, sizeof reason, "its get_count() gave %d, this would be number %ld", result, context->number + 1);
+    snprintf(reason, sizeof reason, "get_count() returned %d; this would be instance %ld", result, context->number + 1);
     return __comp_fail(context, reason);
 }
 

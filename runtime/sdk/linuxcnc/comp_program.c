@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "inside.h"
+#include "comp_instance.h"
 #include "program.h"
 
 enum { most_names = 16 };
@@ -18,7 +19,7 @@ void user_mainloop(void);
 void userinit(int argc, char **argv) __attribute__((weak));
 extern const hal_component hal_plugin;
 
-/* True when the word is one of ours. */
+/* Returns true for an argument that count= or names= is; exits after reporting an invalid one. */
 static bool take_word(char *word) {
     char *end = NULL;
     if (strncmp(word, "count=", 6) == 0) {
@@ -43,6 +44,23 @@ static bool take_word(char *word) {
     return true;
 }
 
+bool halcyon_enter(const hal_host *of, const char *instance) {
+    (void)of;
+    halcyon_set_instance(instance);
+    return true;
+}
+bool halcyon_fail_setup(const char *function, int result) {
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: %s failed: %s\n", hal_plugin.name, function, strerror(-result));
+    return false;
+}
+bool halcyon_leave(bool good) {
+    halcyon_set_instance("");
+    return good;
+}
+bool halcyon_start(void *self, const hal_host *of) { return (void)self, (void)of, true; }
+void halcyon_stop(void *self) { (void)self; }
+void halcyon_gone(void) {}
+
 int main(int argc, char **argv) {
     int kept = argc > 0;
     for (int i = 1; i < argc; ++i)
@@ -64,11 +82,11 @@ int main(int argc, char **argv) {
     const bool single = hal_plugin.flags & HAL_COMPONENT_SINGLETON;
     const int wanted = single ? 1 : count > 0 ? count : (int)hal_plugin.default_count;
     for (int i = 0; names[0] ? i < most_names && names[i] : i < wanted; ++i) {
-        if (names[0]) snprintf(program_prefix, sizeof program_prefix, "%s", names[i]);
-        else if (single) snprintf(program_prefix, sizeof program_prefix, "%s", usual);
-        else snprintf(program_prefix, sizeof program_prefix, "%s.%d", usual, i);
-        void *const instance = program_host.allocate(&program_host, hal_plugin.instance_size, hal_plugin.instance_align);
-        if (!instance || !hal_plugin.create(&program_host, instance)) {
+        if (names[0]) snprintf(halcyon_program_prefix, sizeof halcyon_program_prefix, "%s", names[i]);
+        else if (single) snprintf(halcyon_program_prefix, sizeof halcyon_program_prefix, "%s", usual);
+        else snprintf(halcyon_program_prefix, sizeof halcyon_program_prefix, "%s.%d", usual, i);
+        void *const instance = halcyon_current_host->allocate(halcyon_current_host, hal_plugin.instance_size, hal_plugin.instance_align);
+        if (!instance || !hal_plugin.create(halcyon_current_host, instance)) {
             hal_exit(component);
             return 1;
         }

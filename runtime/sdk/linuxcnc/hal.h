@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * LinuxCNC's HAL interface for real-time components, as its manual pages (section 3, hal) describe it, over Halcyon's own:
- * both the handles with getters and setters, and the older pointers. Bodies are in component.c, which `hal compile FILE.c`
- * compiles with the user's file.
+ * both the handles with getters and setters, and the older pointers. Bodies are in the sources
+ * beside this file, which `hal compile FILE.c` compiles with the user's file.
  *
  * A handle or a pin's pointer leads to the slot where the value is; the runtime sets it when the pin is linked. So it must
  * stay where it was declared: in memory of hal_malloc() or a static variable.

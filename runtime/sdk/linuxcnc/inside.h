@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What the sources behind hal.h and rtapi.h share; nothing for components. */
+/*
+ * What the sources behind hal.h and rtapi.h share; nothing for components. They are linked with the user's files, so every shared
+ * name begins with halcyon_. tools/comp/build_plugin.cpp lists which of them make a plugin and which a program.
+ */
 #ifndef HALCYON_LINUXCNC_INSIDE_H
 #define HALCYON_LINUXCNC_INSIDE_H
 #define HALCYON_INSIDE
@@ -10,17 +13,38 @@
 #define HALCYON_COMPONENT "component"
 #endif
 
-extern const hal_host *host; /* component.c; while the instance is made */
+enum { component_id = 1 };
 
-/* rtapi.c: what the component prints while it is set up is kept, in a cycle it is queued */
-extern char said[2048];
-void look_at_parameters(void); /* component.c: those by pointer */
-void prepare_lines(void);
-void say_what_was_said(void);
-void start_printing(void);
-void stop_printing(void);
+/* Names the host of the instance that is being created, else NULL; a program has the same host all the time. plugin.c, program.c */
+extern const hal_host *halcyon_current_host;
 
-/* ports.c */
-bool publish_streams(const hal_host *of);
+/* declare.c: pins, parameters, functions */
+void halcyon_set_instance(const char *name); /* of a .comp file; the runtime takes names below it. "": names are whole */
+void halcyon_sync_parameters(void);          /* copies those declared by pointer from and to their pins */
+void halcyon_mark_pins(void);                /* those declared later can be dropped */
+void halcyon_drop_marked_pins(void);
+void halcyon_drop_pins(void);
+void halcyon_detach_pins(void); /* lets the user's pointers lead to the pins' own slots */
+bool halcyon_step(const hal_host *of, hal_function_decl *decl);
+
+/* plugin.c. Both report the failure of an instance's creation to the host and return false. */
+bool halcyon_fail(const char *format, ...) __attribute__((format(printf, 1, 2)));
+bool halcyon_fail_setup(const char *function, int result); /* with the messages that it has printed */
+
+/* arguments.c: takes the values of the file's module parameters. False after reporting why not. */
+bool halcyon_take_arguments(void);
+
+/* restore.c: notes the static variables at the first call and restores them at each later one. False when out of memory. */
+bool halcyon_restore_variables(void);
+
+/* rtapi.c: what a component prints is collected while it is created, and queued while its functions run. */
+extern char halcyon_messages[2048];
+void halcyon_prepare_messages(void);
+void halcyon_print_messages(void);
+void halcyon_start_printing(void);
+void halcyon_stop_printing(void);
+
+/* streams.c */
+bool halcyon_publish_streams(const hal_host *of);
 
 #endif

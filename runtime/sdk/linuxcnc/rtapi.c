@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* rtapi.h: messages, time, words. */
+/* rtapi.h: messages, time, splitting of arguments. */
 #define _GNU_SOURCE
 #include <pthread.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #include "inside.h"
 #include "rtapi_string.h"
 
-char said[2048];
+char halcyon_messages[2048];
 static int message_level = RTAPI_MSG_ERR;
 static rtapi_msg_handler_t message_handler;
 static bool in_cycles;
@@ -68,7 +68,7 @@ static void *print_until_stopped(void *unused) {
 #ifndef HALCYON_PROGRAM
 static uint64_t next_line;
 
-static void say_in_cycle(int level, const char *format, va_list arguments) {
+static void queue_message(int level, const char *format, va_list arguments) {
     uint64_t mine = __atomic_load_n(&next_line, __ATOMIC_RELAXED);
     struct line *line;
     do {
@@ -84,20 +84,20 @@ static void say_in_cycle(int level, const char *format, va_list arguments) {
 }
 #endif
 
-static void say(int level, const char *format, va_list arguments) {
+static void print_message(int level, const char *format, va_list arguments) {
     if (message_handler) message_handler((msg_level_t)level, format, arguments);
 #ifdef HALCYON_PROGRAM
     else vfprintf(level == RTAPI_MSG_ALL ? stdout : stderr, format, arguments);
 #else
-    else if (in_cycles) say_in_cycle(level, format, arguments);
-    else if (strlen(said) + 1 < sizeof said) vsnprintf(said + strlen(said), sizeof said - strlen(said), format, arguments);
+    else if (in_cycles) queue_message(level, format, arguments);
+    else if (strlen(halcyon_messages) + 1 < sizeof halcyon_messages) vsnprintf(halcyon_messages + strlen(halcyon_messages), sizeof halcyon_messages - strlen(halcyon_messages), format, arguments);
 #endif
 }
 
 void rtapi_print(const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    say(RTAPI_MSG_ALL, format, arguments);
+    print_message(RTAPI_MSG_ALL, format, arguments);
     va_end(arguments);
 }
 
@@ -105,7 +105,7 @@ void rtapi_print_msg(msg_level_t level, const char *format, ...) {
     if ((int)level > message_level) return;
     va_list arguments;
     va_start(arguments, format);
-    say(level, format, arguments);
+    print_message(level, format, arguments);
     va_end(arguments);
 }
 
@@ -118,19 +118,19 @@ int rtapi_get_msg_level(void) { return message_level; }
 void rtapi_set_msg_handler(rtapi_msg_handler_t handler) { message_handler = handler; }
 rtapi_msg_handler_t rtapi_get_msg_handler(void) { return message_handler; }
 
-void prepare_lines(void) {
+void halcyon_prepare_messages(void) {
     for (size_t i = 0; i < lines_in_flight; ++i) lines[i].turn = i;
 }
-void say_what_was_said(void) {
-    print_text(RTAPI_MSG_ERR, said);
-    *said = '\0';
+void halcyon_print_messages(void) {
+    print_text(RTAPI_MSG_ERR, halcyon_messages);
+    *halcyon_messages = '\0';
 }
-void start_printing(void) {
+void halcyon_start_printing(void) {
     printing = true;
     printer_made = pthread_create(&printer, NULL, print_until_stopped, NULL) == 0; /* without it the last lines are printed at the end */
     in_cycles = true;
 }
-void stop_printing(void) {
+void halcyon_stop_printing(void) {
     in_cycles = false;
     __atomic_store_n(&printing, false, __ATOMIC_RELEASE);
     if (printer_made) pthread_join(printer, NULL);

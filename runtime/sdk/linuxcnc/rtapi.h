@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * LinuxCNC's real-time interface for components, as its manual pages (section 3, rtapi) describe it, over Halcyon's own.
- * Bodies are in component.c, which `hal compile FILE.c` compiles with the user's file.
+ * Bodies are in the sources beside this file, which `hal compile FILE.c` compiles with the user's file.
  */
 #ifndef RTAPI_H
 #define RTAPI_H
