@@ -41,12 +41,12 @@ public:
     /// Sends a datagram with `length` bytes of data() to an address from at_position(), at_station() or the logical address space, and waits
     /// for it. A lost one is sent again up to `repeats` times: 0 for a command that may not be executed twice.
     Exchange exchange(Command command, std::uint32_t address, std::uint16_t length, unsigned repeats = 2) noexcept {
-        command_ = command, address_ = address, length_ = length, repeats_ = repeats, stage_ = Stage::waiting;
+        command_ = command, address_ = address, length_ = length, repeats_ = repeats, stage_ = Stage::waiting, *active_ = 1;
         return {*this};
     }
     /// Waits until `until_ns` on the clock of the cycle.
     Exchange sleep_until(std::int64_t until_ns) noexcept {
-        until_ns_ = until_ns, stage_ = Stage::sleeping;
+        until_ns_ = until_ns, stage_ = Stage::sleeping, *active_ = 1;
         return {*this};
     }
     /// Waits for `ns`.
@@ -76,6 +76,8 @@ public:
     std::uint32_t generation() const noexcept { return generation_; }  ///< Changes when a datagram under way is no longer awaited.
     std::int64_t sent_ns() const noexcept { return sent_ns_; }
     std::int64_t until_ns() const noexcept { return until_ns_; }
+    /// Sets a flag at each exchange() and sleep(), so that idle channels cost nothing. [setup]
+    void set_active_flag(std::uint8_t* flag) noexcept { active_ = flag; }
     void set_now(std::int64_t now_ns) noexcept { now_ns_ = now_ns; }
     void set_sent(std::int64_t now_ns) noexcept { stage_ = Stage::sent, sent_ns_ = now_ns; }
     /// Takes the datagram that came back; its data must be in data(). Resumes the task.
@@ -105,6 +107,8 @@ private:
     std::int64_t now_ns_ = 0, sent_ns_ = 0, until_ns_ = 0;
     Answer answer_;
     unsigned repeats_ = 0;
+    std::uint8_t unwatched_ = 0;
+    std::uint8_t* active_ = &unwatched_;
     std::uint16_t length_ = 0;
     Command command_{};
     Stage stage_ = Stage::idle;

@@ -35,6 +35,8 @@ public:
     /// Writes an object. [realtime]
     virtual Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                                      std::span<const std::uint8_t> from) noexcept = 0;
+    /// Writes a value over another protocol than CoE: SoE, AoE. [realtime]
+    virtual Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept { co_return SdoResult{SdoResult::Outcome::refused}; }
 };
 
 }  // namespace hal::ethercat::master

@@ -92,6 +92,7 @@ struct Slave {
     Timeouts timeouts;
     bool optional = false;         ///< may be missing (hot connect)
     std::uint16_t domain = 0;      ///< index in Setup::domains
+    bool mailbox_status = true;    ///< a byte of the inputs is kept for the mailbox state (080Dh), which a free FMMU copies in each cycle
     bool use_lrw = true;           ///< the SII's "no LRW" wins over true
     bool complete_access = false;  ///< for mapping and assignment
     unsigned entries_per_pdo = 0;  ///< limit; 0: none known
@@ -118,6 +119,7 @@ struct Setup {
     std::optional<std::uint16_t> reference_slave;  ///< index of its Slave; not set: the first one with a 64-bit clock
     std::int64_t frame_timeout_ns = 0;             ///< 0: until the next cycle
     bool accept_other_slaves = false;              ///< slaves on the bus that the setup does not name are left in PRE-OP, without a fault
+    std::uint16_t most_slaves = 0;                 ///< capacity of the bus; 0: the slaves named here and 64 more
     std::int64_t sync_window_ns = 1000;            ///< clock deviation below which a slave counts as synchronised
 };
 

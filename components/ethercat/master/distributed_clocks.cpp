@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+// Distributed clocks (ETG.1000.4, clause 6.7): delays from one latch of all receive times, offsets to the clock of the cycle, drift by the
+// reference clock's time in every cyclic frame, SYNC signals on one grid.
+#include <algorithm>
+
+#include "ethercat/master/bus.hpp"
+#include "ethercat/master/topology.hpp"
+
+namespace hal::ethercat::master {
+
+namespace {
+
+constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start_ns = 100 * millisecond;
+constexpr std::uint32_t tolerable_deviation_ns = 10'000;
+constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
+
+/// Reads port times and local time of all slaves with a clock, after a latch of all.
+Task<bool> latch(Channel& c, Bus& bus, std::int64_t& latched_ns) noexcept {
+    const Answer a = co_await clear_all(c, registers::dc_receive_time, 4);
+    if (!a.arrived || a.wkc == 0) co_return false;
+    latched_ns = c.sent_ns();
+    for (const std::uint16_t number : bus.by_position) {
+        BusSlave& s = bus.devices[number]->slave;
+        if (!s.present || !s.has_dc()) continue;
+        const Answer times = co_await read(c, s, registers::dc_receive_time, receive_time_bytes);
+        if (times.wkc != 1) continue;
+        std::memcpy(s.receive_time.data(), c.data(), 16);
+        s.local_time = get<std::uint64_t>(c.data() + 0x18);
+        if (!s.has_dc64()) s.local_time = static_cast<std::uint32_t>(s.local_time);
+    }
+    co_return true;
+}
+
+int choose_reference(const Bus& bus) noexcept {
+    if (bus.setup.lead == ClockLead::none) return -1;
+    if (bus.setup.reference_slave && *bus.setup.reference_slave < bus.device_of.size())
+        if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 && bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) return n;
+    int first = -1;
+    for (const std::uint16_t number : bus.by_position) {
+        const BusSlave& s = bus.devices[number]->slave;
+        if (!s.present || !s.has_dc()) continue;
+        if (s.has_dc64()) return number;
+        if (first < 0) first = number;
+    }
+    return first;
+}
+
+/// Deviation of 092Ch: bit 31 is its sign (not the same in all controllers).
+std::uint32_t magnitude(std::uint32_t difference) noexcept { return difference & 0x7fff'ffff; }
+
+}  // namespace
+
+Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
+    bool any = false, wanted = false;
+    for (const Slave& s : bus.setup.slaves) wanted |= s.dc.has_value();
+    for (const std::uint16_t number : bus.by_position) any |= bus.devices[number]->slave.present && bus.devices[number]->slave.has_dc();
+    if (bus.reference < 0 && (!any || !wanted)) co_return;
+
+    std::int64_t latched_ns = 0;
+    const bool latched = co_await latch(c, bus, latched_ns);
+    if (!latched) co_return;
+    if (bus.reference < 0) {
+        bus.reference = choose_reference(bus);
+        if (bus.reference < 0) co_return;
+        const Device& d = *bus.devices[static_cast<std::size_t>(bus.reference)];
+        bus.report(Event::reference_clock, d, d.slave.has_dc64() ? 1 : 0);
+    }
+    std::array<BusSlave*, 1024> line{};
+    std::size_t count = 0, reference = 0;
+    for (const std::uint16_t number : bus.by_position) {
+        if (count == line.size()) break;
+        if (number == bus.reference) reference = count;
+        line[count++] = &bus.devices[number]->slave;
+    }
+    find_delays({line.data(), count}, reference);
+
+    for (const std::uint16_t number : bus.by_position) {
+        Device& d = *bus.devices[number];
+        BusSlave& s = d.slave;
+        if (!s.present || !s.has_dc() || d.clock_set) continue;  // never those of running slaves
+        // The frame with the latch passed this slave a delay after it passed the reference clock.
+        const auto system = static_cast<std::uint64_t>(latched_ns + bus.epoch_ns) + s.delay_ns;
+        co_await write(c, s, registers::dc_system_time_offset, system - s.local_time);
+        co_await write(c, s, registers::dc_system_time_delay, s.delay_ns);
+        co_await write<std::uint16_t>(c, s, registers::dc_speed_counter_start, 0x1000);
+        d.clock_set = true;
+    }
+    const BusSlave& leader = bus.devices[static_cast<std::size_t>(bus.reference)]->slave;
+    bus.image.set_reference(leader.station, bus.setup.lead == ClockLead::thread);
+    bus.status.dc_active = true;
+}
+
+Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
+    const Slave* config = bus.config(d);
+    if (config == nullptr || !config->dc) co_return true;
+    if (!d.slave.has_dc()) {
+        bus.report(Event::dc_unsupported, d);
+        co_return false;
+    }
+    const std::int64_t until = c.now_ns() + synchronise_timeout_ns;
+    const auto window = static_cast<std::uint32_t>(bus.setup.sync_window_ns);
+    unsigned within = 0;
+    std::uint32_t deviation = UINT32_MAX;
+    while (within < 3) {
+        if (d.clock_set) {
+            const Answer a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
+            if (!a.arrived || a.wkc != 1) co_return false;
+            deviation = d.status.dc_deviation_ns = magnitude(get<std::uint32_t>(c.data()));
+            within = deviation <= window || d.slave.number == bus.reference ? within + 1 : 0;
+        } else {
+            co_await c.sleep(0);
+        }
+        if (c.now_ns() < until) continue;
+        if (deviation <= tolerable_deviation_ns) break;
+        bus.report(Event::dc_timeout, d, deviation, window);
+        co_return false;
+    }
+    d.synchronised = true;
+    co_return true;
+}
+
+Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
+    const Slave& config = *bus.config(d);
+    if (!config.dc || config.dc->assign_activate == 0) co_return true;
+    const Dc& dc = *config.dc;
+    const auto cycle = static_cast<std::uint64_t>(dc.sync0_cycle_ns > 0 ? dc.sync0_cycle_ns : bus.setup.cycle_ns);
+    co_await write<std::uint8_t>(c, d.slave, registers::dc_activation, 0);
+    if ((dc.assign_activate & 0xff) != 0) co_await write(c, d.slave, registers::dc_cyclic_unit_control, static_cast<std::uint8_t>(dc.assign_activate & 0xff));
+    put(c.data(), static_cast<std::uint32_t>(cycle));
+    put(c.data() + 4, static_cast<std::uint32_t>(dc.sync1_cycle_ns > 0 ? dc.sync1_cycle_ns + dc.sync1_shift_ns : dc.sync1_shift_ns));
+    Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_sync0_cycle), 8);
+    if (a.wkc != 1) co_return false;
+    // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but for their shift.
+    const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(sync_start_ns)) / cycle * cycle + cycle + static_cast<std::uint64_t>(dc.sync0_shift_ns);
+    a = co_await write(c, d.slave, registers::dc_start_time, start);
+    if (a.wkc != 1) co_return false;
+    a = co_await write(c, d.slave, registers::dc_activation, static_cast<std::uint8_t>(dc.assign_activate >> 8));
+    co_return a.wkc == 1;
+}
+
+void take_clock(Bus& bus) noexcept {
+    const auto& sample = bus.engine.clock();
+    if (!sample.fresh || bus.reference < 0) return;
+    std::uint64_t time = sample.dc_ns;
+    if (!bus.devices[static_cast<std::size_t>(bus.reference)]->slave.has_dc64()) {
+        const std::uint64_t guess = bus.status.dc_time_ns != 0 ? bus.status.dc_time_ns : static_cast<std::uint64_t>(bus.engine.now_ns() + bus.epoch_ns);
+        const auto step = static_cast<std::int32_t>(static_cast<std::uint32_t>(time) - static_cast<std::uint32_t>(guess));
+        time = guess + static_cast<std::uint64_t>(static_cast<std::int64_t>(step));
+    }
+    bus.status.dc_time_ns = time;
+}
+
+}  // namespace hal::ethercat::master

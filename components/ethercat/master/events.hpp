@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// What happens on the bus, in numbers: the cycle must not form sentences, a reporter outside does.
+#pragma once
+
+#include <cstdint>
+
+namespace hal::ethercat::master {
+
+/// In brackets the two numbers. `slave` is an index in Setup::slaves, or of_position + position where the setup does not name the slave.
+enum class Event : std::uint8_t {
+    link_lost, link_restored,      ///< primary or backup port [port 0 or 1, -]
+    no_slaves,                     ///< nothing answers
+    scanned,                       ///< [slaves found, slaves expected]
+    too_many_slaves,               ///< [found, capacity]
+    slave_missing,                 ///< not on the bus at start [position, -]
+    unknown_slave,                 ///< not in the setup [vendor, product]
+    wrong_vendor, wrong_product, wrong_revision, wrong_serial,  ///< [found, expected]
+    duplicate_alias,               ///< [alias, position of the second]
+    sii_failed,                    ///< EEPROM not readable [0502h, word]
+    no_mailbox,                    ///< start-up writes for a slave without mailbox
+    too_few_fmmus, too_few_sync_managers,  ///< [present, needed]
+    state_reached,                 ///< [State, -]
+    state_refused,                 ///< [State requested, AL status code]
+    state_timeout,                 ///< [State requested, AL status]
+    fell_back,                     ///< left its state by itself [AL status, AL status code]
+    startup_write_failed,          ///< [index << 8 | sub, abort code]
+    mapping_failed,                ///< [index << 8 | sub, abort code]
+    mapping_differs,               ///< read back other than written [index << 8 | sub, value read]
+    too_many_entries,              ///< [PDO, entries]
+    slave_lost, slave_returned,    ///< [position, -]
+    slave_operational,             ///< [position, ms since its start-up began]
+    wkc_incomplete, wkc_complete,  ///< of a domain [domain << 16 | counter, expected]
+    reference_clock,               ///< `slave` leads [64 bit: 1, -]
+    dc_unsupported,                ///< configured, but the slave has no clock
+    dc_timeout,                    ///< clock not within the window in time [deviation ns, window ns]
+    dc_synchronised,               ///< all slaves [largest deviation ns, -]
+    ring_broken, ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]
+    topology_changed,              ///< [slaves before, slaves now]
+    start_up_failed,               ///< gives up for now and starts again later [State it was in, seconds to the next try]
+};
+
+/// Receives events. [realtime] in the thread of the master's cycle
+class Events {
+public:
+    static constexpr std::uint32_t bus = 0xffff'ffff;          ///< `slave` of an event of the whole bus
+    static constexpr std::uint32_t of_position = 0x1'0000;     ///< see Event
+    virtual ~Events() = default;
+    virtual void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept = 0;
+};
+
+}  // namespace hal::ethercat::master

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/master/master.hpp"
+
+#include "ethercat/master/bus.hpp"
+
+namespace hal::ethercat::master {
+
+namespace {
+
+constexpr unsigned acyclic_frames_starting = 8, acyclic_frames_operating = 2;
+constexpr std::uint64_t link_check_cycles = 64;
+
+}  // namespace
+
+Master::Master(Setup setup, const std::array<std::uint8_t, 6>& source, Events& events, CoeAccess& coe)
+    : bus_(std::make_unique<Bus>(std::move(setup), source, events, coe)) {}
+Master::~Master() = default;
+
+void Master::attach(ethernet::Port& primary, ethernet::Port* backup) {
+    primary_ = &primary, backup_ = backup;
+    bus_->engine.attach(primary, backup);
+    bus_->engine.ready();
+    bus_->status.redundant = backup != nullptr;
+    bus_->status.link = primary.statistics().up;
+}
+void Master::add(Channel& channel) { bus_->engine.add(channel); }
+void Master::set_epoch(std::int64_t epoch_ns) { bus_->epoch_ns = epoch_ns; }
+
+void Master::receive(std::int64_t now_ns) noexcept {
+    Bus& bus = *bus_;
+    bus.engine.receive(now_ns);
+    if (!bus.bus_channel.busy()) rescan();
+    take_clock(bus);
+    judge_counters(bus);
+    bus.update_status();
+    if (links_checked_++ % link_check_cycles != 0) return;
+    const auto link = [&](ethernet::Port* port, bool& was, std::int64_t number) {
+        if (port == nullptr) return;
+        const bool up = port->statistics().up;
+        if (up != was) bus.report(up ? Event::link_restored : Event::link_lost, number), bus.suspicious = true;
+        was = up;
+    };
+    link(primary_, bus.status.link, 0);
+    link(backup_, backup_up_, 1);
+}
+
+void Master::transmit(std::int64_t now_ns) noexcept {
+    Bus& bus = *bus_;
+    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational, bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
+                        static_cast<std::uint64_t>(now_ns + bus.epoch_ns));
+}
+
+void Master::rescan() noexcept {
+    Bus& bus = *bus_;
+    bus.reference = -1;
+    bus.status.dc_active = false;
+    bus.image.set_reference(0, false);
+    bus.bus_channel.set_now(bus.engine.now_ns());
+    bus.watch_channel.set_now(bus.engine.now_ns());
+    bus.bus_channel.start([&] { return supervise(bus.bus_channel, bus); });
+    bus.watch_channel.start([&] { return watch(bus.watch_channel, bus); });
+}
+
+std::span<std::uint8_t> Master::data(std::size_t slave, std::size_t n) noexcept { return bus_->image.data(slave, n); }
+
+void Master::set_target(State target) noexcept {
+    if (target == bus_->target) return;
+    bus_->target = target;
+    for (const auto& d : bus_->devices) {
+        if (!d->slave.present || d->slave.configured < 0 || d->refused) continue;
+        d->status.operational = false;
+        bus_->run(*d, [&] { return boot(d->channel, *bus_, *d); });
+    }
+}
+void Master::set_outputs_valid(bool valid) noexcept { bus_->outputs_valid = valid; }
+
+const Setup& Master::setup() const noexcept { return bus_->setup; }
+const BusStatus& Master::status() const noexcept { return bus_->status; }
+const DomainStatus& Master::domain(std::size_t n) const noexcept { return bus_->image.domain(n); }
+void Master::reset_domain(std::size_t n) noexcept {
+    DomainStatus& d = bus_->image.domain(n);
+    d.was_complete = false;
+    d.least = 0, d.changes = 0;
+}
+const SlaveStatus& Master::slave_status(std::size_t slave) const noexcept {
+    const int device = bus_->device_of[slave];
+    return device < 0 ? bus_->absent[slave] : bus_->devices[static_cast<std::size_t>(device)]->status;
+}
+
+Master::Phase Master::dc_phase() const noexcept {
+    const auto& sample = bus_->engine.clock();
+    if (!sample.fresh || bus_->reference < 0) return {};
+    const std::int64_t cycle = bus_->setup.cycle_ns;
+    const std::int64_t phase = (static_cast<std::int64_t>(bus_->status.dc_time_ns) - sample.sent_after_ns) % cycle;
+    return {true, phase > cycle / 2 ? phase - cycle : phase};
+}
+
+std::size_t Master::found() const noexcept { return bus_->by_position.size(); }
+BusSlave& Master::found(std::size_t position) noexcept { return bus_->devices[bus_->by_position[position]]->slave; }
+BusSlave* Master::slave(std::size_t slave) noexcept {
+    const int device = bus_->device_of[slave];
+    return device < 0 ? nullptr : &bus_->devices[static_cast<std::size_t>(device)]->slave;
+}
+Channel& Master::channel(const BusSlave& slave) noexcept { return bus_->devices[slave.number]->channel; }
+bool Master::idle(const BusSlave& slave) const noexcept { return !bus_->devices[slave.number]->channel.busy(); }
+
+}  // namespace hal::ethercat::master

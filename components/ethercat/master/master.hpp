@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// An EtherCAT master: brings the slaves of a setup to OP, exchanges their process data, watches them.
+//
+//     Master master(setup, port->address(), events, coe);                 // [setup]
+//     master.attach(*port, nullptr);
+//     auto target = master.data(0, 0);                                    // of the first sync manager of the first slave
+//     ...
+//     master.receive(cycle.start_ns());                                   // at the beginning of the cycle
+//     put(target.data(), position);
+//     master.transmit(cycle.start_ns());                                  // at its end
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "ethercat/master/bus_slave.hpp"
+#include "ethercat/master/channel.hpp"
+#include "ethercat/master/coe_access.hpp"
+#include "ethercat/master/events.hpp"
+#include "ethercat/master/setup.hpp"
+#include "ethercat/master/status.hpp"
+#include "link/ethernet.hpp"
+
+namespace hal::ethercat::master {
+
+struct Bus;
+
+/// See the top of this file.
+class Master {
+public:
+    /// `source` is the address frames leave with; `events` and `coe` must outlive the master. [setup]
+    Master(Setup setup, const std::array<std::uint8_t, 6>& source, Events& events, CoeAccess& coe);
+    ~Master();
+    Master(const Master&) = delete;
+    Master& operator=(const Master&) = delete;
+
+    /// Uses these ports, which must outlive the master, and begins with the scan in the next cycle. `backup` closes a ring. [setup]
+    void attach(ethernet::Port& primary, ethernet::Port* backup = nullptr);
+    /// Adds a user of the wire besides the slaves' channels; before attach(). It must outlive the master. [setup]
+    void add(Channel& channel);
+    /// Sets what the system time of the clocks is at time 0 of the cycle's clock, ns since 2000-01-01; before attach(). [setup]
+    void set_epoch(std::int64_t epoch_ns);
+
+    /// Takes the answers of the previous cycle: inputs are fresh, tasks continue. `now_ns`: start of the cycle. [realtime]
+    void receive(std::int64_t now_ns) noexcept;
+    /// Sends process data and the datagrams of the tasks. [realtime]
+    void transmit(std::int64_t now_ns) noexcept;
+
+    /// Returns the process data of sync manager `n` of `Setup::slaves[slave].sync_managers`. The place stays the same. [any]
+    std::span<std::uint8_t> data(std::size_t slave, std::size_t n) noexcept;
+    /// Lets no slave beyond a state; slaves beyond it are taken back, those below are brought up. [realtime]
+    void set_target(State target) noexcept;
+    /// Keeps slaves in SAFE-OP while false: their outputs are not valid yet. True at start. [realtime]
+    void set_outputs_valid(bool valid) noexcept;
+    /// Forgets all slaves and scans again. [realtime]
+    void rescan() noexcept;
+
+    const Setup& setup() const noexcept;                              ///< [any]
+    const BusStatus& status() const noexcept;                         ///< [realtime]
+    const DomainStatus& domain(std::size_t n) const noexcept;         ///< [realtime]
+    void reset_domain(std::size_t n) noexcept;                        ///< Resets least counter and changes. [realtime]
+    const SlaveStatus& slave_status(std::size_t slave) const noexcept;///< Returns the status of `Setup::slaves[slave]`. [realtime]
+
+    /// Error of this cycle's phase: positive when the cycle begins late on the grid of the reference clock, whose cycle times begin at
+    /// multiples of Setup::cycle_ns; within half a cycle. Valid when `fresh`. [realtime]
+    struct Phase {
+        bool fresh = false;
+        std::int64_t error_ns = 0;
+    };
+    Phase dc_phase() const noexcept;
+
+    // Slaves as found, for tools and mailbox clients.
+    std::size_t found() const noexcept;                               ///< Returns the number of slaves on the bus after the scan. [realtime]
+    BusSlave& found(std::size_t position) noexcept;                   ///< Returns the slave at a position below found(). [realtime]
+    BusSlave* slave(std::size_t slave) noexcept;                      ///< Returns the slave that is Setup::slaves[slave]; nullptr: missing. [realtime]
+    /// Returns the channel of a slave. It belongs to the start-up while idle() is false. [realtime]
+    Channel& channel(const BusSlave& slave) noexcept;
+    bool idle(const BusSlave& slave) const noexcept;                  ///< Returns whether no start-up or check works on the slave. [realtime]
+
+private:
+    std::unique_ptr<Bus> bus_;
+    ethernet::Port* primary_ = nullptr;
+    ethernet::Port* backup_ = nullptr;
+    std::uint64_t links_checked_ = 0;
+    bool backup_up_ = true;
+};
+
+}  // namespace hal::ethercat::master

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+// Dynamic PDO mapping (ETG.1000.6, clause 5.6.7.4): reads what the slave has, writes what differs, and reads it back. A slave accepts
+// mappings either while their PDOs are not assigned, or before the assignment is cleared: SyncManager::assignment_first selects it.
+#include <array>
+
+#include "ethercat/master/bus.hpp"
+
+namespace hal::ethercat::master {
+
+namespace {
+
+constexpr std::uint16_t assignment_of(unsigned manager) noexcept { return static_cast<std::uint16_t>(0x1c10 + manager); }
+constexpr std::uint32_t object_missing = 0x06020000, sub_missing = 0x06090011;
+
+std::uint32_t mapping_word(const Entry& e) noexcept { return static_cast<std::uint32_t>(e.index) << 16 | static_cast<std::uint32_t>(e.sub) << 8 | (e.bits & 0xffU); }
+
+/// What comparing a list with the slave's gave.
+enum class Compared : std::uint8_t { same, differs, failed };
+
+template <class T>
+Task<SdoResult> write_value(Channel& c, Bus& bus, Device& d, std::uint16_t index, unsigned sub, T value) noexcept {
+    std::array<std::uint8_t, sizeof(T)> bytes{};
+    put(bytes.data(), value);
+    const SdoResult r = co_await bus.coe.download(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
+    if (!r) bus.report(Event::mapping_failed, d, index << 8 | static_cast<int>(sub), r.abort);
+    co_return r;
+}
+
+/// Reads a sub-index. A missing object is an empty list (facts: outputs-only devices have no 1C13h).
+Task<SdoResult> read_value(Channel& c, Bus& bus, Device& d, std::uint16_t index, unsigned sub, std::uint32_t& value) noexcept {
+    std::array<std::uint8_t, 8> bytes{};
+    value = 0;
+    SdoResult r = co_await bus.coe.upload(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
+    if (r) value = get<std::uint32_t>(bytes.data());
+    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 && (r.abort == object_missing || r.abort == sub_missing)) r.outcome = SdoResult::Outcome::done;
+    co_return r;
+}
+
+/// Compares `count` values of an object with those of `want(n)`, n from 0.
+template <class Want>
+Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want, bool report) noexcept {
+    std::uint32_t value = 0;
+    SdoResult r = co_await read_value(c, bus, d, index, 0, value);
+    if (!r) {
+        bus.report(Event::mapping_failed, d, index << 8, r.abort);
+        co_return Compared::failed;
+    }
+    if ((value & 0xff) != count) {
+        if (report) bus.report(Event::mapping_differs, d, index << 8, value & 0xff);
+        co_return Compared::differs;
+    }
+    for (std::size_t n = 0; n < count; ++n) {
+        r = co_await read_value(c, bus, d, index, static_cast<unsigned>(n + 1), value);
+        const bool same = r && value == want(n);
+        if (same) continue;
+        if (report) bus.report(Event::mapping_differs, d, index << 8 | static_cast<int>(n + 1), value);
+        co_return Compared::differs;
+    }
+    co_return Compared::same;
+}
+
+Task<Compared> compare_mapping(Channel& c, Bus& bus, Device& d, const Pdo& pdo, bool report) noexcept {
+    const auto want = [&pdo](std::size_t n) { return mapping_word(pdo.entries[n]); };
+    return compare(c, bus, d, pdo.index, pdo.entries.size(), want, report);
+}
+
+Task<Compared> compare_assignment(Channel& c, Bus& bus, Device& d, const SyncManager& sm, bool report) noexcept {
+    const auto want = [&sm](std::size_t n) { return std::uint32_t{sm.pdos[n].index}; };
+    return compare(c, bus, d, assignment_of(sm.number), sm.pdos.size(), want, report);
+}
+
+/// Writes a list at once: sub-index 0 padded to 16 bits, then the values.
+template <class T, class Want>
+Task<SdoResult> write_complete(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want) noexcept {
+    std::array<std::uint8_t, 2 + 255 * sizeof(T)> bytes{};
+    bytes[0] = static_cast<std::uint8_t>(count);
+    for (std::size_t n = 0; n < count; ++n) put(&bytes[2 + n * sizeof(T)], static_cast<T>(want(n)));
+    const SdoResult r = co_await bus.coe.download(c, d.slave, index, 0, true, {bytes.data(), 2 + count * sizeof(T)});
+    co_return r;
+}
+
+/// Writes a list: count 0, the values, the count.
+template <class T, class Want>
+Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want) noexcept {
+    SdoResult r;
+    if (d.slave.complete_access && (d.slave.coe_details & 0x20) != 0) {
+        r = co_await write_complete<T>(c, bus, d, index, count, want);
+        if (r) co_return true;
+    }
+    r = co_await write_value<std::uint8_t>(c, bus, d, index, 0, 0);
+    if (!r) co_return false;
+    for (std::size_t n = 0; n < count; ++n) {
+        r = co_await write_value(c, bus, d, index, static_cast<unsigned>(n + 1), static_cast<T>(want(n)));
+        if (!r) co_return false;
+    }
+    if (count == 0) co_return true;
+    r = co_await write_value(c, bus, d, index, 0, static_cast<std::uint8_t>(count));
+    co_return static_cast<bool>(r);
+}
+
+Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm, std::uint64_t which) noexcept {
+    for (std::size_t n = 0; n < sm.pdos.size(); ++n) {
+        if ((which >> n & 1) == 0) continue;
+        const Pdo& pdo = sm.pdos[n];
+        const auto want = [&pdo](std::size_t entry) { return mapping_word(pdo.entries[entry]); };
+        const bool ok = co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.entries.size(), want);
+        if (!ok) co_return false;
+        const Compared now = co_await compare_mapping(c, bus, d, pdo, true);
+        if (now != Compared::same) co_return false;
+    }
+    co_return true;
+}
+
+Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, unsigned limit) noexcept {
+    std::uint64_t differing = 0;  // PDOs whose mapping differs
+    for (std::size_t n = 0; n < sm.pdos.size() && n < 64; ++n) {
+        const Pdo& pdo = sm.pdos[n];
+        if (!pdo.write_mapping) continue;
+        if (pdo.entries.size() > 254 || (limit != 0 && pdo.entries.size() > limit)) {
+            bus.report(Event::too_many_entries, d, pdo.index, static_cast<std::int64_t>(pdo.entries.size()));
+            co_return false;
+        }
+        const Compared now = co_await compare_mapping(c, bus, d, pdo, false);
+        if (now == Compared::failed) co_return false;
+        if (now == Compared::differs) differing |= std::uint64_t{1} << n;
+    }
+    bool assign = false;
+    if (sm.write_assignment) {
+        const Compared now = co_await compare_assignment(c, bus, d, sm, false);
+        if (now == Compared::failed) co_return false;
+        assign = now == Compared::differs;
+    }
+    if (differing == 0 && !assign) co_return true;
+
+    // A mapping changes only while its PDO is not assigned, so the assignment is written again after any change.
+    const std::uint16_t object = assignment_of(sm.number);
+    bool ok = true;
+    if (sm.assignment_first) {
+        const SdoResult r = co_await write_value<std::uint8_t>(c, bus, d, object, 0, 0);
+        if (!r) co_return false;
+    }
+    ok = co_await write_mappings(c, bus, d, sm, differing);
+    if (!ok) co_return false;
+    if (!assign && !sm.assignment_first) co_return true;
+    const auto want = [&sm](std::size_t n) { return sm.pdos[n].index; };
+    ok = co_await write_list<std::uint16_t>(c, bus, d, object, sm.pdos.size(), want);
+    if (!ok) co_return false;
+    const Compared now = co_await compare_assignment(c, bus, d, sm, true);
+    co_return now == Compared::same;
+}
+
+}  // namespace
+
+Task<bool> map_process_data(Channel& c, Bus& bus, Device& d) noexcept {
+    const Slave& config = *bus.config(d);
+    for (const SyncManager& sm : config.sync_managers) {
+        bool any = sm.write_assignment;
+        for (const Pdo& pdo : sm.pdos) any |= pdo.write_mapping;
+        if (!any) continue;
+        if (!d.slave.mailbox.usable() || (d.slave.protocols & coe_supported) == 0) {
+            bus.report(Event::no_mailbox, d, assignment_of(sm.number) << 8);
+            co_return false;
+        }
+        const bool ok = co_await map_manager(c, bus, d, sm, config.entries_per_pdo);
+        if (!ok) co_return false;
+    }
+    co_return true;
+}
+
+}  // namespace hal::ethercat::master

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+// The start-up of one slave: INIT, PRE-OP, SAFE-OP, OP.
+#include <algorithm>
+
+#include "ethercat/master/bus.hpp"
+
+namespace hal::ethercat::master {
+
+namespace {
+
+constexpr std::int64_t retry_after_ns = 1'000 * millisecond;
+
+constexpr std::uint16_t code(State state) noexcept { return static_cast<std::uint16_t>(state); }
+
+Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
+    const Slave* config = bus.config(d);
+    const State  last = std::min(config != nullptr ? config->target : State::preop, bus.target);
+    const Timeouts& t = d.slave.timeouts;
+    const auto done = [&](State reached) {
+        if (reached != last) return false;
+        d.status.operational = config != nullptr;
+        return true;
+    };
+    bool ok = co_await request_state(c, bus, d, State::init, t.to_init);
+    if (!ok) co_return false;
+    ok = co_await clear_settings(c, bus, d);
+    if (!ok) co_return false;
+    ok = co_await startup_writes(c, bus, d, State::preop);
+    if (!ok) co_return false;
+    if (done(State::init)) co_return true;
+
+    d.slave.boot_mailbox = false;
+    ok = co_await set_mailbox(c, bus, d);
+    if (!ok) co_return false;
+    ok = co_await request_state(c, bus, d, State::preop, t.to_preop);
+    if (!ok) co_return false;
+    if (config == nullptr) co_return true;  // not in the setup: stays here for tools
+
+    ok = co_await startup_writes(c, bus, d, State::safeop);
+    if (!ok) co_return false;
+    ok = co_await map_process_data(c, bus, d);
+    if (!ok) co_return false;
+    if (done(State::preop)) co_return true;
+
+    ok = co_await synchronise(c, bus, d);
+    if (!ok) co_return false;
+    ok = co_await set_process_data(c, bus, d);
+    if (!ok) co_return false;
+    ok = co_await start_sync_signals(c, bus, d);
+    if (!ok) co_return false;
+    ok = co_await request_state(c, bus, d, State::safeop, t.to_safeop_op);
+    if (!ok) co_return false;
+    const auto& image = bus.image.slave(static_cast<std::size_t>(d.slave.configured));
+    bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), image.writes, image.reads, false);
+    if (done(State::safeop)) co_return true;
+
+    ok = co_await startup_writes(c, bus, d, State::op);
+    if (!ok) co_return false;
+    for (unsigned cycles = 0; cycles < 3 || !bus.outputs_valid; ++cycles) co_await c.sleep(0);  // valid outputs reach it before OP
+    ok = co_await request_state(c, bus, d, State::op, t.to_safeop_op);
+    if (!ok) co_return false;
+    co_return done(State::op);
+}
+
+}  // namespace
+
+Task<bool> read_state(Channel& c, Bus&, Device& d) noexcept {
+    const Answer a = co_await read(c, d.slave, registers::al_status, 6);
+    if (!a.arrived || a.wkc != 1) co_return false;
+    const auto status = get<std::uint16_t>(c.data());
+    d.slave.state = d.status.state = static_cast<State>(status & 0x0f);
+    d.slave.al_failed = d.status.al_error = (status & al_error) != 0;
+    d.slave.al_code = d.status.al_code = d.slave.al_failed ? get<std::uint16_t>(c.data() + 4) : std::uint16_t{0};
+    co_return true;
+}
+
+Task<bool> request_state(Channel& c, Bus& bus, Device& d, State state, std::uint32_t timeout_ms) noexcept {
+    bool answers = co_await read_state(c, bus, d);
+    if (answers && d.slave.state == state && !d.slave.al_failed) co_return true;
+    // A request for INIT acknowledges whatever went before; other requests start from a state without error.
+    const auto control = static_cast<std::uint16_t>(code(state) | (state == State::init || d.slave.al_failed ? al_error : 0));
+    const Answer a = co_await write(c, d.slave, registers::al_control, control);
+    if (!answers || a.wkc != 1) co_return false;
+    const std::int64_t until = c.now_ns() + timeout_ms * millisecond;
+    unsigned silent = 0;
+    while (c.now_ns() < until && silent < 3) {
+        answers = co_await read_state(c, bus, d);
+        silent = answers ? 0 : silent + 1;
+        if (!answers) continue;
+        if (d.slave.al_failed) {
+            bus.report(Event::state_refused, d, code(state), d.slave.al_code);
+            const auto acknowledge = static_cast<std::uint16_t>(code(d.slave.state) | al_error);
+            co_await write(c, d.slave, registers::al_control, acknowledge);
+            co_return false;
+        }
+        if (d.slave.state == state) {
+            bus.report(Event::state_reached, d, code(state));
+            co_return true;
+        }
+    }
+    if (silent < 3) bus.report(Event::state_timeout, d, code(state), code(d.slave.state));
+    co_return false;
+}
+
+Task<void> boot(Channel& c, Bus& bus, Device& d) noexcept {
+    d.began_ns = c.now_ns();
+    while (true) {
+        d.status.operational = false;
+        const bool ok = co_await bring_up(c, bus, d);
+        if (ok) break;
+        const bool here = co_await read_state(c, bus, d);
+        if (!here) {
+            bus.suspicious = true;  // the supervision decides whether it is lost
+            bus.leave(d);
+            bus.report(Event::slave_lost, d, d.slave.position);
+            ++d.status.losses;
+            co_return;
+        }
+        if (d.slave.configured >= 0) bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), false, false, false);
+        ++d.attempts;
+        const std::int64_t pause = retry_after_ns * std::min(d.attempts, 10U);
+        bus.report(Event::start_up_failed, d, code(d.slave.state), pause / (1000 * millisecond));
+        co_await c.sleep(pause);
+    }
+    d.attempts = 0;
+    if (d.status.operational) bus.report(Event::slave_operational, d, d.slave.position, (c.now_ns() - d.began_ns) / millisecond);
+}
+
+}  // namespace hal::ethercat::master

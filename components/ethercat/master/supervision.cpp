@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: MIT
+// The work for the whole bus: scan, start-up of all slaves at once, then the watch for slaves that fail, go, or return.
+#include <algorithm>
+
+#include "ethercat/master/bus.hpp"
+#include "ethercat/master/topology.hpp"
+
+namespace hal::ethercat::master {
+
+namespace {
+
+constexpr std::int64_t look_every_ns = 10 * millisecond, empty_retry_ns = 100 * millisecond, rediscover_every_ns = 50 * millisecond;
+constexpr std::int64_t counters_every_ns = 1'000 * millisecond;
+constexpr std::uint16_t spare_station = 0x0fff;
+constexpr std::uint8_t  counter_high = 0x80;
+
+Task<void> find_ports(Channel& c, Bus& bus) noexcept {
+    std::array<BusSlave*, 1024> line{};
+    std::size_t count = 0;
+    for (const std::uint16_t number : bus.by_position) {
+        BusSlave& s = bus.devices[number]->slave;
+        if (count == line.size()) break;
+        if (s.present) {
+            const Answer a = co_await read(c, s, registers::dl_status, 2);
+            if (a.wkc == 1) s.dl_status = get<std::uint16_t>(c.data());
+        }
+        line[count++] = &s;
+    }
+    find_tree({line.data(), count});
+}
+
+void start(Bus& bus, Device& d) noexcept {
+    if (d.refused || !d.identified) return;
+    d.checking = false;
+    if (d.slave.configured < 0) {
+        if (bus.setup.accept_other_slaves || bus.setup.slaves.empty()) bus.run(d, [&] { return boot(d.channel, bus, d); });
+        return;
+    }
+    bus.run(d, [&] { return boot(d.channel, bus, d); });
+}
+
+/// Identifies a slave without known address at a position, and makes it one of those that are missing. Returns its device, or -1.
+Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
+    BusSlave found;
+    found.station = spare_station, found.position = position;
+    put(c.data(), spare_station);
+    Answer a = co_await c.exchange(Command::apwr, at_position(position, registers::station_address), 2);
+    if (a.wkc != 1) co_return -1;
+    const bool identified = co_await identify(c, bus, found);
+    if (!identified) co_return -1;
+    Device* place = nullptr;
+    int configured = -1;
+    for (std::size_t n = 0; n < bus.setup.slaves.size() && place == nullptr; ++n) {
+        const Slave& want = bus.setup.slaves[n];
+        Device* before = bus.device_of[n] >= 0 ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get() : nullptr;
+        if (before != nullptr && before->slave.present) continue;
+        if (want.identity.alias ? found.alias != *want.identity.alias : want.position != position && !want.optional) continue;
+        if (!matches(bus, want, found, nullptr)) continue;
+        configured = static_cast<int>(n);
+        place = before;
+        if (place == nullptr)
+            for (const auto& d : bus.devices)
+                if (!d->slave.present && d->slave.configured < 0) {
+                    place = d.get();
+                    break;
+                }
+    }
+    if (place == nullptr) {
+        for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {  // the position is known, the slave is another one
+            const int device = bus.device_of[n];
+            if (bus.setup.slaves[n].position != position || (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present)) continue;
+            if (device >= 0) matches(bus, bus.setup.slaves[n], found, bus.devices[static_cast<std::size_t>(device)].get());
+        }
+        bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor, found.product);
+        co_return -1;
+    }
+    Device& d = *place;
+    found.station = d.slave.station, found.number = d.slave.number;
+    found.configured = configured, found.present = true;
+    found.timeouts = bus.setup.slaves[static_cast<std::size_t>(configured)].timeouts;
+    found.complete_access = bus.setup.slaves[static_cast<std::size_t>(configured)].complete_access;
+    put(c.data(), found.station);
+    a = co_await c.exchange(Command::fpwr, at_station(spare_station, registers::station_address), 2);
+    if (a.wkc != 1) co_return -1;
+    d.slave = found;
+    bus.device_of[static_cast<std::size_t>(configured)] = d.slave.number;
+    d.identified = true, d.refused = false, d.clock_set = d.synchronised = false;
+    d.status.online = true;
+    co_return d.slave.number;
+}
+
+/// Walks along the line after a change, and takes in whoever is new or back.
+Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
+    bool returned = false;
+    std::vector<std::uint16_t>& line = bus.by_position;
+    line.clear();  // capacity: all devices
+    for (unsigned n = 0; n < count && n < bus.devices.size(); ++n) {
+        const auto position = static_cast<std::uint16_t>(n);
+        const Answer a = co_await c.exchange(Command::aprd, at_position(n, registers::station_address), 2);
+        if (!a.arrived || a.wkc != 1) break;
+        const auto station = get<std::uint16_t>(c.data());
+        std::size_t number = static_cast<std::size_t>(station) - first_station;
+        const bool known = station >= first_station && number < bus.devices.size() && (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
+                           std::find(line.begin(), line.end(), number) == line.end();
+        if (!known) {
+            const int taken = co_await take_in(c, bus, position);
+            if (taken < 0) continue;
+            number = static_cast<std::size_t>(taken);
+        }
+        Device& d = *bus.devices[number];
+        const bool back = !d.slave.present || !known;
+        d.slave.position = position;
+        line.push_back(static_cast<std::uint16_t>(number));
+        if (!back) continue;
+        d.slave.present = d.status.online = true;
+        d.clock_set = d.synchronised = false;
+        returned = true;
+        bus.report(Event::slave_returned, d, position);
+    }
+    co_return returned;
+}
+
+/// Slaves that are there and neither in start-up nor running.
+void start_returned(Bus& bus) noexcept {
+    for (const std::uint16_t number : bus.by_position) {
+        Device& d = *bus.devices[number];
+        if (d.slave.present && !d.status.operational && !d.channel.busy()) start(bus, d);
+    }
+}
+
+}  // namespace
+
+Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
+    unsigned silent = 0;
+    bool here = false;
+    while (!here && silent < 3) {
+        here = co_await read_state(c, bus, d);
+        if (!here) ++silent;
+    }
+    if (!here) {
+        bus.leave(d);
+        ++d.status.losses;
+        bus.report(Event::slave_lost, d, d.slave.position);
+        co_return;
+    }
+    const Slave* config = bus.config(d);
+    const State  last = std::min(config != nullptr ? config->target : State::preop, bus.target);
+    if (d.slave.state == last && !d.slave.al_failed) co_return;
+    if (d.status.operational) {
+        const auto status = static_cast<std::uint16_t>(static_cast<unsigned>(d.slave.state) | (d.slave.al_failed ? al_error : 0U));
+        bus.report(Event::fell_back, d, status, d.slave.al_code);
+    }
+    d.status.operational = false;
+    d.began_ns = c.now_ns();
+    co_await boot(c, bus, d);
+}
+
+Task<void> supervise(Channel& c, Bus& bus) noexcept {
+    while (true) {
+        const bool scanned = co_await scan(c, bus);
+        if (scanned) break;
+        co_await c.sleep(empty_retry_ns);
+    }
+    co_await find_ports(c, bus);
+    bus.exchange = !bus.setup.slaves.empty();
+    co_await start_clocks(c, bus);
+    for (const std::uint16_t number : bus.by_position) start(bus, *bus.devices[number]);
+
+    std::int64_t rediscovered = c.now_ns();
+    while (true) {
+        const std::int64_t next = c.now_ns() + look_every_ns;
+        while (c.now_ns() < next && !bus.suspicious) co_await c.sleep(0);
+        bus.suspicious = false;
+        std::memset(c.data(), 0, 6);
+        const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
+        const unsigned count = a.arrived ? a.wkc : 0;
+        const auto states = get<std::uint16_t>(c.data());
+        bus.status.responding = static_cast<std::uint16_t>(count);
+        if (bus.engine.redundant()) judge_ring(bus, count);
+
+        unsigned present = 0;
+        bool at_rest = true;
+        for (const std::uint16_t number : bus.by_position) {
+            const Device& d = *bus.devices[number];
+            present += d.slave.present ? 1 : 0;
+            at_rest &= !d.slave.present || d.status.operational;
+        }
+        const bool all_fine = at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
+        if (all_fine && bus.status.wkc_state != WkcState::part) continue;
+
+        for (const std::uint16_t number : bus.by_position) {
+            Device& d = *bus.devices[number];
+            if (d.slave.present && !d.channel.busy() && !d.refused && d.identified && (d.slave.configured >= 0 || count < present))
+                bus.run(d, [&] { return check(d.channel, bus, d); });
+        }
+        if (count != bus.known || present < count) {
+            if (count != bus.known) bus.report(Event::topology_changed, bus.known, count);
+            bus.known = count;
+        }
+        const bool somebody_waits = present < count || bus.status.responding > present;
+        if (!somebody_waits || c.now_ns() - rediscovered < rediscover_every_ns) continue;
+        rediscovered = c.now_ns();
+        const bool returned = co_await rediscover(c, bus, bus.engine.redundant() ? bus.engine.primary_wkc() : count);
+        if (!returned) continue;
+        co_await find_ports(c, bus);
+        if (!bus.status.ring_broken) co_await start_clocks(c, bus);
+        start_returned(bus);
+    }
+}
+
+Task<void> watch(Channel& c, Bus& bus) noexcept {
+    while (true) {
+        const std::int64_t began = c.now_ns();
+        std::uint32_t largest = 0;
+        bool any = false;
+        for (const auto& device : bus.devices) {
+            Device& d = *device;
+            if (!d.slave.present || !d.identified) continue;
+            Answer a = co_await read(c, d.slave, registers::rx_errors, 20);
+            if (a.wkc == 1) {
+                std::array<std::uint8_t, 20> now{};
+                std::memcpy(now.data(), c.data(), now.size());
+                bool high = false;
+                for (std::size_t p = 0; p < 4; ++p) {
+                    PortErrors& e = d.status.ports[p];
+                    std::array<std::uint8_t, 4>& last = d.last_errors[p];
+                    const std::array<std::uint8_t, 4> values{now[2 * p], now[2 * p + 1], now[8 + p], now[16 + p]};
+                    const auto add = [&](std::uint64_t& sum, std::size_t n) {
+                        sum += values[n] >= last[n] ? values[n] - last[n] : values[n];
+                        high |= values[n] > counter_high;
+                    };
+                    add(e.invalid_frames, 0), add(e.rx_errors, 1), add(e.forwarded, 2), add(e.lost_links, 3);
+                    last = values;
+                }
+                if (high) {  // they stop at FFh
+                    std::memset(c.data(), 0, 20);
+                    co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::rx_errors), 20);
+                    for (auto& last : d.last_errors) last.fill(0);
+                }
+            }
+            if (d.clock_set) {
+                a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
+                if (a.wkc == 1) {
+                    d.status.dc_deviation_ns = get<std::uint32_t>(c.data()) & 0x7fff'ffff;
+                    if (d.slave.number != bus.reference) largest = std::max(largest, d.status.dc_deviation_ns);
+                    any = true;
+                }
+            }
+        }
+        bus.status.dc_deviation_ns = any ? largest : UINT32_MAX;
+        const bool synchronised = any && largest <= bus.setup.sync_window_ns;
+        if (synchronised && !bus.status.dc_synchronised) bus.report(Event::dc_synchronised, largest);
+        bus.status.dc_synchronised = synchronised;
+        co_await c.sleep(std::max<std::int64_t>(began + counters_every_ns - c.now_ns(), 0));
+    }
+}
+
+void judge_counters(Bus& bus) noexcept {
+    bus.status.wkc = bus.status.wkc_expected = 0;
+    bool part = false, any = false;
+    for (std::size_t n = 0; n < bus.image.domain_count(); ++n) {
+        const DomainStatus& d = bus.image.domain(n);
+        bus.status.wkc = static_cast<std::uint16_t>(bus.status.wkc + d.wkc);
+        bus.status.wkc_expected = static_cast<std::uint16_t>(bus.status.wkc_expected + d.expected);
+        part |= d.expected != 0 && d.state != WkcState::complete;
+        any |= d.state == WkcState::complete;
+        if (!d.fresh || d.expected == 0) continue;
+        WkcState& seen = bus.wkc_seen[n];
+        const bool complete = d.state == WkcState::complete;
+        if (complete != (seen == WkcState::complete)) {
+            if (complete || seen != WkcState::none || d.was_complete)
+                bus.report(complete ? Event::wkc_complete : Event::wkc_incomplete, static_cast<std::int64_t>(n << 16 | d.wkc), d.expected);
+            if (!complete) bus.suspicious = true;
+            seen = complete ? WkcState::complete : WkcState::part;
+        }
+    }
+    bus.status.wkc_state = part ? WkcState::part : any ? WkcState::complete : WkcState::none;
+}
+
+}  // namespace hal::ethercat::master

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/master/wire_engine.hpp"
+
+#include <algorithm>
+
+#include "ethercat/wire/registers.hpp"
+
+namespace hal::ethercat::master {
+
+namespace {
+
+constexpr std::size_t  first_datagram = ethernet_header_bytes + ecat_header_bytes;
+constexpr std::int64_t acyclic_timeout_ns = 2'000'000;
+
+constexpr bool counts_positions(Command c) noexcept {
+    return c == Command::aprd || c == Command::apwr || c == Command::aprw || c == Command::armw;
+}
+/// The data sent does not matter, and bytes that no slave touches must come back as zeros.
+constexpr bool only_reads(Command c) noexcept {
+    return c == Command::aprd || c == Command::fprd || c == Command::brd || c == Command::lrd || c == Command::nop;
+}
+
+}  // namespace
+
+void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
+    primary_ = &primary, backup_ = backup;
+    if (backup != nullptr) halves_.resize(image_.datagrams().size() + 1 + setup_.slaves.size());
+}
+
+void WireEngine::add(Channel& channel) { channels_.push_back(&channel); }
+
+void WireEngine::ready() {
+    active_.assign((channels_.size() + 7) / 8 * 8, 0);
+    for (std::size_t n = 0; n < channels_.size(); ++n) channels_[n]->set_active_flag(&active_[n]);
+    acyclic_.resize(4 * most_acyclic);
+}
+
+int WireEngine::take_index() noexcept {
+    for (std::size_t tries = 0; tries < indexes; ++tries) {
+        const std::uint8_t index = next_index_++;
+        Flight& f = flights_[index];
+        if (f.kind == Flight::Kind::cyclic || f.kind == Flight::Kind::acyclic) continue;
+        f = {};
+        return index;
+    }
+    return -1;
+}
+
+bool WireEngine::idle() const noexcept {
+    return std::none_of(flights_.begin(), flights_.end(), [](const Flight& f) { return f.kind == Flight::Kind::cyclic; });
+}
+
+std::uint8_t WireEngine::send(std::span<const std::uint8_t> frame, bool backup) noexcept {
+    std::uint8_t copies = 0;
+    const auto out = [&](ethernet::Port* port) {
+        if (port->send(frame, {}, now_ns_) == ethernet::Sent::queued)
+            ++copies, ++status_.frames_sent;
+        else
+            ++status_.send_failures;
+    };
+    out(primary_);
+    if (backup && backup_ != nullptr) out(backup_);
+    return copies;
+}
+
+void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames, std::uint64_t dc_time_ns) noexcept {
+    sent_after_ns_ = now_ns - cycle_start_ns_;
+    now_ns_ = now_ns;
+    if (process_data) {
+        const auto frames = image_.frames();
+        for (std::size_t n = 0; n < frames.size(); ++n) {
+            ProcessImage::Frame& frame = frames[n];
+            if (!all_domains && frame.every > 1 && cycle_ % frame.every != 0) continue;
+            const int index = take_index();
+            if (index < 0) break;
+            image_.fill(frame, static_cast<std::uint8_t>(index), dc_time_ns);
+            Flight& f = flights_[static_cast<std::size_t>(index)];
+            f.copies = send({frame.bytes.data(), frame.size}, true);
+            f.place = static_cast<std::uint16_t>(n), f.sent_ns = now_ns;
+            if (f.copies != 0) f.kind = Flight::Kind::cyclic, ++in_flight_;
+        }
+        ++cycle_;
+    }
+    send_acyclic(acyclic_frames);
+}
+
+void WireEngine::send_acyclic(unsigned frames) noexcept {
+    for (std::size_t place = 0; place < acyclic_.size() && frames > 0; ++place) {
+        AcyclicFrame& frame = acyclic_[place];
+        if (!frame.free) continue;
+        const int index = take_index();
+        if (index < 0) return;
+        bool backup = false;
+        if (!pack(frame, static_cast<std::uint8_t>(index), backup)) return;
+        Flight& f = flights_[static_cast<std::size_t>(index)];
+        f.copies = send({frame.bytes.data(), frame.size}, backup);
+        f.place = static_cast<std::uint16_t>(place), f.sent_ns = now_ns_;
+        f.kind = Flight::Kind::acyclic, ++in_flight_;
+        frame.free = false;
+        --frames;
+    }
+}
+
+/// Fills a frame with waiting datagrams, in turn. Those that count positions do not share a frame with others, as they leave on one port.
+bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup) noexcept {
+    FrameWriter writer(frame.bytes, primary_->address());
+    frame.count = 0;
+    const std::size_t channels = channels_.size();
+    std::size_t at = next_channel_ < channels ? next_channel_ : 0, next = at;
+    for (std::size_t seen = 0; seen < channels && frame.count < most_items; ++seen, at = at + 1 == channels ? 0 : at + 1) {
+        if (active_[at] == 0) continue;
+        Channel& c = *channels_[at];
+        if (c.stage() != Channel::Stage::waiting) continue;
+        const bool both = use_backup_ && backup_ != nullptr && !counts_positions(c.command());
+        if (frame.count != 0 && both != backup) continue;
+        if (c.length() > writer.space() || (c.length() == 0 && writer.space() == 0)) continue;
+        std::uint8_t* data = writer.add(c.command(), index, c.address(), c.length());
+        if (data == nullptr) continue;
+        if (!only_reads(c.command())) std::memcpy(data, c.data(), c.length());
+        backup = both;
+        c.set_sent(now_ns_);
+        frame.items[frame.count++] = {&c, c.generation(), static_cast<std::uint16_t>(data - frame.bytes.data()), c.length()};
+        next = at + 1;
+    }
+    next_channel_ = next;
+    if (frame.count == 0) return false;
+    frame.size = static_cast<std::uint16_t>(writer.finish().size());
+    return true;
+}
+
+void WireEngine::receive(std::int64_t now_ns) noexcept {
+    now_ns_ = cycle_start_ns_ = now_ns;
+    clock_.fresh = false;
+    drain(*primary_, 0);
+    if (backup_ != nullptr) drain(*backup_, 1);
+    if (in_flight_ != 0) expire();
+    image_.settle();
+    wake();
+}
+
+void WireEngine::drain(ethernet::Port& port, unsigned number) noexcept {
+    while (const auto arrival = port.receive(now_ns_)) arrived(arrival->bytes, number);
+}
+
+void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept {
+    if (bytes.size() < ethernet::smallest_frame || bytes[12] != ethertype >> 8 || bytes[13] != (ethertype & 0xff)) return;
+    Flight& f = flights_[bytes[first_datagram + 1]];
+    switch (f.kind) {
+    case Flight::Kind::none:
+        f.merged ? ++status_.duplicates : ++status_.foreign;
+        return;
+    case Flight::Kind::expired: ++status_.late; return;
+    case Flight::Kind::cyclic:
+        if (!image_.matches(image_.frames()[f.place], bytes)) break;
+        if (accept(f, number)) arrived_cyclic(f, bytes);
+        return;
+    case Flight::Kind::acyclic: return arrived_acyclic(f, bytes, number);
+    }
+    ++status_.foreign;
+}
+
+/// Counts a copy of a frame in flight; the second one at the same port is a duplicate.
+bool WireEngine::accept(Flight& f, unsigned number) noexcept {
+    if ((f.arrivals & 1U << number) != 0 || f.copies == 0) {
+        ++status_.duplicates;
+        return false;
+    }
+    ++status_.frames_received;
+    f.arrivals = static_cast<std::uint8_t>(f.arrivals | 1U << number);
+    --f.copies;
+    return true;
+}
+
+void WireEngine::arrived_cyclic(Flight& f, std::span<const std::uint8_t> bytes) noexcept {
+    const ProcessImage::Frame& frame = image_.frames()[f.place];
+    if (backup_ == nullptr) return complete_cyclic(f, bytes.data());
+    auto& half = halves_[f.place];
+    if (!f.merged)
+        std::memcpy(half.data(), bytes.data(), frame.size);
+    else
+        image_.merge(frame, half.data(), bytes.data());
+    f.merged = true;
+    if (f.copies == 0) complete_cyclic(f, half.data());
+}
+
+void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept {
+    const ProcessImage::Frame& frame = image_.frames()[f.place];
+    image_.take(frame, answer);
+    const std::uint8_t* time = answer + frame.clock_read + datagram_header_bytes;
+    if (get<std::uint16_t>(time + 8) != 0 && !clock_.fresh) clock_ = {true, get<std::uint64_t>(time), sent_after_ns_};
+    f.kind = Flight::Kind::none, f.merged = true;
+    --in_flight_;
+}
+
+void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes, unsigned number) noexcept {
+    AcyclicFrame& frame = acyclic_[f.place];
+    const auto same = [&](const Item& item) {
+        const std::size_t at = item.offset - datagram_header_bytes;
+        return bytes[at] == frame.bytes[at] && bytes[at + 1] == frame.bytes[at + 1] &&
+               get<std::uint16_t>(&bytes[at + 4]) == get<std::uint16_t>(&frame.bytes[at + 4]) &&
+               (get<std::uint16_t>(&bytes[at + 6]) & 0x87ff) == get<std::uint16_t>(&frame.bytes[at + 6]);
+    };
+    if (bytes.size() < frame.size || std::memcmp(&bytes[12], &frame.bytes[12], 4) != 0 ||
+        !std::all_of(frame.items.begin(), frame.items.begin() + static_cast<std::ptrdiff_t>(frame.count), same)) {
+        ++status_.foreign;
+        return;
+    }
+    if (!accept(f, number)) return;
+    if (number == 0)  // how far the primary port reaches
+        for (std::size_t n = 0; n < frame.count; ++n)
+            if (const std::uint8_t* d = &bytes[frame.items[n].offset]; d[-10] == static_cast<std::uint8_t>(Command::brd))
+                if (get<std::uint16_t>(d - 6) == registers::al_status) primary_wkc_ = get<std::uint16_t>(d + frame.items[n].length);
+    if (!f.merged)
+        std::memcpy(frame.answer.data(), bytes.data(), frame.size);
+    else
+        merge_acyclic(frame, bytes.data());
+    f.merged = true;
+    if (f.copies == 0) complete_acyclic(f);
+}
+
+void WireEngine::merge_acyclic(AcyclicFrame& frame, const std::uint8_t* second) noexcept {
+    for (std::size_t n = 0; n < frame.count; ++n) {
+        const Item& item = frame.items[n];
+        std::uint8_t*       to = &frame.answer[item.offset];
+        const std::uint8_t* from = second + item.offset;
+        const auto wkc = get<std::uint16_t>(to + item.length), more = get<std::uint16_t>(from + item.length);
+        if (frame.bytes[item.offset - datagram_header_bytes] == static_cast<std::uint8_t>(Command::brd))
+            for (std::size_t i = 0; i < item.length; ++i) to[i] |= from[i];
+        else if (wkc == 0 && more != 0)
+            std::memcpy(to, from, item.length);
+        put(to + item.length, static_cast<std::uint16_t>(wkc + more));
+    }
+}
+
+void WireEngine::complete_acyclic(Flight& f) noexcept {
+    AcyclicFrame& frame = acyclic_[f.place];
+    f.kind = Flight::Kind::none;
+    --in_flight_;
+    for (std::size_t n = 0; n < frame.count; ++n) {
+        const Item& item = frame.items[n];
+        Channel& c = *item.channel;
+        if (c.stage() != Channel::Stage::sent || c.generation() != item.generation || c.length() != item.length) continue;
+        c.set_now(now_ns_);
+        std::memcpy(c.data(), &frame.answer[item.offset], item.length);
+        c.arrive(get<std::uint16_t>(&frame.answer[item.offset + std::size_t{item.length}]));
+    }
+    frame.free = true;
+}
+
+void WireEngine::expire() noexcept {
+    const std::int64_t timeout = std::max(acyclic_timeout_ns, 2 * setup_.cycle_ns);
+    for (Flight& f : flights_) {
+        if (f.kind == Flight::Kind::cyclic) {
+            if (f.merged && backup_ != nullptr) {  // the other copy is lost
+                complete_cyclic(f, halves_[f.place].data());
+                ++status_.lost;
+            } else if (now_ns_ - f.sent_ns >= setup_.frame_timeout_ns) {
+                f.kind = Flight::Kind::expired, --in_flight_;
+                ++status_.lost;
+            }
+        } else if (f.kind == Flight::Kind::acyclic && (f.copies == 0 || now_ns_ - f.sent_ns >= timeout)) {
+            if (f.copies != 0) ++status_.lost;
+            if (f.merged) {
+                complete_acyclic(f);
+                continue;
+            }
+            AcyclicFrame& frame = acyclic_[f.place];
+            f.kind = Flight::Kind::expired, --in_flight_;
+            frame.free = true;
+            for (std::size_t n = 0; n < frame.count; ++n) {
+                Channel& c = *frame.items[n].channel;
+                if (c.stage() != Channel::Stage::sent || c.generation() != frame.items[n].generation) continue;
+                c.set_now(now_ns_);
+                c.lose();
+            }
+        }
+    }
+}
+
+void WireEngine::wake() noexcept {
+    for (std::size_t block = 0; block < active_.size(); block += 8) {
+        if (get<std::uint64_t>(&active_[block]) == 0) continue;
+        for (std::size_t n = block; n < std::min(block + 8, channels_.size()); ++n) {
+            if (active_[n] == 0) continue;
+            Channel& c = *channels_[n];
+            c.set_now(now_ns_);
+            if (c.stage() == Channel::Stage::sleeping && c.until_ns() <= now_ns_) c.wake();
+            if (c.stage() == Channel::Stage::idle) active_[n] = 0;
+        }
+    }
+}
+
+}  // namespace hal::ethercat::master
