@@ -13,7 +13,8 @@ std::int64_t Clock::at(std::int64_t now_ns) const noexcept {
 std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
     const double       rate = drift_ + correction_;
     const std::int64_t left = local_ns - base_local_;
-    std::int64_t       now = base_now_ + left - static_cast<std::int64_t>(std::floor((static_cast<double>(left) * rate + fraction_) / (1.0 + rate)));
+    const double       ahead = (static_cast<double>(left) * rate + fraction_) / (1.0 + rate);
+    std::int64_t       now = base_now_ + left - static_cast<std::int64_t>(std::floor(ahead));
     for (int i = 0; i < 4 && at(now) < local_ns; ++i) ++now;
     for (int i = 0; i < 4 && at(now - 1) >= local_ns; ++i) --now;
     return now;

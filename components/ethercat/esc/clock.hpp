@@ -10,7 +10,10 @@ namespace hal::ethercat::esc {
 class Clock {
 public:
     /// Starts at `local_ns` with the present drift and without correction.
-    void reset(std::int64_t now_ns, std::int64_t local_ns) noexcept { base_now_ = now_ns, base_local_ = local_ns, fraction_ = 0, correction_ = 0; }
+    void reset(std::int64_t now_ns, std::int64_t local_ns) noexcept {
+        base_now_ = now_ns, base_local_ = local_ns;
+        fraction_ = correction_ = 0;
+    }
     /// Sets the deviation of the oscillator, ppm.
     void set_drift(double ppm, std::int64_t now_ns) noexcept { rebase(now_ns), drift_ = ppm * 1e-6; }
     /// Sets the speed correction of the control loop, relative.

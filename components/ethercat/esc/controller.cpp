@@ -50,7 +50,8 @@ void Controller::execute(const Frame& frame, std::int64_t first_bit_ns) noexcept
     const std::int64_t last_bit_ns = first_bit_ns + frame.length_ns;
     advance(first_bit_ns);
     now_ns_ = first_bit_ns, frame_number_ = frame.number, touched_ = false;
-    const auto events = static_cast<std::uint16_t>(get<std::uint16_t>(&memory_[registers::ecat_event]) & get<std::uint16_t>(&memory_[registers::ecat_event_mask]));
+    const unsigned mask = get<std::uint16_t>(&memory_[registers::ecat_event_mask]);
+    const auto     events = static_cast<std::uint16_t>(get<std::uint16_t>(&memory_[registers::ecat_event]) & mask);
     for (const DatagramView& d : frame.datagrams) {
         datagram(d);
         if (events != 0) put(d.header + 8, static_cast<std::uint16_t>(d.event() | events));
@@ -63,7 +64,10 @@ void Controller::execute(const Frame& frame, std::int64_t first_bit_ns) noexcept
 
 /// Takes over what the frame wrote: its check sequence is good.
 void Controller::commit(std::int64_t now_ns) noexcept {
-    for (std::size_t i = 0; i < write_count_; ++i) write_registers(writes_[i].address, {written_.data() + writes_[i].offset, writes_[i].length});
+    for (std::size_t i = 0; i < write_count_; ++i) {
+        const RegisterWrite& kept = writes_[i];
+        write_registers(kept.address, {written_.data() + kept.offset, kept.length});
+    }
     write_count_ = written_bytes_ = 0;
     if (!sms_.pending()) return;
     const auto done = sms_.commit();

@@ -137,7 +137,8 @@ bool Controller::read_logical(const Fmmus::Unit& unit, const DatagramView& d) no
     std::array<std::uint8_t, largest_frame_bytes> bytes;
     if (!read(part.address(), {bytes.data(), part.bytes()})) return false;
     const std::uint64_t shift = part.in_memory % 8;
-    for (std::uint64_t i = 0; i < part.bits; ++i) logical_bits::set_bit(d.data, part.in_frame + i, logical_bits::bit(bytes.data(), shift + i));
+    for (std::uint64_t i = 0; i < part.bits; ++i)
+        logical_bits::set_bit(d.data, part.in_frame + i, logical_bits::bit(bytes.data(), shift + i));
     return true;
 }
 
@@ -153,7 +154,8 @@ bool Controller::write_logical(const Fmmus::Unit& unit, const DatagramView& d, c
         logical_bits::set_bit(bytes.data(), shift + i, logical_bits::bit(data, part.in_frame + i));
         logical_bits::set_bit(mask.data(), shift + i, true);
     }
-    const bool outputs = part.address() >= datagram_facts::digital_outputs && part.address() + part.bytes() <= datagram_facts::digital_outputs_end;
+    const bool outputs = part.address() >= datagram_facts::digital_outputs &&
+                         part.address() + part.bytes() <= datagram_facts::digital_outputs_end;
     return write(part.address(), {bytes.data(), part.bytes()}, settings_.bit_writes || outputs ? mask.data() : nullptr);
 }
 
@@ -180,7 +182,8 @@ bool Controller::write(std::uint32_t address, std::span<const std::uint8_t> from
         if (mask != nullptr) mask += count;
     }
     if (from.empty() || address >= ram_end_) return accepted;
-    return sms_.write(static_cast<std::uint16_t>(address), from.first(std::min<std::size_t>(from.size(), ram_end_ - address)), mask) || accepted;
+    const std::size_t count = std::min<std::size_t>(from.size(), ram_end_ - address);
+    return sms_.write(static_cast<std::uint16_t>(address), from.first(count), mask) || accepted;
 }
 
 }  // namespace hal::ethercat::esc

@@ -171,7 +171,8 @@ void DistributedClock::was_read(std::uint16_t address, std::size_t length) noexc
             memory_[registers::dc_sync0_status + input] = 0;
         if ((memory_[registers::dc_cyclic_unit_control] & (0x10 << input)) != 0) continue;  // of the PDI
         for (unsigned edge = 0; edge < 2; ++edge)
-            if (covers(dc_registers::latch_times + 16 * input + 8 * edge)) memory_[dc_registers::latch_status + input] &= static_cast<std::uint8_t>(~(1U << edge));
+            if (covers(dc_registers::latch_times + 16 * input + 8 * edge))
+                memory_[dc_registers::latch_status + input] &= static_cast<std::uint8_t>(~(1U << edge));
     }
 }
 

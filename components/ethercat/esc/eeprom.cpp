@@ -5,22 +5,15 @@
 
 #include "ethercat/wire/byte_order.hpp"
 #include "ethercat/wire/registers.hpp"
+#include "ethercat/wire/sii.hpp"
 
 namespace hal::ethercat::esc {
 
 namespace eeprom_bits {
-constexpr std::uint16_t write_enable = 0x0001, reads_8 = 0x0040, two_byte_address = 0x0080, commands = 0x0700, read = 0x0100, write = 0x0200,
-                        reload = 0x0400, bad_checksum = 0x0800, not_loaded = 0x1000, no_acknowledge = 0x2000, not_enabled = 0x4000, busy = 0x8000;
+constexpr std::uint16_t write_enable = 0x0001, reads_8 = 0x0040, two_byte_address = 0x0080;
+constexpr std::uint16_t commands = 0x0700, read = 0x0100, write = 0x0200, reload = 0x0400;
+constexpr std::uint16_t bad_checksum = 0x0800, not_loaded = 0x1000, no_acknowledge = 0x2000, not_enabled = 0x4000, busy = 0x8000;
 }  // namespace eeprom_bits
-
-std::uint8_t sii_checksum(std::span<const std::uint8_t, 14> words) noexcept {
-    std::uint8_t crc = 0xff;
-    for (const std::uint8_t byte : words) {
-        crc ^= byte;
-        for (int bit = 0; bit < 8; ++bit) crc = static_cast<std::uint8_t>((crc & 0x80) != 0 ? crc << 1 ^ 0x07 : crc << 1);
-    }
-    return crc;
-}
 
 void Eeprom::connect(std::uint8_t* memory, std::vector<std::uint8_t> content, std::int64_t read_ns, std::int64_t write_ns, bool reads_8) {
     memory_ = memory, content_ = std::move(content), read_ns_ = read_ns, write_ns_ = write_ns, reads_8_ = reads_8;
@@ -37,10 +30,11 @@ void Eeprom::load(std::int64_t) noexcept {
 void Eeprom::reload(bool power_on) noexcept {
     constexpr std::uint16_t ignored_checksum = 0x88a4, pulse_length = 0x0982;
     constexpr std::size_t   checksum_at = 14;
-    auto status = static_cast<std::uint16_t>(get<std::uint16_t>(memory_ + registers::eeprom_control) & ~(eeprom_bits::bad_checksum | eeprom_bits::not_loaded));
+    auto status = get<std::uint16_t>(memory_ + registers::eeprom_control);
+    status &= static_cast<std::uint16_t>(~(eeprom_bits::bad_checksum | eeprom_bits::not_loaded));
     loaded_ = content_.size() > checksum_at + 1 && !damaged_ &&
               (get<std::uint16_t>(&content_[checksum_at]) == ignored_checksum ||
-               content_[checksum_at] == sii_checksum(std::span<const std::uint8_t, 14>(content_.data(), checksum_at)));
+               content_[checksum_at] == sii::checksum(content_));
     if (loaded_) {
         std::copy_n(&content_[0], 2, memory_ + registers::pdi_control);
         std::copy_n(&content_[2], 2, memory_ + registers::pdi_control + 0x10);
@@ -53,8 +47,9 @@ void Eeprom::reload(bool power_on) noexcept {
 }
 
 void Eeprom::show_status(std::int64_t now_ns) noexcept {
-    auto status = get<std::uint16_t>(memory_ + registers::eeprom_control);
-    put(memory_ + registers::eeprom_control, static_cast<std::uint16_t>(now_ns < busy_until_ns_ ? status | eeprom_bits::busy : status & ~eeprom_bits::busy));
+    const auto status = get<std::uint16_t>(memory_ + registers::eeprom_control);
+    const bool busy = now_ns < busy_until_ns_;
+    put(memory_ + registers::eeprom_control, static_cast<std::uint16_t>(busy ? status | eeprom_bits::busy : status & ~eeprom_bits::busy));
 }
 
 void Eeprom::write(std::uint16_t address, std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
@@ -82,7 +77,9 @@ void Eeprom::execute(bool write_enabled, std::int64_t now_ns) noexcept {
     const auto        command = static_cast<std::uint16_t>(status & eeprom_bits::commands);
     const std::size_t words = std::max<std::size_t>(content_.size() / 2, 1);
     const std::size_t first = 2 * (get<std::uint32_t>(memory_ + registers::eeprom_address) & 0xffff);
-    const auto        end_with = [&](std::uint16_t bits) { put(memory_ + registers::eeprom_control, static_cast<std::uint16_t>((status & ~eeprom_bits::commands) | bits)); };
+    const auto        end_with = [&](std::uint16_t bits) {
+        put(memory_ + registers::eeprom_control, static_cast<std::uint16_t>((status & ~eeprom_bits::commands) | bits));
+    };
     busy_until_ns_ = now_ns + read_ns_;
     if (command == eeprom_bits::write && !write_enabled) return end_with(static_cast<std::uint16_t>(eeprom_bits::not_enabled | command));
     if (failures_ > 0 || now_ns < chip_busy_until_ns_) {

@@ -8,9 +8,7 @@
 
 namespace hal::ethercat::esc {
 
-/// Returns the checksum of SII words 0-6: CRC-8, polynomial 07h, start FFh. [any]
-std::uint8_t sii_checksum(std::span<const std::uint8_t, 14>) noexcept;
-
+/// The content stays over power-off.
 class Eeprom {
 public:
     /// Takes the content. [setup]

@@ -28,7 +28,8 @@ void Fmmus::configure() noexcept {
     }
     for (const Unit& a : *this)
         for (const Unit& b : *this)
-            if (a.reads && b.writes && a.first_bit / 8 <= (b.first_bit + b.bits - 1) / 8 && b.first_bit / 8 <= (a.first_bit + a.bits - 1) / 8) overlap_ = true;
+            if (a.reads && b.writes && a.first_bit / 8 <= (b.first_bit + b.bits - 1) / 8 && b.first_bit / 8 <= (a.first_bit + a.bits - 1) / 8)
+                overlap_ = true;
 }
 
 }  // namespace hal::ethercat::esc

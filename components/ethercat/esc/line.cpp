@@ -60,7 +60,9 @@ bool Line::is_linked(std::size_t slave, unsigned port) const noexcept {
 void Line::update_port(std::size_t slave, unsigned port) noexcept {
     nodes_[slave].controller->set_link(port, is_linked(slave, port));
     const Connection& c = nodes_[slave].cables[port];
-    if (c.slave >= 0) nodes_[static_cast<std::size_t>(c.slave)].controller->set_link(c.port, is_linked(static_cast<std::size_t>(c.slave), c.port));
+    if (c.slave < 0) return;
+    const auto peer = static_cast<std::size_t>(c.slave);
+    nodes_[peer].controller->set_link(c.port, is_linked(peer, c.port));
 }
 
 void Line::update_links(std::size_t slave) noexcept {

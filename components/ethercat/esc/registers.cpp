@@ -19,9 +19,9 @@ struct Range {
 /// Registers that only keep what the master writes.
 constexpr Range plain[]{{registers::station_address, 2}, {registers::dl_control, 4}, {registers::ecat_event_mask, 2},
                         {registers::watchdog_divider, 2}, {registers::pdi_watchdog, 2}, {registers::process_data_watchdog, 2},
-                        {registers::dc_system_time_offset, 8}, {registers::dc_system_time_delay, 4}, {registers::dc_speed_counter_start, 2},
-                        {registers::dc_filter_depth, 2}, {registers::dc_cyclic_unit_control, 2}, {registers::dc_start_time, 8},
-                        {registers::dc_sync0_cycle, 8}, {0x09a8, 2}};
+                        {registers::dc_system_time_offset, 8}, {registers::dc_system_time_delay, 4},
+                        {registers::dc_speed_counter_start, 2}, {registers::dc_filter_depth, 2}, {registers::dc_cyclic_unit_control, 2},
+                        {registers::dc_start_time, 8}, {registers::dc_sync0_cycle, 8}, {0x09a8, 2}};
 /// Counters that a write to any of their bytes clears.
 constexpr Range counters[]{{registers::rx_errors, 12}, {registers::processing_unit_errors, 1}, {registers::pdi_errors, 1},
                            {registers::lost_links, 4}, {registers::process_data_watchdog_counter, 2}};
@@ -46,9 +46,11 @@ void Controller::reset_registers() noexcept {
     memory_[registers::ram_size] = static_cast<std::uint8_t>(settings_.ram_kb);
     for (unsigned p = 0; p < ports; ++p)
         memory_[registers::port_descriptor] |= static_cast<std::uint8_t>(static_cast<unsigned>(settings_.port_kinds[p]) << 2 * p);
-    put(at(registers::features), static_cast<std::uint16_t>((settings_.bit_writes ? 0 : registers::fmmu_bytes_only) | (settings_.dc ? registers::dc_supported : 0) |
-                                                            (settings_.dc && settings_.dc_64_bit ? registers::dc_64_bit : 0) |
-                                                            (settings_.lrw ? 0 : registers::no_lrw) | (settings_.read_write ? 0 : registers::no_brw)));
+    unsigned features = settings_.dc ? registers::dc_supported | (settings_.dc_64_bit ? registers::dc_64_bit : 0U) : 0U;
+    if (!settings_.bit_writes) features |= registers::fmmu_bytes_only;
+    if (!settings_.lrw) features |= registers::no_lrw;
+    if (!settings_.read_write) features |= registers::no_brw;
+    put(at(registers::features), static_cast<std::uint16_t>(features));
     memory_[registers::dl_control] = 1;
     put(at(registers::al_status), static_cast<std::uint16_t>(State::init));
     put(at(registers::al_control), static_cast<std::uint16_t>(State::init));
@@ -93,18 +95,24 @@ void Controller::write_registers(std::uint16_t address, std::span<const std::uin
     using namespace register_facts;
     const auto covers = [&](const Range& range) { return range.touched(address, from.size()); };
     const auto byte = [&](unsigned reg) { return reg >= address && reg < address + from.size() ? from[reg - address] : memory_[reg]; };
+    // The part of the written bytes that falls into a range, and where it starts.
+    struct Part { std::uint16_t address; std::span<const std::uint8_t> bytes; };
+    const auto part = [&](const Range& range) {
+        const std::size_t first = std::max<std::size_t>(range.first, address);
+        const std::size_t end = std::min<std::size_t>(range.first + range.length, address + from.size());
+        return Part{static_cast<std::uint16_t>(first), from.subspan(first - address, end - first)};
+    };
     const auto keep = [&](const Range& range) {
-        const std::size_t first = std::max<std::size_t>(range.first, address), end = std::min<std::size_t>(range.first + range.length, address + from.size());
-        std::memcpy(&memory_[first], &from[first - address], end - first);
+        const Part p = part(range);
+        std::memcpy(&memory_[p.address], p.bytes.data(), p.bytes.size());
     };
     if (covers(dc)) {
         if (!settings_.dc) return;
         if (covers(system_time)) {
             std::array<std::uint8_t, 8> time{};
             for (unsigned i = 0; i < time.size(); ++i) time[i] = byte(registers::dc_system_time + i);
-            const std::size_t end = address + from.size();
-            const bool        wide = end >= registers::dc_system_time + 8U;
-            if (address <= registers::dc_system_time && end >= registers::dc_system_time + 4U) dc_.receive_system_time(get<std::uint64_t>(time.data()), wide ? 8 : 4, now_ns_);
+            const Part p = part(system_time);
+            if (p.address == registers::dc_system_time) dc_.receive_system_time(get<std::uint64_t>(time.data()), p.bytes.size(), now_ns_);
         }
         if (covers(receive_time)) dc_.latch_receive_times(now_ns_, frame_number_);
     }
@@ -118,8 +126,8 @@ void Controller::write_registers(std::uint16_t address, std::span<const std::uin
     }
     if (covers(al_control)) request_state(byte(registers::al_control), byte(registers::al_control + 1));
     if (covers(eeprom_block)) {
-        const std::size_t first = std::max<std::size_t>(eeprom_block.first, address), end = std::min<std::size_t>(eeprom_block.first + eeprom_block.length, address + from.size());
-        eeprom_.write(static_cast<std::uint16_t>(first), from.subspan(first - address, end - first), now_ns_);
+        const Part p = part(eeprom_block);
+        eeprom_.write(p.address, p.bytes, now_ns_);
     }
     if (covers(fmmus)) keep(fmmus), fmmus_.configure();
     if (covers(sync_managers) && sms_.configure(address, from)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Connects a line of emulated slaves to ports: on a `sim:` segment it answers frames while they arrive; on a real interface a loop serves it.
+// Connects a line of emulated slaves to ports: on a `sim:` segment it answers frames while they arrive; a loop serves a real interface.
 #pragma once
 
 #include <atomic>
@@ -36,13 +36,15 @@ private:
     bool connected_ = false;
 };
 
-/// Serves a line on one or two ports of any kind until `stop`; the options of the ports should be promiscuous, with all Ethertypes or those
-/// of EtherCAT. `control` runs between frames, at least every millisecond; it may be nullptr. [realtime] the thread waits for frames only
+/// What changes a line while serve() works it.
 struct ServeControl {
     virtual ~ServeControl() = default;
     /// Changes the line: power, cables, disturbances.
     virtual void work(Line&, std::int64_t now_ns) noexcept = 0;
 };
-void serve(Line& line, ethernet::Port& primary, ethernet::Port* secondary, const std::atomic<bool>& stop, ServeControl* control = nullptr) noexcept;
+/// Serves a line on one or two ports of any kind until `stop`. The ports should be promiscuous. `control` runs between frames, about every
+/// millisecond; it may be nullptr. [realtime] in a thread of its own; it waits for frames only
+void serve(Line& line, ethernet::Port& primary, ethernet::Port* secondary, const std::atomic<bool>& stop,
+           ServeControl* control = nullptr) noexcept;
 
 }  // namespace hal::ethercat::esc

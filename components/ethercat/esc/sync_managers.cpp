@@ -48,7 +48,8 @@ void SyncManagers::activate(unsigned number, bool on) noexcept {
     u.watchdog = (at[sm_bytes::control] & 0x40) != 0;
     const std::size_t buffers = u.mailbox || u.length == 1 ? 1 : 3;
     u.enabled = on;
-    const bool fits = on && u.length > 0 && u.start >= registers::user_memory - 0x80U && u.start + buffers * u.length <= sm_bytes::memory_size;
+    constexpr unsigned first_memory = 0x0f00;  // registers of digital outputs are process data too
+    const bool fits = on && u.length > 0 && u.start >= first_memory && u.start + buffers * u.length <= sm_bytes::memory_size;
     units_[number] = u;
     enabled_ = fits ? enabled_ | 1U << number : enabled_ & ~(1U << number);
 }

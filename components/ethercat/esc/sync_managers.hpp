@@ -56,7 +56,9 @@ private:
     const Unit* at(std::uint32_t address, std::uint32_t& until) const noexcept;
     bool read(Unit&, std::uint32_t offset, std::span<std::uint8_t> to) noexcept;
     bool write(Unit&, std::uint32_t offset, std::span<const std::uint8_t> from, const std::uint8_t* mask) noexcept;
-    std::uint8_t* buffer(const Unit& u, unsigned number) noexcept { return memory_ + (u.length == 1 || u.mailbox ? u.start : (u.start + number * u.length) & 0xffff); }
+    std::uint8_t* buffer(const Unit& u, unsigned number) noexcept {
+        return memory_ + (u.length == 1 || u.mailbox ? u.start : u.start + number * u.length);
+    }
     void activate(unsigned number, bool on) noexcept;
 
     std::uint8_t* memory_ = nullptr;

@@ -9,6 +9,7 @@
 #include "ethercat/esc/line.hpp"
 #include "ethercat/wire/frames.hpp"
 #include "ethercat/wire/registers.hpp"
+#include "ethercat/wire/sii.hpp"
 #include "ethercat/wire/states.hpp"
 
 namespace esc_world {
@@ -35,14 +36,14 @@ struct Firmware : esc::Application {
 
 /// An SII image with identity and a good checksum.
 inline std::vector<std::uint8_t> image(std::uint16_t alias = 0, bool emulation = false) {
-    std::vector<std::uint8_t> sii(256, 0);
-    put<std::uint16_t>(&sii[0], emulation ? 0x0104 : 0x0005);
-    put<std::uint16_t>(&sii[8], alias);
-    put<std::uint32_t>(&sii[16], 0x5a);
-    put<std::uint32_t>(&sii[20], 0x1234);
-    sii[14] = esc::sii_checksum(std::span<const std::uint8_t, 14>(sii.data(), 14));
-    put<std::uint16_t>(&sii[128], 0xffff);
-    return sii;
+    std::vector<std::uint8_t> words(256, 0);
+    put<std::uint16_t>(&words[0], emulation ? 0x0104 : 0x0005);
+    put<std::uint16_t>(&words[8], alias);
+    put<std::uint32_t>(&words[16], 0x5a);
+    put<std::uint32_t>(&words[20], 0x1234);
+    words[14] = sii::checksum(words);
+    put<std::uint16_t>(&words[128], 0xffff);
+    return words;
 }
 
 struct World {
