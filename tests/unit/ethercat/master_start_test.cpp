@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include "tests/unit/ethercat/master_world.hpp"
+
+namespace {
+
+using namespace master_world;
+
+TEST(EthercatMaster, Brings_slaves_to_op_and_exchanges_process_data) {
+    World w;
+    for (unsigned n = 0; n < 3; ++n) w.add(0x100 + n);
+    w.begin(drives(3));
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    EXPECT_LT(w.cycles, 250U);
+    EXPECT_EQ(w.master->status().responding, 3);
+    EXPECT_EQ(w.master->status().state, State::op);
+    for (std::size_t n = 0; n < 3; ++n) w.master->data(n, 0)[0] = static_cast<std::uint8_t>(10 * n + 5);
+    w.run(4);
+    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(w.master->data(n, 1)[0], 10 * n + 6);
+    EXPECT_EQ(w.master->domain(0).state, WkcState::complete);
+    EXPECT_EQ(w.master->domain(0).expected, 9) << "two for outputs and one for inputs of each slave";
+    EXPECT_EQ(w.master->status().lost, 0U);
+    EXPECT_EQ(w.master->status().foreign, 0U);
+    EXPECT_EQ(w.log.count(Event::slave_operational), 3U);
+}
+
+TEST(EthercatMaster, Reports_an_empty_bus_once_and_finds_slaves_that_come_later) {
+    World w;
+    w.add(0x100);
+    w.begin(drives(1));
+    w.line.set_power(0, false, 0);
+    w.run(500);
+    EXPECT_EQ(w.log.count(Event::no_slaves), 1U);
+    w.line.set_power(0, true, w.now_ns);
+    EXPECT_TRUE(w.operational()) << w.log.text();
+}
+
+TEST(EthercatMaster, Refuses_a_slave_of_another_product) {
+    World w;
+    w.add(0x100);
+    w.add(0x999);
+    w.begin(drives(2));
+    w.run(600);
+    EXPECT_FALSE(w.master->status().operational);
+    const auto* e = w.log.last(Event::wrong_product);
+    ASSERT_NE(e, nullptr);
+    EXPECT_EQ(e->slave, 1U);
+    EXPECT_EQ(e->first, 0x999);
+    EXPECT_EQ(e->second, 0x101);
+    EXPECT_EQ(w.master->slave_status(0).state, State::op) << "the others run";
+    EXPECT_EQ(w.master->slave_status(1).state, State::init);
+}
+
+TEST(EthercatMaster, Reports_slaves_that_are_missing_or_not_named) {
+    World w;
+    w.add(0x100);
+    w.begin(drives(2));
+    w.run(400);
+    ASSERT_EQ(w.log.count(Event::slave_missing), 1U);
+    EXPECT_EQ(w.log.last(Event::slave_missing)->slave, 1U);
+    EXPECT_FALSE(w.master->status().operational);
+
+    World more;
+    more.add(0x100);
+    more.add(0x200);
+    more.begin(drives(1));
+    EXPECT_TRUE(more.operational());
+    ASSERT_EQ(more.log.count(Event::unknown_slave), 1U);
+    EXPECT_EQ(more.log.last(Event::unknown_slave)->slave, Events::of_position + 1);
+}
+
+TEST(EthercatMaster, Finds_a_slave_by_its_alias) {
+    World w;
+    w.add(0x100);
+    w.add(0x101, 77);
+    w.add(0x102);
+    master::Setup setup = drives(3);
+    setup.slaves[1].position = 2, setup.slaves[1].identity.alias = 77;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    EXPECT_EQ(w.master->slave(1)->position, 1);
+}
+
+TEST(EthercatMaster, Reports_a_refused_state_with_its_code_and_tries_again) {
+    World w;
+    Firmware& f = w.add(0x100);
+    f.refuse = 4, f.code = 0x1d;
+    w.begin(drives(1));
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::start_up_failed) != 0; }));
+    const auto* e = w.log.last(Event::state_refused);
+    ASSERT_NE(e, nullptr);
+    EXPECT_EQ(e->first, 4);
+    EXPECT_EQ(e->second, 0x1d);
+    f.refuse = 0;
+    EXPECT_TRUE(w.operational()) << w.log.text();
+}
+
+TEST(EthercatMaster, Writes_only_mappings_that_differ_and_reads_them_back) {
+    for (const bool assignment_first : {true, false}) {
+        World w;
+        w.add(0x100, 0, true);
+        master::Setup setup = drives(1);
+        for (auto& sm : setup.slaves[0].sync_managers) {
+            sm.write_assignment = true, sm.assignment_first = assignment_first;
+            for (auto& pdo : sm.pdos) pdo.write_mapping = true;
+        }
+        auto& v = w.objects.values;
+        v[0x1c1200] = {1}, v[0x1c1201] = {0x00, 0x16};                      // outputs as wanted
+        v[0x160000] = {2}, v[0x160001] = {8, 1, 0, 0x70}, v[0x160002] = {8, 1, 1, 0x70};
+        v[0x1c1300] = {1}, v[0x1c1301] = {0x01, 0x1a};                      // inputs are not
+        v[0x1a0000] = {1}, v[0x1a0001] = {8, 1, 0, 0x60};
+        w.begin(setup);
+        ASSERT_TRUE(w.operational()) << w.log.text();
+        const std::vector<std::uint32_t> first{0x1c1300, 0x1a0000, 0x1a0001, 0x1a0002, 0x1a0000, 0x1c1300, 0x1c1301, 0x1c1300};
+        const std::vector<std::uint32_t> last{0x1a0000, 0x1a0001, 0x1a0002, 0x1a0000, 0x1c1300, 0x1c1301, 0x1c1300};
+        EXPECT_EQ(w.objects.written, assignment_first ? first : last);
+        EXPECT_EQ(v[0x1a0002], (std::vector<std::uint8_t>{8, 1, 1, 0x60}));
+    }
+}
+
+TEST(EthercatMaster, Reports_the_object_of_a_start_up_write_that_is_refused) {
+    World w;
+    w.add(0x100, 0, true);
+    master::Setup setup = drives(1);
+    StartupWrite write;
+    write.index = 0x6060, write.data = {8};
+    setup.slaves[0].startup.push_back(write);
+    w.objects.refuse = 0x606000;
+    w.begin(setup);
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::startup_write_failed) != 0; }));
+    EXPECT_EQ(w.log.last(Event::startup_write_failed)->first, 0x606000);
+    EXPECT_EQ(w.log.last(Event::startup_write_failed)->second, 0x06090030);
+}
+
+TEST(EthercatMaster, Splits_process_data_over_frames_and_uses_lrd_and_lwr_where_lrw_is_not_supported) {
+    World w;
+    for (unsigned n = 0; n < 40; ++n) w.add(0x100 + n, 0, false, {.lrw = n != 3}).inputs = 40;
+    master::Setup setup = drives(40, 40);
+    w.begin(setup);
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    for (std::size_t n = 0; n < 40; ++n) w.master->data(n, 0)[39] = static_cast<std::uint8_t>(n);
+    w.run(4);
+    for (std::size_t n = 0; n < 40; ++n) EXPECT_EQ(w.master->data(n, 1)[39], n + 1) << n;
+    EXPECT_EQ(w.master->domain(0).state, WkcState::complete);
+}
+
+TEST(EthercatMaster, Exchanges_a_slow_domain_in_every_nth_cycle_once_operational) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    master::Setup setup = drives(2);
+    setup.domains = {{"fast", 1}, {"slow", 4}};
+    setup.slaves[1].domain = 1;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational());
+    const auto fast = w.master->domain(0).exchanges, slow = w.master->domain(1).exchanges;
+    w.run(40);
+    EXPECT_EQ(w.master->domain(0).exchanges - fast, 40U);
+    EXPECT_NEAR(static_cast<double>(w.master->domain(1).exchanges - slow), 10.0, 1.0);
+}
+
+}  // namespace
