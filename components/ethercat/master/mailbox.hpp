@@ -87,6 +87,8 @@ public:
     Task<MailboxResult> receive(Channel&, BusSlave&, std::int64_t until_ns) noexcept;
     /// Returns the message received last, valid until the next receive().
     const MailboxMessage& reply() const noexcept { return reply_; }
+    /// Declares that the reply that did not come in time is still waited for.
+    void still_waiting() noexcept { stale_ = false; }
     /// Counts the last reply as one that was not expected.
     void drop() noexcept { ++counters_.dropped; }
     /// Reads the message in the mailbox, if there is one, without a request. For emergencies, EoE and VoE.

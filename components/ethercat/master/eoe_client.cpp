@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/master/eoe_client.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace hal::ethercat::master {
+namespace {
+
+constexpr std::size_t ethernet_addresses = 12;
+
+bool accepts_eoe(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
+    const auto header = eoe::read(payload);
+    return header && static_cast<std::uint32_t>(header->type) == expected.first;
+}
+
+}  // namespace
+
+EoeSwitch::EoeSwitch(Mailboxes& mailboxes, std::span<const std::uint16_t> slaves, std::size_t depth)
+    : mailboxes_(mailboxes), port_by_slave_(mailboxes.size(), -1), to_host_(depth * 4), from_host_(depth * 4) {
+    for (const auto number : slaves) {
+        if (number >= mailboxes.size()) continue;
+        port_by_slave_[number] = static_cast<int>(ports_.size());
+        ports_.push_back(std::make_unique<Port>(number, depth));
+        mailboxes.at(number).set_sink(MailboxType::eoe, this);
+    }
+}
+
+EoeSwitch::Port* EoeSwitch::port_of(const BusSlave& slave) const noexcept {
+    if (slave.number >= port_by_slave_.size() || port_by_slave_[slave.number] < 0) return nullptr;
+    return ports_[static_cast<std::size_t>(port_by_slave_[slave.number])].get();
+}
+
+bool EoeSwitch::pending(const BusSlave& slave) const noexcept {
+    const Port* port = port_of(slave);
+    return port != nullptr && port->queue.size() != 0;
+}
+
+EoeCounters EoeSwitch::counters(const BusSlave& slave) const noexcept {
+    const Port* port = port_of(slave);
+    return port != nullptr ? port->counters : EoeCounters{};
+}
+
+void EoeSwitch::pump() noexcept {
+    for (std::size_t left = from_host_.capacity(); left-- != 0;) {
+        const EthernetFrame* frame = from_host_.front();
+        if (frame == nullptr) return;
+        if (frame->length <= frame->bytes.size()) forward(host, {frame->bytes.data(), frame->length});
+        from_host_.drop();
+    }
+}
+
+bool EoeSwitch::take(const BusSlave& slave, const MailboxMessage& message) noexcept {
+    const auto header = eoe::read(message.payload);
+    Port* port = port_of(slave);
+    if (!header || port == nullptr) return false;
+    if (header->type == eoe::Type::timestamp) return true;
+    if (header->type != eoe::Type::fragment) return false;
+    const auto frame = port->joiner.take(message.payload);
+    if (frame.empty()) return true;
+    ++port->counters.from_slave;
+    forward(static_cast<unsigned>(port_by_slave_[slave.number]), frame);
+    return true;
+}
+
+EoeSwitch::Learned& EoeSwitch::slot_of(const std::uint8_t* address) noexcept {
+    unsigned sum = 0;
+    for (unsigned i = 0; i < 6; ++i) sum = sum * 31 + address[i];
+    return learned_[sum % learned_.size()];
+}
+
+void EoeSwitch::forward(unsigned from, std::span<const std::uint8_t> frame) noexcept {
+    if (frame.size() < ethernet_addresses) return;
+    const std::uint8_t* to = frame.data();
+    const std::uint8_t* source = frame.data() + 6;
+    if ((source[0] & 1) == 0) {
+        Learned& slot = slot_of(source);
+        std::memcpy(slot.address.data(), source, 6);
+        slot.port = static_cast<std::uint16_t>(from), slot.used = true;
+    }
+    const Learned& known = slot_of(to);
+    if ((to[0] & 1) == 0 && known.used && std::memcmp(known.address.data(), to, 6) == 0) {
+        if (known.port != from) deliver(known.port, frame);
+        return;
+    }
+    if (from != host) deliver(host, frame);
+    for (unsigned i = 0; i < ports_.size(); ++i)
+        if (i != from) deliver(i, frame);
+}
+
+void EoeSwitch::deliver(unsigned port, std::span<const std::uint8_t> frame) noexcept {
+    Queue<EthernetFrame>& queue = port == host ? to_host_ : ports_[port]->queue;
+    EthernetFrame* place = queue.place();
+    if (place == nullptr) {
+        if (port != host) ++ports_[port]->counters.lost;
+        return;
+    }
+    place->length = static_cast<std::uint16_t>(frame.size());
+    std::memcpy(place->bytes.data(), frame.data(), frame.size());
+    queue.commit();
+}
+
+Task<MailboxResult> EoeSwitch::serve(Channel& channel, BusSlave& slave) noexcept {
+    SlaveMailbox* mailbox = mailboxes_.find(slave);
+    Port* port = port_of(slave);
+    if (mailbox == nullptr || port == nullptr) co_return refused();
+    const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
+    const auto body = mailbox->body(slave);
+    const EthernetFrame* frame = port->queue.front();
+    if (frame == nullptr) co_return succeeded();
+    MailboxResult result = refused();
+    if (body.size() >= eoe::header_bytes + 32) {
+        eoe::Splitter splitter({frame->bytes.data(), frame->length}, port->frame++ & 15U, body.size() + mailbox_header_bytes);
+        for (std::size_t length = splitter.next(body.data()); length != 0; length = splitter.next(body.data())) {
+            result = co_await mailbox->send(channel, slave, MailboxType::eoe, length);
+            if (!result) break;
+        }
+    }
+    port->queue.drop();
+    ++(result ? port->counters.to_slave : port->counters.lost);
+    co_return result;
+}
+
+Task<MailboxResult> EoeClient::set_ip(Channel& channel, BusSlave& slave, const eoe::Ip& ip) noexcept {
+    SlaveMailbox* mailbox = mailboxes_.find(slave);
+    if (mailbox == nullptr) co_return refused();
+    const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
+    const auto body = mailbox->body(slave);
+    if (body.size() < eoe::header_bytes + eoe::largest_ip) co_return refused();
+    eoe::Ip all = ip;
+    all.flags |= eoe::ip_flag::mac | eoe::ip_flag::address | eoe::ip_flag::mask | eoe::ip_flag::gateway | eoe::ip_flag::dns;
+    if ((ip.flags & ~eoe::ip_flag::mac) == 0) all.flags = ip.flags;  // DHCP: the MAC address only
+    eoe::Header header;
+    header.type = eoe::Type::set_ip, header.last = true;
+    eoe::write(body.data(), header);
+    const std::size_t length = eoe::header_bytes + eoe::write_ip(body.data() + eoe::header_bytes, all);
+    const Expected expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::set_ip_response)};
+    const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::eoe, length, expected);
+    if (!result) co_return result;
+    const std::uint16_t code = eoe::read(mailbox->reply().payload)->word;
+    if (code != 0) co_return aborted(code);
+    co_return succeeded();
+}
+
+Task<MailboxResult> EoeClient::get_ip(Channel& channel, BusSlave& slave, eoe::Ip& to) noexcept {
+    SlaveMailbox* mailbox = mailboxes_.find(slave);
+    if (mailbox == nullptr) co_return refused();
+    const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
+    const auto body = mailbox->body(slave);
+    if (body.size() < eoe::header_bytes) co_return refused();
+    eoe::Header header;
+    header.type = eoe::Type::get_ip, header.last = true;
+    eoe::write(body.data(), header);
+    const Expected expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::get_ip_response)};
+    const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::eoe, eoe::header_bytes, expected);
+    if (!result) co_return result;
+    const auto payload = mailbox->reply().payload;
+    const std::uint16_t code = eoe::read(payload)->word;
+    if (code != 0) co_return aborted(code);
+    const auto ip = eoe::read_ip(payload.subspan(eoe::header_bytes));
+    if (!ip) co_return refused();
+    to = *ip;
+    co_return succeeded();
+}
+
+}  // namespace hal::ethercat::master
