@@ -62,6 +62,7 @@ struct Bus {
     std::int64_t epoch_ns = 0;                     ///< system time of the clocks minus the clock of the cycle
     std::uint64_t dc_high = 0;                     ///< extends the time of a 32-bit reference clock
     bool reported_empty = false;
+    bool ring_changed = false;                     ///< the newest broadcast found the ring in another state
 
     const Slave* config(const Device& d) const noexcept {
         return d.slave.configured < 0 ? nullptr : &setup.slaves[static_cast<std::size_t>(d.slave.configured)];

@@ -200,7 +200,7 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         const bool somebody_waits = present < count || bus.status.responding > present;
         if (!somebody_waits || c.now_ns() - rediscovered < rediscover_every_ns) continue;
         rediscovered = c.now_ns();
-        const bool returned = co_await rediscover(c, bus, bus.engine.redundant() ? bus.engine.primary_wkc() : count);
+        const bool returned = co_await rediscover(c, bus, bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
         if (!returned) continue;
         co_await find_ports(c, bus);
         if (!bus.status.ring_broken) co_await start_clocks(c, bus);

@@ -118,6 +118,7 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup) noe
         if (data == nullptr) continue;
         if (!only_reads(c.command())) std::memcpy(data, c.data(), c.length());
         backup = both;
+        if (c.command() == Command::brd && c.address() == at_position(0, registers::al_status)) primary_wkc_ = -1;
         c.set_sent(now_ns_);
         frame.items[frame.count++] = {&c, c.generation(), static_cast<std::uint16_t>(data - frame.bytes.data()), c.length()};
         next = at + 1;

@@ -45,7 +45,9 @@ public:
     /// Channels may use the backup port: false while positions are counted, true once slaves have station addresses.
     void use_backup(bool use) noexcept { use_backup_ = use; }
     std::int64_t now_ns() const noexcept { return now_ns_; }          ///< Returns the start of the current cycle.
-    std::uint16_t primary_wkc() const noexcept { return primary_wkc_; }  ///< Returns the counter of the primary port's copy of the newest BRD 0130h.
+    /// Returns the counter of the newest BRD 0130h copy that arrived at the primary port: 0 on a closed ring, whose slaves count in the copy that
+    /// arrives at the backup port; -1: none arrived.
+    int primary_wkc() const noexcept { return primary_wkc_; }
     bool idle() const noexcept;                                       ///< Returns whether no process data is in flight.
 
 private:
@@ -101,7 +103,7 @@ private:
     std::uint64_t cycle_ = 0;
     std::size_t next_channel_ = 0;
     unsigned in_flight_ = 0;
-    std::uint16_t primary_wkc_ = 0;
+    int primary_wkc_ = -1;
     std::uint8_t next_index_ = 0;
     bool use_backup_ = false;
 };

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/master/topology.hpp"
+#include "tests/unit/ethercat/master_world.hpp"
+
+namespace {
+
+using namespace master_world;
+
+master::Setup with_clocks(unsigned count) {
+    auto setup = drives(count);
+    for (auto& s : setup.slaves) s.dc = Dc{.assign_activate = 0x0300, .sync0_shift_ns = 250'000};
+    return setup;
+}
+
+TEST(EthercatClocks, Come_into_the_window_and_generate_sync0_on_one_grid) {
+    World w;
+    const double drifts[] = {100, -50, 30, -100};
+    for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.dc_64_bit = n != 2, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'000LL * (n + 1)});
+    w.begin(with_clocks(4));
+    ASSERT_TRUE(w.operational(8000)) << w.log.text();
+    EXPECT_LT(w.cycles, 2000U);
+    w.run(2500);
+    EXPECT_TRUE(w.master->status().dc_active);
+    EXPECT_TRUE(w.master->status().dc_synchronised) << w.master->status().dc_deviation_ns;
+    for (std::size_t n = 0; n < 4; ++n) {
+        const auto sync = w.line.controller(n).sync();
+        ASSERT_TRUE(sync.active) << n;
+        EXPECT_GT(sync.pulses, 100U) << n;
+        const auto phase = static_cast<std::int64_t>(n == 2 ? 250'000 : sync.last_pulse_dc_ns % 1'000'000);
+        EXPECT_NEAR(static_cast<double>(phase), 250'000.0, 1000.0) << n;
+    }
+    EXPECT_EQ(w.log.last(Event::reference_clock)->slave, 0U);
+}
+
+TEST(EthercatClocks, Phase_begins_at_zero_and_follows_the_drift_of_the_reference) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 100});
+    w.begin(with_clocks(2));
+    ASSERT_TRUE(w.until([&] { return w.master->dc_phase().fresh; }));
+    const auto first = w.master->dc_phase().error_ns;
+    EXPECT_NEAR(static_cast<double>(first), 0.0, 5000.0);
+    w.run(1000);
+    EXPECT_NEAR(static_cast<double>(w.master->dc_phase().error_ns - first), 100'000.0, 5000.0) << "100 ppm of a second";
+}
+
+TEST(EthercatClocks, The_reference_follows_the_thread_by_choice) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 50});
+    auto setup = with_clocks(2);
+    setup.lead = ClockLead::thread;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational(8000)) << w.log.text();
+    w.run(2000);
+    EXPECT_NEAR(static_cast<double>(w.master->dc_phase().error_ns), 0.0, 5000.0);
+}
+
+TEST(EthercatClocks, A_slave_without_clock_that_needs_one_is_reported) {
+    World w;
+    w.add(0x100);
+    w.add(0x101, 0, false, {.dc = false});
+    w.begin(with_clocks(2));
+    EXPECT_TRUE(w.until([&] { return w.log.count(Event::dc_unsupported) != 0; }));
+    EXPECT_EQ(w.log.last(Event::dc_unsupported)->slave, 1U);
+}
+
+TEST(EthercatTopology, Finds_the_tree_of_a_fork) {
+    // 0 has 1 at port 3 (with 2 behind it) and 3 at port 1.
+    std::array<BusSlave, 4> slaves;
+    std::array<BusSlave*, 4> line{};
+    const auto use = [](std::initializer_list<unsigned> ports) {
+        unsigned status = 0x5500;  // loops closed
+        for (const unsigned p : ports) status = (status & ~(3U << (8 + 2 * p))) | 2U << (8 + 2 * p);
+        return static_cast<std::uint16_t>(status);
+    };
+    slaves[0].dl_status = use({0, 1, 3});
+    slaves[1].dl_status = use({0, 1});
+    slaves[2].dl_status = use({0});
+    slaves[3].dl_status = use({0});
+    for (unsigned n = 0; n < 4; ++n) slaves[n].number = static_cast<std::uint16_t>(n), slaves[n].features = 0x0c, line[n] = &slaves[n];
+    ASSERT_TRUE(find_tree(line));
+    EXPECT_EQ(slaves[1].parent, 0);
+    EXPECT_EQ(slaves[1].parent_port, 3);
+    EXPECT_EQ(slaves[2].parent, 1);
+    EXPECT_EQ(slaves[3].parent, 0);
+    EXPECT_EQ(slaves[3].parent_port, 1);
+    // 100 ns per hop there, and per hop back.
+    slaves[0].receive_time = {1000, 1600, 0, 1400};
+    slaves[1].receive_time = {5100, 5300, 0, 0};
+    slaves[2].receive_time = {7000, 0, 0, 0};
+    slaves[3].receive_time = {9000, 0, 0, 0};
+    find_delays(line, 0);
+    EXPECT_EQ(slaves[1].delay_ns, 100U);
+    EXPECT_EQ(slaves[2].delay_ns, 200U);
+    EXPECT_EQ(slaves[3].delay_ns, 500U);
+}
+
+}  // namespace
