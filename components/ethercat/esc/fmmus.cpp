@@ -26,10 +26,11 @@ void Fmmus::configure() noexcept {
         end_ = std::max(end_, (u.first_bit + u.bits + 7) / 8);
         units_[used_++] = u;
     }
+    const auto meet = [](const Unit& a, const Unit& b) {
+        return a.first_bit / 8 <= (b.first_bit + b.bits - 1) / 8 && b.first_bit / 8 <= (a.first_bit + a.bits - 1) / 8;
+    };
     for (const Unit& a : *this)
-        for (const Unit& b : *this)
-            if (a.reads && b.writes && a.first_bit / 8 <= (b.first_bit + b.bits - 1) / 8 && b.first_bit / 8 <= (a.first_bit + a.bits - 1) / 8)
-                overlap_ = true;
+        for (const Unit& b : *this) overlap_ |= a.reads && b.writes && meet(a, b);
 }
 
 }  // namespace hal::ethercat::esc

@@ -122,6 +122,7 @@ struct Line::Walk {
 };
 
 void Line::advance(std::int64_t now_ns) noexcept {
+    take_commands(now_ns);
     for (Node& n : nodes_) n.controller->advance(now_ns);
 }
 
@@ -184,6 +185,9 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
         case LineFault::corruption: w.corrupted = true; break;
         case LineFault::duplicate: ++w.copies; break;
         case LineFault::delay: w.time_ns += d.what.delay_ns; break;
+        case LineFault::noise:
+            if (slave >= 0) nodes_[static_cast<std::size_t>(slave)].controller->count_symbol_error(port);
+            break;
         }
     }
     if (slave < 0) return true;

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -40,6 +41,7 @@ enum class LineFault : std::uint8_t {
     corruption,  ///< arrives with a wrong check sequence: counted, and not used by any slave behind
     duplicate,   ///< leaves the line twice
     delay,       ///< arrives later by `delay_ns`
+    noise,       ///< arrives; a symbol error is counted (0301h)
 };
 
 /// Selects the frames that are hit.
@@ -50,6 +52,26 @@ struct LineDisturbance {
     std::uint32_t every = 1;        ///< every n-th frame that arrives there
     std::uint64_t count = UINT64_MAX;  ///< ends after this many hits
     std::int64_t delay_ns = 0;
+};
+
+/// A change of a line that another thread requests.
+struct LineCommand {
+    enum class Kind : std::uint8_t {
+        power,      ///< `on`
+        cable,      ///< of `port`: whole if `on`
+        end_cable,  ///< of the end `port`: whole if `on`
+        drift,      ///< of the oscillator: `value`, ppm
+        jump,       ///< of the local clock: `value`, ns
+        eeprom,     ///< fails the next `value` commands
+        checksum,   ///< of the EEPROM: good if `on`; takes effect at power-on
+        watchdog,   ///< expires
+        disturb,    ///< adds `disturbance`
+        calm,       ///< ends all disturbances
+    } kind = Kind::power;
+    unsigned slave = 0, port = 0;
+    bool on = false;
+    double value = 0;
+    LineDisturbance disturbance{};
 };
 
 class Line {
@@ -82,6 +104,10 @@ public:
     int disturb(const LineDisturbance&) noexcept;  ///< Adds a disturbance. Returns its number, -1 when there are too many.
     std::uint64_t hits(int number) const noexcept;  ///< Returns how many frames disturbance `number` has hit.
     void calm() noexcept { disturbance_count_ = 0; }  ///< Ends all disturbances.
+    void execute(const LineCommand&, std::int64_t now_ns) noexcept;  ///< Executes a command.
+
+    /// Queues a command for the next frame or advance(). Returns false if 64 are waiting. [realtime] any one thread
+    bool post(const LineCommand&) noexcept;
 
     /// Where a frame went.
     struct Passage {
@@ -128,6 +154,12 @@ private:
     std::array<Disturbed, most_disturbances> disturbances_;
     std::size_t disturbance_count_ = 0;
     std::array<DatagramView, 128> datagrams_;
+
+    void take_commands(std::int64_t now_ns) noexcept;
+    static constexpr std::size_t most_commands = 64;
+    std::array<LineCommand, most_commands> commands_;
+    std::atomic<std::size_t> posted_{0};  ///< written by the poster
+    std::atomic<std::size_t> taken_{0};   ///< written by the thread of process()
 };
 
 }  // namespace hal::ethercat::esc

@@ -66,7 +66,8 @@ public:
     virtual ~Application() = default;
     /// Starts as after power-on: all volatile state is lost. [realtime]
     virtual void power_on(Pdi&) noexcept = 0;
-    /// Works once; called after each frame and at every SYNC0 pulse, in order of time. [realtime]
+    /// Works once; called at the end of each frame that concerns the slave, at every SYNC0 and SYNC1 pulse, when the watchdog expires, and
+    /// at least every millisecond of traffic, in order of time. [realtime]
     virtual void run(Pdi&, std::int64_t now_ns) noexcept = 0;
 };
 

@@ -14,7 +14,9 @@ namespace register_facts {
 
 struct Range {
     std::uint16_t first, length;
-    bool touched(std::uint32_t address, std::size_t count) const noexcept { return address < first + std::uint32_t{length} && address + count > first; }
+    bool touched(std::uint32_t address, std::size_t count) const noexcept {
+        return address < first + std::uint32_t{length} && address + count > first;
+    }
 };
 /// Registers that only keep what the master writes.
 constexpr Range plain[]{{registers::station_address, 2}, {registers::dl_control, 4}, {registers::ecat_event_mask, 2},
@@ -175,7 +177,7 @@ void Controller::frame_at_closed_port(unsigned port) noexcept {
 }
 
 void Controller::update_ports() noexcept {
-    unsigned status = (eeprom_.loaded() ? 1U : 0U) | 4U | static_cast<unsigned>(link_) << 4, open = 0;
+    unsigned status = (eeprom_.loaded() ? 3U : 0U) | 4U | static_cast<unsigned>(link_) << 4, open = 0;
     for (unsigned p = 0; p < ports; ++p) {
         const bool there = settings_.port_kinds[p] >= PortKind::ebus, link = (link_ >> p & 1) != 0;
         switch (memory_[registers::loop_control] >> 2 * p & 3U) {

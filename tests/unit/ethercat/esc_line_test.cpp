@@ -26,8 +26,8 @@ TEST_F(Line, Frame_takes_the_delays_of_cables_and_slaves) {
 TEST_F(Line, Dl_status_shows_links_and_closed_loops) {
     row(2);
     w.line.power_on(0);
-    EXPECT_EQ(w.read<std::uint16_t>(0, registers::dl_status), 0x5000 | 0x0a00 | 0x0030 | 0x0005) << "ports 0 and 1 open";
-    EXPECT_EQ(w.read<std::uint16_t>(1, registers::dl_status), 0x5400 | 0x0200 | 0x0010 | 0x0005) << "only port 0 open";
+    EXPECT_EQ(w.read<std::uint16_t>(0, registers::dl_status), 0x5000 | 0x0a00 | 0x0030 | 0x0007) << "ports 0 and 1 open";
+    EXPECT_EQ(w.read<std::uint16_t>(1, registers::dl_status), 0x5400 | 0x0200 | 0x0010 | 0x0007) << "only port 0 open";
 }
 
 TEST_F(Line, Tree_is_walked_in_the_order_of_ports_0_3_1_2) {
@@ -205,6 +205,25 @@ TEST_F(Line, Malformed_and_foreign_frames_are_counted_and_do_no_harm) {
     bytes[12] = 8, bytes[13] = 6;
     EXPECT_TRUE(w.line.process(bytes, esc::End::primary, w.now_ns).lost) << "not EtherCAT: destroyed";
     EXPECT_GT(*w.line.controller(0).memory(registers::processing_unit_errors), 0);
+}
+
+TEST_F(Line, Posted_commands_take_effect_with_the_next_frame) {
+    row(2);
+    w.line.power_on(0);
+    using Kind = esc::LineCommand::Kind;
+    ASSERT_TRUE(w.line.post({.kind = Kind::cable, .slave = 1, .port = 0, .on = false}));
+    EXPECT_EQ(count(), 1);
+    w.line.post({.kind = Kind::cable, .slave = 1, .port = 0, .on = true});
+    w.line.post({.kind = Kind::disturb, .disturbance = {.fault = esc::LineFault::noise, .slave = 1, .count = 2}});
+    w.line.post({.kind = Kind::drift, .slave = 1, .value = 25});
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(count(), 2);
+    EXPECT_EQ(*w.line.controller(1).memory(registers::rx_errors + 1), 2);
+    EXPECT_DOUBLE_EQ(w.line.controller(1).clock().clock().drift_ppm(), 25);
+    for (int i = 0; i < 64; ++i) EXPECT_TRUE(w.line.post({.kind = Kind::power, .slave = 99}));
+    EXPECT_FALSE(w.line.post({.kind = Kind::calm}));
+    EXPECT_EQ(count(), 2);
+    EXPECT_TRUE(w.line.post({.kind = Kind::power, .slave = 0, .on = false}));
+    EXPECT_EQ(count(), -1);
 }
 
 }  // namespace
