@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Sentences about what happened on the bus: what failed, why, what to do. For reporters and tools; nothing here is real time.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "ethercat/master/events.hpp"
+#include "ethercat/master/setup.hpp"
+
+namespace hal::ethercat::config {
+
+/// An event as master::Events received it.
+struct Happened {
+    master::Event event{};
+    std::uint32_t slave = master::Events::bus;
+    std::int64_t  first = 0, second = 0;
+};
+
+/// Returns the sentence for an event, without a final stop; empty for one that needs none. `link` and `backup` are the addresses of the
+/// ports. [setup]
+std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup = {});
+
+/// Returns "slave 3 (x-axis)", or "slave at position 3" where the setup does not name it. [setup]
+std::string slave_words(std::uint32_t slave, const master::Setup& setup);
+
+}  // namespace hal::ethercat::config
