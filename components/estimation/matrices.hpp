@@ -230,8 +230,8 @@ public:
     /// Reports an error of a matrix that was read and ends the constructor. [setup]
     [[noreturn]] void refuse(const Given& given, const std::string& sentence, const std::string& help) const {
         if (given.in_file && texts_.offered()) {
-            texts_.say(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
-            hal::Texts::refuse();
+            texts_.report(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
+            hal::Texts::fail();
         }
         if (given.argument.empty()) throw std::invalid_argument(sentence + "; " + help);
         throw hal::ArgumentError(lower(given.name), given.argument + ": " + sentence + "; " + help);

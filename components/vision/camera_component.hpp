@@ -50,7 +50,7 @@ public:
           frames(*this, update_, "frames", "number of valid frames"),
           bad_frames(*this, update_, "bad-frames", "number of invalid frames: damaged, too large, black, frozen, wrong size"),
           source_ok(*this, update_, "source-ok", "TRUE: the source is open and its last frame was valid"),
-          trouble(
+          error_code(
               *this, update_, "error-code",
               "error code: 0 none, 1 missing, 2 unusable, 3 unplugged, 4 no frames, 5 damaged, 6 too large, 7 black, 8 frozen, 9 wrong "
               "size for the calibration, 10 end of the files"),
@@ -61,7 +61,7 @@ public:
 
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
-        raised_ = Trouble::none;
+        raised_ = FrameError::none;
         background_.start();
     }
     void stop() noexcept {
@@ -89,8 +89,8 @@ public:
             frames = d.status.frames;
             bad_frames = d.status.bad;
             source_ok = d.status.ok;
-            trouble = static_cast<std::uint32_t>(d.status.trouble);
-            raise(d.status.trouble);
+            error_code = static_cast<std::uint32_t>(d.status.error);
+            raise(d.status.error);
         }
         const double age = static_cast<double>(cycle.start_ns() - (d.seq == 0 ? began_ns_ : d.stamp_ns)) * 1e-6;
         age_ms = age > 0.0 ? age : 0.0;
@@ -142,8 +142,8 @@ private:
         next_.status = status;
         deliveries_.put(next_);
     }
-    void raise(Trouble now) noexcept {
-        static constexpr const char* reasons[trouble_count] = {"",
+    void raise(FrameError now) noexcept {
+        static constexpr const char* reasons[frame_error_count] = {"",
                                                                "there is no such source; valid is FALSE",
                                                                "the source cannot be used; valid is FALSE",
                                                                "the source disconnected; valid is FALSE",
@@ -156,7 +156,7 @@ private:
                                                                "all frames were shown; valid is FALSE"};
         if (now == raised_) return;
         raised_ = now;
-        if (now == Trouble::none || faults_ == nullptr) return;
+        if (now == FrameError::none || faults_ == nullptr) return;
         faults_->raise(faults_, this, reasons[static_cast<std::size_t>(now)], std::numeric_limits<double>::quiet_NaN());
     }
 
@@ -171,7 +171,7 @@ private:
     Ordered                ordered_;
     std::int64_t           began_ns_ = no_time;
     const hal_faults*      faults_ = nullptr;
-    Trouble                raised_ = Trouble::none;
+    FrameError                raised_ = FrameError::none;
     hal::Background        background_;
     hal::Function          update_;
 
@@ -184,7 +184,7 @@ public:
     hal::Out<double>          proc_ms;
     hal::Out<std::uint32_t>   frames, bad_frames;
     hal::Out<bool>            source_ok;
-    hal::Out<std::uint32_t>   trouble;
+    hal::Out<std::uint32_t>   error_code;
     hal::Param<double>        max_age_ms;
     hal::Param<std::uint32_t> frozen_frames;
 };

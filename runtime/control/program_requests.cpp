@@ -175,7 +175,7 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
     }
     if (!timeout.is_null()) entry->timeout_ns = timeout_ms < 0 ? -1 : timeout_ms * 1'000'000;
     if (!every.is_null()) programs.set_rate(*entry, every_ms * 1'000'000);
-    else programs.hear(*entry);
+    else programs.note_alive(*entry);
     if (!pins.is_null()) {
         const std::vector<Pin*> added(entry->pins.begin() + static_cast<std::ptrdiff_t>(first), entry->pins.end());
         const auto values = by.session.values().peek(added);
@@ -206,9 +206,9 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
         Pin* const pin = entry.pins[number];
         values.emplace_back(pin, value_of(write[i + 1], pin->type, pin->name));
     }
-    if (alive.is_null() || alive.get<bool>()) by.session.programs().hear(entry);
-    if (!entry.silence.empty())  // its pins keep their declared values; what it writes waits until it responds
-        for (auto& [pin, value] : entry.before_silence) {
+    if (alive.is_null() || alive.get<bool>()) by.session.programs().note_alive(entry);
+    if (!entry.unresponsive.empty())  // its pins keep their declared values; what it writes waits until it responds
+        for (auto& [pin, value] : entry.before_timeout) {
             const auto written = std::find_if(values.begin(), values.end(), [&, p = pin](const auto& one) { return one.first == p; });
             if (written == values.end()) continue;
             value = written->second;

@@ -33,7 +33,7 @@ void begin_text(const hal_host* host, const char* name, const char* text, std::s
     });
 }
 
-void say_of_text(const hal_host* host, const hal_text_message* message) {
+void report_in_text(const hal_host* host, const hal_text_message* message) {
     Construction& c = construction_of(host);
     guarded(c, false, [&] {
         if (message->size < sizeof *message) return refuse(c, "unsupported hal_text_message of " + std::to_string(message->size) + " bytes; rebuild the component");
@@ -64,6 +64,6 @@ void say_of_text(const hal_host* host, const hal_text_message* message) {
 
 }  // namespace
 
-constexpr hal_texts texts_extension{sizeof texts_extension, find_text, begin_text, say_of_text};
+constexpr hal_texts texts_extension{sizeof texts_extension, find_text, begin_text, report_in_text};
 
 }  // namespace hal

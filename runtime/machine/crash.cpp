@@ -18,15 +18,15 @@ namespace {
 
 std::atomic<SessionState*> watched[64];  // the machines of this process; further ones are not named in reports
 
-void say(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
+void print(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
 
-void say(std::uint64_t number) noexcept {
+void print(std::uint64_t number) noexcept {
     char digits[24];
     char* at = digits + sizeof digits;
     *--at = '\0';
     do *--at = static_cast<char>('0' + number % 10);
     while (number /= 10);
-    say(at);
+    print(at);
 }
 
 const char* signal_text(int signal) noexcept {
@@ -49,13 +49,13 @@ void name_function(const Core* core, std::uint32_t id) noexcept {
         for (const auto& component : state->model.components)
             for (const auto& function : component->functions)
                 if (function->id == id) {
-                    say(component->name.c_str());
-                    say(": function '");
-                    say(function->name.c_str());
-                    return say("'");
+                    print(component->name.c_str());
+                    print(": function '");
+                    print(function->name.c_str());
+                    return print("'");
                 }
     }
-    say("a function");
+    print("a function");
 }
 
 std::atomic<bool> reported{false};
@@ -66,19 +66,19 @@ void on_signal(int signal) {
         return;
     }
     make_all_safe();
-    say("hal: ");
+    print("hal: ");
     if (const Core* const core = Core::current(); core && core->in_function()) {
         name_function(core, core->current_function());
-        say(" crashed (");
-        say(signal_text(signal));
-        say(") at cycle ");
-        say(core->cycle_number());
+        print(" crashed (");
+        print(signal_text(signal));
+        print(") at cycle ");
+        print(core->cycle_number());
     } else {
-        say("the program crashed outside of the cycle (");
-        say(signal_text(signal));
-        say(")");
+        print("the program crashed outside of the cycle (");
+        print(signal_text(signal));
+        print(")");
     }
-    say("; outputs were set to their safe values; the process ends\n");
+    print("; outputs were set to their safe values; the process ends\n");
     raise(signal);  // SA_RESETHAND put the default action back
 }
 
@@ -90,7 +90,7 @@ void on_signal(int signal) {
     }
     if (reported.exchange(true)) std::abort();
     make_all_safe();
-    say("hal: an exception outside of the cycle was not caught; outputs were set to their safe values; the process ends\n");
+    print("hal: an exception outside of the cycle was not caught; outputs were set to their safe values; the process ends\n");
     std::abort();
 }
 

@@ -36,10 +36,10 @@ constexpr std::int64_t stop_ns = 5'000'000'000;
 std::string Programs::Entry::state() const {
     if (!dead())
         return std::string(!ready            ? "initializing"
-                           : silence.empty() ? "ready"
-                                             : "not responding " + silence) +
+                           : unresponsive.empty() ? "ready"
+                                                  : "not responding " + unresponsive) +
                (stopping ? ", stopping" : "");
-    return "dead " + obituary + (restart_ns != 0 ? ", starts again" : again && !ended ? ", started again" : "");
+    return "dead " + end_report + (restart_ns != 0 ? ", starts again" : again && !ended ? ", started again" : "");
 }
 
 std::string Programs::name_in_use(const Entry& entry) const {
@@ -101,8 +101,8 @@ std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t
     entry->owner = owner;
     entry->timeout_ns = Entry::usual_timeout_ns;
     entry->every_ns = 0;
-    entry->silence.clear();
-    entry->before_silence.clear();
+    entry->unresponsive.clear();
+    entry->before_timeout.clear();
     set_ready(*entry, ready);
     return "";
 }
@@ -114,7 +114,7 @@ Programs::Entry* Programs::owned(std::string_view name, std::uint64_t owner) {
 
 void Programs::set_ready(Entry& entry, bool ready) {
     entry.ready = ready;
-    hear(entry);
+    note_alive(entry);
     if (ready) entry.reserved = false;
     if (ready && entry.every_ns != 0) work();
     if (const LoadedComponent* const component = ready ? session_.model().find_component(entry.name) : nullptr;
@@ -156,8 +156,8 @@ void Programs::leave(Entry& entry) {
     entry.ready = entry.reserved = false;
     entry.owner = 0;
     entry.every_ns = 0;
-    entry.silence.clear();
-    entry.before_silence.clear();
+    entry.unresponsive.clear();
+    entry.before_timeout.clear();
     if (!entry.child || entry.ended) std::erase_if(entries_, [&](const Entry& e) { return &e == &entry; });
     changed_.notify_all();
 }
@@ -186,13 +186,13 @@ void Programs::die(Entry& entry, const std::string& how) {
     entry.owner = 0;
     entry.pins.clear();
     entry.every_ns = 0;
-    entry.silence.clear();
-    entry.before_silence.clear();
+    entry.unresponsive.clear();
+    entry.before_timeout.clear();
     if (!entry.dead()) {
         entry.dead_ns = monotonic_ns();
         entry.declared = false;
     }
-    entry.obituary = "since " + time_of_day() + " (" + how + ")";
+    entry.end_report = "since " + time_of_day() + " (" + how + ")";
     work();
     changed_.notify_all();
 }

@@ -29,7 +29,7 @@ void Programs::schedule(Entry& entry) {
     const std::int64_t now = monotonic_ns();
     std::erase_if(entry.restarts, [&](std::int64_t at) { return now - at > RestartPolicy::within_ns; });
     if (entry.restarts.size() >= RestartPolicy::most) {
-        entry.obituary += ", given up after " + std::to_string(RestartPolicy::most) + " restarts in " +
+        entry.end_report += ", given up after " + std::to_string(RestartPolicy::most) + " restarts in " +
                           format_duration(static_cast<double>(RestartPolicy::within_ns));
         return;
     }
@@ -52,29 +52,29 @@ int Programs::sleep_ms() const {
 
 void Programs::set_rate(Entry& entry, std::int64_t every_ns) {
     entry.every_ns = every_ns;
-    hear(entry);
+    note_alive(entry);
     if (every_ns != 0) work();
 }
 
-void Programs::hear(Entry& entry) {
-    if (entry.every_ns == 0 && entry.silence.empty()) return;
-    entry.heard_ns = monotonic_ns();
-    if (entry.silence.empty()) return;
-    entry.silence.clear();
-    session_.values().write(std::exchange(entry.before_silence, {}));
+void Programs::note_alive(Entry& entry) {
+    if (entry.every_ns == 0 && entry.unresponsive.empty()) return;
+    entry.alive_ns = monotonic_ns();
+    if (entry.unresponsive.empty()) return;
+    entry.unresponsive.clear();
+    session_.values().write(std::exchange(entry.before_timeout, {}));
     work();
     changed_.notify_all();
 }
 
-void Programs::fall_silent(Entry& entry) {
-    entry.silence = "since " + time_of_day(monotonic_ns() - entry.heard_ns);
+void Programs::time_out(Entry& entry) {
+    entry.unresponsive = "since " + time_of_day(monotonic_ns() - entry.alive_ns);
     if (entry.timeout_ns >= 0) {
         std::vector<Pin*> pins;
         std::vector<std::pair<Pin*, hal_value>> declared;
         for (Pin* const pin : entry.pins)
             if ((pin->flags & HAL_PIN_SAFE) && pin->dir != HAL_DIR_IN) pins.push_back(pin), declared.emplace_back(pin, pin->safe);
         const auto values = session_.values().peek(pins);
-        for (std::size_t i = 0; i < pins.size(); ++i) entry.before_silence.emplace_back(pins[i], values[i]);
+        for (std::size_t i = 0; i < pins.size(); ++i) entry.before_timeout.emplace_back(pins[i], values[i]);
         session_.values().write(declared);
     }
     if (entry.restart.when != Restart::no && entry.child && !entry.ended) kill(entry.pid, SIGKILL);  // its end starts it again
@@ -86,8 +86,8 @@ void Programs::act_in_time(std::int64_t overslept_ns) {
     constexpr std::int64_t suspended_ns = 200'000'000;
     const std::int64_t now = monotonic_ns();
     for (Entry& entry : entries_) {
-        if (overslept_ns > suspended_ns && entry.every_ns != 0) entry.heard_ns = std::max(entry.heard_ns, now - entry.every_ns);
-        if (entry.responds() && entry.every_ns != 0 && now >= entry.due_ns()) fall_silent(entry);
+        if (overslept_ns > suspended_ns && entry.every_ns != 0) entry.alive_ns = std::max(entry.alive_ns, now - entry.every_ns);
+        if (entry.responds() && entry.every_ns != 0 && now >= entry.due_ns()) time_out(entry);
         if (entry.kill_ns != 0 && now >= entry.kill_ns) {
             entry.kill_ns = 0;
             if (!entry.ended) kill(entry.pid, SIGKILL);
@@ -105,7 +105,7 @@ void Programs::act_in_time(std::int64_t overslept_ns) {
             std::string problem;
             const pid_t pid = spawn(entry.start, problem);
             if (pid == 0) {
-                entry.obituary += ", cannot be started again: " + problem;
+                entry.end_report += ", cannot be started again: " + problem;
                 continue;
             }
             entry.restarts.push_back(now);

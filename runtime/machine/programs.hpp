@@ -80,7 +80,7 @@ struct Programs {
         static constexpr std::int64_t usual_timeout_ns = 1'000'000'000;
         std::int64_t timeout_ns = usual_timeout_ns;  ///< from its death until its pins take their declared values; < 0: never
         std::int64_t dead_ns = 0;       ///< since when it is dead, on the steady clock; 0: it lives
-        std::string obituary = {};      ///< "since 12:34:56 (exit status 1)"
+        std::string end_report = {};    ///< "since 12:34:56 (exit status 1)"
         bool declared = false;          ///< dead, and its pins have taken their declared values
         bool stopping = false;          ///< asked to end: not started again
         RestartPolicy restart = {};
@@ -90,16 +90,16 @@ struct Programs {
         std::int64_t kill_ns = 0;       ///< when it gets SIGKILL; 0: never
 
         std::int64_t every_ns = 0;      ///< the longest time between two exchanges that it has declared; 0: none
-        std::int64_t heard_ns = 0;      ///< when it last gave a sign of life; kept while every_ns is not 0
-        std::string silence = {};       ///< "since 12:34:56" while it does not respond
-        std::vector<std::pair<Pin*, hal_value>> before_silence = {};  ///< what its pins had when they took their declared values
+        std::int64_t alive_ns = 0;      ///< when it last gave a sign of life; kept while every_ns is not 0
+        std::string unresponsive = {};  ///< "since 12:34:56" while it does not respond
+        std::vector<std::pair<Pin*, hal_value>> before_timeout = {};  ///< what its pins had when they took their declared values
 
         std::vector<std::shared_ptr<ProgramStream>> streams = {};  ///< it made; they go with it
 
         bool dead() const { return dead_ns != 0; }
-        bool responds() const { return ready && silence.empty(); }
+        bool responds() const { return ready && unresponsive.empty(); }
         /// When it is no longer waited for; meaningful while every_ns is not 0.
-        std::int64_t due_ns() const { return heard_ns + every_ns + (timeout_ns >= 0 ? timeout_ns : usual_timeout_ns); }
+        std::int64_t due_ns() const { return alive_ns + every_ns + (timeout_ns >= 0 ? timeout_ns : usual_timeout_ns); }
         /// As `show comp` prints it.
         std::string state() const;
     };
@@ -129,8 +129,8 @@ struct Programs {
     void set_ready(Entry& entry, bool ready);
     /// A component is lost: its pins keep their values, later take the declared ones, and wait for a successor.
     void die(Entry& entry, const std::string& how);
-    /// A sign of life of a component that has declared a rate; one that did not respond gets its values back.
-    void hear(Entry& entry);
+    /// Records a sign of life of a component that has declared a rate; one that did not respond gets its values back.
+    void note_alive(Entry& entry);
     /// A component declares that it exchanges values at least so often; 0: no longer.
     void set_rate(Entry& entry, std::int64_t every_ns);
     /// A component leaves in good order: its pins go.
@@ -172,7 +172,7 @@ private:
     void child_ended(pid_t pid, int status);
     void schedule(Entry& entry);
     void act_in_time(std::int64_t overslept_ns);
-    void fall_silent(Entry& entry);
+    void time_out(Entry& entry);
     std::string name_in_use(const Entry& entry) const;
     int sleep_ms() const;
     pid_t spawn(const ProcessStart& start, std::string& problem);

@@ -21,12 +21,12 @@ std::string policy_text(const Granted& granted, bool virtual_clock) {
     return granted.refused ? "SCHED_OTHER (no privilege)" : "SCHED_OTHER";
 }
 
-std::string delay_text(const Way& way) {
-    const std::string& pin = way.pin->name;
-    std::string line = way.pin->signal->name + ": " + (way.pin->dir == HAL_DIR_OUT ? way.far + " => " + pin : pin + " => " + way.far);
-    line += "  " + std::to_string(way.cycles) + (way.cycles == 1 ? " cycle" : " cycles") + " on the wire, " +
-            format_duration(static_cast<double>(way.worst_ns)) + " at worst";
-    if (way.round_trip != 0) line += "; there and back " + std::to_string(way.round_trip) + (way.round_trip == 1 ? " cycle" : " cycles");
+std::string delay_text(const PathDelay& path) {
+    const std::string& pin = path.pin->name;
+    std::string line = path.pin->signal->name + ": " + (path.pin->dir == HAL_DIR_OUT ? path.far + " => " + pin : pin + " => " + path.far);
+    line += "  " + std::to_string(path.cycles) + (path.cycles == 1 ? " cycle" : " cycles") + " on the wire, " +
+            format_duration(static_cast<double>(path.worst_ns)) + " at worst";
+    if (path.round_trip != 0) line += "; there and back " + std::to_string(path.round_trip) + (path.round_trip == 1 ? " cycle" : " cycles");
     return line;
 }
 
@@ -137,8 +137,8 @@ std::vector<std::string> Reports::latencies() const {
     }
     for (const auto& component : state_.model.components)
         for (const auto& instance : component->instances)
-            for (const Way& way : instance->ways)
-                if (way.pin->signal) lines.push_back(delay_text(way));
+            for (const PathDelay& path : instance->path_delays)
+                if (path.pin->signal) lines.push_back(delay_text(path));
     std::sort(lines.begin(), lines.end());
     return lines;
 }

@@ -4,7 +4,7 @@
 
 #include "execute/executor.hpp"
 #include "hal/supervision.h"
-#include "hal/way.h"
+#include "hal/path_delay.h"
 #include "machine/construct.hpp"
 #include "machine/setup_call.hpp"
 
@@ -37,19 +37,19 @@ bool publish_stream(const hal_host* host, const char* name, hal_stream* stream) 
 }
 constexpr hal_stream_host stream_host{sizeof stream_host, publish_stream};
 
-bool tell_way(const hal_way*, const hal_host* host, const char* pin, const char* far, std::uint32_t cycles, std::uint32_t round_trip,
-              std::int64_t worst_ns) {
+bool report_path_delay(const hal_path_delay*, const hal_host* host, const char* pin, const char* far, std::uint32_t cycles,
+                       std::uint32_t round_trip, std::int64_t worst_ns) {
     Instance& instance = static_cast<Starting*>(host->data)->instance;
     try {
         const std::string name = instance.name + "." + pin;
         for (const auto& one : instance.pins)
-            if (one->name == name) instance.ways.push_back({one.get(), far, cycles, round_trip, worst_ns});
+            if (one->name == name) instance.path_delays.push_back({one.get(), far, cycles, round_trip, worst_ns});
         return true;
     } catch (const std::bad_alloc&) {
         return false;
     }
 }
-constexpr hal_way way_host{sizeof way_host, tell_way};
+constexpr hal_path_delay path_delay_host{sizeof path_delay_host, report_path_delay};
 
 bool claim_clock(const hal_clock*, const hal_host* host) {
     Starting& starting = *static_cast<Starting*>(host->data);
@@ -97,7 +97,7 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
             if (std::strcmp(id, HAL_STATUS) == 0) return &static_cast<Starting*>(h->data)->status;
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
             if (std::strcmp(id, HAL_SUPERVISION) == 0) return &static_cast<Starting*>(h->data)->executor.supervisor().shared;
-            if (std::strcmp(id, HAL_WAY) == 0) return &way_host;
+            if (std::strcmp(id, HAL_PATH_DELAY) == 0) return &path_delay_host;
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
         },
@@ -108,7 +108,7 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
     }
     if (instance.started) return {};
     instance.streams.clear();
-    instance.ways.clear();
+    instance.path_delays.clear();
     instance.leads_clock = false;
     return starting.failure.empty() ? "it gave no reason" : starting.failure;
 }
@@ -120,7 +120,7 @@ void stop_instance(Instance& instance) noexcept {
     const SetupCall call(instance.name, instance.component->name, "stop");
     instance.component->plugin->stop(instance.memory);
     instance.streams.clear();
-    instance.ways.clear();
+    instance.path_delays.clear();
     instance.leads_clock = false;
     instance.started = false;
 }

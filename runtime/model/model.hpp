@@ -84,8 +84,8 @@ struct LoadedFunction {
     std::uint32_t id = 0;
 };
 
-/// Where the value of a pin goes to or comes from, outside of this machine; hal/way.h.
-struct Way {
+/// The delay of a pin's value on its path to or from another machine; hal/path_delay.h.
+struct PathDelay {
     const Pin* pin = nullptr;
     std::string far;
     std::uint32_t cycles = 0, round_trip = 0;
@@ -107,7 +107,7 @@ struct Instance {
     bool leads_clock = false;        ///< it disciplines the threads to an external clock reference
     Span loaded;
     std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances
-    std::vector<Way> ways;           ///< while it is started
+    std::vector<PathDelay> path_delays;           ///< while it is started
 };
 
 /// What one loadrt gave its instances beside their names.

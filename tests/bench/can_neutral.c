@@ -265,7 +265,7 @@ static void synchronous(unsigned count) {
 int main(int argc, char** argv) {
     if (argc < 3) return fputs("can_neutral IFACE slave|master [FACTOR]|generate COUNT NS|receive COUNT\n", stderr), 2;
     struct sockaddr_can at = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex(argv[1])};
-    const struct timeval patience = {2, 0};
+    const struct timeval timeout = {2, 0};
     const int room = 4 << 20;
     const int master = strcmp(argv[2], "master") == 0, answered = master || strcmp(argv[2], "receive") == 0;
     const struct can_filter heard[] = {{0x080, CAN_SFF_MASK}, {0x200 + node, CAN_SFF_MASK}, {0x600 + node, CAN_SFF_MASK}};
@@ -274,7 +274,7 @@ int main(int argc, char** argv) {
     if (fd < 0) return perror("can_neutral"), 1;
     setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, answered ? answers : heard, answered ? sizeof answers : sizeof heard);
     setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &room, sizeof room);
-    setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
     if (bind(fd, (struct sockaddr*)&at, sizeof at) < 0) return perror("can_neutral"), 1;
     puts("ready");
     fflush(stdout);

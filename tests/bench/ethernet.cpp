@@ -127,15 +127,15 @@ Exchange exchange(const std::string& a, const std::string& b, int cpu_a, int cpu
     End here(a, wait, paced), there(b, wait, paced);
     std::atomic<bool> done{false};
     const auto start = link::monotonic_ns() + 20 * period_ns;
-    constexpr std::int64_t patience_ns = 50'000;  // of the end that expects a frame at its time
+    constexpr std::int64_t timeout_ns = 50'000;  // of the end that expects a frame at its time
     std::thread echo([&] {
         run_real_time(cpu_b, [&] {
             double one_way = 0;
             for (std::int64_t due = start; !done.load(std::memory_order_relaxed);) {
                 const auto now = link::monotonic_ns();
                 if (paced)
-                    while (due + patience_ns <= now) due += period_ns;
-                if (!there.receive(paced ? due + patience_ns : now + 10 * period_ns, one_way)) continue;
+                    while (due + timeout_ns <= now) due += period_ns;
+                if (!there.receive(paced ? due + timeout_ns : now + 10 * period_ns, one_way)) continue;
                 Bytes f = broadcast_frame();
                 there.send(f);
                 if (paced) result.one_ways.push_back(one_way), due += period_ns;

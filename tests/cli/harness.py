@@ -140,8 +140,8 @@ class Terminal:
     def send(self, text):
         os.write(self.descriptor, text.encode())
 
-    def read(self, patience):
-        if not select.select([self.descriptor], [], [], patience)[0]:
+    def read(self, timeout):
+        if not select.select([self.descriptor], [], [], timeout)[0]:
             return False
         try:
             data = os.read(self.descriptor, 65536)

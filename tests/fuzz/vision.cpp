@@ -21,7 +21,7 @@ using hal::fuzz::require;
 void picture(const std::uint8_t* bytes, std::size_t count) {
     Frame frame;
     if (const auto problem = read_pnm(bytes, count, frame)) {
-        require(problem->kind == Trouble::damaged || problem->kind == Trouble::huge, "the kind of the problem is reported");
+        require(problem->kind == FrameError::damaged || problem->kind == FrameError::too_large, "the kind of the problem is reported");
         require(frame.pixels.size() <= 3 * most_pixels, "no picture takes more memory than one may have");
         return;
     }

@@ -49,7 +49,7 @@ public:
     /// A transaction that must take effect.
     void must(const std::string& text) { ASSERT_TRUE(edit(text)) << text << "\n" << said; }
     /// Expects the transaction to be rejected with this code and to change nothing.
-    void refused(const std::string& text, const std::string& code) {
+    void rejected(const std::string& text, const std::string& code) {
         const std::string before = dump();
         EXPECT_FALSE(edit(text)) << text;
         EXPECT_NE(said.find("[" + code + "]"), std::string::npos) << "wanted [" << code << "], got:\n" << said;

@@ -95,7 +95,7 @@ TEST_F(DisciplinedThreads, A_grid_that_goes_back_loses_no_cycle) {
 }
 
 TEST_F(DisciplinedThreads, A_second_leader_is_rejected_with_the_name_of_the_first) {
-    machine.refused("loadrt test-clock names=other", "start-failed");
+    machine.rejected("loadrt test-clock names=other", "start-failed");
     EXPECT_NE(machine.said.find("'other' (test-clock) cannot start: the threads already follow the clock of 'fast' (test-clock); "
                                 "disable clock following here or unload 'fast' first"),
               std::string::npos)

@@ -279,7 +279,7 @@ struct Bad {
 struct BadPlugin : testing::TestWithParam<Bad> {};
 TEST_P(BadPlugin, is_a_diagnostic) {
     Machine machine;
-    machine.refused(std::string("loadrt ") + GetParam().component, GetParam().code);
+    machine.rejected(std::string("loadrt ") + GetParam().component, GetParam().code);
     EXPECT_NE(machine.said.find(GetParam().words), std::string::npos) << machine.said;
 }
 INSTANTIATE_TEST_SUITE_P(Built, BadPlugin,

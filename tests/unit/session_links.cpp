@@ -16,14 +16,14 @@ TEST_F(Links, Net_makes_the_signal_with_the_type_of_its_first_pin) {
     EXPECT_EQ(machine.session.model().find_signal("a")->type, HAL_TYPE_S64);
 }
 
-TEST_F(Links, A_signal_has_one_output) { machine.refused("net a x.bit-out y.bit-out", "two-writers"); }
-TEST_F(Links, A_signal_with_an_output_takes_no_io_pin) { machine.refused("net a x.bit-out y.bit-io", "two-writers"); }
-TEST_F(Links, A_signal_with_io_pins_takes_no_output) { machine.refused("net a x.bit-io y.bit-out", "two-writers"); }
-TEST_F(Links, Types_must_be_equal) { machine.refused("net a x.s32-out y.u32-in", "type-mismatch"); }
-TEST_F(Links, A_pin_is_in_one_signal_only) { machine.refused("net a x.bit-in\nnet b x.bit-in", "pin-linked"); }
-TEST_F(Links, Parameters_are_not_linked) { machine.refused("net a x.float-param", "parameter-link"); }
-TEST_F(Links, A_signal_is_not_named_like_a_pin) { machine.refused("net x.bit-in y.bit-in", "signal-named-like-pin"); }
-TEST_F(Links, Net_without_pins_makes_no_signal) { machine.refused("net nothing", "wrong-arguments"); }
+TEST_F(Links, A_signal_has_one_output) { machine.rejected("net a x.bit-out y.bit-out", "two-writers"); }
+TEST_F(Links, A_signal_with_an_output_takes_no_io_pin) { machine.rejected("net a x.bit-out y.bit-io", "two-writers"); }
+TEST_F(Links, A_signal_with_io_pins_takes_no_output) { machine.rejected("net a x.bit-io y.bit-out", "two-writers"); }
+TEST_F(Links, Types_must_be_equal) { machine.rejected("net a x.s32-out y.u32-in", "type-mismatch"); }
+TEST_F(Links, A_pin_is_in_one_signal_only) { machine.rejected("net a x.bit-in\nnet b x.bit-in", "pin-linked"); }
+TEST_F(Links, Parameters_are_not_linked) { machine.rejected("net a x.float-param", "parameter-link"); }
+TEST_F(Links, A_signal_is_not_named_like_a_pin) { machine.rejected("net x.bit-in y.bit-in", "signal-named-like-pin"); }
+TEST_F(Links, Net_without_pins_makes_no_signal) { machine.rejected("net nothing", "wrong-arguments"); }
 
 TEST_F(Links, Io_pins_share_one_value_within_a_thread) {
     machine.must("net a x.s32-io y.s32-io => z.s32-in\nsets a 5");
@@ -45,14 +45,14 @@ TEST_F(Links, Linkps_linksp_and_linkpp_link_as_net_does) {
     EXPECT_EQ(machine.session.model().find_signal("a")->pins.size(), 2u);
     ASSERT_NE(machine.session.model().find_pin("y.bit-in")->signal, nullptr);
     EXPECT_EQ(machine.session.model().find_pin("y.bit-in")->signal, machine.session.model().find_pin("x.bit-out")->signal);
-    machine.refused("linkpp x.bit-out y.bit-io", "pin-linked");
-    machine.refused("linkpp y.bit-io x.bit-out", "pin-linked");
-    machine.refused("linkpp x.bit-out y.bit-in", "pin-linked");
-    machine.refused("net a", "wrong-arguments");
-    machine.refused("net a =>", "wrong-arguments");
-    machine.refused("net fresh =>", "wrong-arguments");
-    machine.refused("linkps x.bit-io a", "type-mismatch");
-    machine.refused("linkps x.bit-io nowhere", "no-such-signal");
+    machine.rejected("linkpp x.bit-out y.bit-io", "pin-linked");
+    machine.rejected("linkpp y.bit-io x.bit-out", "pin-linked");
+    machine.rejected("linkpp x.bit-out y.bit-in", "pin-linked");
+    machine.rejected("net a", "wrong-arguments");
+    machine.rejected("net a =>", "wrong-arguments");
+    machine.rejected("net fresh =>", "wrong-arguments");
+    machine.rejected("linkps x.bit-io a", "type-mismatch");
+    machine.rejected("linkps x.bit-io nowhere", "no-such-signal");
 }
 
 // --- which value a fresh link has ------------------------------------------------------------------------------------
@@ -168,7 +168,7 @@ TEST_F(Links, Delsig_leaves_its_pins_with_the_last_value) {
     EXPECT_EQ(machine.get("x.u32-in"), "17");
     EXPECT_EQ(machine.get("y.u32-in"), "17");
     EXPECT_EQ(machine.get("a"), "?");
-    machine.refused("delsig a", "no-such-signal");
+    machine.rejected("delsig a", "no-such-signal");
 }
 
 TEST_F(Links, Delsig_all_takes_every_signal) {
@@ -185,13 +185,13 @@ TEST_F(Links, Linked_and_unlinked_in_one_transaction_keeps_what_was_inherited) {
 
 // --- setp and sets -----------------------------------------------------------------------------------------------------
 
-TEST_F(Links, Setp_rejects_outputs) { machine.refused("setp x.bit-out 1", "output-set"); }
-TEST_F(Links, Sets_rejects_signals_with_a_writer) { machine.refused("net a x.bit-out\nsets a 1", "writer-set"); }
-TEST_F(Links, Setp_of_nothing_is_an_error) { machine.refused("setp x.bit-inn 1", "no-such-pin"); }
-TEST_F(Links, Sets_of_nothing_is_an_error) { machine.refused("sets nowhere 1", "no-such-signal"); }
+TEST_F(Links, Setp_rejects_outputs) { machine.rejected("setp x.bit-out 1", "output-set"); }
+TEST_F(Links, Sets_rejects_signals_with_a_writer) { machine.rejected("net a x.bit-out\nsets a 1", "writer-set"); }
+TEST_F(Links, Setp_of_nothing_is_an_error) { machine.rejected("setp x.bit-inn 1", "no-such-pin"); }
+TEST_F(Links, Sets_of_nothing_is_an_error) { machine.rejected("sets nowhere 1", "no-such-signal"); }
 TEST_F(Links, Setp_rejects_linked_pins) {
     machine.must("net a x.bit-in");
-    machine.refused("setp x.bit-in 1", "linked-set");
+    machine.rejected("setp x.bit-in 1", "linked-set");
 }
 
 TEST_F(Links, Setp_takes_parameters_io_pins_and_the_equals_sign) {
@@ -205,7 +205,7 @@ struct BadValue {
     const char *pin, *value;
 };
 struct Refused : Links, testing::WithParamInterface<BadValue> {};
-TEST_P(Refused, value_changes_nothing) { machine.refused(std::string("setp x.") + GetParam().pin + " " + GetParam().value, "bad-value"); }
+TEST_P(Refused, value_changes_nothing) { machine.rejected(std::string("setp x.") + GetParam().pin + " " + GetParam().value, "bad-value"); }
 INSTANTIATE_TEST_SUITE_P(Values, Refused,
                          testing::Values(BadValue{"s32-in", "2147483648"}, BadValue{"s32-in", "-2147483649"}, BadValue{"u32-in", "-1"}, BadValue{"u32-in", "4294967296"},
                                          BadValue{"s64-in", "9223372036854775808"}, BadValue{"u64-in", "18446744073709551616"}, BadValue{"u64-in", "-1"},
@@ -244,8 +244,8 @@ TEST_F(Links, Newsig_knows_both_dialects) {
     EXPECT_EQ(model.find_signal("e")->type, HAL_TYPE_PORT);
     EXPECT_EQ(model.find_signal("f")->type, HAL_TYPE_S32);
     EXPECT_EQ(model.find_signal("g")->type, HAL_TYPE_U32);
-    machine.refused("newsig h double", "no-such-type");
-    machine.refused("newsig a bit", "name-taken");
+    machine.rejected("newsig h double", "no-such-type");
+    machine.rejected("newsig a bit", "name-taken");
 }
 
 // --- aliases ----------------------------------------------------------------------------------------------------------------
@@ -264,14 +264,14 @@ TEST_F(Links, An_alias_is_a_second_name_for_every_command) {
 
 TEST_F(Links, Aliases_are_unique_and_one_per_pin) {
     machine.must("alias pin x.s32-in speed\nalias param x.float-param gain\nnewsig sig bit");
-    machine.refused("alias pin x.s32-in other", "alias-taken");
-    machine.refused("alias pin y.s32-in speed", "name-taken");
-    machine.refused("alias pin y.s32-in y.bit-in", "name-taken");
-    machine.refused("alias pin y.s32-in sig", "name-taken");
-    machine.refused("alias signal sig other", "wrong-arguments");
-    machine.refused("unalias pin y.s32-in", "no-alias");
-    machine.refused("alias pin nowhere other", "no-such-pin");
-    machine.refused("newsig speed bit", "signal-named-like-pin");
+    machine.rejected("alias pin x.s32-in other", "alias-taken");
+    machine.rejected("alias pin y.s32-in speed", "name-taken");
+    machine.rejected("alias pin y.s32-in y.bit-in", "name-taken");
+    machine.rejected("alias pin y.s32-in sig", "name-taken");
+    machine.rejected("alias signal sig other", "wrong-arguments");
+    machine.rejected("unalias pin y.s32-in", "no-alias");
+    machine.rejected("alias pin nowhere other", "no-such-pin");
+    machine.rejected("newsig speed bit", "signal-named-like-pin");
 }
 
 TEST_F(Links, An_alias_goes_with_its_instance) {
@@ -322,13 +322,13 @@ TEST_F(Ports, A_stream_crosses_threads) {
 }
 
 TEST_F(Ports, Accept_one_reader_one_writer_and_one_size) {
-    machine.refused("net s p.to q.from r.from", "two-readers");
-    machine.refused("net s p.to q.to", "two-writers");
+    machine.rejected("net s p.to q.from r.from", "two-readers");
+    machine.rejected("net s p.to q.to", "two-writers");
     machine.must("net s p.to q.from\nsets s 8");
-    machine.refused("sets s 16", "port-sized");
-    machine.refused("newsig t port\nsets t 0", "bad-value");
-    machine.refused("setp q.from 3", "linked-set");
-    machine.refused("setp r.from 3", "bad-value");
+    machine.rejected("sets s 16", "port-sized");
+    machine.rejected("newsig t port\nsets t 0", "bad-value");
+    machine.rejected("setp q.from 3", "linked-set");
+    machine.rejected("setp r.from 3", "bad-value");
 }
 
 TEST_F(Ports, An_unlinked_port_pin_has_no_stream) {

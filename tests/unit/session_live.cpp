@@ -132,7 +132,7 @@ TEST(A_slow_thread, takes_edits_and_answers_between_its_cycles) {
 
 TEST(A_period_of_more_than_a_thousand_seconds, is_rejected) {
     Machine machine;
-    machine.refused("newthread t 1000000000001", "bad-period");
+    machine.rejected("newthread t 1000000000001", "bad-period");
 }
 
 TEST_F(Live, Priorities_fall_with_the_period_also_when_a_faster_thread_comes_later) {

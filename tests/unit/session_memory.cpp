@@ -141,7 +141,7 @@ TEST(A_thread_that_the_system_cannot_create, rolls_back_the_edit) {
     machine.must("newthread first 1000000\nloadrt test-counter names=c\naddf c first");
     machine.start();
     refuse_threads = true;
-    machine.refused("newthread second 2000000\nloadrt test-life names=x\naddf x second\nsetp c.step 4", "thread-refused");
+    machine.rejected("newthread second 2000000\nloadrt test-life names=x\naddf x second\nsetp c.step 4", "thread-refused");
     refuse_threads = false;
     EXPECT_NE(machine.said.find("thread 'second' cannot be created: the system gives no thread: Resource temporarily unavailable"), std::string::npos) << machine.said;
     machine.must("newthread second 2000000\nloadrt test-counter names=d\naddf d second");

@@ -50,7 +50,7 @@ TEST_F(Reload, of_a_component_that_starts_stops_the_old_one_first) {
 TEST_F(Reload, in_an_edit_that_fails_elsewhere_is_rolled_back) {
     Watch watch;
     machine.must("loadrt test-life names=x " + watch.argument() + "\naddf x fast\nloadrt test-counter names=c\nalias pin c.step pace\nsetp c.step 4");
-    machine.refused("reload test-life\nreload test-counter\nreload test-counter\nsetp c.step nonsense", "bad-value");
+    machine.rejected("reload test-life\nreload test-counter\nreload test-counter\nsetp c.step nonsense", "bad-value");
     EXPECT_EQ(watch.started, 1);
     EXPECT_EQ(watch.constructed, watch.destroyed + 1);
     machine.start();

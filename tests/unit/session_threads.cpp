@@ -31,27 +31,27 @@ TEST_F(Threads, Addf_places_functions_by_position) {
 
 TEST_F(Threads, Addf_rejects_invalid_positions) {
     machine.must("addf a t\naddf b t");
-    for (const char* position : {"0", "4", "-4", "x", "1.5", "99999999999999999999"}) machine.refused(std::string("addf c t ") + position, "bad-position");
+    for (const char* position : {"0", "4", "-4", "x", "1.5", "99999999999999999999"}) machine.rejected(std::string("addf c t ") + position, "bad-position");
 }
 
 TEST_F(Threads, A_function_is_in_one_thread_once) {
     machine.must("newthread u 2000000\naddf a t");
-    machine.refused("addf a t", "function-in-thread");
-    machine.refused("addf a u", "function-in-thread");
-    machine.refused("initf a t", "function-in-thread");
+    machine.rejected("addf a t", "function-in-thread");
+    machine.rejected("addf a u", "function-in-thread");
+    machine.rejected("initf a t", "function-in-thread");
     machine.must("delf a t\naddf a u");
-    machine.refused("delf a t", "not-in-thread");
-    machine.refused("delf b t", "not-in-thread");
+    machine.rejected("delf a t", "not-in-thread");
+    machine.rejected("delf b t", "not-in-thread");
 }
 
 TEST_F(Threads, Unknown_names_are_rejected) {
-    machine.refused("addf nothing t", "no-such-function");
-    machine.refused("addf a nothing", "no-such-thread");
-    machine.refused("delf nothing t", "no-such-function");
-    machine.refused("delthread nothing", "no-such-thread");
-    machine.refused("loadrt nothing", "no-such-component");
-    machine.refused("unloadrt nothing", "no-such-component");
-    machine.refused("addf a t 1 2", "wrong-arguments");
+    machine.rejected("addf nothing t", "no-such-function");
+    machine.rejected("addf a nothing", "no-such-thread");
+    machine.rejected("delf nothing t", "no-such-function");
+    machine.rejected("delthread nothing", "no-such-thread");
+    machine.rejected("loadrt nothing", "no-such-component");
+    machine.rejected("unloadrt nothing", "no-such-component");
+    machine.rejected("addf a t 1 2", "wrong-arguments");
 }
 
 TEST_F(Threads, Functions_run_in_order_and_a_later_reader_sees_the_same_cycle) {
@@ -96,17 +96,17 @@ TEST_F(Threads, A_period_is_rounded_to_a_multiple_of_the_fastest_with_a_warning)
 
 TEST_F(Threads, A_new_fastest_thread_must_divide_all_others) {
     machine.must("newthread slow 3000000");
-    machine.refused("newthread fast 700000", "period-multiple");
+    machine.rejected("newthread fast 700000", "period-multiple");
     machine.must("newthread fast 500000");
     EXPECT_EQ(machine.session.model().threads.front()->name, "fast");
 }
 
 TEST_F(Threads, Invalid_periods_are_rejected) {
-    for (const char* period : {"0", "999", "-1000000", "x", "1e99"}) machine.refused(std::string("newthread u ") + period, "bad-period");
-    machine.refused("newthread t 1000000", "name-taken");
-    machine.refused("newthread u 1000000 cpu=x", "bad-argument");
-    machine.refused("newthread u 1000000 colour=red", "unknown-argument");
-    machine.refused("loadrt threads name1=u periodx=7", "unknown-argument");
+    for (const char* period : {"0", "999", "-1000000", "x", "1e99"}) machine.rejected(std::string("newthread u ") + period, "bad-period");
+    machine.rejected("newthread t 1000000", "name-taken");
+    machine.rejected("newthread u 1000000 cpu=x", "bad-argument");
+    machine.rejected("newthread u 1000000 colour=red", "unknown-argument");
+    machine.rejected("loadrt threads name1=u periodx=7", "unknown-argument");
 }
 
 TEST_F(Threads, Loadrt_threads_can_be_given_again) {
@@ -159,7 +159,7 @@ TEST_F(Threads, Initf_runs_once_in_a_cycle_of_its_own) {
     machine.cycles(1);
     EXPECT_EQ(machine.get("a.count"), "1");
     EXPECT_EQ(machine.get("b.count"), "5");
-    machine.refused("initf c t", "init-done");
+    machine.rejected("initf c t", "init-done");
 }
 
 TEST_F(Threads, Time_pins_of_threads_and_functions_link_and_set_like_others) {
@@ -169,8 +169,8 @@ TEST_F(Threads, Time_pins_of_threads_and_functions_link_and_set_like_others) {
     EXPECT_EQ(machine.get("ticks"), "3");
     EXPECT_EQ(machine.get("a.tmax"), "5");  // the virtual clock measures nothing
     EXPECT_EQ(machine.get("t.tmax"), "7");
-    machine.refused("setp t.threadbeat 0", "output-set");
-    machine.refused("net m t.tmax", "parameter-link");
+    machine.rejected("setp t.threadbeat 0", "output-set");
+    machine.rejected("net m t.tmax", "parameter-link");
     for (const char* pin : {"t.time", "t.tmax-increased", "t.missed", "t.wakeup", "a.tmax-increased"}) EXPECT_NE(machine.get(pin), "?") << pin;
 }
 
@@ -223,12 +223,12 @@ TEST(Instances, are_numbered_named_and_added_at_any_time) {
     machine.must("loadrt test_counter num_chan=1");
     for (const char* name : {"test-counter.0", "test-counter.1", "test-counter.2", "left", "right", "test-counter.3"}) EXPECT_NE(machine.session.model().find_instance(name), nullptr) << name;
     EXPECT_EQ(machine.session.model().components.size(), 1u);
-    machine.refused("loadrt test-counter names=left", "name-taken");
-    machine.refused("loadrt test-counter names=x,,y", "bad-argument");
-    machine.refused("loadrt test-counter count=0", "bad-argument");
-    machine.refused("loadrt test-counter count=1 names=x", "names-and-count");
-    machine.refused("loadrt test-counter coutn=1", "unknown-argument");
-    machine.refused("loadrt test-counter word", "bad-argument");
+    machine.rejected("loadrt test-counter names=left", "name-taken");
+    machine.rejected("loadrt test-counter names=x,,y", "bad-argument");
+    machine.rejected("loadrt test-counter count=0", "bad-argument");
+    machine.rejected("loadrt test-counter count=1 names=x", "names-and-count");
+    machine.rejected("loadrt test-counter coutn=1", "unknown-argument");
+    machine.rejected("loadrt test-counter word", "bad-argument");
     machine.must("loadrt test-counter");
     EXPECT_NE(machine.session.model().find_instance("test-counter.4"), nullptr) << "a rejected load takes no number";
 }
@@ -237,9 +237,9 @@ TEST(Instances, of_a_singleton_are_one) {
     Machine machine;
     machine.must("loadrt test-single");
     EXPECT_NE(machine.session.model().find_pin("test-single.runs"), nullptr);
-    machine.refused("loadrt test-single", "name-taken");
+    machine.rejected("loadrt test-single", "name-taken");
     Machine other;
-    other.refused("loadrt test-single count=2", "bad-argument");
+    other.rejected("loadrt test-single count=2", "bad-argument");
 }
 
 TEST(Instances, get_arguments_personalities_and_lists) {
@@ -253,11 +253,11 @@ TEST(Instances, get_arguments_personalities_and_lists) {
     EXPECT_EQ(machine.get("test-shared.0.personality"), "7");
     EXPECT_EQ(machine.get("test-shared.1.personality"), "8");
     EXPECT_EQ(machine.get("test-shared.2.personality"), "7");
-    machine.refused("loadrt test-shared kind=x", "bad-argument");
-    machine.refused("loadrt test-shared gain=much", "bad-argument");
-    machine.refused("loadrt test-shared personality=101", "construct-failed");
-    machine.refused("loadrt test-shared count=2 kind=1,2,3", "bad-argument");
-    machine.refused("loadrt test-shared gain=1 gain=2", "bad-argument");
+    machine.rejected("loadrt test-shared kind=x", "bad-argument");
+    machine.rejected("loadrt test-shared gain=much", "bad-argument");
+    machine.rejected("loadrt test-shared personality=101", "construct-failed");
+    machine.rejected("loadrt test-shared count=2 kind=1,2,3", "bad-argument");
+    machine.rejected("loadrt test-shared gain=1 gain=2", "bad-argument");
 }
 
 TEST(Instances, are_as_many_as_a_list_argument_has_values) {
@@ -290,7 +290,7 @@ TEST(Functions_of_one_instance, spread_over_threads_only_when_each_has_its_own_p
     Machine machine;
     machine.must("loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-two names=free\nloadrt test-two names=tied common=1");
     machine.must("addf free.fast t\naddf free.first u\naddf free.last u");
-    machine.refused("addf tied.fast t\naddf tied.first u", "spread-pins");
+    machine.rejected("addf tied.fast t\naddf tied.first u", "spread-pins");
 }
 
 TEST(An_instance, lives_from_construct_to_destroy_in_order) {
@@ -376,7 +376,7 @@ TEST(Auto_order, puts_writers_before_readers_and_reports_where_it_cut_a_loop) {
     machine.must("addf --auto t a b c");
     EXPECT_NE(machine.said.find("[cyclic-order]"), std::string::npos) << machine.said;
     EXPECT_EQ(machine.session.model().find_thread("t")->functions.size(), 3u);
-    machine.refused("addf --auto t", "no-such-function");
+    machine.rejected("addf --auto t", "no-such-function");
 }
 
 }  // namespace

@@ -21,19 +21,19 @@ struct Transaction : testing::TestWithParam<const char*> {
 };
 
 TEST_P(Transaction, is_rolled_back_exactly_when_its_last_command_fails) {
-    machine.refused(std::string(GetParam()) + "\nsetp nowhere 1", "no-such-pin");
+    machine.rejected(std::string(GetParam()) + "\nsetp nowhere 1", "no-such-pin");
     machine.cycles(2);  // and the machine runs on
     EXPECT_EQ(machine.get("a.count"), "12");
     machine.must(GetParam());  // nothing was left that would be in the way
 }
 
 TEST_P(Transaction, is_rolled_back_exactly_when_an_instance_cannot_start) {
-    machine.refused(std::string(GetParam()) + "\nloadrt test-life names=bad fail=start", "start-failed");
+    machine.rejected(std::string(GetParam()) + "\nloadrt test-life names=bad fail=start", "start-failed");
     machine.must(GetParam());
 }
 
 TEST_P(Transaction, is_rolled_back_exactly_when_a_rule_over_the_whole_model_fails) {
-    machine.refused(std::string(GetParam()) + "\nloadrt threads name1=m period1=8000000 name2=n period2=16000000\nloadrt test-two names=tied common=1\naddf tied.fast m\naddf tied.first n",
+    machine.rejected(std::string(GetParam()) + "\nloadrt threads name1=m period1=8000000 name2=n period2=16000000\nloadrt test-two names=tied common=1\naddf tied.fast m\naddf tied.first n",
                     "spread-pins");
     machine.must(GetParam());
 }
@@ -146,7 +146,7 @@ TEST(An_instance_that_cannot_start, rolls_back_the_load_and_stops_those_started_
     Watch watch;
     Machine machine;
     machine.must("loadrt threads");
-    machine.refused("loadrt test-life names=x,y " + watch.argument() + "\nloadrt test-life names=z fail=start\naddf x thread1", "start-failed");
+    machine.rejected("loadrt test-life names=x,y " + watch.argument() + "\nloadrt test-life names=z fail=start\naddf x thread1", "start-failed");
     EXPECT_NE(machine.said.find("the test rejects the start"), std::string::npos);
     EXPECT_EQ(watch.started, 2);
     EXPECT_EQ(watch.stopped, 2);
@@ -157,7 +157,7 @@ TEST(An_instance_that_cannot_start, rolls_back_the_load_and_stops_those_started_
 TEST(A_constructor_that_throws, rolls_back_the_load) {
     Watch watch;
     Machine machine;
-    machine.refused("loadrt test-life names=x " + watch.argument() + "\nloadrt test-life names=z fail=construct", "construct-failed");
+    machine.rejected("loadrt test-life names=x " + watch.argument() + "\nloadrt test-life names=z fail=construct", "construct-failed");
     EXPECT_NE(machine.said.find("the test rejects the construction"), std::string::npos);
     EXPECT_EQ(watch.constructed, 1);
     EXPECT_EQ(watch.started, 0);

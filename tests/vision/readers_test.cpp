@@ -17,7 +17,7 @@ namespace {
 
 std::string pnm(const std::string& text, Frame& frame) {
     const auto problem = read_pnm(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), frame);
-    return problem ? word(problem->kind) + (": " + problem->text) : "";
+    return problem ? to_string(problem->kind) + (": " + problem->text) : "";
 }
 
 TEST(Pnm, is_read_in_all_its_kinds) {
@@ -54,8 +54,8 @@ TEST(Pnm, that_cannot_be_read_says_why) {
     EXPECT_EQ(pnm("P5 4 4 255 abc", f), "damaged: truncated: 4 of 17 bytes");
     EXPECT_EQ(pnm("P2 2 1 9 1 10", f), "damaged: a sample exceeds the maximum given in the header");
     EXPECT_EQ(pnm("P2 2 1 9 1   ", f), "damaged: sample 2 of 2 is not a number");
-    EXPECT_EQ(pnm("P5 60000 60000 255 ", f), "huge: a frame of 60000 x 60000 is larger than 8192 x 8192 or 22 million pixels");
-    EXPECT_EQ(pnm("P5 99999999999999999999 1 255 ", f), "huge: a frame of 65536 x 1 is larger than 8192 x 8192 or 22 million pixels");
+    EXPECT_EQ(pnm("P5 60000 60000 255 ", f), "too large: a frame of 60000 x 60000 is larger than 8192 x 8192 or 22 million pixels");
+    EXPECT_EQ(pnm("P5 99999999999999999999 1 255 ", f), "too large: a frame of 65536 x 1 is larger than 8192 x 8192 or 22 million pixels");
 }
 
 std::string refusal(const char* address) {
@@ -108,7 +108,7 @@ TEST_F(Folder, of_frames_is_shown_in_the_order_of_names_at_its_rate) {
     const auto from = source("?fps=100");
     ASSERT_TRUE(from->open(0));
     EXPECT_EQ(at(*from, {0, 5, 10, 19, 20, 29, 30, 31}), (std::vector<int>{10, -1, 20, -1, 30, -1, -2, -1}));
-    EXPECT_EQ(from->problem().kind, Trouble::ended);
+    EXPECT_EQ(from->problem().kind, FrameError::ended);
     EXPECT_EQ(from->problem().text,
               "all frames of " + path.string() + " were shown; to repeat them, write frames:" + path.string() + "?loop");
 }
@@ -137,7 +137,7 @@ TEST_F(Folder, that_is_not_there_or_empty_is_absent) {
     EXPECT_EQ(from->problem().text, "the folder " + path.string() + " has no .pgm or .ppm file");
     std::filesystem::remove_all(path);
     EXPECT_FALSE(from->open(0));
-    EXPECT_EQ(from->problem().kind, Trouble::absent);
+    EXPECT_EQ(from->problem().kind, FrameError::missing);
     std::filesystem::create_directories(path);
     three();
     EXPECT_TRUE(from->open(0));

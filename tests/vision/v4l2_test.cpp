@@ -185,7 +185,7 @@ TEST_F(V4l2, camera_that_is_unplugged_is_lost_and_can_be_opened_again) {
     ASSERT_TRUE(camera->open(0));
     kernel.gone = true;
     EXPECT_EQ(camera->next(0, 0, frame), Got::lost);
-    EXPECT_EQ(camera->problem().kind, Trouble::unplugged);
+    EXPECT_EQ(camera->problem().kind, FrameError::unplugged);
     EXPECT_EQ(camera->problem().text, "/dev/video0 was unplugged");
     camera->close();
     EXPECT_EQ(kernel.open_now, 0);
@@ -232,7 +232,7 @@ TEST_F(V4l2, rate_that_a_camera_does_not_have_is_said_and_counts) {
 TEST_F(V4l2, refusals_say_what_to_do) {
     kernel.open_error = ENOENT;
     EXPECT_EQ(refusal(), "missing camera /dev/video0; to list cameras: ls -l /dev/v4l/by-id");
-    EXPECT_EQ(camera->problem().kind, Trouble::absent);
+    EXPECT_EQ(camera->problem().kind, FrameError::missing);
     kernel.open_error = EACCES;
     EXPECT_EQ(refusal(), "/dev/video0: permission denied; type: sudo usermod -aG video $USER, and log in again");
     kernel.open_error = 0;
@@ -254,7 +254,7 @@ TEST_F(V4l2, refusals_say_what_to_do) {
     EXPECT_EQ(refusal(), "/dev/video0 has no frames of 16 x 4; write v4l2:/dev/video0?width=640&height=480");
     kernel.format_error = EBUSY;
     EXPECT_EQ(refusal(), "/dev/video0 is used by another program; type: fuser -v /dev/video0");
-    EXPECT_EQ(camera->problem().kind, Trouble::refused);
+    EXPECT_EQ(camera->problem().kind, FrameError::unusable);
 }
 
 TEST_F(V4l2, every_call_may_fail_and_nothing_is_left_open) {

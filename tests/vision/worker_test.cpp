@@ -22,7 +22,7 @@ public:
     std::int64_t taken = -1;
 
     bool open(std::int64_t) override {
-        if (!there) return fail(Trouble::absent, "there is no camera /dev/video9");
+        if (!there) return fail(FrameError::missing, "there is no camera /dev/video9");
         ++opened;
         skipped_ = 0;
         taken = -1;
@@ -30,12 +30,12 @@ public:
     }
     Got next(std::int64_t now, std::int64_t, Frame& frame) override {
         if (starved) throw std::bad_alloc();
-        if (cut) return fail(Trouble::unplugged, "/dev/video9 was unplugged"), Got::lost;
+        if (cut) return fail(FrameError::unplugged, "/dev/video9 was unplugged"), Got::lost;
         const std::int64_t n = now / (10 * ms);
         if (!gives || n == taken) return Got::nothing;
         if (taken >= 0) skipped_ += static_cast<std::uint64_t>(n - taken - 1);
         taken = n;
-        if (damaged) return fail(Trouble::damaged, "half of a frame"), Got::bad;
+        if (damaged) return fail(FrameError::damaged, "half of a frame"), Got::bad;
         frame.resize(width, 6, Format::grey);
         std::fill(frame.pixels.begin(), frame.pixels.end(), brightness);
         if (!still && brightness > 0) frame.pixels[static_cast<std::size_t>(n % 8)] ^= 1;
@@ -88,7 +88,7 @@ TEST_F(Rig, Worker_looks_for_an_absent_camera_every_second_and_says_it_once) {
     camera->there = false;
     run(5 * second);
     EXPECT_EQ(lines, std::vector<std::string>{"eye: there is no camera /dev/video9; retrying every second"});
-    EXPECT_EQ(status().trouble, Trouble::absent);
+    EXPECT_EQ(status().error, FrameError::missing);
     camera->there = true;
     run(second + 10 * ms);
     EXPECT_EQ(lines.back(), "eye: first valid frame after 5.0 s");
@@ -109,7 +109,7 @@ TEST_F(Rig, Worker_goes_on_by_itself_after_the_camera_was_unplugged) {
     EXPECT_EQ(lines.back(), "eye: frames are valid again after 3.0 s");
     EXPECT_TRUE(status().ok);
     EXPECT_EQ(status().openings, 2u);
-    EXPECT_EQ(status().trouble, Trouble::none);
+    EXPECT_EQ(status().error, FrameError::none);
 }
 
 TEST_F(Rig, Worker_says_once_what_the_camera_does_other_than_it_was_told) {
@@ -145,7 +145,7 @@ TEST_F(Rig, Worker_takes_equal_frames_for_a_frozen_camera_if_it_is_told) {
     worker.freeze_after(10);
     run(second);
     EXPECT_EQ(lines, std::vector<std::string>{"eye: 10 frames in a row are identical; the camera is frozen"});
-    EXPECT_EQ(status().trouble, Trouble::frozen);
+    EXPECT_EQ(status().error, FrameError::frozen);
     EXPECT_EQ(status().bad, 91u);
     camera->still = false;
     run(10 * ms);
@@ -158,7 +158,7 @@ TEST_F(Rig, Worker_refuses_frames_that_the_calibration_is_not_about) {
     EXPECT_EQ(lines,
               std::vector<std::string>{"eye: frames are 8 x 6 and the calibration room.camera is for 640 x 480; take the file of this "
                                        "camera, or set the source's width and height"});
-    EXPECT_EQ(status().trouble, Trouble::wrong_size);
+    EXPECT_EQ(status().error, FrameError::wrong_size);
     EXPECT_EQ(seen, 0);
 }
 
@@ -167,7 +167,7 @@ TEST_F(Rig, Worker_says_that_no_frames_come) {
     camera->gives = false;
     run(5 * second);
     EXPECT_EQ(lines, std::vector<std::string>{"eye: no frame for 1.0 s"});
-    EXPECT_EQ(status().trouble, Trouble::silent);
+    EXPECT_EQ(status().error, FrameError::timeout);
     EXPECT_FALSE(status().ok);
     camera->gives = true;
     run(10 * ms);
@@ -210,7 +210,7 @@ TEST_F(Rig, Worker_publishes_each_frame_and_each_change) {
     camera->there = false;
     run(second);
     EXPECT_EQ(published.size(), 1u);
-    EXPECT_EQ(published.back().trouble, Trouble::absent);
+    EXPECT_EQ(published.back().error, FrameError::missing);
     camera->there = true;
     run(second);
     EXPECT_EQ(published.size(), 101u);

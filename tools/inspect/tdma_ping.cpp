@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t usual_count = 4;
 constexpr std::int64_t pause_ns = 200'000'000, look_ns = 2'000'000;
-constexpr auto patience = std::chrono::seconds(30);  // the component times out long before, unless its thread stalls
+constexpr auto reply_timeout = std::chrono::seconds(30);  // the component times out long before, unless its thread stalls
 
 enum class Outcome { none, answered, unanswered, no_room, no_address, not_running };  // of the pin ping-result
 
@@ -47,7 +47,7 @@ public:
             while (!problem.empty() && problem.back() == '\n') problem.pop_back();
             return Outcome::none;
         }
-        const auto until = Clock::now() + patience;
+        const auto until = Clock::now() + reply_timeout;
         while (Clock::now() < until) {
             if (stop.wait_ns(look_ns)) return Outcome::none;
             if (!look(problem)) return Outcome::none;

@@ -17,7 +17,7 @@
 #include "fault_messages.hpp"
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
-#include "hal/way.hpp"
+#include "hal/path_delay.hpp"
 
 namespace {
 
@@ -80,7 +80,7 @@ public:
         notes_told_.assign(nodes_.size(), 0);
         reporter_->start();
         runner_->open(*link_);
-        tell_ways();
+        report_path_delays();
     }
 
     void stop() noexcept {
@@ -141,27 +141,28 @@ private:
     }
 
     /// Reports the latency of each pin on a bus with a known schedule: that of the station named as the node, or the longest. [setup]
-    void tell_ways() {
-        const std::vector<hal::can::DeliveryTime> ways = link_->delivery_times();
-        if (ways.empty()) return;
-        hal::can::DeliveryTime most = ways.front();
-        for (const hal::can::DeliveryTime& w : ways) {
-            most.there_ns = std::max(most.there_ns, w.there_ns), most.back_ns = std::max(most.back_ns, w.back_ns);
-            most.there_cycles = std::max(most.there_cycles, w.there_cycles), most.back_cycles = std::max(most.back_cycles, w.back_cycles);
-            most.round_trip = std::max(most.round_trip, w.round_trip);
+    void report_path_delays() {
+        const std::vector<hal::can::DeliveryTime> delays = link_->delivery_times();
+        if (delays.empty()) return;
+        hal::can::DeliveryTime longest = delays.front();
+        for (const hal::can::DeliveryTime& d : delays) {
+            longest.there_ns = std::max(longest.there_ns, d.there_ns), longest.back_ns = std::max(longest.back_ns, d.back_ns);
+            longest.there_cycles = std::max(longest.there_cycles, d.there_cycles);
+            longest.back_cycles = std::max(longest.back_cycles, d.back_cycles);
+            longest.round_trip = std::max(longest.round_trip, d.round_trip);
         }
         for (const Slot& s : runner_->slots()) {
             const config::Node& node = config_.nodes[s.node];
-            const auto          own = std::find_if(ways.begin(), ways.end(), [&](const auto& w) { return w.station == node.name; });
-            const auto&         way = own == ways.end() ? most : *own;
+            const auto          own = std::find_if(delays.begin(), delays.end(), [&](const auto& d) { return d.station == node.name; });
+            const auto&         delay = own == delays.end() ? longest : *own;
             const std::string   far = "node " + std::to_string(node.setup.id) + " (" + node.name + ")";
-            const auto          tell = [&](const std::string& pin) {
-                hal::tell_way(((by_index() ? "" : node.name + ".") + pin).c_str(), far.c_str(),
-                              s.to_node ? way.there_cycles : way.back_cycles, s.to_node ? 0 : way.round_trip,
-                              s.to_node ? way.there_ns : way.back_ns);
+            const auto          report = [&](const std::string& pin) {
+                hal::report_path_delay(((by_index() ? "" : node.name + ".") + pin).c_str(), far.c_str(),
+                                       s.to_node ? delay.there_cycles : delay.back_cycles, s.to_node ? 0 : delay.round_trip,
+                                       s.to_node ? delay.there_ns : delay.back_ns);
             };
-            if (s.object->bit_pins.empty()) tell(s.object->pin);
-            for (const config::BitPin& b : s.object->bit_pins) tell(b.name);
+            if (s.object->bit_pins.empty()) report(s.object->pin);
+            for (const config::BitPin& b : s.object->bit_pins) report(b.name);
         }
     }
 

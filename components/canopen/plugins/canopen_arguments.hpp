@@ -106,9 +106,9 @@ private:
         texts.begin(path, text);
         for (const config::Message& m : reading.messages)
             if (m.severity != config::Severity::note)  // notes are for `hal canopen check`
-                texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
-                          m.sentence, m.label, m.help);
-        if (!reading.good()) hal::Texts::refuse();
+                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
+                             m.sentence, m.label, m.help);
+        if (!reading.good()) hal::Texts::fail();
     }
 };
 

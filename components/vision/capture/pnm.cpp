@@ -33,7 +33,7 @@ private:
     const std::uint8_t *at_, *end_;
 };
 
-Problem damaged(std::string text) { return {Trouble::damaged, std::move(text)}; }
+Problem damaged(std::string text) { return {FrameError::damaged, std::move(text)}; }
 
 std::uint8_t scaled(unsigned sample, unsigned most) {
     return static_cast<std::uint8_t>(most == 255 ? sample : (sample * 255u + most / 2) / most);
@@ -50,7 +50,7 @@ std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Fr
     if (width == 0 || height == 0 || most == 0 || most > 65535)
         return damaged("invalid header: a value is 0, or the maximum exceeds 65535");
     if (!Frame::fits(width, height))
-        return Problem{Trouble::huge, "a frame of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than " +
+        return Problem{FrameError::too_large, "a frame of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than " +
                                           std::to_string(most_wide) + " x " + std::to_string(most_high) + " or 22 million pixels"};
     const std::size_t samples = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * (colour ? 3 : 1);
     const std::size_t wide = most > 255 ? 2 : 1;

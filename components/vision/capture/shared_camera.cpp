@@ -43,7 +43,7 @@ public:
             if (hub_->address != address_.text()) {
                 const std::string other = hub_->address;
                 hub_.reset();
-                return fail(Trouble::refused,
+                return fail(FrameError::unusable,
                             "another component has opened " + other + "; a camera has one set of options: use the same source= for both");
             }
         } else {

@@ -18,10 +18,10 @@ void to_grey(Frame& frame) {
     frame.pixels.resize(count);
 }
 
-const char* word(Trouble trouble) {
-    static constexpr const char* words[trouble_count] = {"none", "absent", "refused", "unplugged",  "silent", "damaged",
-                                                         "huge", "black",  "frozen",  "wrong size", "ended"};
-    return words[static_cast<std::size_t>(trouble)];
+const char* to_string(FrameError error) {
+    static constexpr const char* names[frame_error_count] = {"none",    "missing",   "unusable", "unplugged", "no frames",  "damaged",
+                                                             "too large", "black", "frozen",   "wrong size", "end of files"};
+    return names[static_cast<std::size_t>(error)];
 }
 
 std::unique_ptr<Source> make_source(const std::string& address, const std::function<std::string(const std::string&)>& find) {

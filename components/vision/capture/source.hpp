@@ -13,25 +13,25 @@
 namespace hal::vision {
 
 /// Reason why frames are invalid. The numbers are those of the pin `error-code`.
-enum class Trouble : std::uint8_t {
+enum class FrameError : std::uint8_t {
     none,
-    absent,       ///< missing camera or folder
-    refused,      ///< unusable: permission denied, busy, not a camera, no supported format
+    missing,      ///< missing camera or folder
+    unusable,     ///< unusable: permission denied, busy, not a camera, no supported format
     unplugged,    ///< disconnected
-    silent,       ///< no frames
+    timeout,      ///< no frames
     damaged,      ///< unreadable frame or file
-    huge,         ///< frame larger than the limit
+    too_large,    ///< frame larger than the limit
     black,        ///< black frames
     frozen,       ///< identical frames
     wrong_size,   ///< frames are not of the calibration's size
     ended,        ///< all frames of a folder were shown
 };
-constexpr int trouble_count = 11;
+constexpr int frame_error_count = 11;
 /// "unplugged", "wrong size" … [any]
-const char* word(Trouble);
+const char* to_string(FrameError);
 
 struct Problem {
-    Trouble     kind = Trouble::none;
+    FrameError     kind = FrameError::none;
     std::string text;  ///< message without a full stop: "/dev/video0 was unplugged"
 };
 
@@ -63,7 +63,7 @@ public:
     virtual std::uint32_t frozen_after() const { return 0; }
 
 protected:
-    bool fail(Trouble kind, std::string text) {
+    bool fail(FrameError kind, std::string text) {
         problem_ = {kind, std::move(text)};
         return false;
     }

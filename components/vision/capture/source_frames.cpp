@@ -39,8 +39,8 @@ public:
             const std::string end = at->path().extension().string();
             if (end == ".pgm" || end == ".ppm") files_.push_back(at->path().filename().string());
         }
-        if (error) return fail(Trouble::absent, "the folder " + shown_ + " cannot be read: " + error.message());
-        if (files_.empty()) return fail(Trouble::absent, "the folder " + shown_ + " has no .pgm or .ppm file");
+        if (error) return fail(FrameError::missing, "the folder " + shown_ + " cannot be read: " + error.message());
+        if (files_.empty()) return fail(FrameError::missing, "the folder " + shown_ + " has no .pgm or .ppm file");
         std::sort(files_.begin(), files_.end());
         // After an interruption it goes on where it was, as a camera would.
         if (!begun_) begin_ns_ = now;
@@ -57,7 +57,7 @@ public:
         }
         if (!loop_ && next_ >= files_.size()) {
             told_end_ = true;
-            fail(Trouble::ended, "all frames of " + shown_ + " were shown; to repeat them, write frames:" + shown_ + "?loop");
+            fail(FrameError::ended, "all frames of " + shown_ + " were shown; to repeat them, write frames:" + shown_ + "?loop");
             return Got::bad;
         }
         std::uint64_t newest = std::max(next_, due(now));
@@ -86,7 +86,7 @@ private:
     }
     bool read(const std::string& name) {
         const fs::path path = fs::path(folder_) / name;
-        const auto     bad = [&](const char* why) { return fail(Trouble::damaged, shown_ + "/" + name + " cannot be read: " + why); };
+        const auto     bad = [&](const char* why) { return fail(FrameError::damaged, shown_ + "/" + name + " cannot be read: " + why); };
         const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
                                                                    [](std::FILE* f) { return std::fclose(f); });
         if (!file) return bad(std::strerror(errno));
@@ -94,7 +94,8 @@ private:
         const auto      size = fs::file_size(path, error);
         if (error) return bad(error.message().c_str());
         if (size > most_bytes)
-            return fail(Trouble::huge, shown_ + "/" + name + " has " + std::to_string(size) + " bytes, more than the limit for a frame");
+            return fail(FrameError::too_large,
+                        shown_ + "/" + name + " has " + std::to_string(size) + " bytes, more than the limit for a frame");
         bytes_.resize(static_cast<std::size_t>(size));
         bytes_.resize(std::fread(bytes_.data(), 1, bytes_.size(), file.get()));
         return true;

@@ -144,32 +144,32 @@ private:
         return system_.control(fd_, VIDIOC_QBUF, &buffer) != -1;
     }
     Got unplugged() {
-        fail(Trouble::unplugged, device_ + " was unplugged");
+        fail(FrameError::unplugged, device_ + " was unplugged");
         return Got::lost;
     }
     bool not_opened(int error) {
         if (error == ENOENT || error == ENODEV || error == ENXIO)
-            return fail(Trouble::absent, "missing camera " + device_ + "; to list cameras: ls -l /dev/v4l/by-id");
+            return fail(FrameError::missing, "missing camera " + device_ + "; to list cameras: ls -l /dev/v4l/by-id");
         if (error == EACCES || error == EPERM)
-            return fail(Trouble::refused, device_ + ": permission denied; type: sudo usermod -aG video $USER, and log in again");
+            return fail(FrameError::unusable, device_ + ": permission denied; type: sudo usermod -aG video $USER, and log in again");
         if (error == EBUSY) return busy();
-        return fail(Trouble::refused, device_ + " cannot be opened: " + std::strerror(error));
+        return fail(FrameError::unusable, device_ + " cannot be opened: " + std::strerror(error));
     }
-    bool busy() { return fail(Trouble::refused, device_ + " is used by another program; type: fuser -v " + device_); }
+    bool busy() { return fail(FrameError::unusable, device_ + " is used by another program; type: fuser -v " + device_); }
     bool failed(const char* what) {
         const int error = errno;
         if (error == EBUSY) return busy();
         if (error == ENODEV) return not_opened(error);
-        return fail(Trouble::refused, device_ + ": " + what + ": " + std::strerror(error));
+        return fail(FrameError::unusable, device_ + ": " + what + ": " + std::strerror(error));
     }
 
     bool start() {
         v4l2_capability able{};
         if (system_.control(fd_, VIDIOC_QUERYCAP, &able) == -1)
-            return fail(Trouble::refused, device_ + " is not a camera; to list cameras: ls -l /dev/v4l/by-id");
+            return fail(FrameError::unusable, device_ + " is not a camera; to list cameras: ls -l /dev/v4l/by-id");
         const std::uint32_t can = (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
         if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
-            return fail(Trouble::refused, device_ + " gives no frames; a camera has several devices, and often the even ones do");
+            return fail(FrameError::unusable, device_ + " gives no frames; a camera has several devices, and often the even ones do");
         return choose_format() && choose_rate() && map() && stream();
     }
     bool choose_format() {
@@ -185,7 +185,7 @@ private:
             offered += (offered.empty() ? "" : ", ") + four_letters(one.pixelformat);
         }
         if (!yuyv && !grey)
-            return fail(Trouble::refused, device_ + " offers " + (offered.empty() ? "no format" : offered) +
+            return fail(FrameError::unusable, device_ + " offers " + (offered.empty() ? "no format" : offered) +
                                               "; only YUYV and GREY are read; ffmpeg -i " + device_ +
                                               " -pix_fmt yuyv422 -f v4l2 /dev/videoN makes YUYV of it for a v4l2loopback device");
         v4l2_format format{};
@@ -198,17 +198,17 @@ private:
         if (system_.control(fd_, VIDIOC_S_FMT, &format) == -1) return failed("format rejected");
         const v4l2_pix_format& is = format.fmt.pix;
         if (is.pixelformat != wanted)
-            return fail(Trouble::refused, device_ + " gives " + four_letters(is.pixelformat) + " and not " + four_letters(wanted) +
+            return fail(FrameError::unusable, device_ + " gives " + four_letters(is.pixelformat) + " and not " + four_letters(wanted) +
                                               " at this size; take a smaller one: v4l2-ctl -d " + device_ + " --list-formats-ext");
         if (is.width != static_cast<std::uint32_t>(width_) || is.height != static_cast<std::uint32_t>(height_))
-            return fail(Trouble::refused, device_ + " has no frames of " + std::to_string(width_) + " x " + std::to_string(height_) +
+            return fail(FrameError::unusable, device_ + " has no frames of " + std::to_string(width_) + " x " + std::to_string(height_) +
                                               "; write v4l2:" + device_ + "?width=" + std::to_string(is.width) +
                                               "&height=" + std::to_string(is.height));
         is_yuyv_ = wanted == V4L2_PIX_FMT_YUYV;
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         line_ = std::max<std::size_t>(is.bytesperline, row);
         if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * most_wide || (is_yuyv_ && width_ % 2 != 0))
-            return fail(Trouble::huge,
+            return fail(FrameError::too_large,
                         "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
         return true;
     }
@@ -246,7 +246,7 @@ private:
             maps_.push_back({at, buffer.length});
             if (!give_back(buffer)) return failed("it takes no buffers");
         }
-        return maps_.size() >= 2 || fail(Trouble::refused, device_ + " gives fewer than two buffers");
+        return maps_.size() >= 2 || fail(FrameError::unusable, device_ + " gives fewer than two buffers");
     }
     bool stream() {
         int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -261,9 +261,9 @@ private:
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         const std::size_t needed = line_ * static_cast<std::size_t>(height_ - 1) + row;
         const Map&        map = maps_[buffer.index];
-        if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return fail(Trouble::damaged, device_ + " marks a frame as damaged");
+        if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return fail(FrameError::damaged, device_ + " marks a frame as damaged");
         if (std::min<std::size_t>(buffer.bytesused, map.bytes) < needed)
-            return fail(Trouble::damaged,
+            return fail(FrameError::damaged,
                         device_ + " gives " + std::to_string(buffer.bytesused) + " bytes of a frame of " + std::to_string(needed));
         frame.resize(width_, height_, is_yuyv_ && !grey_ ? Format::bgr : Format::grey);
         const auto* const bytes = static_cast<const std::uint8_t*>(map.at);

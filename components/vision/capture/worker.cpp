@@ -72,7 +72,7 @@ void Worker::turn(std::int64_t now, bool may_wait) noexcept {
         close();
         try_again_ns_ = now + again_after;
         try {
-            trouble(tried_again({Trouble::silent, std::string("cannot read frames: ") + e.what()}), now);
+            report(tried_again({FrameError::timeout, std::string("cannot read frames: ") + e.what()}), now);
             publish();
         } catch (const std::exception&) {  // no memory for the message either
         }
@@ -97,16 +97,16 @@ void Worker::step(std::int64_t now, bool may_wait) {
     case Got::bad:
         last_frame_ns_ = now;
         ++status_.bad;
-        trouble(source_->problem(), now);
+        report(source_->problem(), now);
         return publish();
     case Got::lost:
-        trouble(tried_again(source_->problem()), now);
+        report(tried_again(source_->problem()), now);
         close();
         try_again_ns_ = now + again_after;
         return publish();
     case Got::nothing:
-        if (static_cast<double>(now - last_frame_ns_) * 1e-9 > source_->timeout_s() && status_.trouble == Trouble::none) {
-            trouble({Trouble::silent, "no frame for " + seconds(now - last_frame_ns_)}, now);
+        if (static_cast<double>(now - last_frame_ns_) * 1e-9 > source_->timeout_s() && status_.error == FrameError::none) {
+            report({FrameError::timeout, "no frame for " + seconds(now - last_frame_ns_)}, now);
             return publish();
         }
         if (more) publish();
@@ -120,7 +120,7 @@ void Worker::open(std::int64_t now) {
         last_frame_ns_ = now;
         dropped_before_ = status_.dropped;
         equal_ = 0;
-        if (status_.trouble == Trouble::absent && !told_) status_.trouble = Trouble::none;  // nothing was wrong so far
+        if (status_.error == FrameError::missing && !told_) status_.error = FrameError::none;  // nothing was wrong so far
         if (std::string remark = source_->remark(); remark != remark_) {  // once, not at each reconnection
             remark_ = std::move(remark);
             if (!remark_.empty()) say(remark_);
@@ -128,7 +128,7 @@ void Worker::open(std::int64_t now) {
         return;
     }
     try_again_ns_ = now + again_after;
-    trouble(tried_again(source_->problem()), now);
+    report(tried_again(source_->problem()), now);
     publish();
 }
 
@@ -143,14 +143,14 @@ void Worker::take(const Frame& frame, std::int64_t now) {
     const auto size = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
     Problem    problem;
     if (width_ != 0 && (frame.width != width_ || frame.height != height_))
-        problem = {Trouble::wrong_size, "frames are " + size(frame.width, frame.height) + " and the calibration " + file_ + " is for " +
+        problem = {FrameError::wrong_size, "frames are " + size(frame.width, frame.height) + " and the calibration " + file_ + " is for " +
                                             size(width_, height_) + "; take the file of this camera, or set the source's width and height"};
     else if (frozen(frame))
-        problem = {Trouble::frozen, std::to_string(frozen_after_) + " frames in a row are identical; the camera is frozen"};
-    else if (black(frame)) problem = {Trouble::black, "frames are black; check the light and the lens cap"};
-    if (problem.kind != Trouble::none) {
+        problem = {FrameError::frozen, std::to_string(frozen_after_) + " frames in a row are identical; the camera is frozen"};
+    else if (black(frame)) problem = {FrameError::black, "frames are black; check the light and the lens cap"};
+    if (problem.kind != FrameError::none) {
         ++status_.bad;
-        trouble(std::move(problem), now);
+        report(std::move(problem), now);
         return publish();
     }
     try {
@@ -159,7 +159,7 @@ void Worker::take(const Frame& frame, std::int64_t now) {
         well(now);
     } catch (const std::exception& e) {
         ++status_.bad;
-        trouble({Trouble::damaged, std::string("cannot process a frame: ") + e.what()}, now);
+        report({FrameError::damaged, std::string("cannot process a frame: ") + e.what()}, now);
     }
     publish();
 }
@@ -182,10 +182,10 @@ bool Worker::black(const Frame& frame) const {
     return sum < 8 * count && bright * 1000 <= count;
 }
 
-void Worker::trouble(Problem problem, std::int64_t now) {
-    const bool known = told_ && problem.kind == status_.trouble;
-    if (status_.trouble == Trouble::none || !told_) since_ns_ = now;
-    status_.trouble = problem.kind;
+void Worker::report(Problem problem, std::int64_t now) {
+    const bool known = told_ && problem.kind == status_.error;
+    if (status_.error == FrameError::none || !told_) since_ns_ = now;
+    status_.error = problem.kind;
     status_.ok = false;
     told_ = true;
     std::int64_t& said = said_ns_[static_cast<std::size_t>(problem.kind)];
@@ -195,11 +195,11 @@ void Worker::trouble(Problem problem, std::int64_t now) {
 }
 
 void Worker::well(std::int64_t now) {
-    const bool again = told_ && status_.trouble != Trouble::none;
+    const bool again = told_ && status_.error != FrameError::none;
     // only after a problem that was logged: messages come in pairs
-    if (again && said_ns_[static_cast<std::size_t>(status_.trouble)] >= since_ns_)
+    if (again && said_ns_[static_cast<std::size_t>(status_.error)] >= since_ns_)
         say((ever_ ? "frames are valid again after " : "first valid frame after ") + seconds(now - since_ns_));
-    status_.trouble = Trouble::none;
+    status_.error = FrameError::none;
     status_.ok = ever_ = true;
     told_ = false;
 }

@@ -17,7 +17,7 @@ struct Status {
     std::uint32_t dropped = 0;  ///< skipped for a newer one or lost by the camera
     std::uint32_t bad = 0;  ///< invalid frames: damaged, too large, black, frozen, wrong size
     std::uint32_t openings = 0;  ///< number of times the source was opened
-    Trouble       trouble = Trouble::absent;
+    FrameError    error = FrameError::missing;
     bool          ok = false;  ///< it is open without an error
 };
 
@@ -48,7 +48,7 @@ private:
     void take(const Frame& frame, std::int64_t now_ns);
     bool black(const Frame& frame) const;
     bool frozen(const Frame& frame);
-    void trouble(Problem problem, std::int64_t now_ns);
+    void report(Problem problem, std::int64_t now_ns);
     void well(std::int64_t now_ns);
     void publish();
     void say(const std::string& sentence);
@@ -67,7 +67,7 @@ private:
     bool                                     open_ = false, told_ = false, ever_ = false;
     std::int64_t                             now_ = 0;  // of this turn
     std::int64_t                             try_again_ns_ = INT64_MIN, last_frame_ns_ = 0, since_ns_ = 0;
-    std::int64_t                             said_ns_[trouble_count];  // time of the last message about it
+    std::int64_t                             said_ns_[frame_error_count];  // time of the last message about it
 };
 
 }  // namespace hal::vision

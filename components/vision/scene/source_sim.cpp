@@ -45,7 +45,7 @@ private:
         scene::State state;
         return stage.newest(state) && state[scene::at::unplugged] != 0.0;
     }
-    bool unplugged() { return fail(Trouble::unplugged, "sim:" + name_ + " was unplugged"); }
+    bool unplugged() { return fail(FrameError::unplugged, "sim:" + name_ + " was unplugged"); }
 
     /// The newest picture that has arrived by `now_ns`; due_ns_ is when there is another one.
     Got look(std::int64_t now_ns, Frame& frame) {
@@ -54,7 +54,7 @@ private:
         scene::State newest;
         if (!stage) {
             if (now_ns - opened_ns_ < timeout_for_scene) return Got::nothing;
-            fail(Trouble::absent, "missing scene sim:" + name_ + ": loadrt vision_scene camera=" + name_);
+            fail(FrameError::missing, "missing scene sim:" + name_ + ": loadrt vision_scene camera=" + name_);
             return Got::lost;
         }
         if (!stage->newest(newest)) return Got::nothing;

@@ -34,7 +34,7 @@ typedef struct hal_texts {
     /* Sets the text, and its name, to which the following messages refer. [setup] */
     void (*begin)(const hal_host *, const char *name, const char *text, size_t bytes);
     /* Reports a message. After an error create must fail; fail() is then unnecessary. [setup] */
-    void (*say)(const hal_host *, const hal_text_message *);
+    void (*report)(const hal_host *, const hal_text_message *);
 } hal_texts;
 
 #ifdef __cplusplus

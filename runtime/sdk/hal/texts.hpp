@@ -37,22 +37,22 @@ public:
         if (texts_) texts_->begin(detail::creating, name.c_str(), text.data(), text.size());
     }
     /// Reports a message about bytes `begin` to `end`. [setup]
-    void say(hal_severity severity, const char* code, std::uint32_t begin, std::uint32_t end, const std::string& sentence,
-             const std::string& label, const std::string& help) const {
+    void report(hal_severity severity, const char* code, std::uint32_t begin, std::uint32_t end, const std::string& sentence,
+                const std::string& label, const std::string& help) const {
         const hal_text_message message{sizeof message, severity, code, begin, end, sentence.c_str(), label.c_str(), help.c_str()};
-        if (texts_) texts_->say(detail::creating, &message);
+        if (texts_) texts_->report(detail::creating, &message);
     }
     /// Reports all problems of a file at their spans and ends the constructor, if there are any. [setup]
     template <class Problems>
     void reject(const std::string& file, std::string_view text, const char* code, const Problems& problems) const {
         if (problems.empty()) return;
         begin(file, text);
-        for (const auto& p : problems) say(HAL_SEVERITY_ERROR, code, p.begin, p.end, p.sentence, "", p.help);
-        if (offered()) refuse();
+        for (const auto& p : problems) report(HAL_SEVERITY_ERROR, code, p.begin, p.end, p.sentence, "", p.help);
+        if (offered()) fail();
         throw std::invalid_argument(file + ": " + problems.front().sentence + "; " + problems.front().help);
     }
     /// Ends the constructor after an error was reported. [setup]
-    [[noreturn]] static void refuse() { detail::refused(); }
+    [[noreturn]] static void fail() { detail::refused(); }
 
 private:
     const hal_texts* texts_;

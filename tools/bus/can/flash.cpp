@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint8_t stop_program = 0, start_program = 1, clear_program = 3;
 constexpr std::uint32_t flash_busy = 1, no_valid_program = 1,  // bit 0 of 1F57h; its error code when erased
                         any_error = 0xff;
-constexpr std::int64_t between_looks = 100'000'000, patience = 60'000'000'000;
+constexpr std::int64_t between_looks = 100'000'000, device_timeout_ns = 60'000'000'000;
 
 const char* flash_error(std::uint32_t code) {
     constexpr const char* words[] = {"no error", "no valid program", "unknown data format", "wrong data or checksum", "flash not cleared before writing",
@@ -73,7 +73,7 @@ private:
     }
     /// Waits until 1F57h reports the flash ready. `allowed`: the error code that belongs to this step; any_error: ignores a stale one.
     bool settle(const char* step, std::uint32_t allowed) {
-        for (const std::int64_t end = monotonic_ns() + patience; monotonic_ns() < end && !station_.bus.stop.requested();) {
+        for (const std::int64_t end = monotonic_ns() + device_timeout_ns; monotonic_ns() < end && !station_.bus.stop.requested();) {
             std::uint32_t status = 0;
             switch (read(0x1f57, status)) {
             case Answer::refused: return true;  // an optional object: only the responses to the commands are known
@@ -92,7 +92,7 @@ private:
     }
     int look() {
         std::uint32_t running = 0, id = 0;
-        for (const std::int64_t end = monotonic_ns() + patience; monotonic_ns() < end && !station_.bus.stop.requested();) {
+        for (const std::int64_t end = monotonic_ns() + device_timeout_ns; monotonic_ns() < end && !station_.bus.stop.requested();) {
             station_.until([] { return false; }, between_looks);
             if (read(0x1f51, running) != Answer::value) continue;  // starting
             if ((running & 0xff) != start_program)

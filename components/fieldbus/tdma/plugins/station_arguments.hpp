@@ -66,9 +66,9 @@ struct StationArguments {
         if (!texts.offered() && !reading.good()) throw std::invalid_argument(config::to_string(reading, file));
         texts.begin(file, text);
         for (const config::Message& m : reading.messages)
-            texts.say(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length, m.sentence,
-                      m.label, m.help);
-        if (!reading.good()) hal::Texts::refuse();
+            texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
+                         m.sentence, m.label, m.help);
+        if (!reading.good()) hal::Texts::fail();
         schedule = std::move(reading.schedule);
         if (station.get().empty())
             throw std::invalid_argument("missing station=; stations in " + file + ": " + config::names(schedule));
