@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One real-time thread's work, without the operating-system thread: the cycle, the inbox, the statistics. The same
-// code runs under the real and the virtual clock. Reading this file and core.cpp explains a cycle.
+// The work of one real-time thread without the operating-system thread: the cycle, the inbox, the statistics. The same code runs under
+// the real and the virtual clock. This file and core.cpp define a cycle.
 #pragma once
 
 #include <csetjmp>
@@ -23,12 +23,12 @@ struct Write {
     hal_value value;
 };
 
-/// A wish to see values of this thread, all of one finished cycle. The session fills it, the thread answers it.
+/// A request for values of this thread, all from one finished cycle. The session fills it in, the thread answers it.
 struct Observation {
     const hal_value* const* from = nullptr;
     hal_value* to = nullptr;
     std::size_t count = 0;
-    std::uint64_t cycle = 0;              ///< which cycle it was; written by the thread
+    std::uint64_t cycle = 0;              ///< number of that cycle; written by the thread
     std::atomic<bool> done{false};
 };
 
@@ -43,73 +43,73 @@ public:
          const std::atomic<bool>& running, bool measure);
 
     // --- by the thread --------------------------------------------------------------------------------------------
-    /// The cycle at position `grid_ns`, which was due at `due_ns` and woke at `woke_ns`, just now: its execution time counts from
-    /// there. [realtime]
+    /// Runs the cycle at position `grid_ns`, which was due at `due_ns`. The thread woke at `woke_ns`, just now; the execution time counts
+    /// from then. [realtime]
     void cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept;
-    /// Takes a new plan and writes, answers an observation: between two cycles. [realtime]
+    /// Takes a new plan and queued writes and answers an observation, between two cycles. [realtime]
     void service() noexcept;
-    /// Brings the memory of the next cycle into the caches, as far as it gets until `until_ns`. [realtime]
+    /// Prefetches the memory of the next cycle into the caches until `until_ns` at most. [realtime]
     void warm(std::int64_t until_ns) const noexcept;
-    /// Periods that passed unserved. [realtime]
+    /// Counts periods in which no cycle ran. [realtime]
     void skip(std::uint64_t periods) noexcept;
-    /// The thread begins: from now on it is expected to finish cycles. [realtime]
+    /// Begins supervision: from now on the thread must finish cycles. [realtime]
     void begin(std::int64_t now_ns) noexcept;
-    /// The cycle that was due at `due_ns` begins only now: later than the supervision limit is a fault that stops the thread. [realtime]
+    /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit is a fault and stops the thread. [realtime]
     void woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept;
     /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
     void make_safe() noexcept;
-    /// The same at the end of the thread: waits while the supervisor does it. Not in a cycle
+    /// Does the same at the end of the thread; waits while the supervisor does it. Not in a cycle
     void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
-    /// Moves the grid for all positions after this cycle's; nothing outside a function. [realtime]
+    /// Shifts the grid for all positions after that of this cycle; does nothing outside a function. [realtime]
     void step_clock(std::int64_t ns) noexcept;
 
     // --- by the supervisor, in a thread of its own (supervisor.hpp) ----------------------------------------------------
-    /// When the newest cycle ended, CLOCK_MONOTONIC. [any]
+    /// Returns when the newest cycle ended, CLOCK_MONOTONIC. [any]
     std::int64_t finished_ns() const noexcept { return finished_.load(std::memory_order_acquire); }
-    /// Since when the cycle that runs, or is due next, has not ended. In the future while it is not due yet. [any]
+    /// Returns the time from which the running or next cycle counts as unfinished; in the future while it is not due yet. [any]
     std::int64_t overdue_since_ns() const noexcept;
-    /// Another thread kept the CPU from it until now: its time without a cycle counts from here. Not by the thread itself
+    /// Restarts the time without a finished cycle, because another thread used the CPU until now. Not called by the thread itself
     void excuse(std::int64_t now_ns) noexcept { excused_.store(now_ns, std::memory_order_release); }
-    /// Declared hung, and no cycle has ended since. [any]
+    /// Returns true while the thread is declared hung and no cycle has ended since. [any]
     bool hung() const noexcept { return hung_at_.load(std::memory_order_acquire) == cycles.load(std::memory_order_acquire) + 1; }
-    /// Stops the thread's functions because the cycle that runs or is due does not end. False: that was done already. [any]
+    /// Stops the thread's functions because the running or due cycle does not end. Returns false if they were stopped already. [any]
     bool declare_hung() noexcept;
-    /// Notes where the cycle is, so that an overrun can be named.
+    /// Records the current function, so that an overrun report can name it.
     void sample() noexcept;
-    /// In place of a thread that hangs: safe values, with `emergency` the emergency functions, the missed periods, and what other
-    /// threads read of all that.
+    /// Acts for a thread that hangs: writes the safe values, with `emergency` calls the emergency functions, counts the missed periods, and
+    /// publishes the result to other threads.
     void stand_in(std::int64_t now_ns, bool emergency) noexcept;
-    /// The function that the cycle is in; 0: none.
+    /// Returns the function that the cycle is running; 0: none.
     std::uint32_t hung_function() const noexcept;
-    /// Missed periods by the clock: those that the thread has counted, and those that have passed since. [any]
+    /// Returns the missed periods by the clock: those that the thread has counted, and those that have passed since. [any]
     std::uint64_t missed_by(std::int64_t now_ns) const noexcept;
 
     // --- by the session ---------------------------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
     void offer(plan::Plan* plan) { inbox_.store(plan, std::memory_order_release); }
-    /// Takes an unanswered plan back. False when the thread has it already.
+    /// Withdraws an unanswered plan. Returns false if the thread has taken it already.
     bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
-    /// Queues a batch of writes, which all take effect in the same cycle. Returns false and queues none when the queue is full.
+    /// Queues a batch of writes, all of which take effect in the same cycle. Returns false and queues none if the queue is full.
     bool write(const Write* row, std::size_t count) {
         if (!writes_.push(row, count)) return false;
         pushed_ += count;
         return true;
     }
-    static constexpr std::size_t most_writes = 4096;              ///< longest row
-    /// Remaining capacity in writes; the thread only increases it.
+    static constexpr std::size_t most_writes = 4096;              ///< largest batch
+    /// Returns the remaining capacity in writes; the thread only increases it.
     std::size_t room() const { return writes_.capacity() - writes_.size(); }
-    /// When the cycle that is running began (CLOCK_MONOTONIC), or 0 between cycles and under the virtual clock.
+    /// Returns when the running cycle began (CLOCK_MONOTONIC); 0 between cycles and under the virtual clock.
     std::int64_t busy_since_ns() const { return busy_since_.load(std::memory_order_acquire); }
-    /// All writes have reached their places.
+    /// Returns true when all queued writes have been applied.
     bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
     void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
     bool withdraw(Observation* observation) {
         return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel);
     }
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
-    /// True once the thread has made its first pass, so that initf functions have run.
+    /// Returns true after the first pass of the thread, in which initf functions run.
     bool passed() const { return passed_.load(std::memory_order_acquire); }
     void clear_stop() { stopped_.store(false, std::memory_order_release); }
 
@@ -118,15 +118,15 @@ public:
     std::atomic<std::int64_t> budget_ns{0};
     /// Longest time without a finished cycle; 0: not supervised. Set before the thread begins.
     std::atomic<std::int64_t> supervise_ns{0};
-    /// A cycle of so many periods is a fault, whatever the budget.
+    /// A cycle that takes this many periods is a fault, whatever the budget.
     static constexpr std::int64_t longest_overrun = 10;
-    std::atomic<std::uint64_t> hangs{0};                          ///< how often the thread was declared hung
+    std::atomic<std::uint64_t> hangs{0};                          ///< number of times the thread was declared hung
     std::atomic<bool> profile_every{false};
     Histogram wakeup, busy;                                       ///< written by the thread
     std::atomic<std::uint64_t> cycles{0}, missed{0}, overruns{0}; ///< written by the thread
     bool stopped_by_fault() const { return stopped_.load(std::memory_order_acquire); }
 
-    /// For crash and terminate handlers: the core whose functions run on this thread, if any.
+    /// Returns the core whose functions run on the calling thread, or nullptr; for crash and terminate handlers.
     static Core* current() noexcept;
     std::uint32_t current_function() const noexcept;
     std::uint32_t interrupted_function() const noexcept;          ///< the same, seen from another thread
@@ -192,7 +192,7 @@ private:
     bool in_budget_ = true;
 };
 
-/// The step the compiler puts behind a function with a declared-finite output; `self` is a plan::FiniteCheck whose
+/// The step that the compiler inserts after a function with a declared-finite output; `self` is a plan::FiniteCheck whose
 /// sink is the Core. [realtime]
 void check_finite(void* self, const hal_cycle* cycle);
 

@@ -6,11 +6,11 @@ namespace hal {
 
 class Core;
 
-/// Enters a core. Beyond 256 of them nothing is entered, and a crash handler does not know the core. [setup]
+/// Registers a core. Crash handlers cover at most 256 cores; further ones are not registered. [setup]
 void list_core(Core& core) noexcept;
 /// Removes a core, before it is destroyed. [setup]
 void unlist_core(const Core& core);
-/// Returns a core in the middle of a function; nullptr: there is none. [any]
+/// Returns a core that is running a function; nullptr: none. [any]
 Core* core_in_cycle() noexcept;
 /// Calls make_safe() of all cores. async-signal-safe.
 void make_all_safe() noexcept;

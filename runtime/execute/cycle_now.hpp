@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the virtual clocks of this process are doing, for a thread that watches them.
+// The cycles that the virtual clocks of this process are running, for a supervising thread.
 #pragma once
 
 #include <cstdint>
@@ -8,15 +8,15 @@
 
 namespace hal {
 
-/// The cycle that is in the middle of a function; no core: there is none.
+/// The cycle that is running a function; without a core: none.
 struct CycleNow {
     const Core* core = nullptr;
     std::uint64_t cycle = 0;
     std::uint32_t function = 0;  ///< the model's number
 };
-/// Of any executor with a virtual clock; from any thread but those that run cycles.
+/// Returns the running cycle of any executor with a virtual clock. Not called by threads that run cycles.
 CycleNow cycle_now();
-/// Waits until no cycle_now() reads a core or its plan: what was removed or replaced before may go. [setup]
+/// Waits until no cycle_now() reads a core or its plan; whatever was removed or replaced before can then be freed. [setup]
 void fence_cycle_now();
 
 }  // namespace hal

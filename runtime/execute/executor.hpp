@@ -50,17 +50,17 @@ public:
     /// Changes the priority of a running SCHED_FIFO thread: threads with a shorter period were added or removed.
     void set_priority(Core& core, int priority);
 
-    /// Virtual clock: runs until this thread has done `cycles` more cycles, with all that is due until then.
+    /// Runs, under the virtual clock, until this thread has finished `cycles` more cycles, with all other cycles due until then.
     void advance_cycles(const Core& core, std::uint64_t cycles);
-    /// Virtual clock: runs every cycle due within the next `ns`, fastest thread first at equal instants.
-    /// Real clock: waits for that time.
+    /// Runs, under the virtual clock, every cycle due within the next `ns`, the fastest thread first at equal instants. Waits for that time
+    /// under the real clock.
     void advance(std::int64_t ns);
     std::int64_t now_ns() const;
     bool is_virtual() const { return virtual_; }
 
     Granted granted(const Core& core) const;
     std::int64_t spin_ns(const Core& core) const;
-    /// Page faults in the thread's cycles since its 100th.
+    /// Returns the number of page faults in the thread's cycles since its 100th.
     std::uint64_t page_faults(const Core& core) const;
     FaultBoard& board() { return board_; }
     Supervisor& supervisor() { return supervisor_; }

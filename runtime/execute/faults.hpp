@@ -17,17 +17,17 @@ struct FaultEvent {
     std::uint32_t subject = 0;      ///< the model's number of a function (exception, budget) or pin (not finite)
     std::uint64_t cycle = 0;
     std::int64_t time_ns = 0;
-    double value = 0.0;             ///< budget: ns it took; component: its detail
+    double value = 0.0;             ///< budget: execution time, ns; component: its detail
     const char* reason = nullptr;   ///< component faults: a literal of the component
     const void* self = nullptr;     ///< component faults: the instance
-    std::uint64_t repeats = 0;      ///< how many of the same kind were counted, this one included; 0: it is queued by itself
-    std::int64_t last_ns = 0;       ///< when the last of them came
+    std::uint64_t repeats = 0;      ///< number of events of the same kind, including this one; 0: queued individually
+    std::int64_t last_ns = 0;       ///< time of the last of them
 
-    /// Of the same kind: they differ in time and measured value only. [any]
+    /// Returns true if both are of the same kind: they differ in time and measured value only. [any]
     bool same(const FaultEvent& o) const noexcept {
         return code == o.code && subject == o.subject && reason == o.reason && self == o.self && (!has_code() || value == o.value);
     }
-    /// Its detail is the number of an error, {x}, and not a measured value. [any]
+    /// Returns true if the detail is an error number, {x}, not a measured value. [any]
     bool has_code() const noexcept {
         if (reason == nullptr) return false;
         for (const char* c = reason; *c != '\0'; ++c)
@@ -69,7 +69,7 @@ public:
         *place = {event, event.time_ns, 0, 1, true};
         queue(event);
     }
-    /// Queues what was counted in seconds that are over. At the end of each cycle. [realtime]
+    /// Queues the counts of past seconds. Called at the end of each cycle. [realtime]
     template <class Queue>
     void flush(std::int64_t now_ns, Queue&& queue) noexcept {
         if (pending_ == 0) [[likely]] return;
@@ -79,7 +79,7 @@ public:
                 k.since_ns = now_ns;
             }
     }
-    /// Queues what was counted and forgets all kinds. [realtime]
+    /// Queues all counts and discards all kinds. [realtime]
     template <class Queue>
     void clear(Queue&& queue) noexcept {
         for (Kind& k : kinds_) release(k, queue), k.used = false;
@@ -106,20 +106,20 @@ private:
     std::size_t          pending_ = 0;  // kinds with some that were counted
 };
 
-/// What is common to all threads; the component `faults` and the session read it.
+/// Fault state shared by all threads; the component `faults` and the session read it.
 struct FaultBoard {
     FaultBoard() noexcept;
     FaultBoard(const FaultBoard&) = delete;
 
     hal_faults shared{};                    ///< given out as extension "hal.faults/1"; written with atomic builtins
-    /// Any thread that raises one. [realtime]
+    /// Counts a fault; any thread may raise one. [realtime]
     void count(const FaultEvent& event, std::uint32_t thread) noexcept {
         __atomic_store_n(&shared.last_code, static_cast<std::uint32_t>(event.code), __ATOMIC_RELAXED);
         __atomic_store_n(&shared.last_thread, thread, __ATOMIC_RELAXED);
         __atomic_store_n(&shared.last_cycle, event.cycle, __ATOMIC_RELAXED);
         __atomic_fetch_add(&shared.count, 1, __ATOMIC_RELEASE);
     }
-    /// Acknowledges all that were counted. [any]
+    /// Acknowledges all counted faults. [any]
     void clear() noexcept { __atomic_store_n(&shared.cleared, __atomic_load_n(&shared.count, __ATOMIC_ACQUIRE), __ATOMIC_RELEASE); }
 };
 

@@ -21,13 +21,13 @@ public:
     }
     std::uint64_t max_ns() const noexcept { return max_.load(std::memory_order_relaxed); }
     std::uint64_t count(std::size_t bucket) const noexcept { return counts_[bucket].load(std::memory_order_relaxed); }
-    /// Lower edge of a bucket, ns.
+    /// Returns the lower edge of a bucket, ns.
     static std::uint64_t edge(std::size_t bucket) noexcept {
         if (bucket < 8) return bucket;
         const auto octave = (bucket - 8) / 8;
         return (8 + (bucket - 8) % 8) << octave;
     }
-    /// The value that `share` (0 to 1) of all samples do not exceed, interpolated in its bucket.
+    /// Returns the quantile `share` (0 to 1) of all samples, interpolated within its bucket.
     double quantile(double share) const noexcept {
         std::uint64_t total = 0;
         for (const auto& c : counts_) total += c.load(std::memory_order_relaxed);

@@ -27,16 +27,16 @@ struct CoreOptions {
     std::string name{};       ///< as the system shows it: top -H, a debugger; its first 15 bytes
 };
 
-/// What a thread got from the system.
+/// What the system granted a thread.
 struct Granted {
     enum class Policy { fifo, deadline, other } policy = Policy::other;
     int priority = 0, cpu = -1;
-    bool refused = false;     ///< asked for a real-time policy, not allowed
+    bool refused = false;     ///< a real-time policy was requested and denied
 };
 
 class Runner {
 public:
-    /// `epoch_ns`: where position 0 of the grid lies; `measure`: cycles take real time.
+    /// `epoch_ns`: time of position 0 of the grid; `measure`: cycles take real time.
     Runner(std::uint32_t id, const CoreOptions& options, ThreadPins pins, FaultBoard& board, Timeline& timeline, const std::atomic<bool>& running,
            bool measure, std::int64_t epoch_ns);
     Runner(const Runner&) = delete;
@@ -49,14 +49,14 @@ public:
     /// Withdraws the request: the thread continues should its function return.
     void ask_to_go_on() { quit_.store(false, std::memory_order_release); }
     bool ended() const { return ended_.load(std::memory_order_acquire); }
-    /// Waits for the end of a thread that has ended its last cycle. False: it is still there.
+    /// Waits for the end of a thread that has finished its last cycle. Returns false if it still runs.
     bool join(std::int64_t timeout_ns);
-    /// Gets the thread's attention now rather than at its next cycle, where that is possible.
+    /// Wakes the thread before its next cycle where possible.
     void call();
 
-    /// Moves to the first position that is due after `now_ns`. The thread does it by itself.
+    /// Advances to the first position that is due after `now_ns`. Called by the thread itself.
     void place(std::int64_t now_ns) noexcept;
-    /// Page faults in the thread's cycles since its 100th.
+    /// Returns the number of page faults in the thread's cycles since its 100th.
     std::uint64_t page_faults() const;
     std::int64_t spin_ns() const { return wait_.spin_ns; }
 
@@ -64,7 +64,7 @@ public:
     const CoreOptions options;
     pthread_t thread{};
     std::atomic<int> tid{0};
-    Granted granted;                          ///< what the thread got from the system
+    Granted granted;                          ///< what the system granted the thread
     std::int64_t grid_ns = 0;                 ///< position of the next cycle; the thread's, or the virtual clock's
 
 private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Watches the threads from outside of them: one that ends no cycle for longer than its limit is stopped, its outputs take their safe
-// values in its place, and the session learns why. An ordinary thread with a priority above the threads it watches, where the system
-// grants one, so that an endless loop cannot keep it from looking.
+// Supervises the real-time threads: it stops a thread that finishes no cycle within its limit, sets the thread's outputs to their safe
+// values and reports the cause to the session. It is an ordinary thread whose priority is above those of the supervised threads where
+// the system grants that, so that an endless loop cannot block it.
 #pragma once
 
 #include <atomic>
@@ -29,14 +29,14 @@ struct Stall {
     };
     static constexpr std::size_t most_starved = 8;
     Cause cause = Cause::busy;
-    bool demoted = false;              ///< its real-time priority was taken from it
+    bool demoted = false;              ///< lost its real-time priority
     std::uint32_t thread = 0;          ///< Core::id
     std::uint32_t function = 0;        ///< the model's number; 0: between two functions or two cycles
     std::uint32_t occupant = 0;        ///< starved: Core::id of the thread that uses its CPU; 0: unknown
     std::int32_t tracer = 0, cpu = -1; ///< process ID of the debugger; CPU the thread is bound to
     std::uint64_t cycle = 0;
     std::int64_t time_ns = 0, silent_ns = 0, limit_ns = 0;
-    std::uint32_t starved[most_starved]{};  ///< Core::id of threads that got no CPU time beside it
+    std::uint32_t starved[most_starved]{};  ///< Core::id of further threads that got no CPU time
     std::uint32_t starved_count = 0;
 };
 
@@ -47,25 +47,25 @@ public:
     Supervisor(const Supervisor&) = delete;
 
     // [setup], like all below
-    /// Watches a thread from now on. `priority`: of SCHED_FIFO, 0: another policy; `cpu`: -1: not bound to one.
+    /// Begins to supervise a thread. `priority`: of SCHED_FIFO, 0: another policy; `cpu`: -1: not bound to a CPU.
     void add(Core& core, pthread_t thread, int tid, int priority, int cpu);
-    /// No longer; what is being done for it is done when this returns.
+    /// Ends the supervision of a thread; waits until actions on it are complete.
     void remove(const Core& core);
-    /// Waits until nothing is being done for any thread: after a plan was taken, before the old one goes.
+    /// Waits until no action on any thread is in progress; called after a plan was taken and before the old one is freed.
     void fence();
     void set_priority(const Core& core, int priority);
-    /// Lets the thread's functions run again, at the priority they had. False: it still hangs.
+    /// Lets the thread's functions run again, at their previous priority. Returns false if the thread still hangs.
     bool reset(Core& core);
-    /// The thread has been deprived of its real-time priority.
+    /// Returns true if the thread has lost its real-time priority.
     bool demoted(const Core& core);
-    /// Takes the oldest fault that was not taken yet.
+    /// Removes and returns the oldest fault in the queue.
     bool next(Stall& stall) { return stalls_.pop(stall); }
     /// Whether the process as a whole got no CPU time, or hardly any, in the time before `until_ns`: how long.
     std::int64_t process_gap_ns(std::int64_t until_ns, std::int64_t silent_ns) const;
-    /// Returns true when at least one CPU has no thread bound to it, and while there are no threads.
+    /// Returns true if at least one CPU has no thread bound to it, and while there are no threads.
     bool has_own_cpu() const { return own_cpu_.load(); }
     std::int64_t interval_ns() const { return interval_ns_.load(); }
-    /// Writes a byte there several times a second, as long as all supervised threads make progress.
+    /// Sets a file descriptor to which the supervisor writes a byte several times a second while all supervised threads make progress.
     void feed(int descriptor) { watchdog_.store(descriptor); }
     int feeding() const { return watchdog_.load(); }
 

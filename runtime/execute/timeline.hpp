@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The deadline grid of all threads, and how an external clock reference disciplines it.
 //
-// A thread's deadlines are positions on a grid, epoch + k * period, which never changes; where a position lies on the clock is the
-// position plus the shift. A step changes the shift for all positions after that of the cycle that makes it: threads that are due at
-// one position stay together, whichever of them has looked already, and their phase to one another is for ever what it was.
+// A thread's deadlines are positions on a grid, epoch + k * period, which never changes; a position is due, on the clock, at the position
+// plus the shift. An adjustment changes the shift for all positions after that of the cycle that makes it: threads that are due at the
+// same position stay aligned, whichever of them has read the shift already, and their relative phase never changes.
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,7 @@ public:
     Timeline() noexcept;
     Timeline(const Timeline&) = delete;
 
-    /// When position `grid_ns` is due, on the clock. [any]
+    /// Returns when position `grid_ns` is due, on the clock. [any]
     std::int64_t due_ns(std::int64_t grid_ns) const noexcept {
         for (;;) {
             const std::uint32_t newest = newest_.load(std::memory_order_acquire);
@@ -28,15 +28,15 @@ public:
             if (newest_.load(std::memory_order_relaxed) == newest) return grid_ns + shift;
         }
     }
-    /// A step of the cycle at position `grid_ns`; what exceeds the limit together with other steps of that cycle is cut off. One thread
-    /// makes steps at a time. [realtime]
+    /// Adjusts the clock in the cycle at position `grid_ns`; the sum of the adjustments of a cycle is clamped to the limit. Only one thread
+    /// adjusts at a time. [realtime]
     void step(std::int64_t grid_ns, std::int64_t ns) noexcept;
 
     std::int64_t shift_ns() const noexcept { return __atomic_load_n(&shared.shift_ns, __ATOMIC_RELAXED); }  ///< [any]
-    /// Rate of the grid relative to the clock, of late, minus one: +200e-6 follows an external reference that is
-    /// 200 ppm slow. 0 before the first second of steps. [any]
+    /// Returns the recent rate of the grid relative to the clock, minus one: +200e-6 follows an external reference that is 200 ppm slow.
+    /// 0 during the first second of adjustments. [any]
     double rate() const noexcept { return rate_.load(std::memory_order_relaxed); }
-    /// The fastest thread has this period, 0: there is none. [setup]
+    /// Sets the period of the fastest thread; 0: no thread. [setup]
     void bound(std::int64_t fastest_period_ns) noexcept { __atomic_store_n(&shared.limit_ns, fastest_period_ns / 10, __ATOMIC_RELAXED); }
     /// Enables adjustments: from now on threads must poll for them while they sleep. [setup]
     void lead() noexcept { led_.store(true, std::memory_order_release); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The clock of `hal sim`: it moves from one due cycle to the next and runs each on the caller's thread.
+// The clock of `hal sim`: advances from one due cycle to the next and runs each on the caller's thread.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ public:
     std::int64_t now_ns() const { return now_ns_; }
     /// Runs every cycle due within the next `ns`.
     void advance(std::int64_t ns);
-    /// Runs until `of` has done this many more cycles, and what else is due until then.
+    /// Runs until `of` has finished this many more cycles, with all other cycles that are due until then.
     void advance_cycles(const Runner& of, std::uint64_t cycles);
 
 private:

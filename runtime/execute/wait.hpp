@@ -15,14 +15,14 @@ struct Wait {
 
     /// Sleeps until `spin_ns` before the deadline. [realtime]
     void sleep(std::int64_t deadline_ns) const noexcept;
-    /// The same; false: `bell` no longer has the value `heard`, and the sleep ended early.
+    /// Does the same; returns false if the sleep ended early because `bell` no longer has the value `heard`.
     bool sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept;
-    /// Spins for the rest. Returns the time it is then. [realtime]
+    /// Spins until the deadline. Returns the time at the end. [realtime]
     static std::int64_t spin(std::int64_t deadline_ns) noexcept;
     /// Wakes a thread that waits on `bell`. [any]
     static void ring(std::atomic<std::uint32_t>& bell) noexcept;
 
-    /// The spin window for a period, when the user named none: two fifths of the period, at most 150 us.
+    /// Returns the default spin window of a period: two fifths of the period, at most 150 us.
     static std::int64_t default_spin_ns(std::int64_t period_ns) noexcept;
 };
 

@@ -11,7 +11,7 @@
 
 namespace hal::vision {
 
-/// A kind of thing: an upright cylinder of one colour.
+/// A kind of object: an upright cylinder of one colour.
 struct BlobKind {
     Hue    hue;
     double radius = 0.033;  ///< m
@@ -21,13 +21,13 @@ struct BlobKind {
 };
 
 struct BlobRules {
-    int    threshold = 40;     ///< of the colour, of 255
+    int    threshold = 40;     ///< minimum weight of the colour, of 255
     int    least_area = 40;    ///< px
     double most_distance = 3;  ///< m: maximum distance of objects
 };
 
-/// Detects the objects of each kind: the axis is `radius` behind the lower end. An object cut by the picture's lower edge is skipped,
-/// since its position on the ground is not visible. [any] allocates memory
+/// Detects the objects of each kind; the axis of an object is `radius` behind its lower end. Skips an object cut by the lower edge of the
+/// picture, because its position on the ground is not visible. [any] allocates memory
 std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground, std::span<const BlobKind> kinds, const BlobRules& rules);
 
 }  // namespace hal::vision

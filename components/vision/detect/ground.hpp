@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
-// The ground before a camera on a mast.
+// The ground in front of a camera on a mast.
 #pragma once
 
 #include "vision/detect/homography.hpp"
 
 namespace hal::vision {
 
-/// How a camera stands: looking forward and down, not rolled.
+/// Mounting of a camera that looks forward and down, without roll.
 struct Mast {
     double focal = 280.0;    ///< px
     double height = 0.3;     ///< above the ground, m
-    double pitch = 0.6;      ///< how far it looks down, rad; above 0
-    double forward = 0.0;    ///< in front of the robot's middle, m
+    double pitch = 0.6;      ///< downward tilt, rad; above 0
+    double forward = 0.0;    ///< distance in front of the robot's centre, m
 };
 
-/// The ground, in mm, x forward and y to the left of the robot's middle, in frames of this size. [setup]
+/// Returns the ground for frames of this size, px: positions in mm from the robot's centre, x forward and y to the left. [setup]
 Ground ground_before(const Mast& mast, int width, int height);
 
-/// Ground::map() in m. [any]
+/// Calls Ground::map() and converts the position to m. [any]
 inline bool place(const Ground& ground, double u, double v, double& x, double& y) noexcept {
     if (!ground.map(u, v, x, y)) return false;
     x *= 1e-3, y *= 1e-3;

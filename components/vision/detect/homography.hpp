@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a pixel to the place on a plane that is seen there.
+// Maps a pixel to the point of a plane that is visible there.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace hal::vision {
 
-/// A point of the plane, and where it is seen.
+/// A point of the plane and the pixel that shows it.
 struct GroundPoint {
     double        u = 0, v = 0, x = 0, y = 0;
-    std::uint32_t begin = 0, end = 0;  ///< of its text
+    std::uint32_t begin = 0, end = 0;  ///< bytes of the text
 };
 
 struct GroundText {
@@ -24,12 +24,12 @@ struct GroundText {
     std::vector<CameraProblem> problems;
 };
 
-/// Rows of four numbers, u v x y; a row ends with the line or with `;`, between numbers there is a space, a comma or a colon, behind a `#`
-/// a comment. At least four rows, at most 1000. [setup]
+/// Parses rows of four numbers, u v x y. A row ends with the line or at `;`; a space, comma or colon separates
+/// numbers; `#` begins a comment. 4..1000 rows. [setup]
 GroundText read_ground(std::string_view text);
 
-/// A homography (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd edition, 4.1): w (x, y, 1) = H (u', v', 1), with u', v' the pixel
-/// without the lens's distortion.
+/// A homography (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd edition, 4.1): w (x, y, 1) = H (u', v', 1), where u', v' is the
+/// undistorted pixel.
 class Ground {
 public:
     /// Computes the best fit. Collinear or coinciding points are problems, which are added to `text`; then the result is invalid. [setup]

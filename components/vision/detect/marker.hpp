@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Square markers in a frame, and where they stand before the camera.
+// Finds square markers in a frame and their poses relative to the camera.
 #pragma once
 
 #include <array>
@@ -22,26 +22,26 @@ struct Pose {
 
 struct Marker {
     int                                  id = -1;
-    std::array<std::array<double, 2>, 4> corners{};  ///< px, from its top left one on in the sense of the clock
+    std::array<std::array<double, 2>, 4> corners{};  ///< px, clockwise from the marker's top left corner
     Pose                                 pose;
-    double                               error_px = 0;   ///< distance of the pose's corners from those seen, root mean square
+    double                               error_px = 0;   ///< reprojection error of the corners, root mean square
     double ambiguity = 0;  ///< 0: only this pose fits; 1: its mirror image about the line of sight fits as well
 };
 
-/// Finds markers of one ArUco dictionary (S. Garrido-Jurado et al., 2014) by OpenCV, and their poses as those of planes (T. Collins and
-/// A. Bartoli, 2014), refined by least squares. A small or distant square fits two poses nearly equally well: both are followed from frame
-/// to frame, and the one with the smaller error over the last frames is returned.
+/// Finds markers of one ArUco dictionary (S. Garrido-Jurado et al., 2014) with OpenCV, and their poses from the plane
+/// homography (T. Collins and A. Bartoli, 2014), refined by least squares. A small or distant square fits two poses nearly equally well:
+/// the detector follows both from frame to frame and returns the one with the smaller error over the last frames.
 class MarkerDetector {
 public:
     /// `dictionary`: "4x4_50" ... "7x7_1000". Throws std::invalid_argument with the list of names. [setup]
     MarkerDetector(const std::string& dictionary, std::optional<Camera> camera);
     ~MarkerDetector();
 
-    /// Those with an id that is wanted (`id` < 0: all), in order of id; poses for a side of `size_mm`, where there is a camera. Throws
-    /// std::exception. [one thread at a time]
+    /// Returns the markers with this ID (`id` < 0: all), ordered by ID; with poses for a side of `size_mm` if the camera is
+    /// calibrated. Throws std::exception. [one thread at a time]
     std::vector<Marker> find(const Frame& frame, int id, double size_mm);
 
-    /// How many markers the dictionary has.
+    /// Returns the number of markers in the dictionary.
     int count() const;
 
 private:

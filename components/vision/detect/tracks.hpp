@@ -8,16 +8,16 @@
 
 namespace hal::vision {
 
-/// A thing in one frame.
+/// An object detected in one frame.
 struct Sighting {
     std::uint32_t kind = 0;
     double        x = 0.0, y = 0.0;  ///< m
     double        area = 0.0;        ///< px
 };
 
-/// The same thing over many frames.
+/// An object tracked over successive frames.
 struct Track {
-    std::uint32_t id = 0;  ///< counts from 1; 0: this place is free
+    std::uint32_t id = 0;  ///< counts from 1; 0: this slot is free
     std::uint32_t kind = 0;
     double        x = 0.0, y = 0.0, area = 0.0;
     std::int64_t  first_ns = 0, last_ns = 0;  ///< stamps of the first and the last frame that showed it
@@ -25,15 +25,15 @@ struct Track {
 };
 
 struct TrackRules {
-    double       gate = 0.15;         ///< m: farther from where a thing was, it is another one
-    double       gain = 0.5;          ///< how much of the way to a new sighting a track goes, 0 to 1
+    double       gate = 0.15;         ///< m: maximum distance between a track and a detection of the same object
+    double       gain = 0.5;          ///< fraction by which a track moves towards a new detection, 0 to 1
     std::int64_t forget_ns = 1'000'000'000;
 };
 
 constexpr std::size_t most_tracks = 32;
 
-/// Each track keeps its place in the row as long as it lives. Who belongs to whom: the nearest pair of one kind first, then the nearest
-/// of the rest.
+/// Assigns detections to tracks: the nearest pair of one kind first, then the nearest of the remaining ones. A track keeps
+/// its slot as long as it exists.
 class Tracks {
 public:
     explicit Tracks(std::size_t count) : count_(count < most_tracks ? count : most_tracks) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Draws shapes whose edges are right to a small part of a pixel: a pixel takes the shape's colour by as much of it as the shape covers.
+// Draws anti-aliased shapes: each pixel is blended with the shape's colour in proportion to the area that the shape covers.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ struct Point {
 };
 using Colour = std::array<std::uint8_t, 3>;  ///< blue, green, red
 
-/// A rod with round ends, seen at one moment; a disc when both ends are one.
+/// A rod with round ends at one moment; a disc if both ends coincide.
 struct Capsule {
     Point  a, b;
     double radius_a = 1.0, radius_b = 1.0;
@@ -29,18 +29,18 @@ public:
     int                        height() const noexcept { return height_; }
     std::vector<std::uint8_t>& pixels() noexcept { return pixels_; }
 
-    /// From `top` to `bottom`.
+    /// Fills the canvas with a vertical gradient from `top` to `bottom`.
     void background(Colour top, Colour bottom);
-    /// One rod at several moments of the exposure: what moves is smeared.
+    /// Draws one rod at several moments of the exposure, which gives motion blur.
     void capsule(std::span<const Capsule> moments, Colour colour);
-    /// A convex shape, corners clockwise as seen.
+    /// Fills a convex polygon; its corners are in clockwise order in the picture.
     void polygon(std::span<const Point> corners, Colour colour);
-    /// Fills a rectangle; `cover(u, v)` returns the covered part of a pixel, 0 to 1.
+    /// Fills a rectangle; `cover(u, v)` returns the covered fraction of a pixel, 0 to 1.
     template <class Cover>
     void paint(double left, double top, double right, double bottom, Colour colour, Cover cover) {
         shade(left, top, right, bottom, [&](double u, double v, Colour& taken) { return taken = colour, cover(u, v); });
     }
-    /// Like above with a colour per pixel, which `cover(u, v, colour)` returns.
+    /// Fills a rectangle with a colour per pixel, which `cover(u, v, colour)` sets.
     template <class Cover>
     void shade(double left, double top, double right, double bottom, Cover cover) {
         Colour    colour{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a state of the scene to the picture a camera takes of it.
+// Renders the picture that a camera takes of a scene.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace hal::vision::scene {
 
-/// The picture (8 bit, blue green red) of an exposure that begins with `from` and ends with `to`; the light, the noise and what is in the
-/// way are those of `to`. The same settings, states and `number` give the same bytes on any machine. [any] takes memory
+/// Renders the picture (8 bit; blue, green, red) of an exposure from state `from` to state `to`; light, noise and
+/// occlusion are those of `to`. The same settings, states and `number` give the same bytes on any machine. [any] allocates memory
 std::vector<std::uint8_t> render(const Settings& settings, const State& from, const State& to, std::uint64_t number);
 
-/// The parts of it: see the manual of vision_scene for what stands where.
+/// Draw one part of the scene each; the manual of vision_scene describes their layout.
 void draw_furuta(Canvas& canvas, const Settings& settings, const State& from, const State& to);
 void draw_floor(Canvas& canvas, const Settings& settings, const State& state);
 void draw_markers(Canvas& canvas, const Settings& settings, const State& state);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The newest states of a plant for a simulated camera: written by the cycle, read by renderers.
+// The newest states of a plant for a simulated camera, written in the cycle and read by renderers.
 #pragma once
 
 #include <array>
@@ -13,22 +13,22 @@ namespace hal::vision::scene {
 
 enum class Kind { furuta, floor, markers };
 
-/// What does not change while a scene stands. Lengths in m, angles in rad.
+/// Constants of a scene. Lengths in m, angles in rad.
 struct Settings {
     Kind          kind = Kind::furuta;
     int           width = 320, height = 240;
-    double        focal = 280.0;      ///< px; the axis goes through the middle of the picture
+    double        focal = 280.0;      ///< px; the optical axis passes through the centre of the picture
     double        fps = 100.0;
     std::uint64_t seed = 1;
     bool          grey = false;
-    double        distance = 1.2;     ///< furuta: from the motor's axis; markers: not used
+    double        distance = 1.2;     ///< furuta: from the motor's axis; markers: unused
     double        camera_height = 0.3;  ///< furuta: above the arm; floor: above the floor
-    double        pitch = 0.6;        ///< floor: how far the camera looks down
+    double        pitch = 0.6;        ///< floor: downward tilt of the camera
     int           objects = 0;        ///< floor: bottles and cans
     int           markers = 0;        ///< markers, floor
 };
 
-/// Where in a state what stands. Poses begin at `poses`.
+/// Indices of the values in a state. Poses begin at `poses`.
 namespace at {
 constexpr std::size_t light = 0, noise = 1, blur = 2, covered = 3, frozen = 4, unplugged = 5, exposure = 6, delay = 7, poses = 8;
 constexpr std::size_t smooth = 3;  // poses that move and do not jump: they lie between two states
@@ -50,11 +50,10 @@ struct State {
     double operator[](std::size_t i) const noexcept { return values[i]; }
 };
 
-/// The newest states. One writer, any number of readers.
+/// Buffers the newest states for one writer and any number of readers.
 ///
-/// Each slot is a sequence lock: (1) the writer makes its number odd, (2) writes, (3) makes it even; a reader that sees an odd number, or
-/// another one after it has copied than before, discards the slot. All words are atomic, so discarding a copy is free of data
-/// races.
+/// Each slot is a sequence lock: (1) the writer makes its number odd, (2) writes, (3) makes it even. A reader discards its copy if the
+/// number was odd, or changed while it copied. All words are atomic, so there is no data race.
 class Stage {
 public:
     explicit Stage(const Settings& settings) : settings_(settings) {}
@@ -85,7 +84,7 @@ private:
 
 /// Registers the stage as sim:NAME. Throws std::invalid_argument if the name is in use. [setup]
 void open(const std::string& name, std::shared_ptr<Stage> stage);
-/// [setup]
+/// Removes the stage sim:NAME. [setup]
 void close(const std::string& name) noexcept;
 /// Returns the stage, or null if the name is unknown. [setup] and helper threads
 std::shared_ptr<const Stage> find(const std::string& name);
