@@ -44,20 +44,21 @@ struct MailboxSlave {
         for (unsigned i = 0; i < cycles && channel.busy(); ++i) step();
         return !channel.busy();
     }
-    void step() {
+    void step() { step(channel); }
+    void step(master::Channel& on) {
         now_ns += 1'000'000;
-        channel.set_now(now_ns);
+        on.set_now(now_ns);
         firmware();
         using Stage = master::Channel::Stage;
-        if (channel.stage() == Stage::sleeping && channel.until_ns() <= now_ns) return channel.wake();
-        if (channel.stage() != Stage::waiting) return;
-        channel.set_sent(now_ns);
+        if (on.stage() == Stage::sleeping && on.until_ns() <= now_ns) return on.wake();
+        if (on.stage() != Stage::waiting) return;
+        on.set_sent(now_ns);
         const bool lose = lose_every != 0 && ++datagrams % lose_every == 0;
         if (lose) ++lost;
-        if (lose && lost % 2 == 0) return channel.lose();  // before the slave
-        const std::uint16_t wkc = present ? execute() : 0;
-        if (lose) return channel.lose();                   // behind it
-        channel.arrive(wkc);
+        if (lose && lost % 2 == 0) return on.lose();  // before the slave
+        const std::uint16_t wkc = present ? execute(on) : 0;
+        if (lose) return on.lose();                   // behind it
+        on.arrive(wkc);
     }
 
 private:
@@ -79,24 +80,24 @@ private:
         }
         if (!full_ && !outbox.empty()) in_ = outbox.front(), outbox.pop_front(), full_ = true;
     }
-    std::uint16_t execute() {
-        if (channel.address() % 0x10000 != bus.station) return 0;
-        const auto at = static_cast<std::uint16_t>(channel.address() >> 16);
-        const bool reading = channel.command() == Command::fprd;
-        std::uint8_t* data = channel.data();
+    std::uint16_t execute(master::Channel& on) {
+        if (on.address() % 0x10000 != bus.station) return 0;
+        const auto at = static_cast<std::uint16_t>(on.address() >> 16);
+        const bool reading = on.command() == Command::fprd;
+        std::uint8_t* data = on.data();
         if (at == bus.area().out_start && !reading) {
             if (out_full_) return 0;
-            out_.assign(data, data + channel.length()), out_full_ = true;
+            out_.assign(data, data + on.length()), out_full_ = true;
             return 1;
         }
         if (at == bus.area().in_start && reading) {
             if (!full_) return 0;
-            std::fill(data, data + channel.length(), std::uint8_t{0});
-            std::copy_n(in_.begin(), std::min<std::size_t>(in_.size(), channel.length()), data);
+            std::fill(data, data + on.length(), std::uint8_t{0});
+            std::copy_n(in_.begin(), std::min<std::size_t>(in_.size(), on.length()), data);
             sent_ = in_, full_ = false;
             return 1;
         }
-        for (unsigned i = 0; i < channel.length(); ++i) {
+        for (unsigned i = 0; i < on.length(); ++i) {
             const unsigned r = at + i;
             if (reading) data[i] = r == 0x805 ? (out_full_ ? 8 : 0) : r == 0x80d ? (full_ ? 8 : 0) : r == 0x80e ? activate_ : r == 0x80f ? repeat_ : 0;
             else if (r == 0x80e) activate_ = data[i];

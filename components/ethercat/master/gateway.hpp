@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP while the machine runs. There is no access
+// control in the protocol, so it listens on the loopback interface unless told otherwise.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ethercat/master/request_queue.hpp"
+
+namespace hal::ethercat::master {
+
+/// A slave as the gateway offers it: found by its station address, described in the master's own dictionary.
+struct GatewaySlave {
+    std::uint16_t station = 0, number = 0;  ///< number: BusSlave::number
+    std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;
+};
+
+struct GatewaySetup {
+    std::string address = "127.0.0.1";  ///< of the interface to listen on; "0.0.0.0": all
+    std::uint16_t port = 34980;         ///< 0: any free one
+    bool tcp = true;
+    std::size_t most_clients = 16;      ///< of TCP
+    std::vector<GatewaySlave> slaves;
+};
+
+/// Answers an SDO upload from the dictionary of the master (ETG.1510): names, 8000h + n configuration of slave n, F000h, F020h addresses.
+/// `message` holds the request, and then the answer; returns its length, 0 for a message that is not understood. [any]
+std::size_t answer_for_master(std::span<const GatewaySlave> slaves, std::span<std::uint8_t> message, std::size_t length) noexcept;
+
+/// See the top of this file. All functions [setup].
+class Gateway {
+public:
+    /// Opens the sockets and starts the thread. `problem` is set when a socket cannot be opened; then the gateway does nothing. `port` must
+    /// be used by nothing else, and its server must serve or be stopped until the gateway is destroyed.
+    Gateway(RequestPort& port, GatewaySetup setup, std::string& problem);
+    ~Gateway();
+    Gateway(const Gateway&) = delete;
+    Gateway& operator=(const Gateway&) = delete;
+    std::uint16_t port() const noexcept { return number_; }  ///< Returns the UDP and TCP port.
+    std::uint32_t answered() const noexcept { return answered_; }
+    std::uint32_t dropped() const noexcept { return dropped_; }  ///< Returns the number of invalid requests and of those without a reply.
+
+private:
+    struct Sender;
+    struct Client;
+    struct Pending;
+    void run();
+    void take(std::span<const std::uint8_t> bytes, const Sender& sender);
+    void answer(const Sender& sender, std::span<const std::uint8_t> message);
+    void read_udp();
+    void read_tcp(Client& client);
+    void collect();
+
+    RequestPort& requests_;
+    GatewaySetup setup_;
+    int udp_ = -1, tcp_ = -1;
+    std::uint16_t number_ = 0;
+    std::vector<std::unique_ptr<Client>> clients_;
+    std::vector<std::unique_ptr<Pending>> pending_;
+    std::uint32_t next_client_ = 1;
+    std::atomic<std::uint32_t> answered_{0}, dropped_{0};
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
+};
+
+}  // namespace hal::ethercat::master

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/master/request_queue.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <thread>
+
+namespace hal::ethercat::master {
+namespace {
+
+using Stage = MailboxRequest::Stage;
+constexpr MailboxResult nobody{MailboxResult::Outcome::lost, 0, 0};
+
+// Type, 1 for CoE: the reply to a request of the gateway, never an unrequested message.
+bool accepts_reply(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
+    if (expected.first != static_cast<std::uint32_t>(MailboxType::coe)) return true;
+    if (payload.size() < coe::header_bytes) return false;
+    const auto service = coe::service_of(payload.data());
+    return service != coe::Service::emergency && service != coe::Service::tx_pdo;
+}
+
+}  // namespace
+
+bool RequestPort::submit(MailboxRequest& request) noexcept {
+    if (closed_) return false;
+    request.next = nullptr;
+    request.stage = Stage::queued;
+    if (queue_.push(&request)) return true;
+    request.stage = Stage::idle;
+    return false;
+}
+
+bool RequestPort::finished(MailboxRequest& request) const noexcept {
+    const Stage stage = request.stage;
+    if (stage == Stage::queued && closed_) {
+        request.result = nobody;
+        return true;
+    }
+    return stage == Stage::finished;
+}
+
+void RequestPort::wait(MailboxRequest& request) const noexcept {
+    while (!finished(request)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+RequestServer::RequestServer(Mailboxes& mailboxes, Find find, std::size_t workers)
+    : mailboxes_(mailboxes), find_(std::move(find)), coe_(mailboxes), foe_(mailboxes), soe_(mailboxes), aoe_(mailboxes), eoe_(mailboxes),
+      voe_(mailboxes), slots_(mailboxes.size()) {
+    for (std::size_t i = 0; i < std::max<std::size_t>(workers, 1); ++i) workers_.push_back(std::make_unique<Worker>());
+}
+
+RequestServer::~RequestServer() { stop(); }
+
+RequestPort& RequestServer::open(std::size_t capacity) { return *ports_.emplace_back(std::make_unique<RequestPort>(capacity)); }
+
+void RequestServer::finish(MailboxRequest& request, const MailboxResult& result) noexcept {
+    request.result = result;
+    request.stage = Stage::finished;  // the owner may destroy it from here on
+}
+
+void RequestServer::finish(Worker& worker) noexcept {
+    if (worker.request != nullptr) finish(*std::exchange(worker.request, nullptr), nobody);
+    slots_[worker.slave].busy = false;
+}
+
+void RequestServer::collect() noexcept {
+    for (const auto& port : ports_) {
+        MailboxRequest* request = nullptr;
+        while (port->queue_.pop(request)) {
+            if (request->slave >= slots_.size()) {
+                finish(*request, nobody);
+                continue;
+            }
+            Slot& slot = slots_[request->slave];
+            (slot.last != nullptr ? slot.last->next : slot.first) = request;
+            slot.last = request;
+        }
+    }
+}
+
+void RequestServer::step(std::int64_t now_ns) noexcept {
+    collect();
+    std::size_t at = 0;
+    for (const auto& worker : workers_) {
+        if (worker->channel.busy()) continue;
+        for (; at < slots_.size(); ++at) {
+            const std::size_t n = (next_slot_ + at) % slots_.size();
+            Slot& slot = slots_[n];
+            if (slot.busy) continue;
+            BusSlave* slave = find_(static_cast<std::uint16_t>(n));
+            if (slave == nullptr || mailboxes_.find(*slave) == nullptr) {
+                for (; slot.first != nullptr; ) finish(*std::exchange(slot.first, slot.first->next), slave == nullptr ? nobody : refused());
+                slot.last = nullptr;
+                continue;
+            }
+            const bool frames = switch_ != nullptr && switch_->pending(*slave);
+            const bool full = slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
+            const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present && now_ns - slot.polled_ns >= poll_interval_ns_;
+            if (slot.first == nullptr && !frames && !full && !due) continue;
+            if (slot.first == nullptr && mailboxes_.at(n).held()) continue;  // its holder reads the mailbox
+            slot.busy = true, slot.polled_ns = now_ns;
+            worker->slave = static_cast<std::uint16_t>(n);
+            worker->channel.set_now(now_ns);
+            if (slot.first != nullptr) {
+                worker->request = std::exchange(slot.first, slot.first->next);
+                if (slot.first == nullptr) slot.last = nullptr;
+                worker->request->stage = Stage::running;
+                worker->channel.start([&] { return serve(worker->channel, *worker, *slave); });
+            } else {
+                worker->channel.start([&] { return serve_unrequested(worker->channel, *worker, *slave, frames); });
+            }
+            ++at;
+            break;
+        }
+    }
+    if (!slots_.empty()) next_slot_ = (next_slot_ + at) % slots_.size();
+}
+
+void RequestServer::stop() noexcept {
+    for (const auto& port : ports_) port->closed_ = true;
+    for (const auto& worker : workers_) {
+        if (!worker->channel.busy()) continue;
+        worker->channel.stop();
+        finish(*worker);
+    }
+    collect();
+    for (auto& slot : slots_) {
+        while (slot.first != nullptr) finish(*std::exchange(slot.first, slot.first->next), nobody);
+        slot.last = nullptr;
+    }
+}
+
+Task<> RequestServer::serve(Channel& channel, Worker& worker, BusSlave& slave) noexcept {
+    FoeProgress& progress = worker.request->progress != nullptr ? *worker.request->progress : worker.progress;
+    const MailboxResult result = co_await execute(channel, slave, *worker.request, progress);
+    slots_[worker.slave].busy = false;
+    finish(*std::exchange(worker.request, nullptr), result);
+}
+
+Task<> RequestServer::serve_unrequested(Channel& channel, Worker& worker, BusSlave& slave, bool frames) noexcept {
+    if (frames) {
+        co_await switch_->serve(channel, slave);
+    } else {
+        SlaveMailbox& mailbox = mailboxes_.at(slave.number);
+        const SlaveMailbox::Hold hold = co_await mailbox.hold(channel);
+        co_await mailbox.poll(channel, slave);
+    }
+    slots_[worker.slave].busy = false;
+}
+
+Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, MailboxRequest& r, FoeProgress& progress) noexcept {
+    using Kind = MailboxRequest::Kind;
+    const std::span<char> name{reinterpret_cast<char*>(r.data.data()), r.data.size()};
+    MailboxResult result = refused();
+    switch (r.kind) {
+    case Kind::sdo_upload: result = co_await coe_.upload(channel, slave, r.index, r.sub, r.complete, r.data); break;
+    case Kind::sdo_download: result = co_await coe_.download(channel, slave, r.index, r.sub, r.complete, r.data); break;
+    case Kind::object_list: result = co_await coe_.list(channel, slave, static_cast<coe::List>(r.index), r.data); break;
+    case Kind::object: result = co_await coe_.object(channel, slave, r.index, r.object, name); break;
+    case Kind::entry: result = co_await coe_.entry(channel, slave, r.index, r.sub, r.entry, name); break;
+    case Kind::foe_read: result = co_await foe_.read(channel, slave, r.name, r.foe, r.data, progress); break;
+    case Kind::foe_write: result = co_await foe_.write(channel, slave, r.name, r.foe, r.data, progress); break;
+    case Kind::soe_read: result = co_await soe_.read(channel, slave, r.sub, r.index, r.elements, r.data); break;
+    case Kind::soe_write: result = co_await soe_.write(channel, slave, r.sub, r.index, r.elements, r.data); break;
+    case Kind::aoe_read: result = co_await aoe_.read(channel, slave, r.aoe, r.group, r.offset, r.data); break;
+    case Kind::aoe_write: result = co_await aoe_.write(channel, slave, r.aoe, r.group, r.offset, r.data); break;
+    case Kind::voe_send: result = co_await voe_.send(channel, slave, r.voe, r.data); break;
+    case Kind::set_ip: result = co_await eoe_.set_ip(channel, slave, r.ip); break;
+    case Kind::get_ip: result = co_await eoe_.get_ip(channel, slave, r.ip); break;
+    case Kind::message: result = co_await pass(channel, slave, r); break;
+    }
+    co_return result;
+}
+
+Task<MailboxResult> RequestServer::pass(Channel& channel, BusSlave& slave, MailboxRequest& r) noexcept {
+    const auto request = read_mailbox(r.data.first(std::min(r.length, r.data.size())));
+    if (!request) co_return refused();
+    SlaveMailbox& mailbox = mailboxes_.at(slave.number);
+    const SlaveMailbox::Hold hold = co_await mailbox.hold(channel);
+    const auto body = mailbox.body(slave);
+    const std::size_t length = request->payload.size();
+    if (length > body.size()) co_return refused(0, length);
+    if (length != 0) std::memcpy(body.data(), request->payload.data(), length);
+    const Expected expected{accepts_reply, static_cast<std::uint32_t>(request->type)};
+    const MailboxResult result = co_await mailbox.exchange(channel, slave, request->type, length, expected);
+    const bool fault = result.outcome == MailboxResult::Outcome::refused && result.abort != 0;  // is a reply, too
+    if (!result && !fault) co_return result;
+    const MailboxMessage& reply = mailbox.reply();
+    const std::size_t bytes = mailbox_header_bytes + reply.payload.size();
+    if (bytes > r.data.size()) co_return refused(0, bytes);
+    write_mailbox_header(r.data.data(), reply.payload.size(), request->station, reply.type, reply.counter);
+    if (!reply.payload.empty()) std::memcpy(r.data.data() + mailbox_header_bytes, reply.payload.data(), reply.payload.size());
+    co_return succeeded(bytes);
+}
+
+}  // namespace hal::ethercat::master
