@@ -54,7 +54,8 @@ public:
     void skip(std::uint64_t periods) noexcept;
     /// Begins supervision: from now on the thread must finish cycles. [realtime]
     void begin(std::int64_t now_ns) noexcept;
-    /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit is a fault and stops the thread. [realtime]
+    /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit is a fault that stops the
+    /// thread. [realtime]
     void woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept;
     /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
     void make_safe() noexcept;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Electronic data sheets (EDS) and device configuration files (DCF) of CiA 306 as plain data.
 //
-// Reading never throws and does not stop at a defect: each defect is a message with its line, the rest is read. Nothing is lost: unknown keys,
-// unknown sections and comment lines are kept. `write_eds` writes a file that reads back equal.
+// The reader never throws and does not stop at a defect: it reports each defect with its line and reads the rest. It keeps unknown keys,
+// unknown sections and comment lines; a file that `write_eds` writes reads back equal.
 #pragma once
 
 #include <array>
@@ -34,14 +34,14 @@ struct Entry {
     std::string   name;
     std::string   denotation;           ///< DCF: the name given by the user
     ObjectType    type = ObjectType::var;
-    std::uint16_t data_type = 0;      ///< 0: not given
+    std::uint16_t data_type = 0;      ///< 0: not specified
     Access        access = Access::rw;
     bool          pdo_mapping = false;
     std::string   default_value;        ///< as written, including `$NODEID`; see `encode`
     std::string   low_limit, high_limit;
     std::string   parameter_value;      ///< DCF: the value to configure
     std::string   upload_file, download_file;  ///< DCF, of domains
-    std::uint32_t flags = 0;          ///< ObjFlags: bit 0 excludes it from scanning and restoring, bit 1: writing it has side effects
+    std::uint32_t flags = 0;          ///< ObjFlags: bit 0: excluded from scanning and restoring; bit 1: writing it has side effects
     Extras        extras = {};
     Span         at = {};
 
@@ -57,10 +57,10 @@ struct Object {
     ObjectType                 type = ObjectType::var;
     Category                   category = Category::optional;
     std::uint16_t              data_type = 0;      ///< of a DEFSTRUCT, RECORD or ARRAY, if given
-    unsigned                   compact = 0;             ///< CompactSubObj: entries 1..compact were described once
+    unsigned                   compact = 0;             ///< CompactSubObj: one description for entries 1..compact
     std::uint32_t              flags = 0;
     std::vector<std::uint16_t> links = {};  ///< [xxxxObjectLinks]
-    std::vector<Entry>         entries = {};  ///< by sub-index, ascending; one of a VAR
+    std::vector<Entry>         entries = {};  ///< by sub-index, ascending; a VAR has one
     Extras                     extras = {};
     Span                      at = {};
 
@@ -74,30 +74,30 @@ struct FileInfo {
     std::string  file_name, eds_version, description;
     std::string  creation_time, creation_date, created_by, modification_time, modification_date, modified_by;
     std::uint8_t version = 0, revision = 0;
-    std::string  last_eds;             ///< DCF: the EDS it was made from
+    std::string  last_eds;             ///< DCF: the EDS from which it was created
     Extras       extras = {};
 
     bool operator==(const FileInfo&) const = default;
 };
 
-inline constexpr std::array<unsigned, 9> baud_rates{10, 20, 50, 100, 125, 250, 500, 800, 1000};  ///< kbit/s; CiA 306 has no 100
+inline constexpr std::array<unsigned, 9> baud_rates{10, 20, 50, 100, 125, 250, 500, 800, 1000};  ///< kbit/s; 100 is not in CiA 306
 
 struct DeviceInfo {
     std::string                         vendor_name, product_name, order_code;
     std::optional<std::uint32_t>        vendor_number, product_number, revision_number;
     std::array<bool, baud_rates.size()> supports = {};  ///< in the order of baud_rates
     bool                                boot_up_master = false, boot_up_slave = false;
-    std::uint8_t                        granularity = 0;     ///< of mapping, in bits; 0: mapping is fixed
+    std::uint8_t                        granularity = 0;     ///< granularity of PDO mapping, bits; 0: the mapping is fixed
     bool                                dynamic_channels = false, group_messaging = false, lss = false;
     std::uint8_t  compact_pdo = 0;     ///< bit n-1: sub-index n exists in communication parameters that are not described individually
     std::uint16_t rx_pdos = 0, tx_pdos = 0;
-    Span         rx_pdos_at = {1, 1, 0, 0}, tx_pdos_at = {1, 1, 0, 0};  ///< the beginning, if the file does not have them
+    Span         rx_pdos_at = {1, 1, 0, 0}, tx_pdos_at = {1, 1, 0, 0};  ///< the begin of the file, if the keys are missing
     Extras        extras = {};
 
     bool operator==(const DeviceInfo&) const = default;
 };
 
-/// DCF: [DeviceComissioning], in the spelling of CiA 306.
+/// DCF: the section [DeviceComissioning], as CiA 306 spells it.
 struct Commissioning {
     std::uint8_t  node_id = 0;
     std::string   node_name, node_reference, network_name, network_reference;
@@ -112,7 +112,7 @@ struct Commissioning {
 
 /// Sub-indices that a module adds to an object ([MnSubExtxxxx]): `count` of them, or counts by sub-index ranges in the extras.
 struct SubExtension {
-    Object      object;                    ///< one entry, the pattern of each new one
+    Object      object;                    ///< one entry, the template of each new one
     std::string count, object_extend;
 
     bool operator==(const SubExtension&) const = default;
@@ -170,7 +170,7 @@ struct DeviceDescription {
 
 /// The result of reading a file.
 struct Reading {
-    std::optional<DeviceDescription> description;  ///< none: rejected, the last message is the reason
+    std::optional<DeviceDescription> description;  ///< nothing: the file was rejected; the last message is the reason
     std::vector<Message>             messages;                 ///< in the order of the file
     std::string                      text;                              ///< the decoded text that the spans refer to
     std::size_t                      count(Severity severity) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a device description to what an object dictionary is made of.
+// Converts a device description to the entries of an object dictionary.
 #pragma once
 
 #include "canopen/protocol/description.hpp"

@@ -23,7 +23,7 @@ struct SectionName {
     What          what = What::other;
     std::uint16_t index = 0;
     unsigned      sub = 0;
-    bool          odd = false;  ///< understood, but not in the spelling of CiA 306
+    bool          odd = false;  ///< recognized, but not spelled as in CiA 306
 };
 SectionName section_name(std::string_view name);
 
@@ -39,7 +39,7 @@ public:
     std::string text(IniSection& section, std::string_view key);
     /// Returns the value without a trailing comment.
     std::string bare(IniSection& section, std::string_view key);
-    /// Returns nothing if the key is missing, empty or not a number of 0..`most`; reports only the last.
+    /// Returns nothing if the key is missing, empty or not a number in 0..`most`; reports an invalid number.
     std::optional<std::uint64_t> number(IniSection& section, std::string_view key, std::uint64_t most);
     bool                         flag(IniSection& section, std::string_view key, bool otherwise = false);
     /// Returns the keys 1=, 2=, … of a list whose length is in `count_key`; without one the length is not checked.
@@ -83,13 +83,13 @@ private:
     std::string prefix_;
 };
 
-/// Reads a section of comment lines. What else it has goes to `others`.
+/// Reads a section of comment lines; moves its other keys to `others`.
 void read_comments(Keys& keys, IniSection* section, std::vector<std::string>& out, std::vector<OtherSection>& others);
 void read_modules(Ini& ini, Keys& keys, DeviceDescription& out);
 /// Adds the PDOs that CompactPDO describes.
 void add_compact_pdos(DeviceDescription& out);
 
-/// Returns whether CompactSubObj can describe the object: entries 1..n differ only in names and DCF values, and sub-index 0 is the usual one.
+/// Returns whether CompactSubObj can describe the object: entries 1..n differ only in names and DCF values, and sub-index 0 is standard.
 bool compactable(const Object& object);
 
 }  // namespace hal::canopen::eds

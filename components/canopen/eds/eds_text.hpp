@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The text below an EDS: bytes of any editor to UTF-8 lines, sections and keys, each with its span.
+// The text of an EDS: converts the bytes of a file to UTF-8 lines, sections and keys with their spans.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ enum class Topic : std::uint8_t {
     missing,     ///< a mandatory key or section is missing
     count,       ///< a list or count differs from what the file contains
     value,       ///< a number, a limit, a date
-    object,      ///< an object as a whole: its kind, its entries, its mapping
+    object,      ///< an object as a whole: its type, its entries, its mapping
 };
 
 using Message = text::Message<Topic>;
@@ -54,7 +54,7 @@ struct IniSection {
     IniKey* find(std::string_view key);  ///< not case sensitive
 };
 
-/// The sections in file order. Duplicate sections are merged, a duplicate key has its last value; both are reported.
+/// The sections in file order. Merges duplicate sections and keeps the last value of a duplicate key; reports both.
 class Ini {
 public:
     void                            parse(std::string_view text, std::vector<Message>& messages);

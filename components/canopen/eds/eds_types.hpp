@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// CANopen's data types, and numbers as EDS files spell them.
+// CANopen's data types and the number formats of EDS files.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +21,12 @@ struct DataType {
     unsigned         bytes() const { return (bits + 7) / 8; }
 };
 
-/// The standard types and the complex ones of CiA 301; null for others (manufacturers' and profiles' own).
+/// Returns a standard or complex type of CiA 301; nullptr for the types of manufacturers and profiles.
 const DataType*           data_type(std::uint16_t code);
 const DataType*           data_type(std::string_view name);
 std::span<const DataType> data_types();
 
-/// What was odd about a number's spelling.
+/// Deviations in the spelling of a number.
 enum class Spelling : std::uint8_t { plain, octal, decimal_with_zero, unsigned_for_negative, number_as_real, real_as_bits, words };
 
 struct Number {
@@ -37,30 +37,30 @@ struct Number {
     Spelling      spelling = Spelling::plain;
 };
 
-/// A sum of numbers as C spells them (0x… hexadecimal, 0… octal) and at most one `$NODEID`; none when it is something else.
+/// Parses a sum of C integer literals (0x… hexadecimal, 0… octal) and at most one `$NODEID`. Returns nothing if the text is invalid.
 std::optional<Number> parse_number(std::string_view text);
-/// A decimal fraction, or a number as above.
+/// Parses a decimal fraction, or a number as above.
 std::optional<double> parse_real(std::string_view text);
 
 struct Encoded {
-    std::vector<std::uint8_t> bytes;  ///< little endian, as SDO carries it
-    bool                      node_id = false;             ///< depends on the node-id
+    std::vector<std::uint8_t> bytes;  ///< little endian, as in an SDO
+    bool                      node_id = false;             ///< depends on the node ID
     Spelling                  spelling = Spelling::plain;
-    std::string               error;                ///< why there are no bytes: "'300' does not fit into UNSIGNED8 (0..255)"
+    std::string               error;                ///< reason if the text is invalid: "'300' does not fit into UNSIGNED8 (0..255)"
     explicit                  operator bool() const { return error.empty(); }
 };
 
-/// The value `text` of an object of type `code` on node `node_id`. An empty text is a value of no bytes and no error.
+/// Encodes the value `text` of an object of type `code` on node `node_id`. An empty text gives no bytes and no error.
 Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id);
 
-/// The same of what a person writes by hand: no octal, and a decimal number that does not fit is an error, not the same bits with the
-/// other sign, as files have it.
+/// Encodes a value typed by a user: without octal numbers, and a decimal number out of range is an error. In files such a number stands for
+/// the same bits with the other sign.
 Encoded encode_strictly(std::string_view text, std::uint16_t code, unsigned node_id);
 
-/// The opposite, as the writer spells it: hexadecimal for naturals, decimal for integers; text as it is.
+/// Decodes a value to the text that the writer uses: hexadecimal for unsigned numbers, decimal for signed ones, strings unchanged.
 std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code);
 
-/// The value as a number to compare with limits; none for texts.
+/// Returns the value as a number for the comparison with limits; nothing for strings.
 std::optional<long double> comparable(std::string_view text, std::uint16_t code, unsigned node_id);
 
 }  // namespace hal::canopen::eds

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Device descriptions in XML (XDD) and with a configuration (XDC), CiA 311: read into what an EDS is read into.
+// Reads device descriptions in XML (XDD), also with a configuration (XDC), CiA 311, into the same structures as an EDS.
 #pragma once
 
 #include <string_view>

@@ -15,7 +15,7 @@ std::string own_options();
 
 /// Opens `cane:IF?key=value`: CAN messages in Ethernet frames. `place` includes the driver's own options. [setup]
 Opened open(const std::string& place, const Options&);
-/// Describes what open() would return, as far as the place determines it. [setup]
+/// Describes the link that open() would return, as far as the place determines it. [setup]
 Description describe(const std::string& place);
 
 }  // namespace hal::can::cane

@@ -28,7 +28,7 @@ enum class Wrong : std::uint8_t {
     none,
     cut,      ///< truncated
     form,     ///< invalid message: length above 8, identifier out of range
-    version,  ///< another format than the configured one, or an unsupported version
+    version,  ///< differs from the configured format, or an unsupported version
     check,    ///< wrong check sequence
     not_signed,  ///< a key is configured, and the frame has no tag
     tag,         ///< made with another key, or modified
@@ -53,8 +53,8 @@ struct Stamp {
 /// end of the last message. [realtime]
 void close_packed(std::span<std::uint8_t> whole, std::uint8_t messages, Stamp) noexcept;
 
-/// The same in two steps. begin_packed() writes the header and leaves space for the fields that finish_packed() writes when the frame
-/// leaves: in a signed frame, `counter_bytes` after the header and `tag_bytes` after the last message. [realtime]
+/// Do the same in two steps: begin_packed() writes the header and leaves space for the fields that finish_packed() writes when the frame
+/// is sent: in a signed frame, `counter_bytes` after the header and `tag_bytes` after the last message. [realtime]
 void begin_packed(std::span<std::uint8_t> whole, std::uint8_t messages, std::uint16_t session, bool is_signed) noexcept;
 void finish_packed(std::span<std::uint8_t> whole, std::uint16_t sequence, std::uint64_t counter, const Key*) noexcept;
 /// Bit of the session set in frames of only SDO, heartbeats and LSS.

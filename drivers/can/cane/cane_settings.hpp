@@ -17,7 +17,7 @@ struct Settings {
     std::string segment_options;      ///< "?mac=…", or empty
     Format format = Format::packed;
     Order order = Order::big;
-    std::optional<unsigned> slot;     ///< slot of the discipline on the segment; none: frames leave at once
+    std::optional<unsigned> slot;     ///< slot of the discipline on the segment; none: frames are sent at once
     unsigned priority = 8;            ///< priority of process data in the slot; SDO, heartbeats and LSS have the next lower one
     bool learns = true;
     bool produced_to_master = false;

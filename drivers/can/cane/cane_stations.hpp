@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stations of the segment: where each node ID is, and which frames have been received already. Nothing is allocated after construction.
+// The stations of the segment: the address of each node ID, and the sequence of received frames. Nothing is allocated after construction.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ public:
 
 private:
     static constexpr std::uint64_t known = 1ULL << 48, fixed = 1ULL << 49, doubtful = 1ULL << 50;
-    static constexpr unsigned master = 0;  ///< place of the NMT master
+    static constexpr unsigned master = 0;  ///< index of the NMT master
 
     struct Place {
         std::atomic<std::uint64_t> is{0};
@@ -66,7 +66,7 @@ private:
     std::array<Sender, most> senders_;
 };
 
-/// Counts the frames to each destination. Frames leave from several threads.
+/// Counts the frames to each destination. Several threads send frames.
 class Sequences {
 public:
     std::uint16_t next(const Address& to) noexcept;  ///< Returns the next number. [realtime] any thread

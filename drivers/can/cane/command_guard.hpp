@@ -48,7 +48,7 @@ public:
         if (!fixed_) known_ = false;
         own_ns_.store(INT64_MIN, std::memory_order_relaxed);
     }
-    /// Notes a command sent by this link itself. [realtime] sender
+    /// Records a command that this link sent. [realtime] sender
     void sent(const Frame& f, std::int64_t now_ns) noexcept {
         if (commands(f)) own_ns_.store(now_ns, std::memory_order_relaxed);
     }
