@@ -31,7 +31,7 @@ struct Device {
     bool refused = false;      ///< is not the slave that the setup names; stays in INIT
     bool clock_set = false;    ///< offset and delay are written
     bool synchronised = false; ///< its clock was within the window
-    bool checking = false;     ///< the task on its channel only reads the state
+    bool helping = false;      ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0; ///< of the newest start-up
     unsigned attempts = 0;     ///< start-ups in a row that failed
     std::array<std::array<std::uint8_t, 4>, 4> last_errors{};  ///< counters of 0300h as last read, per port
@@ -58,6 +58,7 @@ struct Bus {
     bool outputs_valid = true;                     ///< the slaves may go to OP
     bool exchange = false;                         ///< process data frames are sent
     bool suspicious = true;                        ///< look at the slaves now
+    bool resting = false;                          ///< the supervision waits; Master wakes it when `suspicious` is set
     int reference = -1;                            ///< device with the reference clock
     std::int64_t epoch_ns = 0;                     ///< system time of the clocks minus the clock of the cycle
     std::uint64_t dc_high = 0;                     ///< extends the time of a 32-bit reference clock
@@ -109,6 +110,7 @@ Task<bool> scan(Channel&, Bus&) noexcept;                     ///< Finds and ide
 Task<bool> identify(Channel&, Bus&, BusSlave&) noexcept;      ///< Reads the registers and the SII of the slave at its station address.
 Task<void> scan_one(Channel&, Bus&, Device&) noexcept;
 bool matches(Bus&, const Slave&, const BusSlave&, Device* to_report) noexcept;  ///< Returns whether a slave is the one that the setup names.
+bool is_at_its_place(const Slave&, const BusSlave&) noexcept;  ///< Compares alias, device identification, or position.
 void assign(Bus&) noexcept;                                   ///< Finds the slaves of the setup among those on the bus.
 
 // slave_boot.cpp

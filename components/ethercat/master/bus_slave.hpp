@@ -39,6 +39,7 @@ struct BusSlave {
 
     std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;
     std::uint16_t alias = 0;
+    std::uint16_t device_id = 0;           ///< explicit device identification (ETG.1020); 0: none, or nobody asked for it
     std::uint8_t fmmus = 0, sync_managers = 0, port_descriptor = 0;
     std::uint16_t features = 0;            ///< 0008h
     std::uint16_t dl_status = 0;           ///< 0110h

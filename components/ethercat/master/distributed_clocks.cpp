@@ -14,21 +14,38 @@ constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start
 constexpr std::uint32_t tolerable_deviation_ns = 10'000;
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
-/// Reads port times and local time of all slaves with a clock, after a latch of all.
-Task<bool> latch(Channel& c, Bus& bus, std::int64_t& latched_ns) noexcept {
-    const Answer a = co_await clear_all(c, registers::dc_receive_time, 4);
-    if (!a.arrived || a.wkc == 0) co_return false;
-    latched_ns = c.sent_ns();
-    for (const std::uint16_t number : bus.by_position) {
-        BusSlave& s = bus.devices[number]->slave;
-        if (!s.present || !s.has_dc()) continue;
-        const Answer times = co_await read(c, s, registers::dc_receive_time, receive_time_bytes);
-        if (times.wkc != 1) continue;
-        std::memcpy(s.receive_time.data(), c.data(), 16);
-        s.local_time = get<std::uint64_t>(c.data() + 0x18);
-        if (!s.has_dc64()) s.local_time = static_cast<std::uint32_t>(s.local_time);
+Task<void> read_times(Channel& c, BusSlave& s) noexcept {
+    const Answer a = co_await read(c, s, registers::dc_receive_time, receive_time_bytes);
+    if (a.wkc != 1) co_return;
+    std::memcpy(s.receive_time.data(), c.data(), 16);
+    s.local_time = get<std::uint64_t>(c.data() + 0x18);
+    if (!s.has_dc64()) s.local_time = static_cast<std::uint32_t>(s.local_time);
+}
+
+Task<void> set_clock(Channel& c, Device& d, std::uint64_t offset) noexcept {
+    put(c.data(), offset), put(c.data() + 8, d.slave.delay_ns);
+    const Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_system_time_offset), 12);
+    if (a.wkc != 1) co_return;
+    co_await write<std::uint16_t>(c, d.slave, registers::dc_speed_counter_start, 0x1000);  // resets the filters
+    d.clock_set = true;
+}
+
+/// Starts work on the channel of a slave, or does it here if that channel is in use.
+template <class Make>
+Task<void> start_or_do(Channel& c, Bus& bus, Device& d, Make make) noexcept {
+    if (d.channel.busy()) {
+        co_await make(c);
+        co_return;
     }
-    co_return true;
+    d.helping = true;
+    bus.run(d, [&] { return make(d.channel); });
+}
+
+Task<void> wait_for_helpers(Channel& c, Bus& bus) noexcept {
+    for (const auto& d : bus.devices) {
+        while (d->helping && d->channel.busy()) co_await c.sleep(0);
+        d->helping = false;
+    }
 }
 
 int choose_reference(const Bus& bus) noexcept {
@@ -56,9 +73,14 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
     for (const std::uint16_t number : bus.by_position) any |= bus.devices[number]->slave.present && bus.devices[number]->slave.has_dc();
     if (bus.reference < 0 && (!any || !wanted)) co_return;
 
-    std::int64_t latched_ns = 0;
-    const bool latched = co_await latch(c, bus, latched_ns);
-    if (!latched) co_return;
+    const Answer latched = co_await clear_all(c, registers::dc_receive_time, 4);
+    if (!latched.arrived || latched.wkc == 0) co_return;
+    const std::int64_t latched_ns = c.sent_ns();
+    for (const std::uint16_t number : bus.by_position) {
+        Device& d = *bus.devices[number];
+        if (d.slave.present && d.slave.has_dc()) co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d.slave); });
+    }
+    co_await wait_for_helpers(c, bus);
     if (bus.reference < 0) {
         bus.reference = choose_reference(bus);
         if (bus.reference < 0) co_return;
@@ -80,11 +102,10 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         if (!s.present || !s.has_dc() || d.clock_set) continue;  // never those of running slaves
         // The frame with the latch passed this slave a delay after it passed the reference clock.
         const auto system = static_cast<std::uint64_t>(latched_ns + bus.epoch_ns) + s.delay_ns;
-        co_await write(c, s, registers::dc_system_time_offset, system - s.local_time);
-        co_await write(c, s, registers::dc_system_time_delay, s.delay_ns);
-        co_await write<std::uint16_t>(c, s, registers::dc_speed_counter_start, 0x1000);
-        d.clock_set = true;
+        const std::uint64_t offset = system - s.local_time;
+        co_await start_or_do(c, bus, d, [&d, offset](Channel& on) { return set_clock(on, d, offset); });
     }
+    co_await wait_for_helpers(c, bus);
     const BusSlave& leader = bus.devices[static_cast<std::size_t>(bus.reference)]->slave;
     bus.image.set_reference(leader.station, bus.setup.lead == ClockLead::thread);
     bus.status.dc_active = true;

@@ -32,7 +32,8 @@ void Master::receive(std::int64_t now_ns) noexcept {
     if (!bus.bus_channel.busy()) rescan();
     take_clock(bus);
     judge_counters(bus);
-    bus.update_status();
+    if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) bus.bus_channel.wake();
+    if (const auto resumed = bus.engine.resumed(); resumed != resumed_) resumed_ = resumed, bus.update_status();  // only tasks change states
     if (links_checked_++ % link_check_cycles != 0) return;
     const auto link = [&](ethernet::Port* port, bool& was, std::int64_t number) {
         if (port == nullptr) return;

@@ -82,7 +82,7 @@ private:
     std::unique_ptr<Bus> bus_;
     ethernet::Port* primary_ = nullptr;
     ethernet::Port* backup_ = nullptr;
-    std::uint64_t links_checked_ = 0;
+    std::uint64_t links_checked_ = 0, resumed_ = 0;
     bool backup_up_ = true;
 };
 

@@ -12,6 +12,23 @@ namespace {
 
 enum Category : std::uint16_t { general_category = 30, sync_manager_category = 41, end_category = 0xffff };
 constexpr unsigned most_categories = 64;
+constexpr std::int64_t device_id_timeout_ns = 100 * millisecond;
+
+/// Explicit device identification: AL control with bit 5, the number appears in the AL status code.
+Task<void> read_device_id(Channel& c, BusSlave& s) noexcept {
+    Answer a = co_await read(c, s, registers::al_status, 2);
+    if (a.wkc != 1) co_return;
+    const auto state = static_cast<std::uint16_t>(get<std::uint16_t>(c.data()) & 0x0f);
+    co_await write(c, s, registers::al_control, static_cast<std::uint16_t>(state | al_identify));
+    const std::int64_t until = c.now_ns() + device_id_timeout_ns;
+    while (c.now_ns() < until) {
+        a = co_await read(c, s, registers::al_status, 6);
+        if (a.wkc != 1 || (get<std::uint16_t>(c.data()) & al_identify) == 0) continue;
+        s.device_id = get<std::uint16_t>(c.data() + 4);
+        break;
+    }
+    co_await write(c, s, registers::al_control, state);
+}
 
 }  // namespace
 
@@ -74,6 +91,9 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
         }
         at += 2U + length;
     }
+    s.device_id = 0;
+    const auto wants = [](const Slave& slave) { return slave.identity.device_id.has_value(); };
+    if (std::any_of(bus.setup.slaves.begin(), bus.setup.slaves.end(), wants)) co_await read_device_id(c, s);
     co_return true;
 }
 
@@ -160,6 +180,11 @@ bool matches(Bus& bus, const Slave& want, const BusSlave& have, Device* to_repor
     return true;
 }
 
+bool is_at_its_place(const Slave& want, const BusSlave& have) noexcept {
+    if (want.identity.device_id) return have.device_id == *want.identity.device_id;
+    return want.identity.alias ? have.alias == *want.identity.alias : have.position == want.position;
+}
+
 void assign(Bus& bus) noexcept {
     for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
         if (bus.device_of[n] >= 0) continue;
@@ -168,7 +193,7 @@ void assign(Bus& bus) noexcept {
         for (const std::uint16_t number : bus.by_position) {
             Device& d = *bus.devices[number];
             if (!d.slave.present || !d.identified || d.slave.configured >= 0) continue;
-            if (want.identity.alias ? d.slave.alias != *want.identity.alias : d.slave.position != want.position) continue;
+            if (!is_at_its_place(want, d.slave)) continue;
             if (found != nullptr)
                 bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(n), d.slave.alias, d.slave.position);
             else

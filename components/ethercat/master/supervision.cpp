@@ -14,13 +14,14 @@ constexpr std::int64_t counters_every_ns = 1'000 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
 
-Task<void> find_ports(Channel& c, Bus& bus) noexcept {
+/// Finds the tree; `changed`: the ports may have changed since the slaves were identified.
+Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
     std::array<BusSlave*, 1024> line{};
     std::size_t count = 0;
     for (const std::uint16_t number : bus.by_position) {
         BusSlave& s = bus.devices[number]->slave;
         if (count == line.size()) break;
-        if (s.present) {
+        if (changed && s.present) {
             const Answer a = co_await read(c, s, registers::dl_status, 2);
             if (a.wkc == 1) s.dl_status = get<std::uint16_t>(c.data());
         }
@@ -31,7 +32,6 @@ Task<void> find_ports(Channel& c, Bus& bus) noexcept {
 
 void start(Bus& bus, Device& d) noexcept {
     if (d.refused || !d.identified) return;
-    d.checking = false;
     if (d.slave.configured < 0) {
         if (bus.setup.accept_other_slaves || bus.setup.slaves.empty()) bus.run(d, [&] { return boot(d.channel, bus, d); });
         return;
@@ -54,7 +54,7 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
         const Slave& want = bus.setup.slaves[n];
         Device* before = bus.device_of[n] >= 0 ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get() : nullptr;
         if (before != nullptr && before->slave.present) continue;
-        if (want.identity.alias ? found.alias != *want.identity.alias : want.position != position && !want.optional) continue;
+        if (!is_at_its_place(want, found) && !(want.optional && !want.identity.alias && !want.identity.device_id)) continue;
         if (!matches(bus, want, found, nullptr)) continue;
         configured = static_cast<int>(n);
         place = before;
@@ -156,21 +156,22 @@ Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
 }
 
 Task<void> supervise(Channel& c, Bus& bus) noexcept {
+    bus.resting = false;
     while (true) {
         const bool scanned = co_await scan(c, bus);
         if (scanned) break;
         co_await c.sleep(empty_retry_ns);
     }
-    co_await find_ports(c, bus);
+    co_await find_ports(c, bus, false);
     bus.exchange = !bus.setup.slaves.empty();
     co_await start_clocks(c, bus);
     for (const std::uint16_t number : bus.by_position) start(bus, *bus.devices[number]);
 
     std::int64_t rediscovered = c.now_ns();
     while (true) {
-        const std::int64_t next = c.now_ns() + look_every_ns;
-        while (c.now_ns() < next && !bus.suspicious) co_await c.sleep(0);
-        bus.suspicious = false;
+        bus.resting = true;
+        if (!bus.suspicious) co_await c.sleep(look_every_ns);
+        bus.resting = bus.suspicious = false;
         std::memset(c.data(), 0, 6);
         const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
         const unsigned count = a.arrived ? a.wkc : 0;
@@ -202,7 +203,7 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         rediscovered = c.now_ns();
         const bool returned = co_await rediscover(c, bus, bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
         if (!returned) continue;
-        co_await find_ports(c, bus);
+        co_await find_ports(c, bus, true);
         if (!bus.status.ring_broken) co_await start_clocks(c, bus);
         start_returned(bus);
     }

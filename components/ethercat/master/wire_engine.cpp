@@ -243,6 +243,7 @@ void WireEngine::complete_acyclic(Flight& f) noexcept {
         if (c.stage() != Channel::Stage::sent || c.generation() != item.generation || c.length() != item.length) continue;
         c.set_now(now_ns_);
         std::memcpy(c.data(), &frame.answer[item.offset], item.length);
+        ++resumed_;
         c.arrive(get<std::uint16_t>(&frame.answer[item.offset + std::size_t{item.length}]));
     }
     frame.free = true;
@@ -272,6 +273,7 @@ void WireEngine::expire() noexcept {
                 Channel& c = *frame.items[n].channel;
                 if (c.stage() != Channel::Stage::sent || c.generation() != frame.items[n].generation) continue;
                 c.set_now(now_ns_);
+                ++resumed_;
                 c.lose();
             }
         }
@@ -285,7 +287,7 @@ void WireEngine::wake() noexcept {
             if (active_[n] == 0) continue;
             Channel& c = *channels_[n];
             c.set_now(now_ns_);
-            if (c.stage() == Channel::Stage::sleeping && c.until_ns() <= now_ns_) c.wake();
+            if (c.stage() == Channel::Stage::sleeping && c.until_ns() <= now_ns_) ++resumed_, c.wake();
             if (c.stage() == Channel::Stage::idle) active_[n] = 0;
         }
     }

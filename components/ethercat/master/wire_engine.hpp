@@ -48,6 +48,7 @@ public:
     /// Returns the counter of the newest BRD 0130h copy that arrived at the primary port: 0 on a closed ring, whose slaves count in the copy that
     /// arrives at the backup port; -1: none arrived.
     int primary_wkc() const noexcept { return primary_wkc_; }
+    std::uint64_t resumed() const noexcept { return resumed_; }       ///< Returns how often a task continued.
     bool idle() const noexcept;                                       ///< Returns whether no process data is in flight.
 
 private:
@@ -100,7 +101,7 @@ private:
     std::array<Flight, indexes> flights_{};
     ClockSample clock_;
     std::int64_t now_ns_ = 0, cycle_start_ns_ = 0, sent_after_ns_ = 0;
-    std::uint64_t cycle_ = 0;
+    std::uint64_t cycle_ = 0, resumed_ = 0;
     std::size_t next_channel_ = 0;
     unsigned in_flight_ = 0;
     int primary_wkc_ = -1;

@@ -80,6 +80,18 @@ TEST(EthercatMaster, Finds_a_slave_by_its_alias) {
     EXPECT_EQ(w.master->slave(1)->position, 1);
 }
 
+TEST(EthercatMaster, Finds_a_slave_by_its_device_identification) {
+    World w;
+    w.add(0x100);
+    w.add(0x102);
+    w.add(0x101).device_id = 42;
+    master::Setup setup = drives(3);
+    setup.slaves[1].identity.device_id = 42, setup.slaves[2].position = 1;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    EXPECT_EQ(w.master->slave(1)->position, 2);
+}
+
 TEST(EthercatMaster, Reports_a_refused_state_with_its_code_and_tries_again) {
     World w;
     Firmware& f = w.add(0x100);

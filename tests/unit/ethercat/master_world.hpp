@@ -21,13 +21,16 @@ using namespace hal::ethercat::master;
 struct Firmware : esc::Application {
     std::uint16_t refuse = 0, code = 0;  ///< state that is refused
     bool echo = true;
+    std::uint16_t device_id = 0;
     std::array<std::uint8_t, 64> bytes{};
     std::size_t inputs = 2;
     void power_on(esc::Pdi&) noexcept override { bytes.fill(0); }
     void run(esc::Pdi& pdi, std::int64_t) noexcept override {
         if (const auto control = pdi.take_al_control()) {
             const auto state = static_cast<std::uint16_t>(*control & 0x0f);
-            if (state == refuse)
+            if ((*control & al_identify) != 0)
+                pdi.set_al_status(static_cast<std::uint16_t>(state | al_identify), device_id);
+            else if (state == refuse)
                 pdi.set_al_status(static_cast<std::uint16_t>((pdi.al_status() & 0x0f) | 0x10), code);
             else
                 pdi.set_al_status(state, 0);
