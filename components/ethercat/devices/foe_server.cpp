@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstring>
+
+#include "ethercat/devices/mailbox_device.hpp"
+
+namespace hal::ethercat::devices {
+
+void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::uint32_t password, bool boot_only) {
+    File file{std::move(name), std::move(content), 0, password, boot_only};
+    file.length = file.bytes.size();
+    file.bytes.resize(std::max(file.length, most_bytes_));
+    files_.push_back(std::move(file));
+}
+
+std::span<const std::uint8_t> FoeServer::content(std::string_view name) const noexcept {
+    for (const auto& f : files_)
+        if (f.name == name) return {f.bytes.data(), f.length};
+    return {};
+}
+
+void FoeServer::send(Outbox& out, foe::Opcode opcode, std::uint32_t value) noexcept {
+    foe::write_header(out.payload(), opcode, value);
+    out.send(MailboxType::foe, foe::header_bytes);
+}
+
+void FoeServer::refuse(Outbox& out, foe::Error error) noexcept {
+    file_ = nullptr;
+    send(out, foe::Opcode::error, static_cast<std::uint32_t>(error));
+}
+
+void FoeServer::open(const foe::Message& m, bool write, State state, Outbox& out) noexcept {
+    file_ = nullptr;
+    for (auto& f : files_)
+        if (f.name == m.text()) file_ = &f;
+    if (file_ == nullptr) return refuse(out, foe::Error::not_found);
+    if (file_->password != 0 && file_->password != m.value) return refuse(out, foe::Error::no_rights);
+    if (write && file_->boot_only && state != State::boot) return refuse(out, foe::Error::bootstrap_only);
+    writing_ = write, at_ = 0, busy_ = false;
+    packet_ = write ? 0 : 1;
+    if (write) send(out, foe::Opcode::ack, 0);
+    else send_packet(out);
+}
+
+void FoeServer::send_packet(Outbox& out) noexcept {
+    last_ = std::min(foe::packet_capacity(out.mailbox()), file_->length - at_);
+    std::uint8_t* to = out.payload();
+    foe::write_header(to, foe::Opcode::data, packet_);
+    std::memcpy(to + foe::header_bytes, file_->bytes.data() + at_, last_);
+    out.send(MailboxType::foe, foe::header_bytes + last_);
+}
+
+void FoeServer::take(const MailboxMessage& message, State state, Outbox& out) noexcept {
+    const auto m = foe::read(message.payload);
+    if (!m) return out.send(MailboxType::error, write_mailbox_error(out.payload(), MailboxError::too_short));
+    switch (m->opcode) {
+    case foe::Opcode::read: return open(*m, false, state, out);
+    case foe::Opcode::write: return open(*m, true, state, out);
+    case foe::Opcode::data: {
+        if (file_ == nullptr || !writing_) return refuse(out, foe::Error::illegal);
+        if (m->value != packet_ + 1) return refuse(out, foe::Error::packet_number);
+        if (busy_every_ != 0 && m->value % busy_every_ == 0 && !busy_) {
+            busy_ = true;
+            return send(out, foe::Opcode::busy, 100U << 16);
+        }
+        busy_ = false;
+        if (m->data.size() > file_->bytes.size() - at_) return refuse(out, foe::Error::disk_full);
+        if (!m->data.empty()) std::memcpy(file_->bytes.data() + at_, m->data.data(), m->data.size());
+        at_ += m->data.size();
+        packet_ = m->value;
+        send(out, foe::Opcode::ack, packet_);
+        if (m->data.size() < foe::packet_capacity(out.mailbox())) {  // both mailboxes have the same size
+            file_->length = at_;
+            file_ = nullptr;
+        }
+        return;
+    }
+    case foe::Opcode::ack:
+        if (file_ == nullptr || writing_) return;
+        if (m->value != packet_) return refuse(out, foe::Error::packet_number);
+        at_ += last_;
+        if (last_ < foe::packet_capacity(out.mailbox())) {
+            file_ = nullptr;
+            return;
+        }
+        ++packet_;
+        return send_packet(out);
+    case foe::Opcode::busy:
+        if (file_ != nullptr && !writing_) send_packet(out);
+        return;
+    case foe::Opcode::error: file_ = nullptr; return;
+    }
+    refuse(out, foe::Error::illegal);
+}
+
+}  // namespace hal::ethercat::devices

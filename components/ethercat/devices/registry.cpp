@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/devices/registry.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "ethercat/devices/mailbox_device.hpp"
+#include "ethercat/devices/servo.hpp"
+#include "text/numbers.hpp"
+
+namespace hal::ethercat::devices {
+namespace {
+
+struct DeviceRow {
+    std::string_view name, options;
+    Parts (*make)(const DeviceOptions&);
+};
+constexpr DeviceRow device_rows[] = {
+    {"coupler", "", make_coupler},
+    {"digital_in", "bits", [](const DeviceOptions& o) { return make_digital(o, false); }},
+    {"digital_out", "bits", [](const DeviceOptions& o) { return make_digital(o, true); }},
+    {"analog_in", "channels", [](const DeviceOptions& o) { return make_analog(o, false); }},
+    {"analog_out", "channels", [](const DeviceOptions& o) { return make_analog(o, true); }},
+    {"servo", "axes dc", make_servo},
+    {"mailbox_device", "", make_mailbox_device},
+};
+
+const DeviceRow* device_row(std::string_view name) {
+    for (const auto& row : device_rows)
+        if (row.name == name) return &row;
+    return nullptr;
+}
+
+bool offers(const DeviceRow& row, std::string_view option) {
+    return option == "alias" || option == "serial" || (" " + std::string(row.options) + " ").find(" " + std::string(option) + " ") !=
+        std::string::npos;
+}
+
+std::string list_of_names() {
+    std::string out;
+    for (const auto& row : device_rows) out += (out.empty() ? "" : ", ") + std::string(row.name);
+    return out;
+}
+
+/// Sets an option; returns what is wrong with it, or an empty text.
+std::string set_option(DeviceOptions& o, std::string_view key, std::string_view value) {
+    if (key == "dc") {
+        if (value != "required" && value != "optional") return "invalid value '" + std::string(value) + "' of dc; use required or optional";
+        o.dc_required = value == "required";
+        return {};
+    }
+    const std::uint64_t most = key == "bits" ? 64 : key == "channels" ? 16 : key == "axes" ? 8 : key == "alias" ? 0xffff : 0xffffffff;
+    const std::uint64_t least = key == "alias" || key == "serial" ? 0 : 1;
+    const auto number = parse_natural(value);
+    if (!number || *number < least || *number > most)
+        return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " + std::to_string(least) + ".." +
+            std::to_string(most);
+    if (key == "bits") o.bits = static_cast<unsigned>(*number);
+    else if (key == "channels") o.channels = static_cast<unsigned>(*number);
+    else if (key == "axes") o.axes = static_cast<unsigned>(*number);
+    else if (key == "alias") o.alias = static_cast<std::uint16_t>(*number);
+    else o.serial = static_cast<std::uint32_t>(*number);
+    return {};
+}
+
+}  // namespace
+
+std::vector<std::string_view> names() {
+    std::vector<std::string_view> out;
+    for (const auto& row : device_rows) out.push_back(row.name);
+    return out;
+}
+
+std::optional<Device> make(std::string_view name, const DeviceOptions& options) {
+    const auto* row = device_row(name);
+    if (row == nullptr) return std::nullopt;
+    Parts parts = row->make(options);
+    Device device;
+    device.name = std::string(name);
+    device.sii = sii::build(parts.design.sii);
+    device.dc = parts.design.dc;
+    device.firmware = std::make_unique<Firmware>(std::move(parts.design), std::move(parts.behaviour));
+    return device;
+}
+
+LineDescription read_line(std::string_view text) {
+    LineDescription out;
+    text::Messages<LineTopic> messages;
+    for (text::Lines lines(text); auto line = lines.next();) {
+        const auto words = text::words_of(*line);
+        const auto* row = device_row(words[0].text);
+        if (row == nullptr) {
+            messages.error(LineTopic::device, words[0].at, "unknown device '" + words[0].text + "'", "use one of: " + list_of_names());
+            continue;
+        }
+        LineDescription::Slave slave{words[0].text, {}, words[0].at};
+        bool good = true;
+        for (std::size_t n = 1; n < words.size(); ++n) {
+            const auto equals = words[n].text.find('=');
+            const std::string key = words[n].text.substr(0, equals);
+            std::string problem;
+            if (equals == std::string::npos) problem = "option '" + key + "' has no value; write " + key + "=VALUE";
+            else if (!offers(*row, key)) problem = "unknown option '" + key + "' of " + words[0].text;
+            else problem = set_option(slave.options, key, std::string_view(words[n].text).substr(equals + 1));
+            if (problem.empty()) continue;
+            good = false;
+            messages.error(LineTopic::option, words[n].at, problem,
+                           "options of " + words[0].text + ": " + std::string(row->options) + (row->options.empty() ? "" : " ") +
+                           "alias serial");
+        }
+        if (good) out.slaves.push_back(std::move(slave));
+    }
+    if (out.slaves.empty() && !messages.failed()) messages.error(LineTopic::device, {}, "the line has no device",
+        "write one device per line");
+    for (std::size_t i = 0; i < out.slaves.size(); ++i)
+        for (std::size_t k = 0; k < i; ++k)
+            if (out.slaves[i].options.alias != 0 && out.slaves[i].options.alias == out.slaves[k].options.alias)
+                messages.warning(LineTopic::option, out.slaves[i].at, "duplicate alias " + std::to_string(out.slaves[i].options.alias),
+                                 "give each device its own alias, unless the fault is wanted");
+    out.messages = std::move(messages.all);
+    return out;
+}
+
+std::vector<Device> make_line(const LineDescription& line) {
+    std::vector<Device> out;
+    for (const auto& slave : line.slaves)
+        if (auto device = make(slave.device, slave.options)) out.push_back(std::move(*device));
+    return out;
+}
+
+}  // namespace hal::ethercat::devices
