@@ -2,7 +2,7 @@
 // The firmware of an emulated slave: its state machine with all checks, its mailbox, its process data. What the device does is a Behaviour.
 //
 //     auto firmware = Firmware(std::move(design), std::make_unique<Blinker>());   // [setup]
-//     firmware.faults().refuse[State::op] = 0x0029;                               // from any thread
+//     firmware.faults().reject[State::op] = 0x0029;                               // from any thread
 #pragma once
 
 #include <array>
@@ -39,11 +39,11 @@ public:
 
 /// Faults on command. Written from any thread, read by the firmware.
 struct FirmwareFaults {
-    struct Refusals {
+    struct Rejections {
         std::atomic<std::uint16_t>& operator[](State s) noexcept { return codes[static_cast<unsigned>(s) & 15]; }
         std::array<std::atomic<std::uint16_t>, 16> codes{};
     };
-    Refusals refuse;                                   ///< AL status code with which a state is refused; 0: accepted
+    Rejections reject;                                   ///< AL status code with which a state is rejected; 0: accepted
     std::atomic<std::uint16_t> fail{0};                ///< drops to SAFE-OP with this code, once
     std::atomic<std::int64_t> mailbox_delay_ns{0};     ///< minimum time to an answer
     std::atomic<std::int64_t> state_delay_ns{0};       ///< time that a state change takes
@@ -58,7 +58,7 @@ struct Design {
     std::vector<std::unique_ptr<MailboxService>> services;  ///< apart from CoE
     bool coe = true;
     bool dc = false;                        ///< has SYNC0
-    bool dc_required = false;               ///< refuses free run
+    bool dc_required = false;               ///< rejects free run
     std::uint32_t shortest_cycle_ns = 62'500;
     std::uint16_t device_id = 0;            ///< explicit device identification; 0: none set
     std::size_t most_output_bytes = 0, most_input_bytes = 0;

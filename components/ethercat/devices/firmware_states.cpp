@@ -44,7 +44,7 @@ void Firmware::change(esc::Pdi& pdi, State to) noexcept {
                                                                                : state_ == State::safeop));
     if (!valid) return fail(pdi, state_, 0x0011);
     if (to == state_) return error_ ? void() : pdi.set_al_status(static_cast<std::uint16_t>(state_), 0);
-    if (const auto code = faults_.refuse[to].load(std::memory_order_relaxed)) return fail(pdi, state_, code);
+    if (const auto code = faults_.reject[to].load(std::memory_order_relaxed)) return fail(pdi, state_, code);
     if (const auto code = up ? code_against(pdi, to) : std::uint16_t{0}) return fail(pdi, state_, code);
     if (to == State::op) {
         op_since_ns_ = now_ns_;
