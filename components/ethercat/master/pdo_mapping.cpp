@@ -12,8 +12,6 @@ namespace {
 constexpr std::uint16_t assignment_of(unsigned manager) noexcept { return static_cast<std::uint16_t>(0x1c10 + manager); }
 constexpr std::uint32_t object_missing = 0x06020000, sub_missing = 0x06090011;
 
-std::uint32_t mapping_word(const Entry& e) noexcept { return static_cast<std::uint32_t>(e.index) << 16 | static_cast<std::uint32_t>(e.sub) << 8 | (e.bits & 0xffU); }
-
 /// What comparing a list with the slave's gave.
 enum class Compared : std::uint8_t { same, differs, failed };
 
@@ -60,8 +58,8 @@ Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std
 }
 
 Task<Compared> compare_mapping(Channel& c, Bus& bus, Device& d, const Pdo& pdo, bool report) noexcept {
-    const auto want = [&pdo](std::size_t n) { return mapping_word(pdo.entries[n]); };
-    return compare(c, bus, d, pdo.index, pdo.entries.size(), want, report);
+    const auto want = [&pdo](std::size_t n) { return pdo.mapping(n); };
+    return compare(c, bus, d, pdo.index, pdo.mapped(), want, report);
 }
 
 Task<Compared> compare_assignment(Channel& c, Bus& bus, Device& d, const SyncManager& sm, bool report) noexcept {
@@ -102,8 +100,8 @@ Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm
     for (std::size_t n = 0; n < sm.pdos.size(); ++n) {
         if ((which >> n & 1) == 0) continue;
         const Pdo& pdo = sm.pdos[n];
-        const auto want = [&pdo](std::size_t entry) { return mapping_word(pdo.entries[entry]); };
-        const bool ok = co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.entries.size(), want);
+        const auto want = [&pdo](std::size_t entry) { return pdo.mapping(entry); };
+        const bool ok = co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.mapped(), want);
         if (!ok) co_return false;
         const Compared now = co_await compare_mapping(c, bus, d, pdo, true);
         if (now != Compared::same) co_return false;
@@ -116,8 +114,8 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, u
     for (std::size_t n = 0; n < sm.pdos.size() && n < 64; ++n) {
         const Pdo& pdo = sm.pdos[n];
         if (!pdo.write_mapping) continue;
-        if (pdo.entries.size() > 254 || (limit != 0 && pdo.entries.size() > limit)) {
-            bus.report(Event::too_many_entries, d, pdo.index, static_cast<std::int64_t>(pdo.entries.size()));
+        if (pdo.mapped() > 254 || (limit != 0 && pdo.mapped() > limit)) {
+            bus.report(Event::too_many_entries, d, pdo.index, static_cast<std::int64_t>(pdo.mapped()));
             co_return false;
         }
         const Compared now = co_await compare_mapping(c, bus, d, pdo, false);

@@ -25,12 +25,30 @@ struct Entry {
     double scale = 1.0, offset = 0.0;  ///< pin = raw * scale + offset, if `scaled`
     bool scaled = false;           ///< the pin is a float
     bool is_signed = false;
+    bool part = false;             ///< a further part of the object of the entry before it: in the mapping both are one
 };
 
 struct Pdo {
     std::uint16_t index = 0;       ///< 1600h… or 1A00h…
     std::vector<Entry> entries;
     bool write_mapping = false;    ///< the mapping is written in PRE-OP if it differs
+
+    /// Returns how many objects the mapping has. [any]
+    std::size_t mapped() const noexcept {
+        std::size_t count = 0;
+        for (const Entry& e : entries) count += e.part ? 0 : 1;
+        return count;
+    }
+    /// Returns the word of object `n` of the mapping: index, sub-index, bits. [any]
+    std::uint32_t mapping(std::size_t n) const noexcept {
+        std::uint32_t word = 0;
+        for (const Entry& e : entries) {
+            if (!e.part && n-- == 0) word = static_cast<std::uint32_t>(e.index) << 16 | static_cast<std::uint32_t>(e.sub) << 8 | (e.bits & 0xffU);
+            else if (word != 0 && !e.part) break;
+            else if (word != 0) word += e.bits;
+        }
+        return word;
+    }
 };
 
 /// A sync manager with process data.

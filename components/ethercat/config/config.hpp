@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// The configuration of an EtherCAT bus: a `.ethercat` file, or LinuxCNC's ethercat-conf.xml. docs/ethercat-configuration.md is the reference.
+//
+//     config::Reading reading = config::read(text, "machine.ethercat");
+//     if (!reading.good()) print(config::to_string(reading, "machine.ethercat"));
+//     for (const config::Bus& bus : reading.buses) start(bus.link, bus.setup);
+//
+// Everything here is [setup].
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ethercat/esi/esi.hpp"
+#include "ethercat/master/setup.hpp"
+#include "text/config_text.hpp"
+
+namespace hal::ethercat::config {
+
+using hal::Severity;
+using text::Span;
+
+/// Subject of a message: its diagnostic code.
+enum class Topic : std::uint8_t {
+    line,    ///< an invalid line, section, key or element
+    value,   ///< an invalid value
+    object,  ///< an unknown object, or one that a PDO cannot carry
+    slave,   ///< conflicting or incomplete slaves
+};
+/// Returns "ethercat-line" and the like: the diagnostic's code.
+const char* code_of(Topic);
+
+using Message = text::Message<Topic>;
+
+/// What belongs to a pin besides its entry in the setup.
+struct PinInfo {
+    std::string unit, about;
+};
+
+/// A slave as the user sees it; the slave of the same number in the setup is how the master sees it.
+struct SlaveInfo {
+    std::string type;          ///< order code or name of its device, for messages and lists
+    std::string description;   ///< path of its ESI; empty: none
+    unsigned cia402_axes = 0;  ///< drives of CiA 402
+    std::vector<std::pair<std::string, PinInfo>> pins;  ///< by name
+    Span at{};
+    const PinInfo* find(std::string_view pin) const;
+};
+
+/// One bus with its master.
+struct Bus {
+    std::string name;                 ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
+    std::string link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
+    bool cycle_given = false;         ///< setup.cycle_ns is from the file; else it is that of the thread
+    master::Setup setup;
+    std::vector<SlaveInfo> slaves;    ///< as many as in setup.slaves
+    Span at{};
+};
+
+struct Reading {
+    std::vector<Bus> buses;           ///< one for a `.ethercat` file
+    bool lcec = false;                ///< LinuxCNC's format: pins are named lcec.MASTER.SLAVE.PIN
+    std::vector<Message> messages;    ///< in order of place
+    bool good() const { return text::good(messages); }
+};
+
+/// Reads a whole file. Returns false and sets `bytes` to the reason.
+using ReadFile = std::function<bool(const std::string& path, std::string& bytes)>;
+bool read_from_disk(const std::string& path, std::string& bytes);
+
+/// Reads a configuration of either format: XML if its first character is `<`. Relative paths in it start at the folder of `path`.
+Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
+
+/// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
+std::string to_string(const Reading&, const std::string& path);
+
+/// A slave as found on a bus or described in an ESI, for write().
+struct Found {
+    std::string name;                   ///< of its section; empty: slave-POSITION
+    std::string device;                 ///< name or order code, for a comment
+    std::string esi;                    ///< path of its description; empty: none
+    std::uint32_t vendor = 0, product = 0, revision = 0;
+    std::uint16_t alias = 0;
+    std::vector<sii::Pdo> rx, tx;       ///< of the SII; those with a sync manager are assigned
+    std::vector<sii::SyncManager> sync_managers;
+    std::uint16_t assign_activate = 0;  ///< 0: without SYNC
+};
+/// Returns the text of a `.ethercat` file for these slaves in order of position. It can be read without errors.
+std::string write(const std::string& link, std::int64_t cycle_ns, const std::vector<Found>& slaves);
+
+}  // namespace hal::ethercat::config

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+#include <random>
+
+#include "ethercat/config/config.hpp"
+#include "ethercat/config/plan.hpp"
+#include "hal/read_file.hpp"
+
+namespace hal::ethercat::config {
+namespace {
+
+bool read_test_file(const std::string& path, std::string& bytes) { return read_regular_file("tests/unit/ethercat/data/" + path, 1'000'000, bytes); }
+
+Bus good(const std::string& text) {
+    Reading r = read(text, "m.ethercat", read_test_file);
+    EXPECT_EQ(to_string(r, "m.ethercat"), "");
+    return r.buses.at(0);
+}
+std::string errors(const std::string& text) { return to_string(read(text, "m.ethercat", read_test_file), "m.ethercat"); }
+
+const char* const servo =
+    "[bus]\nlink = sim:line\ncycle = 1ms\nclock = reference\nreference = x\n[domain io]\nevery = 4\n"
+    "[type drive]\nesi = servo.xml\ndevice = SERVO-1\noutputs = 6040 607A 60FE:1 gap 8\ninputs = 6041, 6064\nsdo 60C2:1 = 1\nsdo 60C2:2 = -3\n"
+    "dc = sync0 250us\nwatchdog = 50ms\n607A.scale = 65536/360\n607A.unit = deg\nposition-actual-value.name = position\n"
+    "[slave 0 x]\ntype = drive\n[slave alias=5 y]\ntype = drive\noptional = yes\n[slave 2]\nesi = servo.xml\ndevice = DIO-8\ndomain = io\n";
+
+TEST(EthercatConfig, Drives_of_a_type_have_its_PDOs_clocks_and_writes) {
+    const Bus bus = good(servo);
+    EXPECT_EQ(bus.link, "sim:line");
+    EXPECT_EQ(bus.setup.cycle_ns, 1'000'000);
+    ASSERT_EQ(bus.setup.slaves.size(), 3U);
+    EXPECT_EQ(bus.setup.reference_slave, 0);
+    const master::Slave& x = bus.setup.slaves[0];
+    EXPECT_EQ(x.identity.vendor, 0xcafeU);
+    EXPECT_EQ(x.identity.product, 0x402U);
+    EXPECT_FALSE(x.identity.revision);
+    ASSERT_EQ(x.sync_managers.size(), 2U);
+    const master::SyncManager& out = x.sync_managers[0];
+    EXPECT_EQ(out.number, 2);
+    EXPECT_EQ(out.start, 0x1100);
+    EXPECT_TRUE(out.output && out.write_assignment && out.watchdog);
+    ASSERT_EQ(out.pdos.size(), 1U);
+    EXPECT_EQ(out.pdos[0].index, 0x1600);
+    EXPECT_TRUE(out.pdos[0].write_mapping);
+    ASSERT_EQ(out.pdos[0].entries.size(), 4U);
+    EXPECT_EQ(out.pdos[0].entries[0].name, "controlword");
+    EXPECT_EQ(out.pdos[0].entries[1].name, "target-position");
+    EXPECT_TRUE(out.pdos[0].entries[1].scaled);
+    EXPECT_DOUBLE_EQ(out.pdos[0].entries[1].scale, 360.0 / 65536);
+    EXPECT_EQ(out.pdos[0].entries[2].name, "digital-outputs-1");
+    EXPECT_EQ(out.pdos[0].entries[3].index, 0);
+    EXPECT_FALSE(x.sync_managers[1].pdos[0].write_mapping) << "as described";
+    EXPECT_EQ(x.sync_managers[1].pdos[0].entries[1].name, "position");
+    EXPECT_EQ(x.sync_managers[1].pdos[0].entries[1].type, master::Type::s32);
+    EXPECT_EQ(bus.slaves[0].find("target-position")->unit, "deg");
+    EXPECT_EQ(bus.slaves[0].cia402_axes, 1U);
+    ASSERT_EQ(x.startup.size(), 3U);
+    EXPECT_EQ(x.startup[0].index, 0x6060) << "of the description";
+    EXPECT_EQ(x.startup[2].data, (std::vector<std::uint8_t>{0xfd}));
+    EXPECT_EQ(x.startup[2].line, 14U);
+    ASSERT_TRUE(x.dc);
+    EXPECT_EQ(x.dc->assign_activate, 0x300);
+    EXPECT_EQ(x.dc->sync0_shift_ns, 250'000);
+    EXPECT_EQ(x.watchdog.intervals, 500);
+    EXPECT_EQ(x.timeouts.to_preop, 2000U);
+    EXPECT_TRUE(x.complete_access);
+    EXPECT_EQ(bus.setup.slaves[1].identity.alias, 5);
+    EXPECT_TRUE(bus.setup.slaves[1].optional);
+    const master::Slave& io = bus.setup.slaves[2];
+    EXPECT_EQ(io.name, "slave-2");
+    EXPECT_EQ(io.domain, 1);
+    EXPECT_EQ(bus.setup.domains[1].every, 4U);
+    ASSERT_EQ(io.sync_managers.size(), 2U);
+    EXPECT_EQ(io.sync_managers[0].number, 0);
+    EXPECT_FALSE(io.sync_managers[0].write_assignment);
+    EXPECT_EQ(io.sync_managers[0].pdos[0].entries[0].name, "out-0");
+    EXPECT_EQ(io.sync_managers[0].pdos[0].entries[0].type, master::Type::bit);
+}
+
+TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile) {
+    const Bus bus = good("[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = 0x20+\noutputs = 6040 6840 2000:1 u8\n"
+                         "inputs = 6041\nentries-per-pdo = 2\nsdo 6860 = 8\nsdo 8000 complete = 01 00 02\nregister 0420 u16 = 1000\nidn P-0-150 1 = 07 00\n");
+    const master::Slave& s = bus.setup.slaves[0];
+    ASSERT_EQ(s.sync_managers[0].pdos.size(), 2U);
+    EXPECT_EQ(s.sync_managers[0].pdos[1].index, 0x1601);
+    EXPECT_EQ(s.sync_managers[0].pdos[0].entries[1].name, "axis-2-controlword");
+    EXPECT_EQ(s.sync_managers[0].pdos[1].entries[0].name, "2000-01");
+    EXPECT_EQ(s.identity.revision, 0x20U);
+    EXPECT_TRUE(s.identity.revision_or_higher);
+    ASSERT_EQ(s.startup.size(), 4U);
+    EXPECT_TRUE(s.startup[1].complete);
+    EXPECT_EQ(s.startup[2].protocol, master::StartupWrite::Protocol::reg);
+    EXPECT_EQ(s.startup[3].index, 0x8096);
+    EXPECT_EQ(s.startup[3].sub, 1);
+}
+
+TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
+    EXPECT_EQ(errors("link = x\n[slav 0]\n"),
+              "m.ethercat:1:1: error: this line is before the first section; begin the file with [bus]\n"
+              "m.ethercat:1:1: error: missing section [bus]; write [bus] and below it link = eth:enp3s0 and cycle = 1ms\n"
+              "m.ethercat:2:1: error: unknown section 'slav'; did you mean 'slave'?");
+    EXPECT_EQ(errors("[bus]\n"), "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
+    EXPECT_EQ(errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
+              "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
+              "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"
+              "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path of an ESI file, relative to this file");
+    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-2\n"),
+              "m.ethercat:4:10: error: 'servo.xml' does not describe a device 'SERVO-2'; did you mean 'SERVO-1'?");
+    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\n"), "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
+    const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
+    EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),
+              "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; write its type, as in 6072 u16; the types are bit, u8, u16, u32, u64, "
+              "s8, s16, s32, s64, real32 or real64");
+    EXPECT_EQ(errors(a + "outputs = 6040 u32\n"), "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out the type");
+    EXPECT_EQ(errors(a + "outputs = 1602\n"), "m.ethercat:5:11: error: unknown PDO '1602'; the PDOs are: 1600, 1601");
+    EXPECT_EQ(errors(a + "outputs = 1600 1601\n"), "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign only one of them");
+    EXPECT_EQ(errors(a + "sdo 6060 = 200\n"), "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of -128..127, decimal or with 0x");
+    EXPECT_EQ(errors(a + "607b.scale = 2\noutput = 6040\n"),
+              "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: controlword, target-position, statusword, position-actual-value\n"
+              "m.ethercat:6:1: error: unknown key 'output' of a slave; did you mean 'outputs'?");
+    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = DIO-8\noutputs = 7000:1\ndc = sync0\n[slave 0 a]\ndevice = cia402\n"),
+              "m.ethercat:5:11: error: the PDOs of 'DIO-8' are fixed: it has no CoE mailbox to map objects with; delete the line, or assign PDOs: 1600\n"
+              "m.ethercat:6:6: error: 'DIO-8' has no distributed clocks; delete the line\n"
+              "m.ethercat:7:1: error: duplicate slave name 'a'; first in line 2\n"
+              "m.ethercat:7:1: error: duplicate position 0; first in line 2");
+    EXPECT_EQ(errors("[bus]\n[slave 0]\ndevice = x\n[slave z]\n[slave 1]\ntype = q\n"),
+              "m.ethercat:3:10: error: unknown device 'x'; write device = cia402, or esi = FILE for a device with a description\n"
+              "m.ethercat:4:8: error: invalid slave section: expected a position of 0..65535 and a name; write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]\n"
+              "m.ethercat:6:8: error: unknown type 'q'; write [type q]");
+}
+
+TEST(EthercatConfig, Plan_shows_the_arithmetic) {
+    const Plan p = plan(good(servo));
+    EXPECT_EQ(p.frames, 1U);
+    EXPECT_EQ(p.text,
+              "domain default: 22 bytes out, 12 bytes in, every cycle, working counter 6\n"
+              "domain io: 1 bytes out, 1 bytes in, every 4 cycles, working counter 3\n"
+              "1 frame, 114 bytes: (114 + 1 x 24) x 80 ns = 11.04 us at 100 Mbit/s\n"
+              "through 3 slaves x 1.00 us = 3.00 us\n"
+              "cycle 1000.00 us: wire load 1.1 %, needed 100.00 us + 11.04 us + 3.00 us = 114.04 us\n"
+              "input to output at most 5 x 1000.00 us + 114.04 us = 5114.04 us\n");
+    EXPECT_TRUE(p.fits);
+}
+
+TEST(EthercatConfig, Written_file_is_read_again_without_errors) {
+    Found drive;
+    drive.name = "Axis X", drive.device = "SERVO-1", drive.vendor = 0xcafe, drive.product = 0x402, drive.revision = 0x10001, drive.assign_activate = 0x300;
+    drive.rx = {{0x1601, 2, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}}, {0x1602, 0xff, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}}}};
+    drive.tx = {{0x1a00, 3, 0, "", 0, {{0x6064, 0, "", 4, 32, 0}}}};
+    const std::string text = write("eth:enp3s0", 1'000'000, {drive, drive});
+    EXPECT_TRUE(text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1000us\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = 0x402\nrevision = 0x10001+  # or a higher one\n"
+                                 "outputs = 6040:00 u16, gap 8, 7000:01 bit\ninputs = 6064:00 s32\n"))
+        << text;
+    const Bus bus = good(text);
+    ASSERT_EQ(bus.setup.slaves.size(), 2U);
+    EXPECT_EQ(bus.setup.slaves[1].name, "axis-x-1");
+    EXPECT_EQ(bus.setup.slaves[0].sync_managers[0].pdos[0].index, 0x1601);
+    EXPECT_EQ(bus.setup.slaves[0].dc->assign_activate, 0x300);
+}
+
+TEST(EthercatConfig, Any_bytes_are_read_without_harm) {
+    std::mt19937 random(3);
+    for (int n = 0; n < 1500; ++n) {
+        std::string text = servo;
+        for (int i = 0; i < 1 + n % 6; ++i) {
+            const std::size_t at = random() % text.size();
+            switch (random() % 3) {
+            case 0: text[at] = static_cast<char>(random()); break;
+            case 1: text.erase(at, random() % 20); break;
+            default: text.insert(at, text.substr(random() % text.size(), random() % 40)); break;
+            }
+        }
+        for (const Bus& bus : read(text, "m.ethercat", read_test_file).buses) plan(bus);
+    }
+}
+
+}  // namespace
+}  // namespace hal::ethercat::config
