@@ -26,6 +26,15 @@ std::uint64_t Bus::dc_now() const noexcept {
     return reference >= 0 && status.dc_time_ns != 0 ? status.dc_time_ns : static_cast<std::uint64_t>(engine.now_ns() + epoch_ns);
 }
 
+bool Bus::clocks_missing() const noexcept {
+    if (reference < 0) return false;
+    if (!devices[static_cast<std::size_t>(reference)]->slave.present) return true;
+    return std::any_of(by_position.begin(), by_position.end(), [&](std::uint16_t n) {
+        const Device& d = *devices[n];
+        return d.slave.present && d.identified && d.slave.has_dc() && !d.clock_set;
+    });
+}
+
 void Bus::leave(Device& d) noexcept {
     d.slave.present = false, d.slave.state = State::none, d.slave.mailbox_status = nullptr;
     d.status.online = d.status.operational = d.status.al_error = false;

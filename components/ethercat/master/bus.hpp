@@ -61,7 +61,8 @@ struct Bus {
     bool resting = false;                          ///< the supervision waits; Master wakes it when `suspicious` is set
     int reference = -1;                            ///< device with the reference clock
     std::int64_t epoch_ns = 0;                     ///< system time of the clocks minus the clock of the cycle
-    std::uint64_t dc_high = 0;                     ///< extends the time of a 32-bit reference clock
+    std::int64_t skew_ns = 0;                      ///< system time minus the clock of the cycle, by the newest frame; 0: not known
+    std::uint32_t unknown_product = 0;             ///< of the slave last reported as unknown, so that it is reported once
     bool reported_empty = false;
     bool ring_changed = false;                     ///< the newest broadcast found the ring in another state
 
@@ -80,6 +81,7 @@ struct Bus {
         d.channel.set_now(engine.now_ns());
         d.channel.start(make);
     }
+    bool clocks_missing() const noexcept;   ///< Returns whether a slave has a clock that is not set, or the reference clock is lost.
     std::uint64_t dc_now() const noexcept;  ///< Returns the system time at the start of the cycle, as well as it is known.
     void leave(Device&) noexcept;           ///< Takes a slave out of the working counters and the list of those present.
     void update_status() noexcept;          ///< Derives the state of the bus from those of the slaves.

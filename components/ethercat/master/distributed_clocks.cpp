@@ -54,6 +54,10 @@ int choose_reference(const Bus& bus) noexcept {
         if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 && bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) return n;
     int first = -1;
     for (const std::uint16_t number : bus.by_position) {
+        const Device& d = *bus.devices[number];
+        if (d.slave.present && d.clock_set && d.slave.has_dc64()) return number;
+    }
+    for (const std::uint16_t number : bus.by_position) {
         const BusSlave& s = bus.devices[number]->slave;
         if (!s.present || !s.has_dc()) continue;
         if (s.has_dc64()) return number;
@@ -81,9 +85,10 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         if (d.slave.present && d.slave.has_dc()) co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d.slave); });
     }
     co_await wait_for_helpers(c, bus);
-    if (bus.reference < 0) {
-        bus.reference = choose_reference(bus);
-        if (bus.reference < 0) co_return;
+    if (bus.reference < 0 || !bus.devices[static_cast<std::size_t>(bus.reference)]->slave.present) {
+        const int chosen = choose_reference(bus);  // a running clock, if there is one, so that the time of the others continues
+        if (chosen < 0) co_return;
+        bus.reference = chosen;
         const Device& d = *bus.devices[static_cast<std::size_t>(bus.reference)];
         bus.report(Event::reference_clock, d, d.slave.has_dc64() ? 1 : 0);
     }
@@ -101,7 +106,7 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         BusSlave& s = d.slave;
         if (!s.present || !s.has_dc() || d.clock_set) continue;  // never those of running slaves
         // The frame with the latch passed this slave a delay after it passed the reference clock.
-        const auto system = static_cast<std::uint64_t>(latched_ns + bus.epoch_ns) + s.delay_ns;
+        const auto system = static_cast<std::uint64_t>(latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) + s.delay_ns;
         const std::uint64_t offset = system - s.local_time;
         co_await start_or_do(c, bus, d, [&d, offset](Channel& on) { return set_clock(on, d, offset); });
     }
@@ -169,6 +174,7 @@ void take_clock(Bus& bus) noexcept {
         time = guess + static_cast<std::uint64_t>(static_cast<std::int64_t>(step));
     }
     bus.status.dc_time_ns = time;
+    if (bus.devices[static_cast<std::size_t>(bus.reference)]->clock_set) bus.skew_ns = static_cast<std::int64_t>(time) - sample.sent_ns;
 }
 
 }  // namespace hal::ethercat::master

@@ -54,6 +54,7 @@ void Master::transmit(std::int64_t now_ns) noexcept {
 void Master::rescan() noexcept {
     Bus& bus = *bus_;
     bus.reference = -1;
+    bus.skew_ns = 0;
     bus.status.dc_active = false;
     bus.image.set_reference(0, false);
     bus.bus_channel.set_now(bus.engine.now_ns());

@@ -43,6 +43,8 @@ void start(Bus& bus, Device& d) noexcept {
 Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     BusSlave found;
     found.station = spare_station, found.position = position;
+    // One that was not accepted before keeps the spare address; two of them would both answer.
+    co_await write<std::uint16_t>(c, found, registers::station_address, 0);
     put(c.data(), spare_station);
     Answer a = co_await c.exchange(Command::apwr, at_position(position, registers::station_address), 2);
     if (a.wkc != 1) co_return -1;
@@ -69,9 +71,10 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
         for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {  // the position is known, the slave is another one
             const int device = bus.device_of[n];
             if (bus.setup.slaves[n].position != position || (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present)) continue;
-            if (device >= 0) matches(bus, bus.setup.slaves[n], found, bus.devices[static_cast<std::size_t>(device)].get());
+            if (device >= 0 && found.product != bus.unknown_product) matches(bus, bus.setup.slaves[n], found, bus.devices[static_cast<std::size_t>(device)].get());
         }
-        bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor, found.product);
+        if (std::exchange(bus.unknown_product, found.product) != found.product)
+            bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor, found.product);
         co_return -1;
     }
     Device& d = *place;
@@ -86,6 +89,7 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     bus.device_of[static_cast<std::size_t>(configured)] = d.slave.number;
     d.identified = true, d.refused = false, d.clock_set = d.synchronised = false;
     d.status.online = true;
+    bus.unknown_product = 0;
     co_return d.slave.number;
 }
 
@@ -178,6 +182,8 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         const auto states = get<std::uint16_t>(c.data());
         bus.status.responding = static_cast<std::uint16_t>(count);
         if (bus.engine.redundant()) judge_ring(bus, count);
+        // On a broken ring the delays are others; they are frozen until it is closed.
+        if (bus.clocks_missing() && !bus.status.ring_broken) co_await start_clocks(c, bus);
 
         unsigned present = 0;
         bool at_rest = true;
@@ -204,8 +210,8 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         const bool returned = co_await rediscover(c, bus, bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
         if (!returned) continue;
         co_await find_ports(c, bus, true);
-        if (!bus.status.ring_broken) co_await start_clocks(c, bus);
         start_returned(bus);
+        bus.suspicious = true;  // for their clocks
     }
 }
 

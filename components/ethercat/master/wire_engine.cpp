@@ -188,7 +188,7 @@ void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept
     const ProcessImage::Frame& frame = image_.frames()[f.place];
     image_.take(frame, answer);
     const std::uint8_t* time = answer + frame.clock_read + datagram_header_bytes;
-    if (get<std::uint16_t>(time + 8) != 0 && !clock_.fresh) clock_ = {true, get<std::uint64_t>(time), sent_after_ns_};
+    if (get<std::uint16_t>(time + 8) != 0 && !clock_.fresh) clock_ = {true, get<std::uint64_t>(time), f.sent_ns, sent_after_ns_};
     f.kind = Flight::Kind::none, f.merged = true;
     --in_flight_;
 }

@@ -26,6 +26,7 @@ public:
     struct ClockSample {
         bool fresh = false;             ///< came with the newest cycle
         std::uint64_t dc_ns = 0;        ///< when the frame passed the reference clock, its time
+        std::int64_t sent_ns = 0;       ///< when the frame left, on the clock of the cycle
         std::int64_t sent_after_ns = 0; ///< between the start of that cycle and the sending of the frame
     };
 

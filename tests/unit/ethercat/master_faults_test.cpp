@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "tests/unit/ethercat/master_world.hpp"
 
+#include <random>
+
 namespace {
 
 using namespace master_world;
@@ -113,6 +115,42 @@ TEST_F(EthercatFaults, A_ring_works_closed_broken_and_closed_again) {
     EXPECT_FALSE(w.master->status().ring_broken);
     EXPECT_TRUE(w.master->status().operational);
     EXPECT_EQ(w.log.count(Event::ring_closed), 1U);
+}
+
+TEST(EthercatSoak, Always_in_op_again_after_power_cables_and_frames_failed_at_random) {
+    for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+        for (const bool ring : {false, true}) {
+            World w;
+            for (unsigned n = 0; n < 6; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 10.0 * n});
+            if (ring) w.line.close_ring(5, 1);
+            auto setup = drives(6);
+            for (auto& s : setup.slaves) s.dc = Dc{.assign_activate = 0x0300};
+            w.begin(setup, ring);
+            std::mt19937 generator(seed);
+            const auto random = [&] { return static_cast<unsigned>(generator()); };
+            for (unsigned step = 0; step < 60; ++step) {
+                const std::size_t slave = random() % 6;
+                switch (random() % 5) {
+                case 0: w.line.set_power(slave, false, w.now_ns); break;
+                case 1: w.line.set_power(slave, true, w.now_ns); break;
+                case 2: w.line.set_cable(slave, 0, random() % 2 == 0); break;
+                case 3: w.primary.lose_every = random() % 3 == 0 ? 2 + random() % 9 : 0; break;
+                default: w.primary.double_every = random() % 3 == 0 ? 2 + random() % 9 : 0; break;
+                }
+                w.run(random() % 150);
+            }
+            w.primary.lose_every = w.primary.double_every = 0;
+            for (std::size_t n = 0; n < 6; ++n) {
+                w.line.set_cable(n, 0, true);
+                if (!w.line.controller(n).powered()) w.line.set_power(n, true, w.now_ns);
+            }
+            w.run(300);  // a change of the last step is noticed
+            ASSERT_TRUE(w.operational(30000)) << "seed " << seed << (ring ? " ring " : " line ") << w.log.text().substr(w.log.text().size() - std::min<std::size_t>(2000, w.log.text().size()));
+            for (std::size_t n = 0; n < 6; ++n) w.master->data(n, 0)[0] = static_cast<std::uint8_t>(n + 50);
+            w.run(4);
+            for (std::size_t n = 0; n < 6; ++n) EXPECT_EQ(w.master->data(n, 1)[0], n + 51) << n;
+        }
+    }
 }
 
 TEST_F(EthercatFaults, An_optional_slave_may_be_missing_and_join_later) {
