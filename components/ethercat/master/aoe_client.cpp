@@ -10,7 +10,8 @@ namespace {
 // Number of the request, command.
 bool accepts_aoe(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
     const auto header = aoe::read(payload);
-    return header && header->response() && header->invoke == expected.first && static_cast<std::uint32_t>(header->command) == expected.second;
+    return header && header->response() && header->invoke == expected.first &&
+        static_cast<std::uint32_t>(header->command) == expected.second;
 }
 
 void write_request(std::uint8_t* to, const AoeAddress& address, aoe::Command command, std::uint32_t data, std::uint32_t invoke,
@@ -36,7 +37,8 @@ Task<MailboxResult> AoeClient::read(Channel& channel, BusSlave& slave, const Aoe
     const std::size_t most = std::min<std::size_t>(to.size(), slave.area().in_size - overhead);
     write_request(body.data(), address, aoe::Command::read, aoe::address_bytes, ++invoke_, group, offset, static_cast<std::uint32_t>(most));
     const Expected expected{accepts_aoe, invoke_, static_cast<std::uint32_t>(aoe::Command::read)};
-    const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::aoe, aoe::header_bytes + aoe::address_bytes, expected);
+    const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::aoe, aoe::header_bytes + aoe::address_bytes,
+        expected);
     if (!result) co_return result;
     const auto payload = mailbox->reply().payload;
     const std::uint32_t error = get<std::uint32_t>(payload.data() + 24);
@@ -52,7 +54,8 @@ Task<MailboxResult> AoeClient::read(Channel& channel, BusSlave& slave, const Aoe
     co_return succeeded(length);
 }
 
-Task<MailboxResult> AoeClient::write(Channel& channel, BusSlave& slave, const AoeAddress& address, std::uint32_t group, std::uint32_t offset,
+Task<MailboxResult> AoeClient::write(Channel& channel, BusSlave& slave, const AoeAddress& address, std::uint32_t group,
+    std::uint32_t offset,
                                      std::span<const std::uint8_t> from) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();

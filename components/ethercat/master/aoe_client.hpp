@@ -21,7 +21,8 @@ struct AoeAddress {
 class AoeClient {
 public:
     explicit AoeClient(Mailboxes& mailboxes) noexcept : mailboxes_(mailboxes) {}
-    Task<MailboxResult> read(Channel&, BusSlave&, const AoeAddress&, std::uint32_t group, std::uint32_t offset, std::span<std::uint8_t> to) noexcept;
+    Task<MailboxResult> read(Channel&, BusSlave&, const AoeAddress&, std::uint32_t group, std::uint32_t offset,
+        std::span<std::uint8_t> to) noexcept;
     Task<MailboxResult> write(Channel&, BusSlave&, const AoeAddress&, std::uint32_t group, std::uint32_t offset,
                               std::span<const std::uint8_t> from) noexcept;
 

@@ -55,7 +55,8 @@ class CoeClient final : public CoeAccess {
 public:
     explicit CoeClient(Mailboxes& mailboxes) noexcept : mailboxes_(mailboxes) {}
 
-    Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete, std::span<std::uint8_t> to) noexcept override;
+    Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
+        std::span<std::uint8_t> to) noexcept override;
     Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                              std::span<const std::uint8_t> from) noexcept override;
 
@@ -68,7 +69,8 @@ public:
                               std::span<char> name) noexcept;
 
 private:
-    Task<SdoResult> upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::size_t size, std::size_t first,
+    Task<SdoResult> upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::size_t size,
+        std::size_t first,
                                     std::span<std::uint8_t> to) noexcept;
     Task<SdoResult> download_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub,
                                       std::span<const std::uint8_t> rest) noexcept;

@@ -47,7 +47,7 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave, co
     MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::coe, coe::information_header_bytes + what_bytes);
     if (!result) co_return result;
 
-    // Each fragment announces how many follow, which tells a duplicate from the next one.
+    // Each fragment announces how many follow, which distinguishes a duplicate from the next one.
     const auto response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
     std::size_t used = 0;
     bool first = true;
@@ -78,7 +78,8 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave, co
 
 Task<MailboxResult> CoeClient::list(Channel& channel, BusSlave& slave, coe::List which, std::span<std::uint8_t> to) noexcept {
     std::array<std::uint8_t, 2> head{};  // the type; following fragments have none
-    const MailboxResult result = co_await information(channel, slave, coe::Information::list_request, static_cast<std::uint16_t>(which), 2, head, to);
+    const MailboxResult result = co_await information(channel, slave, coe::Information::list_request, static_cast<std::uint16_t>(which),
+        2, head, to);
     co_return result;
 }
 
@@ -94,7 +95,8 @@ Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::ui
     co_return result;
 }
 
-Task<MailboxResult> CoeClient::entry(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub, EntryDescription& description,
+Task<MailboxResult> CoeClient::entry(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub,
+    EntryDescription& description,
                                      std::span<char> name) noexcept {
     std::array<std::uint8_t, 10> head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};

@@ -65,7 +65,8 @@ Task<MailboxResult> FoeClient::exchange(Channel& channel, BusSlave& slave, Slave
     }
 }
 
-Task<MailboxResult> FoeClient::read(Channel& channel, BusSlave& slave, std::string_view name, FoeOptions options, std::span<std::uint8_t> to,
+Task<MailboxResult> FoeClient::read(Channel& channel, BusSlave& slave, std::string_view name, FoeOptions options,
+    std::span<std::uint8_t> to,
                                     FoeProgress& progress) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();

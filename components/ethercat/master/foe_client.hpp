@@ -37,7 +37,8 @@ public:
 
 private:
     /// Sends the message in the mailbox's body, again while the slave is busy, and waits for the answer to `packet`.
-    Task<MailboxResult> exchange(Channel&, BusSlave&, SlaveMailbox&, std::size_t length, foe::Opcode answer, std::uint32_t packet, FoeOptions,
+    Task<MailboxResult> exchange(Channel&, BusSlave&, SlaveMailbox&, std::size_t length, foe::Opcode answer, std::uint32_t packet,
+        FoeOptions,
                                  FoeProgress&) noexcept;
     Mailboxes& mailboxes_;
 };

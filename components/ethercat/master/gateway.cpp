@@ -147,7 +147,8 @@ void Gateway::take(std::span<const std::uint8_t> bytes, const Sender& sender) {
         else ++dropped_;
         return;
     }
-    const auto slave = std::find_if(setup_.slaves.begin(), setup_.slaves.end(), [&](const auto& s) { return s.station == message->station; });
+    const auto slave = std::find_if(setup_.slaves.begin(), setup_.slaves.end(),
+        [&](const auto& s) { return s.station == message->station; });
     pending->sender = sender;
     MailboxRequest& request = pending->request;
     request.kind = MailboxRequest::Kind::message;
@@ -176,7 +177,8 @@ void Gateway::answer(const Sender& sender, std::span<const std::uint8_t> message
     if (sender.client == 0) {
         sent = sendto(udp_, bytes.data(), length, 0, reinterpret_cast<const sockaddr*>(&sender.address), sizeof sender.address);
     } else {
-        const auto client = std::find_if(clients_.begin(), clients_.end(), [&](const auto& c) { return c->id == sender.client && c->fd >= 0; });
+        const auto client = std::find_if(clients_.begin(), clients_.end(), [&](const auto& c) { return c->id == sender.client &&
+            c->fd >= 0; });
         if (client != clients_.end()) {
             sent = send((*client)->fd, bytes.data(), length, MSG_NOSIGNAL);
             if (sent != static_cast<ssize_t>(length)) shutdown((*client)->fd, SHUT_RDWR);  // a part would end the framing

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP while the machine runs. There is no access
-// control in the protocol, so it listens on the loopback interface unless told otherwise.
+// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP while the machine runs. There is no
+// access
+// control in the protocol, so it listens on the loopback interface by default.
 #pragma once
 
 #include <array>

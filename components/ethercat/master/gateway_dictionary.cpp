@@ -21,7 +21,8 @@ MasterValue value_of(std::span<const GatewaySlave> slaves, std::uint16_t index, 
     if (index == 0x1008 && sub == 0) return {0, 0, "Halcyon EtherCAT master"};
     if (index == 0x1018 && sub == 0) return {4, 1, {}};
     if (index == 0x1018 && sub <= 4) return {0, 4, {}};
-    if (index == 0xf000 && sub <= 2) return sub == 0 ? MasterValue{2, 1, {}} : MasterValue{sub == 1 ? 1U : static_cast<std::uint32_t>(most_slaves), 2, {}};
+    if (index == 0xf000 && sub <= 2) return sub == 0 ? MasterValue{2, 1,
+        {}} : MasterValue{sub == 1 ? 1U : static_cast<std::uint32_t>(most_slaves), 2, {}};
     if (index >= 0xf020 && index <= 0xf02f) {
         const std::size_t first = (index - 0xf020U) * addresses_per_object;
         const std::size_t count = slaves.size() <= first ? 0 : std::min(slaves.size() - first, addresses_per_object);
@@ -65,9 +66,12 @@ std::size_t answer_for_master(std::span<const GatewaySlave> slaves, std::span<st
     if (sdo->command == coe::command::abort) return 0;
     if (!sdo->is(coe::command::upload)) reply.value = coe::abort::read_only;
     else if (sdo->complete()) reply.value = coe::abort::no_complete_access;
-    else if (value.bytes == 0 && value.text.empty()) reply.value = value_of(slaves, sdo->index, 0).bytes != 0 ? coe::abort::no_sub : coe::abort::no_object;
-    else if (value.text.empty()) reply.command = coe::expedited_command(coe::command::upload_response, value.bytes), reply.value = value.number;
-    else reply.command = coe::command::upload_response | coe::command::size_given, reply.value = static_cast<std::uint32_t>(value.text.size());
+    else if (value.bytes == 0 && value.text.empty()) reply.value = value_of(slaves, sdo->index,
+        0).bytes != 0 ? coe::abort::no_sub : coe::abort::no_object;
+    else if (value.text.empty()) reply.command = coe::expedited_command(coe::command::upload_response, value.bytes),
+        reply.value = value.number;
+    else reply.command = coe::command::upload_response | coe::command::size_given,
+        reply.value = static_cast<std::uint32_t>(value.text.size());
     std::size_t bytes = coe::write_sdo(payload, coe::Service::sdo_response, reply);
     if (reply.command != coe::command::abort && !value.text.empty()) {
         std::memcpy(payload + bytes, value.text.data(), value.text.size());

@@ -89,7 +89,8 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave, std
     }
 }
 
-Task<MailboxResult> SlaveMailbox::exchange(Channel& channel, BusSlave& slave, MailboxType type, std::size_t length, Expected expected) noexcept {
+Task<MailboxResult> SlaveMailbox::exchange(Channel& channel, BusSlave& slave, MailboxType type, std::size_t length,
+    Expected expected) noexcept {
     MailboxResult result = co_await send(channel, slave, type, length);
     if (!result) co_return result;
     result = co_await wait_for(channel, slave, type, response_timeout_ns(slave), expected);
@@ -128,7 +129,8 @@ Task<MailboxResult> SlaveMailbox::poll(Channel& channel, BusSlave& slave) noexce
 
 Task<bool> SlaveMailbox::read(Channel& channel, BusSlave& slave, std::int64_t until_ns) noexcept {
     const std::size_t size = std::min<std::size_t>(slave.area().in_size, largest_mailbox);
-    const Answer answer = co_await channel.exchange(Command::fprd, at_station(slave.station, slave.area().in_start), static_cast<std::uint16_t>(size), 0);
+    const Answer answer = co_await channel.exchange(Command::fprd, at_station(slave.station, slave.area().in_start),
+        static_cast<std::uint16_t>(size), 0);
     if (!answer) {  // the message may have left the slave
         ++counters_.repeated, ++lost_reads_;
         co_await repeat(channel, slave, until_ns);
@@ -142,7 +144,8 @@ Task<bool> SlaveMailbox::read(Channel& channel, BusSlave& slave, std::int64_t un
 
 Task<bool> SlaveMailbox::repeat(Channel& channel, BusSlave& slave, std::int64_t until_ns) noexcept {
     const std::uint32_t address = at_station(slave.station, activate_of(1));
-    until_ns = std::min(until_ns, channel.now_ns() + std::int64_t{slave.timeouts.mailbox_request} * 1'000'000);  // not every slave acknowledges
+    // not every slave acknowledges
+    until_ns = std::min(until_ns, channel.now_ns() + std::int64_t{slave.timeouts.mailbox_request} * 1'000'000);
     std::uint8_t wanted = 0;
     for (bool toggled = false; !toggled;) {
         Answer answer = co_await channel.exchange(Command::fprd, address, 1);
@@ -179,7 +182,7 @@ bool SlaveMailbox::accept(const BusSlave& slave, std::size_t size) noexcept {
     return true;
 }
 
-// A slave that repeats a message does so with its counter. One that never counts, or always sends the same number, is not judged by it.
+// A slave that repeats a message does so with its counter. One that never counts, or always sends the same number, is exempt.
 bool SlaveMailbox::is_duplicate(const MailboxMessage& message) noexcept {
     const std::uint64_t sum = sum_of(message.payload);
     const bool same_counter = message.counter != 0 && message.counter == last_counter_;

@@ -139,7 +139,8 @@ public:
     /// Allocates the mailboxes of slaves 0..count-1. [setup]
     explicit Mailboxes(std::size_t count) : count_(count), mailboxes_(std::make_unique<SlaveMailbox[]>(count)) {}
     /// Returns the mailbox of a slave; nullptr if the slave has none or is unknown. [realtime]
-    SlaveMailbox* find(const BusSlave& slave) noexcept { return slave.number < count_ && slave.area().usable() ? &mailboxes_[slave.number] : nullptr; }
+    SlaveMailbox* find(const BusSlave& slave) noexcept { return slave.number < count_ &&
+        slave.area().usable() ? &mailboxes_[slave.number] : nullptr; }
     /// Returns the mailbox number `n`, below size(). [any]
     SlaveMailbox& at(std::size_t n) noexcept { return mailboxes_[n]; }
     std::size_t size() const noexcept { return count_; }
@@ -149,8 +150,9 @@ private:
     std::unique_ptr<SlaveMailbox[]> mailboxes_;
 };
 
-/// Returns the result of a protocol that was refused, `code` being a mailbox error or 0. [any]
-constexpr MailboxResult refused(std::uint32_t code = 0, std::size_t length = 0) noexcept { return {MailboxResult::Outcome::refused, code, length}; }
+/// Returns the result of a rejected request, `code` being a mailbox error or 0. [any]
+constexpr MailboxResult refused(std::uint32_t code = 0, std::size_t length = 0) noexcept { return {MailboxResult::Outcome::refused, code,
+    length}; }
 /// Returns the result of a protocol's own error. [any]
 constexpr MailboxResult aborted(std::uint32_t code) noexcept { return {MailboxResult::Outcome::aborted, code, 0}; }
 /// Returns the result of success. [any]

@@ -96,7 +96,8 @@ void RequestServer::step(std::int64_t now_ns) noexcept {
             }
             const bool frames = switch_ != nullptr && switch_->pending(*slave);
             const bool full = slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
-            const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present && now_ns - slot.polled_ns >= poll_interval_ns_;
+            const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present &&
+                now_ns - slot.polled_ns >= poll_interval_ns_;
             if (slot.first == nullptr && !frames && !full && !due) continue;
             if (slot.first == nullptr && mailboxes_.at(n).held()) continue;  // its holder reads the mailbox
             slot.busy = true, slot.polled_ns = now_ns;

@@ -89,7 +89,8 @@ public:
     /// Returns a port for one more thread. [setup]
     RequestPort& open(std::size_t capacity = 16);
     std::size_t workers() const noexcept { return workers_.size(); }
-    Channel& channel(std::size_t n) noexcept { return workers_[n]->channel; }  ///< Returns the channel of a worker, to be added to the engine. [setup]
+    /// Returns the channel of a worker, to be added to the engine. [setup]
+    Channel& channel(std::size_t n) noexcept { return workers_[n]->channel; }
     /// Serves the frames of a switch too. [setup]
     void set_switch(EoeSwitch* frames) noexcept { switch_ = frames; }
     /// Sets how often a mailbox is read without a request where the process image does not report it full, in ns; 0: never. [setup]

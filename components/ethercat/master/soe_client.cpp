@@ -11,7 +11,8 @@ namespace {
 // Operation and drive << 8, IDN, fragments that the last fragment announced (0: this is the first one).
 bool accepts_soe(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
     const auto header = soe::read(payload);
-    if (!header || static_cast<std::uint32_t>(header->opcode) != (expected.first & 0xff) || header->drive != expected.first >> 8) return false;
+    if (!header || static_cast<std::uint32_t>(header->opcode) != (expected.first & 0xff) ||
+        header->drive != expected.first >> 8) return false;
     if (header->error) return payload.size() >= soe::header_bytes + 2;
     return header->incomplete ? expected.third == 0 || header->idn < expected.third : header->idn == expected.second;
 }
@@ -57,7 +58,8 @@ Task<MailboxResult> SoeClient::read(Channel& channel, BusSlave& slave, std::uint
     soe::write(mailbox->body(slave).data(), {soe::Opcode::read, false, false, drive, elements, idn});
     MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::soe, soe::header_bytes);
     if (!result) co_return result;
-    Expected expected{accepts_soe, static_cast<std::uint32_t>(soe::Opcode::read_response) | static_cast<std::uint32_t>(drive & 7U) << 8, idn, 0};
+    Expected expected{accepts_soe, static_cast<std::uint32_t>(soe::Opcode::read_response) | static_cast<std::uint32_t>(drive & 7U) << 8,
+        idn, 0};
     std::size_t used = 0;
     bool overflow = false;
     for (;;) {
@@ -95,7 +97,8 @@ Task<MailboxResult> SoeClient::write(Channel& channel, BusSlave& slave, std::uin
         const MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::soe, soe::header_bytes + bytes);
         if (!result) co_return result;
     }
-    const Expected expected{accepts_soe, static_cast<std::uint32_t>(soe::Opcode::write_response) | static_cast<std::uint32_t>(drive & 7U) << 8, idn, 0};
+    const Expected expected{accepts_soe,
+        static_cast<std::uint32_t>(soe::Opcode::write_response) | static_cast<std::uint32_t>(drive & 7U) << 8, idn, 0};
     const std::int64_t timeout = SlaveMailbox::response_timeout_ns(slave);
     const MailboxResult result = co_await mailbox->wait_for(channel, slave, MailboxType::soe, timeout, expected);
     if (!result) co_return result;

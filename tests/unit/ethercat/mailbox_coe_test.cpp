@@ -60,7 +60,8 @@ struct CoeSlave : MailboxSlave {
                 if (size <= 4 && size != 0) {
                     std::uint32_t value = 0;
                     std::memcpy(&value, target->data(), size);
-                    coe::write_sdo(p.data(), coe::Service::sdo_response, {static_cast<std::uint8_t>(0x43 | (4 - size) << 2), index, sub, value});
+                    coe::write_sdo(p.data(), coe::Service::sdo_response, {static_cast<std::uint8_t>(0x43 | (4 - size) << 2), index, sub,
+                        value});
                     return answer(p);
                 }
                 at = std::min(size, room - 10);
@@ -106,7 +107,8 @@ struct CoeSlave : MailboxSlave {
         Bytes data;
         if (m.payload[2] == 1) {
             data = {m.payload[6], m.payload[7]};
-            for (const auto& [key, value] : objects) data.push_back(static_cast<std::uint8_t>(key >> 8)), data.push_back(static_cast<std::uint8_t>(key >> 16));
+            for (const auto& [key, value] : objects) data.push_back(static_cast<std::uint8_t>(key >> 8)),
+                data.push_back(static_cast<std::uint8_t>(key >> 16));
         } else if (m.payload[2] == 3) {
             data = {m.payload[6], m.payload[7], 7, 0, 3, 9};
             for (const char c : std::string("A name longer than one mailbox of 64 bytes can hold in one go")) data.push_back(static_cast<std::uint8_t>(c));
@@ -116,8 +118,10 @@ struct CoeSlave : MailboxSlave {
         const std::size_t chunk = (room - 6) / 2 * 2, fragments = (data.size() + chunk - 1) / chunk;
         for (std::size_t i = 0; i < fragments; ++i) {
             Bytes p(6);
-            coe::write_information(p.data(), {static_cast<coe::Information>(m.payload[2] + 1), i + 1 < fragments, static_cast<std::uint16_t>(fragments - 1 - i)});
-            p.insert(p.end(), data.begin() + static_cast<long>(i * chunk), data.begin() + static_cast<long>(std::min(data.size(), (i + 1) * chunk)));
+            coe::write_information(p.data(), {static_cast<coe::Information>(m.payload[2] + 1), i + 1 < fragments,
+                static_cast<std::uint16_t>(fragments - 1 - i)});
+            p.insert(p.end(), data.begin() + static_cast<long>(i * chunk), data.begin() + static_cast<long>(std::min(data.size(),
+                (i + 1) * chunk)));
             answer(p);
         }
     }

@@ -98,7 +98,7 @@ TEST(EthercatGateway, Invalid_requests_are_dropped) {
     f.send(f.upload(0x1001, 0x2000, 3));
     for (unsigned i = 0; i < 100; ++i) {
         const Bytes reply = f.receive();
-        ASSERT_FALSE(reply.empty());
+        if (reply.empty()) f.send(f.upload(0x1001, 0x2000, 3));  // a full socket buffer drops requests
         if (reply.size() == 18 && get<std::uint32_t>(reply.data() + 14) == 0xcafe) return;
     }
     FAIL() << "the valid request is not answered";
