@@ -10,9 +10,13 @@ std::int64_t Clock::at(std::int64_t now_ns) const noexcept {
     return base_local_ + passed + static_cast<std::int64_t>(std::floor(fraction_ + static_cast<double>(passed) * (drift_ + correction_)));
 }
 
+/// Beyond this many ns a time is never reached: 31 years.
+static constexpr std::int64_t never_ns = 1'000'000'000'000'000'000;
+
 std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
     const double       rate = drift_ + correction_;
-    const std::int64_t left = local_ns - base_local_;
+    const auto         left = static_cast<std::int64_t>(static_cast<std::uint64_t>(local_ns) - static_cast<std::uint64_t>(base_local_));
+    if (left > never_ns || left < -never_ns) return INT64_MAX;
     const double       ahead = (static_cast<double>(left) * rate + fraction_) / (1.0 + rate);
     std::int64_t       now = base_now_ + left - static_cast<std::int64_t>(std::floor(ahead));
     for (int i = 0; i < 4 && at(now) < local_ns; ++i) ++now;

@@ -12,7 +12,7 @@ namespace hal::ethercat::esc {
 namespace controller_facts {
 constexpr std::size_t   memory_bytes = 0x10000;
 constexpr std::int64_t  idle_ns = 1'000'000;    ///< the application runs at least this often
-constexpr std::int64_t  longest_pause_ns = 10'000'000'000;  ///< without frames; SYNC pulses and idle work of more are skipped
+constexpr std::int64_t  longest_pause_ns = 2'000'000'000;  ///< without frames; SYNC pulses and idle work of more are skipped
 constexpr std::int64_t  bystander_ns = 200'000; ///< and at frames that did not concern it, if it did not run for this long
 constexpr std::uint32_t watchdog_event = 0x40;
 constexpr std::uint16_t al_status_event = 0x0008;

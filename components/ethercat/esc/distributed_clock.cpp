@@ -39,7 +39,8 @@ void DistributedClock::latch_receive_times(std::int64_t unit_ns, std::uint64_t n
 }
 
 std::int64_t DistributedClock::system_time(std::int64_t now_ns) const noexcept {
-    return clock_.at(now_ns) + get<std::int64_t>(memory_ + registers::dc_system_time_offset);
+    const auto local = static_cast<std::uint64_t>(clock_.at(now_ns));
+    return static_cast<std::int64_t>(local + get<std::uint64_t>(memory_ + registers::dc_system_time_offset));
 }
 
 void DistributedClock::show_system_time(std::int64_t now_ns) noexcept {
@@ -87,15 +88,18 @@ void DistributedClock::clear_filters(std::int64_t now_ns) noexcept {
 void DistributedClock::clock_changed(std::int64_t now_ns) noexcept {
     if (!sync0_on_) return;
     const std::int64_t time = system_time(now_ns), cycle = sync_.sync0_cycle_ns;
-    if (!waits_ && cycle > 0 && sync0_dc_ < time - cycle) sync0_dc_ += (time - sync0_dc_) / cycle * cycle;  // a jump skips pulses
-    if (sync1_on_ && sync1_dc_ < time - cycle) sync1_dc_ = INT64_MAX;
+    const auto behind = [&](std::int64_t pulse) {
+        return static_cast<std::int64_t>(static_cast<std::uint64_t>(time) - static_cast<std::uint64_t>(pulse));
+    };
+    if (cycle > 0 && sync0_dc_ != INT64_MAX && behind(sync0_dc_) > cycle) sync0_dc_ += behind(sync0_dc_) / cycle * cycle;  // a jump skips pulses
+    if (sync1_on_ && sync1_dc_ != INT64_MAX && behind(sync1_dc_) > cycle) sync1_dc_ = INT64_MAX;
     find_next();
 }
 
 void DistributedClock::activate(std::int64_t now_ns) noexcept {
     if (!present_) return;
     const std::uint8_t activation = memory_[registers::dc_activation];
-    constexpr std::uint32_t shortest_cycle_ns = 1000;
+    constexpr std::uint32_t shortest_cycle_ns = 10'000;
     sync_.sync0_cycle_ns = get<std::uint32_t>(memory_ + registers::dc_sync0_cycle);
     if (sync_.sync0_cycle_ns != 0) sync_.sync0_cycle_ns = std::max(sync_.sync0_cycle_ns, shortest_cycle_ns);
     sync_.sync1_cycle_ns = get<std::uint32_t>(memory_ + registers::dc_sync1_cycle);
@@ -113,7 +117,7 @@ void DistributedClock::activate(std::int64_t now_ns) noexcept {
         if (start < time) {
             memory_[dc_registers::activation_status] = 0x04;  // in the past: no pulse, as if the start waited for the wrap of 64 bits
         } else {
-            sync0_dc_ = start, waits_ = true;
+            sync0_dc_ = start;
             memory_[dc_registers::activation_status] = sync1_on_ ? 0x03 : 0x01;
         }
     }
@@ -122,7 +126,8 @@ void DistributedClock::activate(std::int64_t now_ns) noexcept {
 
 void DistributedClock::find_next() noexcept {
     const std::int64_t next = std::min(sync0_dc_, sync1_dc_);
-    next_ns_ = next == INT64_MAX ? INT64_MAX : clock_.time_of(next - get<std::int64_t>(memory_ + registers::dc_system_time_offset));
+    const auto         local = static_cast<std::uint64_t>(next) - get<std::uint64_t>(memory_ + registers::dc_system_time_offset);
+    next_ns_ = next == INT64_MAX ? INT64_MAX : clock_.time_of(static_cast<std::int64_t>(local));
 }
 
 std::uint32_t DistributedClock::pulse() noexcept {
@@ -132,7 +137,6 @@ std::uint32_t DistributedClock::pulse() noexcept {
         ++sync_.pulses;
         sync_.last_pulse_ns = next_ns_;
         sync_.last_pulse_dc_ns = static_cast<std::uint64_t>(sync0_dc_);
-        waits_ = false;
         memory_[dc_registers::activation_status] &= 0xfe;
         memory_[registers::dc_sync0_status] |= 1;
         if (sync1_on_ && sync1_dc_ == INT64_MAX) sync1_dc_ = sync0_dc_ + sync_.sync1_cycle_ns;

@@ -60,7 +60,7 @@ private:
     double filtered_ = 0, speed_ = 0;
 
     Pdi::Sync sync_;
-    bool sync0_on_ = false, sync1_on_ = false, waits_ = false;
+    bool sync0_on_ = false, sync1_on_ = false;
     std::int64_t sync0_dc_ = INT64_MAX, sync1_dc_ = INT64_MAX;  ///< system time of the next pulses
     std::int64_t next_ns_ = INT64_MAX;
 };

@@ -22,7 +22,10 @@ void Line::take_commands(std::int64_t now_ns) noexcept {
 
 void Line::execute(const LineCommand& command, std::int64_t now_ns) noexcept {
     using Kind = LineCommand::Kind;
-    if (command.kind == Kind::end_cable) return command.port < ends_.size() ? set_cable(static_cast<End>(command.port), command.on) : void();
+    if (command.kind == Kind::end_cable) {
+        if (command.port < ends_.size()) set_cable(static_cast<End>(command.port), command.on);
+        return;
+    }
     if (command.kind == Kind::calm) return calm();
     if (command.kind == Kind::disturb) {
         disturb(command.disturbance);
