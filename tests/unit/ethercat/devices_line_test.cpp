@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: MIT
+// Emulated devices behind emulated controllers, driven datagram by datagram.
+#include "ethercat/devices/mailbox_device.hpp"
+#include "ethercat/devices/registry.hpp"
+#include "ethercat/devices/servo.hpp"
+#include "tests/unit/ethercat/esc_world.hpp"
+
+namespace {
+
+using namespace esc_world;
+using namespace hal::ethercat::devices;
+using Bytes = std::vector<std::uint8_t>;
+
+struct Devices : testing::Test {
+    World w;
+    Device device;
+    sii::Contents sii;
+    std::uint8_t counter = 0;
+
+    void start(std::string_view name, const DeviceOptions& options = {}) {
+        device = *make(name, options);
+        sii = sii::parse(device.sii);
+        EXPECT_TRUE(sii.problems.empty()) << sii.problems.front();
+        w.line.add({.controller = {.dc = device.dc}, .sii = device.sii, .application = device.firmware.get()});
+        w.line.power_on(0);
+    }
+    void write(std::uint16_t address, Bytes bytes) { w.send(Command::apwr, at_position(0, address), std::move(bytes)); }
+    Bytes read(std::uint16_t address, std::size_t bytes) {
+        w.send(Command::aprd, at_position(0, address), Bytes(bytes));
+        return w.data;
+    }
+    void sync_manager(unsigned n, std::uint16_t start, std::size_t length, std::uint8_t control) {
+        Bytes b(8);
+        put(&b[0], start), put(&b[2], static_cast<std::uint16_t>(length));
+        b[4] = control, b[6] = length != 0;
+        write(registers::sync_manager_at(n), b);
+    }
+    /// Returns AL status, with the code in the upper half.
+    std::uint32_t request(State s, unsigned extra = 0) {
+        write(registers::al_control, {static_cast<std::uint8_t>(static_cast<unsigned>(s) | extra), 0});
+        return status();
+    }
+    std::uint32_t status() {
+        const Bytes b = read(registers::al_status, 6);
+        return get<std::uint16_t>(&b[0]) | static_cast<std::uint32_t>(get<std::uint16_t>(&b[4])) << 16;
+    }
+    void mailboxes(const sii::Mailboxes& m) {
+        sync_manager(0, m.receive.start, m.receive.size, 0x26), sync_manager(1, m.send.start, m.send.size, 0x22);
+    }
+    void to_preop() {
+        if (sii.has_mailbox()) mailboxes(sii.mailboxes);
+        ASSERT_EQ(request(State::preop), 2U);
+    }
+    void process_data() {
+        for (unsigned n = 0; n < sii.sync_managers.size(); ++n)
+            if (const auto& sm = sii.sync_managers[n]; sm.type == sii::SmType::outputs || sm.type == sii::SmType::inputs)
+                sync_manager(n, sm.start, sm.length, sm.control);
+    }
+    const sii::SyncManager& area(sii::SmType type) {
+        for (const auto& sm : sii.sync_managers)
+            if (sm.type == type) return sm;
+        return sii.sync_managers.front();
+    }
+    void outputs(const Bytes& b) { write(area(sii::SmType::outputs).start, b); }
+    Bytes inputs() { return read(area(sii::SmType::inputs).start, area(sii::SmType::inputs).length); }
+    void to_op(const Bytes& out) {
+        to_preop();
+        process_data();
+        ASSERT_EQ(request(State::safeop), 4U);
+        if (!out.empty()) outputs(out);
+        request(State::op);
+        ASSERT_EQ(status(), 8U);
+    }
+    void post(MailboxType type, const Bytes& payload) {
+        Bytes b(sii.mailboxes.receive.size);
+        write_mailbox_header(b.data(), payload.size(), 0, type, counter = next_mailbox_counter(counter));
+        std::copy(payload.begin(), payload.end(), b.begin() + mailbox_header_bytes);
+        EXPECT_EQ(w.send(Command::apwr, at_position(0, sii.mailboxes.receive.start), b), 1);
+    }
+    /// Returns the payload of the next answer; empty if there is none.
+    Bytes fetch(MailboxType type) {
+        if (w.send(Command::aprd, at_position(0, sii.mailboxes.send.start), Bytes(sii.mailboxes.send.size)) != 1) return {};
+        const auto m = read_mailbox(w.data);
+        if (!m) return {};
+        EXPECT_EQ(m->type, type);
+        return {m->payload.begin(), m->payload.end()};
+    }
+    Bytes ask(MailboxType type, const Bytes& payload) {
+        post(type, payload);
+        return fetch(type);
+    }
+    Bytes sdo(std::uint8_t command, std::uint16_t index, std::uint8_t sub, std::uint32_t value = 0, const Bytes& data = {}) {
+        Bytes b(coe::sdo_bytes);
+        coe::write_sdo(b.data(), coe::Service::sdo_request, {command, index, sub, value});
+        b.insert(b.end(), data.begin(), data.end());
+        return ask(MailboxType::coe, b);
+    }
+    /// Returns the abort code of a download of up to 4 bytes; 0: accepted.
+    std::uint32_t download(std::uint16_t index, std::uint8_t sub, std::uint32_t value, std::size_t bytes) {
+        const auto r = coe::read_sdo(sdo(coe::expedited_command(coe::command::download, bytes), index, sub, value));
+        return r && r->is(coe::command::abort) ? r->value : 0;
+    }
+    std::uint32_t upload(std::uint16_t index, std::uint8_t sub) {
+        const auto r = coe::read_sdo(sdo(coe::command::upload, index, sub));
+        return r ? r->value : 0xdeadbeef;
+    }
+};
+
+TEST_F(Devices, Digital_outputs_reach_the_terminals_in_op_only) {
+    start("digital_out", {.bits = 12});
+    to_preop();
+    process_data();
+    ASSERT_EQ(request(State::safeop), 4U);
+    auto& io = dynamic_cast<IoBehaviour&>(device.firmware->behaviour());
+    outputs({0x05, 0x08});
+    EXPECT_EQ(io.output(0), 0);
+    request(State::op);
+    ASSERT_EQ(status(), 8U);
+    outputs({0x05, 0x08});
+    EXPECT_EQ(io.output(0), 1);
+    EXPECT_EQ(io.output(1), 0);
+    EXPECT_EQ(io.output(2), 1);
+    EXPECT_EQ(io.output(11), 1);
+    request(State::safeop);
+    status();
+    EXPECT_EQ(io.output(0), 0);
+}
+
+TEST_F(Devices, Digital_inputs_are_read) {
+    start("digital_in", {.bits = 3});
+    dynamic_cast<IoBehaviour&>(device.firmware->behaviour()).set_input(2, 1);
+    to_op({});
+    EXPECT_EQ(inputs(), Bytes{4});
+}
+
+TEST_F(Devices, State_machine_rejects_wrong_settings_with_the_code_of_the_standard) {
+    start("servo");
+    EXPECT_EQ(request(State::preop), 0x160011U) << "no mailbox";
+    EXPECT_EQ(request(State::init, al_error), 1U);
+    EXPECT_EQ(request(State::op), 0x110011U) << "init to op";
+    EXPECT_EQ(request(State::init, al_error), 1U);
+    EXPECT_EQ(request(State::boot), 0x130011U) << "no bootstrap";
+    EXPECT_EQ(request(static_cast<State>(7), al_error), 0x120011U) << "unknown state";
+    EXPECT_EQ(request(State::init, al_error), 1U);
+    to_preop();
+    EXPECT_EQ(request(State::safeop), 0x1d0012U) << "no outputs";
+    const auto& out = area(sii::SmType::outputs);
+    sync_manager(2, out.start, out.length, 0x64);
+    EXPECT_EQ(request(State::safeop), 0x1d0012U) << "not acknowledged";
+    EXPECT_EQ(request(State::safeop, al_error), 0x1e0012U) << "no inputs";
+    process_data();
+    device.firmware->faults().reject[State::safeop] = 0x8123;
+    EXPECT_EQ(request(State::safeop, al_error), 0x81230012U);
+    device.firmware->faults().reject[State::safeop] = 0;
+    EXPECT_EQ(request(State::safeop, al_error), 4U);
+    request(State::op);
+    EXPECT_EQ(status(), 4U) << "waits for outputs";
+    w.now_ns += 300'000'000;
+    EXPECT_EQ(status(), 0x1b0014U) << "no outputs";
+}
+
+TEST_F(Devices, Remapping_changes_the_length_of_the_sync_manager) {
+    start("servo");
+    to_preop();
+    EXPECT_EQ(download(0x1600, 1, 0x60400010, 4), coe::abort::sub0_not_zero);
+    EXPECT_EQ(download(0x1c12, 0, 0, 1), 0U);
+    EXPECT_EQ(download(0x1600, 0, 0, 1), 0U);
+    EXPECT_EQ(download(0x1600, 1, 0x60410010, 4), coe::abort::not_mappable);
+    EXPECT_EQ(download(0x1600, 1, 0x60400010, 4), 0U);
+    EXPECT_EQ(download(0x1600, 2, 0x607a0020, 4), 0U);
+    EXPECT_EQ(download(0x1600, 0, 2, 1), 0U);
+    EXPECT_EQ(download(0x1c12, 1, 0x1600, 2), 0U);
+    EXPECT_EQ(download(0x1c12, 0, 1, 1), 0U);
+    const Bytes assignment = sdo(coe::command::upload | coe::command::complete, 0x1c12, 0);
+    EXPECT_EQ(assignment, (Bytes{0, 0x30, 0x53, 0x12, 0x1c, 0, 1, 0, 0, 0x16})) << "padded count";
+    process_data();
+    EXPECT_EQ(request(State::safeop), 0x1d0012U);
+    sync_manager(2, 0, 0, 0), sync_manager(2, area(sii::SmType::outputs).start, 6, 0x64);
+    EXPECT_EQ(request(State::safeop, al_error), 4U);
+}
+
+TEST_F(Devices, Servo_follows_its_target_position) {
+    start("servo");
+    const auto frame = [&](std::uint16_t control, std::int32_t position, std::uint8_t mode = 8) {
+        Bytes b(13);
+        put(&b[0], control), b[2] = mode, put(&b[3], position);
+        outputs(b);
+        return get<std::uint16_t>(inputs().data());
+    };
+    to_op(Bytes(13));
+    EXPECT_EQ(frame(0, 0) & 0x4f, 0x40);
+    EXPECT_EQ(frame(6, 0) & 0x6f, 0x21);
+    EXPECT_EQ(frame(7, 0) & 0x6f, 0x23);
+    EXPECT_EQ(frame(15, 0) & 0x6f, 0x27);
+    for (int n = 1; n <= 20; ++n) frame(15, n * 10);
+    EXPECT_EQ(get<std::int32_t>(&inputs()[3]), 200);
+    auto& servo = dynamic_cast<Servo&>(device.firmware->behaviour());
+    servo.axis(0).fail(0x2310);
+    EXPECT_EQ(frame(15, 200) & 0x4f, 0x08);
+    const auto emergency = coe::read_emergency(fetch(MailboxType::coe));
+    ASSERT_TRUE(emergency);
+    EXPECT_EQ(emergency->code, 0x2310);
+    EXPECT_EQ(frame(0x80, 200) & 0x4f, 0x40);
+}
+
+TEST_F(Devices, Long_objects_travel_in_segments) {
+    start("mailbox_device");
+    to_preop();
+    Bytes data(2000);
+    for (std::size_t i = 0; i < data.size(); ++i) data[i] = static_cast<std::uint8_t>(i * 7);
+    const std::size_t mailbox = sii.mailboxes.receive.size, first = coe::normal_capacity(mailbox);
+    sdo(coe::command::download | coe::command::size_given, 0x2000, 0, 2000,
+        {data.begin(), data.begin() + static_cast<std::ptrdiff_t>(first)});
+    bool toggle = false;
+    for (std::size_t at = first; at < data.size(); toggle = !toggle) {
+        const std::size_t n = std::min(coe::segment_capacity(mailbox), data.size() - at);
+        Bytes b(mailbox);
+        b.resize(coe::write_segment(b.data(), coe::Service::sdo_request, 0, toggle, at + n == data.size(), {&data[at], n}));
+        const Bytes answer = ask(MailboxType::coe, b);
+        ASSERT_EQ(answer[2], 0x20 | (toggle ? 0x10 : 0));
+        at += n;
+    }
+    Bytes got = sdo(coe::command::upload, 0x2000, 0);
+    ASSERT_EQ(coe::read_sdo(got)->value, 2000U);
+    got.erase(got.begin(), got.begin() + coe::sdo_bytes);
+    for (toggle = false; got.size() < 2000; toggle = !toggle) {
+        Bytes b(10);
+        coe::write_header(b.data(), coe::Service::sdo_request);
+        b[2] = static_cast<std::uint8_t>(0x60 | (toggle ? 0x10 : 0));
+        const Bytes answer = ask(MailboxType::coe, b);
+        const auto segment = coe::segment_of(answer);
+        ASSERT_FALSE(segment.empty());
+        got.insert(got.end(), segment.begin(), segment.end());
+    }
+    EXPECT_EQ(got, data);
+    EXPECT_EQ(download(0x2001, 0, 101, 2), coe::abort::too_high);
+    EXPECT_EQ(download(0x2001, 0, 0xff9c, 2), 0U) << "-100";
+}
+
+TEST_F(Devices, Other_protocols_answer) {
+    start("mailbox_device");
+    to_preop();
+    EXPECT_EQ(ask(MailboxType::voe, {1, 2, 3, 4, 5, 6, 7}), (Bytes{1, 2, 3, 4, 5, 6, 7}));
+    Bytes name(foe::header_bytes);
+    foe::write_header(name.data(), foe::Opcode::read, 0);
+    for (const char c : std::string_view("parameters")) name.push_back(static_cast<std::uint8_t>(c));
+    Bytes file = ask(MailboxType::foe, name);
+    EXPECT_EQ(foe::read(file)->text(), "gain = 1\n");
+    Bytes soe_read(soe::header_bytes);
+    soe::write(soe_read.data(), {soe::Opcode::read, false, false, 0, soe::element::value, 24});
+    EXPECT_EQ(ask(MailboxType::soe, soe_read), (Bytes{2, 0x40, 24, 0, 2, 0, 2, 0, 36, 0}));
+    Bytes ads(aoe::header_bytes + aoe::address_bytes);
+    aoe::Header h;
+    h.command = aoe::Command::read, h.length = aoe::address_bytes, h.invoke = 9;
+    aoe::write(ads.data(), h);
+    put(&ads[32], aoe::group_sdo), put(&ads[36], aoe::sdo_offset(0x1018, 2)), put<std::uint32_t>(&ads[40], 4);
+    const Bytes answer = ask(MailboxType::aoe, ads);
+    ASSERT_EQ(answer.size(), aoe::header_bytes + 12U);
+    EXPECT_EQ(get<std::uint32_t>(&answer[40]), sii.product);
+    Bytes frame(300);
+    for (std::size_t i = 0; i < frame.size(); ++i) frame[i] = static_cast<std::uint8_t>(i);
+    eoe::Splitter out(frame, 1, sii.mailboxes.receive.size);
+    for (Bytes b(sii.mailboxes.receive.size); const auto n = out.next(b.data());)
+        post(MailboxType::eoe, {b.begin(), b.begin() + static_cast<std::ptrdiff_t>(n)});
+    eoe::Joiner in;
+    Bytes back;
+    for (unsigned n = 0; n < 10 && back.empty(); ++n) {
+        const Bytes fragment = fetch(MailboxType::eoe);
+        const auto whole = in.take(fragment);
+        back.assign(whole.begin(), whole.end());
+    }
+    ASSERT_EQ(back.size(), frame.size());
+    EXPECT_EQ(back[0], 6);
+    EXPECT_EQ(back[299], frame[299]);
+}
+
+TEST(DeviceLine, Description_reports_what_is_invalid) {
+    const auto good = read_line("# line\ncoupler\nservo axes=2 alias=5 serial=1 dc=required\ndigital_in bits=16\n");
+    EXPECT_TRUE(good.messages.empty());
+    ASSERT_EQ(make_line(good).size(), 3U);
+    EXPECT_EQ(sii::parse(make_line(good)[1].sii).alias(), 5);
+    const auto bad = read_line("servos\nservo axes=9\nservo bits=3\ndigital_in bits\n");
+    ASSERT_EQ(bad.messages.size(), 4U);
+    EXPECT_EQ(bad.messages[0].sentence, "unknown device 'servos'");
+    EXPECT_EQ(bad.messages[1].sentence, "invalid value '9' of axes; use 1..8");
+    EXPECT_EQ(bad.messages[2].sentence, "unknown option 'bits' of servo");
+    EXPECT_EQ(bad.messages[3].sentence, "option 'bits' has no value; write bits=VALUE");
+}
+
+}  // namespace
