@@ -91,7 +91,8 @@ void DistributedClock::clock_changed(std::int64_t now_ns) noexcept {
     const auto behind = [&](std::int64_t pulse) {
         return static_cast<std::int64_t>(static_cast<std::uint64_t>(time) - static_cast<std::uint64_t>(pulse));
     };
-    if (cycle > 0 && sync0_dc_ != INT64_MAX && behind(sync0_dc_) > cycle) sync0_dc_ += behind(sync0_dc_) / cycle * cycle;  // a jump skips pulses
+    const bool skips = cycle > 0 && sync0_dc_ != INT64_MAX && behind(sync0_dc_) > cycle;  // after a jump
+    if (skips) sync0_dc_ += behind(sync0_dc_) / cycle * cycle;
     if (sync1_on_ && sync1_dc_ != INT64_MAX && behind(sync1_dc_) > cycle) sync1_dc_ = INT64_MAX;
     find_next();
 }
