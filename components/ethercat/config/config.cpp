@@ -11,7 +11,8 @@ namespace {
 
 class ConfigFile {
 public:
-    ConfigFile(std::string_view text, const std::string& path, const ReadFile& read) : sections_(split(text, report_)), descriptions_(read, path) {
+    ConfigFile(std::string_view text, const std::string& path, const ReadFile& read) : sections_(split(text, report_)), descriptions_(read,
+        path) {
         out_.buses.resize(1);
     }
 
@@ -25,9 +26,11 @@ public:
         if (reference_ != nullptr) reference();
         for (const auto& [name, s] : types_)
             if (!used_types_.contains(name))
-                report_.warning(Topic::line, s->at, "unused type '" + name + "'", "write type = " + name + " below a [slave …], or delete the section");
+                report_.warning(Topic::line, s->at, "unused type '" + name + "'", "write type = " + name +
+                    " below a [slave …], or delete the section");
         if (slaves_.empty() && bus_ != nullptr)
-            report_.error(Topic::line, bus_->at, "the configuration has no slave", "write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
+            report_.error(Topic::line, bus_->at, "the configuration has no slave",
+                "write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
         check_bus(out_.buses[0], report_);
         out_.messages = std::move(report_.all);
         text::sort(out_.messages);  // a line of a type is read once for each slave of it
@@ -44,14 +47,16 @@ private:
         };
         const auto once = [&](Section*& to, const char* form) {
             if (!expect(1, form)) return;
-            if (to != nullptr) report_.error(Topic::line, s.at, "duplicate section " + std::string(form), "first in line " + std::to_string(to->at.line), "duplicate");
+            if (to != nullptr) report_.error(Topic::line, s.at, "duplicate section " + std::string(form), "first in line " +
+                std::to_string(to->at.line), "duplicate");
             else to = &s;
         };
         if (kind == "bus") once(bus_, "[bus]");
         else if (kind == "defaults") once(defaults_, "[defaults]");
         else if (kind == "type") {
             if (expect(2, "[type NAME]") && !types_.emplace(s.words[1].text, &s).second)
-                report_.error(Topic::line, s.words[1].at, "duplicate type '" + s.words[1].text + "'", "rename or delete one of them", "duplicate");
+                report_.error(Topic::line, s.words[1].at, "duplicate type '" + s.words[1].text + "'", "rename or delete one of them",
+                    "duplicate");
         } else if (kind == "domain") {
             if (expect(2, "[domain NAME]")) domains_.push_back(&s);
         } else if (kind == "slave") slaves_.push_back(&s);
@@ -64,7 +69,8 @@ private:
 
     void unknown_keys(const Keys& keys, const char* where, const std::vector<std::string>& all) {
         for (const Line* line : keys.all())
-            if (!line->used) report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' in " + where, suggestion(line->key.text, all, "the keys are"));
+            if (!line->used) report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' in " + where,
+                suggestion(line->key.text, all, "the keys are"));
     }
 
     void read_bus() {
@@ -88,7 +94,8 @@ private:
             else if (!same_word(line->value.text, "fault")) keys.reject(*line, "fault or accept");
         }
         if (!bus.backup.empty() && bus.backup == bus.link)
-            report_.error(Topic::value, keys.find("backup")->value.at, "the backup is the link itself: '" + bus.link + "'", "write the address of the second port, which closes the ring");
+            report_.error(Topic::value, keys.find("backup")->value.at, "the backup is the link itself: '" + bus.link + "'",
+                "write the address of the second port, which closes the ring");
         unknown_keys(keys, "[bus]", {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window", "other-slaves"});
     }
 
@@ -104,7 +111,8 @@ private:
         unknown_keys(keys, "[domain]", {"every"});
         for (std::size_t i = 0; i < domains.size(); ++i) {
             if (domains[i].name != d.name) continue;
-            if (i != 0 || default_given_) return report_.error(Topic::line, s.words[1].at, "duplicate domain '" + d.name + "'", "rename or delete one of them", "duplicate");
+            if (i != 0 || default_given_) return report_.error(Topic::line, s.words[1].at, "duplicate domain '" + d.name + "'",
+                "rename or delete one of them", "duplicate");
             default_given_ = true, domains[0] = d;
             return;
         }
@@ -119,9 +127,11 @@ private:
         const Word where = s.words.size() >= 2 ? s.words[1] : Word{"", s.at};
         const std::size_t equals = where.text.find('=');
         const std::string by = equals == std::string::npos ? "" : lower(std::string_view(where.text).substr(0, equals));
-        const auto number = parse_natural(equals == std::string::npos ? std::string_view(where.text) : std::string_view(where.text).substr(equals + 1));
+        const auto number = parse_natural(equals == std::string::npos ? std::string_view(where.text)
+            : std::string_view(where.text).substr(equals + 1));
         if (!number || *number > 65535 || s.words.size() > 3 || (!by.empty() && by != "alias" && by != "id"))
-            return report_.error(Topic::line, where.at, "invalid slave section: expected a position of 0..65535 and a name", "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
+            return report_.error(Topic::line, where.at, "invalid slave section: expected a position of 0..65535 and a name",
+                "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
         const auto value = static_cast<std::uint16_t>(*number);
         if (by == "alias") slave.identity.alias = value;
         else if (by == "id") slave.identity.device_id = value;
@@ -158,7 +168,8 @@ private:
             if (setup.slaves[i].name == reference_->value.text) setup.reference_slave = static_cast<std::uint16_t>(i);
         }
         if (!setup.reference_slave)
-            report_.error(Topic::slave, reference_->value.at, "unknown slave '" + reference_->value.text + "'", suggestion(reference_->value.text, names, "the slaves are"));
+            report_.error(Topic::slave, reference_->value.at, "unknown slave '" + reference_->value.text + "'",
+                suggestion(reference_->value.text, names, "the slaves are"));
     }
 
     Report report_;
@@ -187,7 +198,8 @@ const esi::File* Descriptions::get(const Word& file, Report& report) {
         std::string bytes;
         const std::string path = file.text.starts_with('/') ? file.text : folder_ + file.text;
         if (!read_(path, bytes)) {
-            report.error(Topic::value, file.at, "cannot read '" + path + "': " + bytes, "write the path of an ESI file, relative to this file");
+            report.error(Topic::value, file.at, "cannot read '" + path + "': " + bytes,
+                "write the path of an ESI file, relative to this file");
         } else {
             esi::File read = esi::read(bytes);
             for (const esi::Message& m : read.messages)
@@ -212,14 +224,16 @@ void check_bus(const Bus& bus, Report& report) {
             if (a.identity.alias && a.identity.alias == b.identity.alias)
                 report.error(Topic::slave, bus.slaves[i].at, "duplicate alias " + std::to_string(*a.identity.alias), first, "duplicate");
             if (a.identity.device_id && a.identity.device_id == b.identity.device_id)
-                report.error(Topic::slave, bus.slaves[i].at, "duplicate device ID " + std::to_string(*a.identity.device_id), first, "duplicate");
+                report.error(Topic::slave, bus.slaves[i].at, "duplicate device ID " + std::to_string(*a.identity.device_id), first,
+                    "duplicate");
         }
 }
 
 bool read_from_disk(const std::string& path, std::string& bytes) { return read_regular_file(path, 64'000'000, bytes); }
 
 Reading read(std::string_view text, const std::string& path, const ReadFile& read_file) {
-    return trimmed(text).starts_with('<') || trimmed(text).starts_with("\xef\xbb\xbf<") ? read_lcec(text, path, read_file) : ConfigFile(text, path, read_file).read();
+    return trimmed(text).starts_with('<') || trimmed(text).starts_with("\xef\xbb\xbf<") ? read_lcec(text, path, read_file)
+        : ConfigFile(text, path, read_file).read();
 }
 
 std::string to_string(const Reading& reading, const std::string& path) { return text::errors_text(reading.messages, path); }

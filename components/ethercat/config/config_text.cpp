@@ -30,7 +30,8 @@ std::vector<Section> split(std::string_view file, Report& report) {
     text::Lines lines(file);
     while (const auto whole = lines.next()) {
         if (whole->at.line > most_lines) {
-            report.error(Topic::line, whole->at, "the file has more than " + std::to_string(most_lines) + " lines", "is it the right file?");
+            report.error(Topic::line, whole->at, "the file has more than " + std::to_string(most_lines) + " lines",
+                "is it the right file?");
             break;
         }
         const text::IniLine ini = text::ini_line(whole->text);

@@ -10,8 +10,10 @@ namespace {
 using master::Type;
 
 constexpr const char* parameter_names[] = {
-    "ciaChannels", "pdoIncrement", "ciaRxPDOEntryLimit", "ciaTxPDOEntryLimit", "zeroBasedAxisNames", "enablePP", "enablePV", "enableCSP", "enableCSV", "enableHM",
-    "enableActualTorque", "enableActualFollowingError", "enableErrorCode", "enableTargetTorque", "enableProbeStatus", "enableDigitalInput", "enableDigitalOutput"};
+    "ciaChannels", "pdoIncrement", "ciaRxPDOEntryLimit", "ciaTxPDOEntryLimit", "zeroBasedAxisNames", "enablePP", "enablePV", "enableCSP",
+        "enableCSV", "enableHM",
+    "enableActualTorque", "enableActualFollowingError", "enableErrorCode", "enableTargetTorque", "enableProbeStatus", "enableDigitalInput",
+        "enableDigitalOutput"};
 
 /// A feature is on if one of the parameters is; objects are in the order of the driver.
 struct Feature {
@@ -67,7 +69,8 @@ public:
                     for (unsigned n = 0; n < limit && i < objects.size(); ++n, ++i)
                         for (auto& e : objects[i]) p.entries.push_back(std::move(e));
                     if (index >= (output ? 0x1600U : 0x1a00U) + (axis + 1) * increment && axis + 1 < axes)
-                        problems_.push_back("axis " + std::to_string(axis + 1) + " needs more PDOs than pdoIncrement leaves; raise pdoIncrement or the entry limit");
+                        problems_.push_back("axis " + std::to_string(axis + 1) +
+                            " needs more PDOs than pdoIncrement leaves; raise pdoIncrement or the entry limit");
                     sm.pdos.push_back(std::move(p));
                 }
             }
@@ -94,7 +97,8 @@ private:
         const std::string* value = find(name);
         if (value == nullptr) return otherwise;
         if (const auto n = parse_natural(*value); n && *n >= least && *n <= most) return static_cast<unsigned>(*n);
-        problems_.push_back("invalid value '" + *value + "' of modParam '" + name + "': expected " + std::to_string(least) + ".." + std::to_string(most));
+        problems_.push_back("invalid value '" + *value + "' of modParam '" + name + "': expected " + std::to_string(least) + ".." +
+            std::to_string(most));
         return otherwise;
     }
     bool on(const Feature& f) {
@@ -104,7 +108,8 @@ private:
     }
     std::vector<master::Entry> entries(const Feature& f, unsigned axis, const std::string& prefix) {
         master::Entry e;
-        e.index = static_cast<std::uint16_t>(f.index + 0x800 * axis), e.sub = f.sub, e.bits = f.bits, e.type = f.type, e.is_signed = is_signed(f.type);
+        e.index = static_cast<std::uint16_t>(f.index + 0x800 * axis), e.sub = f.sub, e.bits = f.bits, e.type = f.type,
+            e.is_signed = is_signed(f.type);
         const bool in = f.index == 0x60fd, out = f.index == 0x60fe;
         std::vector<master::Entry> list;
         if (!in && !out) {
@@ -135,7 +140,8 @@ private:
 
 std::span<const char* const> cia402_parameters() { return parameter_names; }
 
-void build_cia402(const std::map<std::string, std::string>& parameters, master::Slave& slave, SlaveInfo& info, std::vector<std::string>& problems) {
+void build_cia402(const std::map<std::string, std::string>& parameters, master::Slave& slave, SlaveInfo& info,
+    std::vector<std::string>& problems) {
     Cia402(parameters, slave, info, problems).build();
     std::sort(problems.begin(), problems.end());
     problems.erase(std::unique(problems.begin(), problems.end()), problems.end());

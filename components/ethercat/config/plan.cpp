@@ -86,19 +86,26 @@ Plan plan(const Bus& bus, const PlanOptions& options) {
     out.shortest_cycle_ns = options.master_ns + out.wire_ns + out.propagation_ns;
     out.fits = out.shortest_cycle_ns <= setup.cycle_ns;
     // An input that changes just after it was read waits a cycle of its domain; the answer leaves a cycle later and arrives with that frame.
-    out.input_to_output_ns = static_cast<std::int64_t>(slowest) * setup.cycle_ns + setup.cycle_ns + out.wire_ns + out.propagation_ns + options.master_ns + options.drive_ns;
+    out.input_to_output_ns = static_cast<std::int64_t>(slowest) * setup.cycle_ns + setup.cycle_ns + out.wire_ns + out.propagation_ns +
+        options.master_ns + options.drive_ns;
 
     for (const auto& d : out.domains)
-        out.text += "domain " + d.domain + ": " + std::to_string(d.output_bytes) + " bytes out, " + std::to_string(d.input_bytes) + " bytes in, every " +
-                    (d.every == 1 ? std::string("cycle") : std::to_string(d.every) + " cycles") + ", working counter " + std::to_string(d.expected_wkc) + "\n";
+        out.text += "domain " + d.domain + ": " + std::to_string(d.output_bytes) + " bytes out, " + std::to_string(d.input_bytes) +
+            " bytes in, every " +
+                    (d.every == 1 ? std::string("cycle") : std::to_string(d.every) + " cycles") + ", working counter " +
+                        std::to_string(d.expected_wkc) + "\n";
     out.text += std::to_string(out.frames) + (out.frames == 1 ? " frame, " : " frames, ") + std::to_string(out.frame_bytes) + " bytes: (" +
-                std::to_string(out.frame_bytes) + " + " + std::to_string(out.frames) + " x 24) x 80 ns = " + micro(out.wire_ns) + " at 100 Mbit/s\n";
-    out.text += "through " + std::to_string(setup.slaves.size()) + " slaves x " + micro(options.slave_delay_ns) + " = " + micro(out.propagation_ns) + "\n";
+                std::to_string(out.frame_bytes) + " + " + std::to_string(out.frames) + " x 24) x 80 ns = " + micro(out.wire_ns) +
+                    " at 100 Mbit/s\n";
+    out.text += "through " + std::to_string(setup.slaves.size()) + " slaves x " + micro(options.slave_delay_ns) + " = " +
+        micro(out.propagation_ns) + "\n";
     char load[32];
     std::snprintf(load, sizeof load, "%.1f %%", out.load * 100);
-    out.text += "cycle " + micro(out.cycle_ns) + ": wire load " + load + ", needed " + micro(options.master_ns) + " + " + micro(out.wire_ns) + " + " +
+    out.text += "cycle " + micro(out.cycle_ns) + ": wire load " + load + ", needed " + micro(options.master_ns) + " + " +
+        micro(out.wire_ns) + " + " +
                 micro(out.propagation_ns) + " = " + micro(out.shortest_cycle_ns) + (out.fits ? "\n" : ": too long for the cycle\n");
-    out.text += "input to output at most " + std::to_string(slowest + 1) + " x " + micro(out.cycle_ns) + " + " + micro(out.shortest_cycle_ns) +
+    out.text += "input to output at most " + std::to_string(slowest + 1) + " x " + micro(out.cycle_ns) + " + " +
+        micro(out.shortest_cycle_ns) +
                 (options.drive_ns != 0 ? " + " + micro(options.drive_ns) : "") + " = " + micro(out.input_to_output_ns) + "\n";
     return out;
 }

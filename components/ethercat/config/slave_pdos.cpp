@@ -17,18 +17,25 @@ struct ProfileObject {
 };
 constexpr ProfileObject profile_objects[] = {
     {0x603f, 0, Type::u16, "error-code"}, {0x6040, 0, Type::u16, "controlword"}, {0x6041, 0, Type::u16, "statusword"},
-    {0x6060, 0, Type::s8, "modes-of-operation"}, {0x6061, 0, Type::s8, "modes-of-operation-display"}, {0x6064, 0, Type::s32, "position-actual-value"},
-    {0x6065, 0, Type::u32, "following-error-window"}, {0x606c, 0, Type::s32, "velocity-actual-value"}, {0x6071, 0, Type::s16, "target-torque"},
+    {0x6060, 0, Type::s8, "modes-of-operation"}, {0x6061, 0, Type::s8, "modes-of-operation-display"}, {0x6064, 0, Type::s32,
+        "position-actual-value"},
+    {0x6065, 0, Type::u32, "following-error-window"}, {0x606c, 0, Type::s32, "velocity-actual-value"}, {0x6071, 0, Type::s16,
+        "target-torque"},
     {0x6072, 0, Type::u16, "max-torque"}, {0x6077, 0, Type::s16, "torque-actual-value"}, {0x607a, 0, Type::s32, "target-position"},
     {0x607c, 0, Type::s32, "home-offset"}, {0x607d, 1, Type::s32, "min-position-limit"}, {0x607d, 2, Type::s32, "max-position-limit"},
     {0x6080, 0, Type::u32, "max-motor-speed"}, {0x6081, 0, Type::u32, "profile-velocity"}, {0x6083, 0, Type::u32, "profile-acceleration"},
-    {0x6084, 0, Type::u32, "profile-deceleration"}, {0x6085, 0, Type::u32, "quick-stop-deceleration"}, {0x6098, 0, Type::s8, "homing-method"},
-    {0x6099, 1, Type::u32, "homing-speed-switch"}, {0x6099, 2, Type::u32, "homing-speed-zero"}, {0x609a, 0, Type::u32, "homing-acceleration"},
+    {0x6084, 0, Type::u32, "profile-deceleration"}, {0x6085, 0, Type::u32, "quick-stop-deceleration"}, {0x6098, 0, Type::s8,
+        "homing-method"},
+    {0x6099, 1, Type::u32, "homing-speed-switch"}, {0x6099, 2, Type::u32, "homing-speed-zero"}, {0x609a, 0, Type::u32,
+        "homing-acceleration"},
     {0x60b0, 0, Type::s32, "position-offset"}, {0x60b1, 0, Type::s32, "velocity-offset"}, {0x60b2, 0, Type::s16, "torque-offset"},
-    {0x60b8, 0, Type::u16, "touch-probe-function"}, {0x60b9, 0, Type::u16, "touch-probe-status"}, {0x60ba, 0, Type::s32, "touch-probe-1-positive"},
-    {0x60bb, 0, Type::s32, "touch-probe-1-negative"}, {0x60c2, 1, Type::u8, "interpolation-time-value"}, {0x60c2, 2, Type::s8, "interpolation-time-index"},
+    {0x60b8, 0, Type::u16, "touch-probe-function"}, {0x60b9, 0, Type::u16, "touch-probe-status"}, {0x60ba, 0, Type::s32,
+        "touch-probe-1-positive"},
+    {0x60bb, 0, Type::s32, "touch-probe-1-negative"}, {0x60c2, 1, Type::u8, "interpolation-time-value"}, {0x60c2, 2, Type::s8,
+        "interpolation-time-index"},
     {0x60f4, 0, Type::s32, "following-error"}, {0x60fd, 0, Type::u32, "digital-inputs"}, {0x60fe, 1, Type::u32, "digital-outputs"},
-    {0x60fe, 2, Type::u32, "digital-outputs-mask"}, {0x60ff, 0, Type::s32, "target-velocity"}, {0x6502, 0, Type::u32, "supported-drive-modes"},
+    {0x60fe, 2, Type::u32, "digital-outputs-mask"}, {0x60ff, 0, Type::s32, "target-velocity"}, {0x6502, 0, Type::u32,
+        "supported-drive-modes"},
 };
 constexpr unsigned width_of(Type t) {
     constexpr unsigned widths[] = {1, 8, 16, 32, 64, 8, 16, 32, 64, 32, 64};
@@ -38,7 +45,8 @@ constexpr unsigned width_of(Type t) {
 }  // namespace
 
 Known profile_object(std::uint16_t index, std::uint8_t sub, unsigned axes) {
-    if (index >= 0x1c32 && index <= 0x1c33 && sub >= 1 && sub <= 6) return sub == 1 || sub == 4 ? Known{"", Type::u16, 16} : Known{"", Type::u32, 32};
+    if (index >= 0x1c32 && index <= 0x1c33 && sub >= 1 && sub <= 6) return sub == 1 || sub == 4 ? Known{"", Type::u16, 16} : Known{"",
+        Type::u32, 32};
     for (unsigned axis = 0; axis < axes; ++axis)
         for (const ProfileObject& o : profile_objects)
             if (o.index + 0x800U * axis == index && o.sub == sub)
@@ -52,7 +60,8 @@ Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
             if (const esi::Value* v = o->find(sub); v != nullptr && v->bits != 0) {
                 const TypeWord* type = type_named(v->type);
                 std::string name = o->name;
-                if (o->values.size() > 1) name += v->name.empty() || v->name.starts_with("SubIndex") ? " " + std::to_string(sub) : " " + v->name;
+                if (o->values.size() > 1) name += v->name.empty() || v->name.starts_with("SubIndex") ? " " + std::to_string(sub) : " " +
+                    v->name;
                 return {dashed(name), type != nullptr ? type->type : type_of(v->bits, v->type.starts_with("INT")), v->bits};
             }
         for (const auto* pdos : {&device_->rx, &device_->tx})
@@ -60,7 +69,8 @@ Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
                 for (const esi::Entry& e : p.entries)
                     if (e.index == index && e.sub == sub) {
                         const TypeWord* type = type_named(e.type);
-                        return {dashed(e.name), type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits, e.type.starts_with("INT")), e.bits};
+                        return {dashed(e.name), type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits,
+                            e.type.starts_with("INT")), e.bits};
                     }
     }
     if (device_ != nullptr && !device_->objects.empty()) return {};  // a description with a dictionary has all objects
@@ -113,7 +123,8 @@ void SlavePdos::direction(bool output) {
         if (!same_word(line->value.text, "none")) list(*line, sm);
     } else {
         if (line != nullptr && device_ == nullptr)
-            keys.report().error(Topic::object, line->value.at, "'" + key + " = default' needs a description of the device", "write esi = FILE, or list the objects");
+            keys.report().error(Topic::object, line->value.at, "'" + key + " = default' needs a description of the device",
+                "write esi = FILE, or list the objects");
         for (const esi::Pdo& p : described(output)) {
             if (!p.sync_manager) continue;
             if (*p.sync_manager == number) {
@@ -144,7 +155,8 @@ void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
         entry.index = e.index, entry.sub = e.sub, entry.bits = e.bits;
         if (e.index != 0) {
             const TypeWord* type = type_named(e.type);
-            entry.type = type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits, e.type.starts_with("INT") || e.type.starts_with("DINT"));
+            entry.type = type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits, e.type.starts_with("INT") ||
+                e.type.starts_with("DINT"));
             entry.is_signed = is_signed(entry.type);
             entry.name = dashed(e.name);
             if (entry.name.empty()) entry.name = known(e.index, e.sub).name;
@@ -163,7 +175,8 @@ void SlavePdos::check_exclusions(const Line* line, const master::SyncManager& sm
         for (const master::Pdo& other : sm.pdos)
             if (std::find(described_pdo->exclude.begin(), described_pdo->exclude.end(), other.index) != described_pdo->exclude.end())
                 in_.keys.report().error(Topic::object, line->value.at,
-                                        "PDOs " + address_text(p.index, 0).substr(0, 4) + " and " + address_text(other.index, 0).substr(0, 4) +
+                                        "PDOs " + address_text(p.index, 0).substr(0, 4) + " and " + address_text(other.index, 0).substr(0,
+                                            4) +
                                             " of '" + in_.info.type + "' exclude each other",
                                         "assign only one of them");
     }
@@ -175,7 +188,8 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
     // Objects are separated by commas or blanks; a type or a number of bits follows its object.
     std::vector<Word> items;
     for (const Word& word : words_of(spaced, ",")) {
-        const bool follows = !items.empty() && (type_named(word.text) != nullptr || (items.back().text == "gap" && parse_natural(word.text)));
+        const bool follows = !items.empty() && (type_named(word.text) != nullptr || (items.back().text == "gap" &&
+            parse_natural(word.text)));
         if (follows) items.back().text += " " + word.text;
         else items.push_back(word);
     }
@@ -191,7 +205,8 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
             std::vector<std::string> names;
             for (const esi::Pdo& p : pdos) names.push_back(address_text(p.index, 0).substr(0, 4));
             in_.keys.report().error(Topic::object, item.at, "unknown PDO '" + item.text + "'",
-                                    device_ == nullptr ? "write esi = FILE, or list the objects" : names.empty() ? "the description has none in this direction" : "the PDOs are: " + listed(names));
+                                    device_ == nullptr ? "write esi = FILE, or list the objects" : names.empty()
+                                        ? "the description has none in this direction" : "the PDOs are: " + listed(names));
             continue;
         }
         master::Entry e;
@@ -205,7 +220,8 @@ bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& 
     const auto words = words_of(item);
     if (words[0].text == "gap") {
         const auto bits = words.size() == 2 ? parse_natural(words[1].text) : std::nullopt;
-        if (!bits || *bits < 1 || *bits > 255) return report.error(Topic::value, item.at, "invalid gap", "write gap 8 for 8 bits, at most 255"), false;
+        if (!bits || *bits < 1 || *bits > 255) return report.error(Topic::value, item.at, "invalid gap",
+            "write gap 8 for 8 bits, at most 255"), false;
         e.bits = static_cast<std::uint16_t>(*bits);
         return true;
     }
@@ -219,7 +235,8 @@ bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& 
     if (words.size() > 1) {
         const TypeWord* type = type_named(words[1].text);
         if (k.bits != 0 && k.bits != type->bits && device_ != nullptr)
-            report.error(Topic::object, item.at, "object " + address_text(e.index, e.sub) + " of '" + in_.info.type + "' has " + std::to_string(k.bits) + " bits, not " +
+            report.error(Topic::object, item.at, "object " + address_text(e.index, e.sub) + " of '" + in_.info.type + "' has " +
+                std::to_string(k.bits) + " bits, not " +
                                                      std::to_string(type->bits),
                          "leave out the type");
         k.type = type->type, k.bits = type->bits;
@@ -227,13 +244,15 @@ bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& 
     if (k.bits == 0) {
         const std::string label = address_text(e.index, e.sub);
         return report.error(Topic::object, item.at,
-                            device_ != nullptr ? "object " + label + " is not in the description of '" + in_.info.type + "'" : "object " + label + " has no known type",
+                            device_ != nullptr ? "object " + label + " is not in the description of '" + in_.info.type + "'" : "object " +
+                                label + " has no known type",
                             "write its type, as in " + words[0].text + " u16; the types are " + std::string(type_words)),
                false;
     }
     for (const auto& p : sm.pdos)
         for (const auto& other : p.entries)
-            if (other.index == e.index && other.sub == e.sub) return report.error(Topic::object, item.at, "duplicate object " + address_text(e.index, e.sub), "delete one of them"), false;
+            if (other.index == e.index && other.sub == e.sub) return report.error(Topic::object, item.at, "duplicate object " +
+                address_text(e.index, e.sub), "delete one of them"), false;
     e.bits = static_cast<std::uint16_t>(std::min(k.bits, 65535U)), e.type = k.type, e.is_signed = is_signed(k.type);
     e.name = k.bits > 64 ? "" : k.name;
     if (e.name.empty() && k.bits <= 64) {
@@ -247,7 +266,8 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
     Keys& keys = in_.keys;
     const auto& pdos = described(sm.output);
     for (const esi::Pdo& p : pdos) {  // exactly one of the description: nothing has to be written
-        const bool same = p.entries.size() == entries.size() && std::equal(entries.begin(), entries.end(), p.entries.begin(), [](const auto& a, const auto& b) {
+        const bool same = p.entries.size() == entries.size() && std::equal(entries.begin(), entries.end(), p.entries.begin(),
+            [](const auto& a, const auto& b) {
                               return a.index == b.index && a.sub == b.sub && a.bits == b.bits;
                           });
         if (same && sm.pdos.empty()) {
@@ -258,7 +278,8 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
     if (device_ != nullptr && !(device_->mailbox && device_->mailbox->coe)) {
         std::vector<std::string> names;
         for (const esi::Pdo& p : pdos) names.push_back(address_text(p.index, 0).substr(0, 4));
-        return keys.report().error(Topic::object, line.value.at, "the PDOs of '" + in_.info.type + "' are fixed: it has no CoE mailbox to map objects with",
+        return keys.report().error(Topic::object, line.value.at, "the PDOs of '" + in_.info.type +
+            "' are fixed: it has no CoE mailbox to map objects with",
                                    names.empty() ? "delete the line" : "delete the line, or assign PDOs: " + listed(names));
     }
     std::vector<std::uint16_t> free;
@@ -266,7 +287,8 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
         for (const esi::Pdo& p : pdos)
             if (!p.fixed && p.sync_manager.has_value() == (pass == 0)) free.push_back(p.index);
     if (!pdos.empty() && free.empty())
-        return keys.report().error(Topic::object, line.value.at, "all PDOs of '" + in_.info.type + "' in this direction are fixed", "assign one of them, as in " + line.key.text + " = " + address_text(pdos[0].index, 0).substr(0, 4));
+        return keys.report().error(Topic::object, line.value.at, "all PDOs of '" + in_.info.type + "' in this direction are fixed",
+            "assign one of them, as in " + line.key.text + " = " + address_text(pdos[0].index, 0).substr(0, 4));
     const std::string key = line.key.text + ".pdo";
     if (Line* chosen = keys.find(key)) {
         const auto at = address(chosen->value.text);
@@ -308,7 +330,8 @@ void SlavePdos::pin_options() {
     for (auto& sm : in_.slave.sync_managers)
         for (auto& p : sm.pdos)
             for (auto& e : p.entries)
-                if (!e.name.empty() && in_.info.find(e.name) == nullptr) in_.info.pins.push_back({e.name, {"", address_text(e.index, e.sub)}});
+                if (!e.name.empty() && in_.info.find(e.name) == nullptr) in_.info.pins.push_back({e.name, {"", address_text(e.index,
+                    e.sub)}});
 }
 
 void SlavePdos::option(const Line& line) {
@@ -325,7 +348,8 @@ void SlavePdos::option(const Line& line) {
                 if (e.index != 0 && ((at && e.index == at->index && e.sub == at->sub) || e.name == object)) entry = &e;
             }
     if (entry == nullptr)
-        return report.error(Topic::object, line.key.at, "no PDO of this slave has an object '" + object + "'", suggestion(object, names, "the objects are"));
+        return report.error(Topic::object, line.key.at, "no PDO of this slave has an object '" + object + "'", suggestion(object, names,
+            "the objects are"));
     auto info = std::find_if(in_.info.pins.begin(), in_.info.pins.end(), [&](const auto& p) { return p.first == entry->name; });
     if (info == in_.info.pins.end()) info = in_.info.pins.insert(info, {entry->name, {"", address_text(entry->index, entry->sub)}});
     const std::string& value = line.value.text;
@@ -333,15 +357,18 @@ void SlavePdos::option(const Line& line) {
     if (property == "scale" || property == "offset") {  // object = pin * scale + offset; the setup has the inverse
         const std::size_t slash = std::min(value.find('/'), value.size());
         const auto over = parse_real(trimmed(std::string_view(value).substr(0, slash)));
-        const auto below = slash < value.size() ? parse_real(trimmed(std::string_view(value).substr(slash + 1))) : std::optional<double>(1.0);
-        if (!over || !below || *below == 0 || (property == "scale" && *over == 0)) return reject("a number other than 0, or a fraction such as 65536/360");
+        const auto below = slash < value.size() ? parse_real(trimmed(std::string_view(value).substr(slash + 1)))
+            : std::optional<double>(1.0);
+        if (!over || !below || *below == 0 || (property == "scale" &&
+            *over == 0)) return reject("a number other than 0, or a fraction such as 65536/360");
         const double object_scale = property == "scale" ? *over / *below : 1 / entry->scale;
         const double object_offset = property == "offset" ? *over / *below : -entry->offset / entry->scale;
         entry->scale = 1 / object_scale, entry->offset = -object_offset / object_scale, entry->scaled = true;
     } else if (property == "name") {
         const std::string name = dashed(value) == value ? value : "";
         if (name.empty()) return reject("a name of lower-case letters, digits and dashes");
-        if (std::find(names.begin(), names.end(), name) != names.end() && name != entry->name) return report.error(Topic::slave, line.value.at, "duplicate pin name '" + name + "'", "choose another one");
+        if (std::find(names.begin(), names.end(), name) != names.end() && name != entry->name) return report.error(Topic::slave,
+            line.value.at, "duplicate pin name '" + name + "'", "choose another one");
         entry->name = name, info->first = name;
     } else if (property == "unit") {
         info->second.unit = value, entry->scaled = true;
@@ -355,7 +382,8 @@ void SlavePdos::option(const Line& line) {
             return reject("float, or one of " + std::string(type_words) + " with at least " + counted(entry->bits, "bit"));
         entry->type = type->type, entry->is_signed = is_signed(type->type);
     } else {
-        report.error(Topic::line, line.key.at, "unknown property '" + property + "' of an object", suggestion(property, {"scale", "offset", "name", "unit", "type"}, "the properties are"));
+        report.error(Topic::line, line.key.at, "unknown property '" + property + "' of an object", suggestion(property, {"scale", "offset",
+            "name", "unit", "type"}, "the properties are"));
     }
 }
 

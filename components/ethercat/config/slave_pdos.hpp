@@ -19,7 +19,8 @@ Known profile_object(std::uint16_t index, std::uint8_t sub, unsigned axes);
 
 class SlavePdos {
 public:
-    SlavePdos(SlaveInput in, const esi::Device* device, std::uint64_t entries_per_pdo) : in_(in), device_(device), limit_(entries_per_pdo) {}
+    SlavePdos(SlaveInput in, const esi::Device* device, std::uint64_t entries_per_pdo) : in_(in), device_(device),
+        limit_(entries_per_pdo) {}
     void read();
     /// Finds an object in the description, or else in the profile.
     Known known(std::uint16_t index, std::uint8_t sub) const;

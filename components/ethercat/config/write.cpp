@@ -27,14 +27,16 @@ std::string objects(const std::string& key, const std::vector<sii::Pdo>& pdos, b
             std::string item = address_text(e.index, e.sub);
             if (e.index == 0) item = "gap " + std::to_string(e.bits);
             else if (type != nullptr && type->bits == e.bits) item += with_types ? std::string(" ") + type->word : "";
-            else if (e.bits == 1 || e.bits == 8 || e.bits == 16 || e.bits == 32 || e.bits == 64) item += e.bits == 1 ? " bit" : " u" + std::to_string(e.bits);
+            else if (e.bits == 1 || e.bits == 8 || e.bits == 16 || e.bits == 32 || e.bits == 64) item += e.bits == 1 ? " bit" : " u" +
+                std::to_string(e.bits);
             else item = "gap " + std::to_string(e.bits);
             if (e.index != 0 && list.find(address_text(e.index, e.sub)) != std::string::npos) item = "gap " + std::to_string(e.bits);
             list += (list.empty() ? "" : ", ") + item;
         }
     }
     if (list.empty()) return {};
-    options += key + ".sync-manager = " + std::to_string(sync_manager) + "\n" + key + ".pdo = " + address_text(static_cast<std::uint16_t>(index), 0).substr(0, 4) + "\n";
+    options += key + ".sync-manager = " + std::to_string(sync_manager) + "\n" + key + ".pdo = " +
+        address_text(static_cast<std::uint16_t>(index), 0).substr(0, 4) + "\n";
     return key + " = " + list + "\n";
 }
 
@@ -62,7 +64,8 @@ std::string write(const std::string& link, std::int64_t cycle_ns, const std::vec
         std::string options;
         const bool with_types = s.esi.empty();
         if (with_types) {
-            const std::string outputs = objects("outputs", s.rx, with_types, options), inputs = objects("inputs", s.tx, with_types, options);
+            const std::string outputs = objects("outputs", s.rx, with_types, options), inputs = objects("inputs", s.tx, with_types,
+                options);
             out += outputs + inputs + options;
         }
         if (s.assign_activate != 0) out += "dc = sync0\nassign-activate = " + hex(s.assign_activate) + "\n";

@@ -90,7 +90,8 @@ private:
         return name;
     }
 
-    void value(Object& o, unsigned sub, const std::string& name, const std::string& type, unsigned bits, const Flags& flags, const Flags& otherwise) {
+    void value(Object& o, unsigned sub, const std::string& name, const std::string& type, unsigned bits, const Flags& flags,
+        const Flags& otherwise) {
         if (sub > 255 || o.find(static_cast<std::uint8_t>(sub)) != nullptr) return;
         const Flags& f = flags.given ? flags : otherwise;
         Value v;
@@ -120,7 +121,8 @@ private:
             for (const SubItem& s : at->second.items) {
                 const auto inner = types_.find(s.type);
                 if (inner != types_.end() && inner->second.array) o.code = Object::Code::array, array(o, inner->second, s.flags, flags);
-                else value(o, s.sub < 0 ? static_cast<unsigned>(o.values.size()) : static_cast<unsigned>(s.sub), s.name, s.type, s.bits, s.flags, flags);
+                else value(o, s.sub < 0 ? static_cast<unsigned>(o.values.size()) : static_cast<unsigned>(s.sub), s.name, s.type, s.bits,
+                    s.flags, flags);
             }
         } else if (at != types_.end() && at->second.array) {
             o.code = Object::Code::array;
@@ -142,7 +144,8 @@ private:
         std::size_t i = 0;
         for (const Xml item : info.children("SubItem")) {
             if (i == o.values.size()) break;
-            if (const std::string name = text_of(item, "Name"); o.code == Object::Code::array && !name.empty() && i != 0) o.values[i].name = name;
+            if (const std::string name = text_of(item, "Name"); o.code == Object::Code::array && !name.empty() &&
+                i != 0) o.values[i].name = name;
             set(item.child("Info"), o.values[i++]);
         }
         Value& count = o.values.front();
@@ -188,8 +191,10 @@ unsigned type_bits(std::string_view type) {
         unsigned bits;
     };
     constexpr Basic basics[] = {{"BOOL", 1},    {"BIT", 1},     {"BYTE", 8},    {"WORD", 16},   {"DWORD", 32},  {"LWORD", 64},  {"SINT", 8},
-                                {"INT", 16},    {"DINT", 32},   {"LINT", 64},   {"USINT", 8},   {"UINT", 16},   {"UDINT", 32},  {"ULINT", 64},
-                                {"INT24", 24},  {"INT40", 40},  {"INT48", 48},  {"INT56", 56},  {"UINT24", 24}, {"UINT40", 40}, {"UINT48", 48},
+                                {"INT", 16},    {"DINT", 32},   {"LINT", 64},   {"USINT", 8},   {"UINT", 16},   {"UDINT", 32},  {"ULINT",
+                                    64},
+                                {"INT24", 24},  {"INT40", 40},  {"INT48", 48},  {"INT56", 56},  {"UINT24", 24}, {"UINT40", 40}, {"UINT48",
+                                    48},
                                 {"UINT56", 56}, {"REAL", 32},   {"LREAL", 64},  {"BITARR8", 8}, {"BITARR16", 16}, {"BITARR32", 32}};
     for (const Basic& b : basics)
         if (b.name == type) return b.bits;

@@ -36,7 +36,8 @@ struct Context {
     std::int64_t number_of(const Xml& at, std::string_view name, std::string_view value, std::int64_t otherwise) {
         if (trimmed(value).empty()) return otherwise;
         if (const auto n = number(value)) return *n;
-        warn(at, "invalid " + std::string(name) + " '" + std::string(trimmed(value).substr(0, 60)) + "': expected a number, as in 12 or #x1F");
+        warn(at, "invalid " + std::string(name) + " '" + std::string(trimmed(value).substr(0, 60)) +
+            "': expected a number, as in 12 or #x1F");
         return otherwise;
     }
     template <class T>

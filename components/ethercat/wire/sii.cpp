@@ -67,12 +67,14 @@ public:
     }
 
 private:
-    std::uint16_t word(std::size_t address) const { return 2 * address + 2 <= image_.size() ? get<std::uint16_t>(image_.data() + 2 * address) : std::uint16_t{0}; }
+    std::uint16_t word(std::size_t address) const { return 2 * address + 2 <= image_.size() ? get<std::uint16_t>(image_.data() +
+        2 * address) : std::uint16_t{0}; }
     std::uint32_t number(std::size_t address) const { return word(address) | static_cast<std::uint32_t>(word(address + 1)) << 16; }
     Mailboxes mailboxes(std::size_t at) const { return {{word(at), word(at + 1)}, {word(at + 2), word(at + 3)}}; }
 
     void configuration() {
-        if (image_.size() < categories_at) out_.problems.push_back("the image has " + std::to_string(image_.size()) + " bytes; at least 128 are expected");
+        if (image_.size() < categories_at) out_.problems.push_back("the image has " + std::to_string(image_.size()) +
+            " bytes; at least 128 are expected");
         for (std::size_t i = 0; i < 7; ++i) out_.configuration[i] = word(i);
         const std::uint16_t stored = word(word_checksum);
         out_.checksum_valid = image_.size() >= 16 && (stored == 0x88a4 || (stored & 0xff) == checksum(image_));

@@ -27,7 +27,8 @@ inline constexpr std::uint16_t aoe = 0x01, eoe = 0x02, coe = 0x04, foe = 0x08, s
 inline constexpr std::uint8_t coe_sdo = 0x01, coe_sdo_info = 0x02, coe_pdo_assign = 0x04, coe_pdo_config = 0x08, coe_upload_at_start = 0x10,
                               coe_complete_access = 0x20;
 /// Category numbers.
-enum class Category : std::uint16_t { strings = 10, data_types = 20, general = 30, fmmu = 40, sync_manager = 41, tx_pdo = 50, rx_pdo = 51, dc = 60, end = 0xffff };
+enum class Category : std::uint16_t { strings = 10, data_types = 20, general = 30, fmmu = 40, sync_manager = 41, tx_pdo = 50, rx_pdo = 51,
+    dc = 60, end = 0xffff };
 
 struct Area {
     std::uint16_t start = 0, size = 0;

@@ -8,7 +8,8 @@
 namespace hal::ethercat::config {
 namespace {
 
-bool read_test_file(const std::string& path, std::string& bytes) { return read_regular_file("tests/unit/ethercat/data/" + path, 1'000'000, bytes); }
+bool read_test_file(const std::string& path, std::string& bytes) { return read_regular_file("tests/unit/ethercat/data/" + path, 1'000'000,
+    bytes); }
 
 Bus good(const std::string& text) {
     Reading r = read(text, "m.ethercat", read_test_file);
@@ -98,22 +99,27 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:1:1: error: this line is before the first section; begin the file with [bus]\n"
               "m.ethercat:1:1: error: missing section [bus]; write [bus] and below it link = eth:enp3s0 and cycle = 1ms\n"
               "m.ethercat:2:1: error: unknown section 'slav'; did you mean 'slave'?");
-    EXPECT_EQ(errors("[bus]\n"), "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
+    EXPECT_EQ(errors("[bus]\n"),
+        "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
     EXPECT_EQ(errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
               "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
               "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"
               "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path of an ESI file, relative to this file");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-2\n"),
               "m.ethercat:4:10: error: 'servo.xml' does not describe a device 'SERVO-2'; did you mean 'SERVO-1'?");
-    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\n"), "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
+    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\n"),
+        "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
     const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
     EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),
               "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; write its type, as in 6072 u16; the types are bit, u8, u16, u32, u64, "
               "s8, s16, s32, s64, real32 or real64");
-    EXPECT_EQ(errors(a + "outputs = 6040 u32\n"), "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out the type");
+    EXPECT_EQ(errors(a + "outputs = 6040 u32\n"),
+        "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out the type");
     EXPECT_EQ(errors(a + "outputs = 1602\n"), "m.ethercat:5:11: error: unknown PDO '1602'; the PDOs are: 1600, 1601");
-    EXPECT_EQ(errors(a + "outputs = 1600 1601\n"), "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign only one of them");
-    EXPECT_EQ(errors(a + "sdo 6060 = 200\n"), "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of -128..127, decimal or with 0x");
+    EXPECT_EQ(errors(a + "outputs = 1600 1601\n"),
+        "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign only one of them");
+    EXPECT_EQ(errors(a + "sdo 6060 = 200\n"),
+        "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of -128..127, decimal or with 0x");
     EXPECT_EQ(errors(a + "607b.scale = 2\noutput = 6040\n"),
               "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: controlword, target-position, statusword, position-actual-value\n"
               "m.ethercat:6:1: error: unknown key 'output' of a slave; did you mean 'outputs'?");
@@ -143,8 +149,10 @@ TEST(EthercatConfig, Plan_shows_the_arithmetic) {
 
 TEST(EthercatConfig, Written_file_is_read_again_without_errors) {
     Found drive;
-    drive.name = "Axis X", drive.device = "SERVO-1", drive.vendor = 0xcafe, drive.product = 0x402, drive.revision = 0x10001, drive.assign_activate = 0x300;
-    drive.rx = {{0x1601, 2, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}}, {0x1602, 0xff, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}}}};
+    drive.name = "Axis X", drive.device = "SERVO-1", drive.vendor = 0xcafe, drive.product = 0x402, drive.revision = 0x10001,
+        drive.assign_activate = 0x300;
+    drive.rx = {{0x1601, 2, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}}, {0x1602, 0xff, 0, "", 0,
+        {{0x6040, 0, "", 6, 16, 0}}}};
     drive.tx = {{0x1a00, 3, 0, "", 0, {{0x6064, 0, "", 4, 32, 0}}}};
     const std::string text = write("eth:enp3s0", 1'000'000, {drive, drive});
     EXPECT_TRUE(text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1000us\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = 0x402\nrevision = 0x10001+  # or a higher one\n"

@@ -103,7 +103,8 @@ TEST(Esi, Numbers_are_read_as_real_files_write_them) {
 TEST(Esi, Invalid_files_are_reported_with_their_place) {
     const auto first = [](std::string_view xml) {
         const File file = read(xml);
-        return file.messages.empty() ? "" : text::message_text("x.xml", file.messages[0].severity, file.messages[0].at, file.messages[0].sentence, file.messages[0].help);
+        return file.messages.empty() ? "" : text::message_text("x.xml", file.messages[0].severity, file.messages[0].at,
+            file.messages[0].sentence, file.messages[0].help);
     };
     EXPECT_EQ(first("<EtherCATInfo>\n<Vendor>"), "x.xml:2:1: error: invalid XML: start-end tags mismatch; is it a device description?");
     EXPECT_EQ(first("<masters/>"),

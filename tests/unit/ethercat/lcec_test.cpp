@@ -64,8 +64,10 @@ TEST(Lcec, Drive_class_has_the_pins_of_its_parameters) {
     const master::Slave& y = r.buses.at(0).setup.slaves.at(1);
     EXPECT_EQ(r.buses[0].setup.domains.at(y.domain).every, 2U);
     const SlaveInfo& info = r.buses[0].slaves.at(1);
-    for (const char* pin : {"srv-cia-controlword", "srv-cia-statusword", "srv-opmode", "srv-opmode-display", "srv-actual-position", "srv-target-position",
-                            "srv-actual-velocity", "srv-target-velocity", "srv-din-negative-limit", "srv-din-home", "srv-din-0", "srv-din-15"})
+    for (const char* pin : {"srv-cia-controlword", "srv-cia-statusword", "srv-opmode", "srv-opmode-display", "srv-actual-position",
+        "srv-target-position",
+                            "srv-actual-velocity", "srv-target-velocity", "srv-din-negative-limit", "srv-din-home", "srv-din-0",
+                                "srv-din-15"})
         EXPECT_NE(info.find(pin), nullptr) << pin;
     EXPECT_EQ(info.find("srv-actual-torque"), nullptr);
     EXPECT_EQ(y.sync_managers.at(1).pdos.at(0).mapping(0), 0x60410010U);
@@ -87,7 +89,8 @@ TEST(Lcec, Errors_name_the_element_and_its_line) {
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"basic_cia402\" vid=\"1\" pid=\"2\"><modParam name=\"enableCPS\" value=\"1\"/><modParam name=\"enableCSP\" value=\"maybe\"/></slave>"),
               "c.xml:2:2: error: invalid value 'maybe' of modParam 'enableCSP': expected true or false\n"
               "c.xml:2:53: error: unsupported modParam 'enableCPS'; did you mean 'enableCSP'?");
-    EXPECT_EQ(to_string(read("<x/>", "c.xml"), "c.xml"), "c.xml:1:2: error: the root element is 'x', not masters; the file begins with <masters>");
+    EXPECT_EQ(to_string(read("<x/>", "c.xml"), "c.xml"),
+        "c.xml:1:2: error: the root element is 'x', not masters; the file begins with <masters>");
 }
 
 TEST(Lcec, Any_bytes_are_read_without_harm) {
