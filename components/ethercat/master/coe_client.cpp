@@ -82,7 +82,8 @@ Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint
         std::memcpy(&request.value, from.data(), from.size());
         first = from.size();
     } else {
-        request.command = static_cast<std::uint8_t>(coe::command::download | coe::command::size_given | (complete ? coe::command::complete : 0));
+        request.command = static_cast<std::uint8_t>(coe::command::download | coe::command::size_given |
+                                                    (complete ? coe::command::complete : 0));
         request.value = static_cast<std::uint32_t>(from.size());
         first = std::min(from.size(), body.size() - coe::sdo_bytes);
         if (first != 0) std::memcpy(body.data() + coe::sdo_bytes, from.data(), first);

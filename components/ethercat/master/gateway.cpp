@@ -31,7 +31,8 @@ int open_socket(int type, const std::string& address, std::uint16_t port, std::s
     const int on = 1;
     if (fd >= 0 && type == SOCK_STREAM) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     if (fd < 0 || bind(fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 || (type == SOCK_STREAM && listen(fd, 8) != 0)) {
-        problem = "mailbox gateway: cannot listen on " + address + ", " + name + " port " + std::to_string(port) + ": " + std::strerror(errno);
+        problem = "mailbox gateway: cannot listen on " + address + ", " + name + " port " + std::to_string(port) + ": ";
+        problem += std::strerror(errno);
         if (fd >= 0) close(fd);
         return -1;
     }

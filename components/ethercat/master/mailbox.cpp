@@ -11,8 +11,9 @@ namespace {
 
 constexpr std::uint8_t sm_full = 0x08, sm_repeat = 0x02;
 constexpr unsigned most_absent = 4;  // answers with WKC 0 in a row after which a slave counts as not on the bus
-constexpr std::uint16_t status_of(unsigned sync_manager) { return static_cast<std::uint16_t>(registers::sync_manager_at(sync_manager) + 5); }
-constexpr std::uint16_t activate_of(unsigned sync_manager) { return static_cast<std::uint16_t>(registers::sync_manager_at(sync_manager) + 6); }
+constexpr std::uint16_t status_of(unsigned n) { return static_cast<std::uint16_t>(registers::sync_manager_at(n) + 5); }
+constexpr std::uint16_t activate_of(unsigned n) { return static_cast<std::uint16_t>(registers::sync_manager_at(n) + 6); }
+MailboxResult too_late(bool lost) noexcept { return {lost ? MailboxResult::Outcome::lost : MailboxResult::Outcome::timed_out, 0, 0}; }
 
 std::uint64_t sum_of(std::span<const std::uint8_t> bytes) noexcept {  // FNV-1a
     std::uint64_t sum = 0xcbf29ce484222325U;
@@ -56,7 +57,7 @@ Task<MailboxResult> SlaveMailbox::send(Channel& channel, BusSlave& slave, Mailbo
         if (full == Full::yes && unknown) break;  // it is the message whose datagram was lost
         absent = full == Full::absent ? absent + 1 : 0;
         if (absent >= most_absent) co_return failed(MailboxResult::Outcome::lost);
-        if (channel.now_ns() >= until) co_return failed(full == Full::lost ? MailboxResult::Outcome::lost : MailboxResult::Outcome::timed_out);
+        if (channel.now_ns() >= until) co_return too_late(full == Full::lost);
         if (!answer && (counters_.resent & 1) == 0) co_await is_full(channel, slave, 0, 0);  // see receive()
         if (full == Full::yes) co_await poll(channel, slave);  // a slave may wait for its own message to be read
     }
@@ -85,7 +86,7 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave, std
         }
         absent = full == Full::absent ? absent + 1 : 0;
         if (absent >= most_absent) co_return failed(MailboxResult::Outcome::lost);
-        if (channel.now_ns() >= until_ns) co_return failed(full == Full::lost ? MailboxResult::Outcome::lost : MailboxResult::Outcome::timed_out);
+        if (channel.now_ns() >= until_ns) co_return too_late(full == Full::lost);
     }
 }
 

@@ -99,7 +99,9 @@ public:
     /// Waits for a reply; all other messages are dropped. A mailbox error ends the wait.
     Task<MailboxResult> wait_for(Channel&, BusSlave&, MailboxType, std::int64_t timeout_ns, Expected expected) noexcept;
     /// Returns how long to wait for the reply of this slave, in ns.
-    static std::int64_t response_timeout_ns(const BusSlave& slave) noexcept { return std::int64_t{slave.timeouts.mailbox_response} * 1'000'000; }
+    static std::int64_t response_timeout_ns(const BusSlave& slave) noexcept {
+        return std::int64_t{slave.timeouts.mailbox_response} * 1'000'000;
+    }
 
     /// Sets the consumer of unrequested messages of a type; nullptr: none. [setup]
     void set_sink(MailboxType type, MailboxSink* sink) noexcept { sinks_[static_cast<unsigned>(type) % types] = sink; }
