@@ -187,16 +187,16 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
 
         unsigned present = 0;
         bool at_rest = true;
-        for (const std::uint16_t number : bus.by_position) {
-            const Device& d = *bus.devices[number];
+        for (const auto& device : bus.devices) {  // not by position: one that lost its address has none
+            const Device& d = *device;
             present += d.slave.present ? 1 : 0;
             at_rest &= !d.slave.present || d.status.operational;
         }
         const bool all_fine = at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
         if (all_fine && bus.status.wkc_state != WkcState::part) continue;
 
-        for (const std::uint16_t number : bus.by_position) {
-            Device& d = *bus.devices[number];
+        for (const auto& device : bus.devices) {
+            Device& d = *device;
             if (d.slave.present && !d.channel.busy() && !d.refused && d.identified && (d.slave.configured >= 0 || count < present))
                 bus.run(d, [&] { return check(d.channel, bus, d); });
         }
