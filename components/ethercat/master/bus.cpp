@@ -6,7 +6,8 @@
 namespace hal::ethercat::master {
 
 Bus::Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events_, CoeAccess& coe_)
-    : setup(std::move(setup_)), image(setup, source), engine(image, status, setup), events(events_), coe(coe_), device_of(setup.slaves.size(), -1),
+    : setup(std::move(setup_)), image(setup, source), engine(image, status, setup), events(events_), coe(coe_),
+        device_of(setup.slaves.size(), -1),
       absent(setup.slaves.size()), wkc_seen(image.domain_count(), WkcState::none) {
     constexpr std::size_t spare = 64;
     const std::size_t capacity = setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
@@ -16,7 +17,8 @@ Bus::Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events
         devices[n]->slave.station = static_cast<std::uint16_t>(first_station + n);
     }
     by_position.reserve(capacity);
-    status.expected = static_cast<std::uint16_t>(std::count_if(setup.slaves.begin(), setup.slaves.end(), [](const Slave& s) { return !s.optional; }));
+    status.expected = static_cast<std::uint16_t>(std::count_if(setup.slaves.begin(), setup.slaves.end(),
+        [](const Slave& s) { return !s.optional; }));
     for (const auto& d : devices) engine.add(d->channel);
     engine.add(watch_channel);
     engine.add(bus_channel);  // last: it sees what the others did in the same cycle

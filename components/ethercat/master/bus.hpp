@@ -111,7 +111,8 @@ inline Channel::Exchange clear_all(Channel& c, std::uint16_t address, std::uint1
 Task<bool> scan(Channel&, Bus&) noexcept;                     ///< Finds and identifies all slaves. False: none, or too many.
 Task<bool> identify(Channel&, Bus&, BusSlave&) noexcept;      ///< Reads the registers and the SII of the slave at its station address.
 Task<void> scan_one(Channel&, Bus&, Device&) noexcept;
-bool matches(Bus&, const Slave&, const BusSlave&, Device* to_report) noexcept;  ///< Returns whether a slave is the one that the setup names.
+/// Returns whether a slave is the one that the setup names.
+bool matches(Bus&, const Slave&, const BusSlave&, Device* to_report) noexcept;
 bool is_at_its_place(const Slave&, const BusSlave&) noexcept;  ///< Compares alias, device identification, or position.
 void assign(Bus&) noexcept;                                   ///< Finds the slaves of the setup among those on the bus.
 

@@ -12,7 +12,7 @@
 
 namespace hal::ethercat::master {
 
-/// What came back of a datagram.
+/// Answer to a datagram.
 struct Answer {
     bool arrived = false;   ///< false: lost, after all repeats
     std::uint16_t wkc = 0;  ///< working counter
@@ -28,7 +28,7 @@ public:
     Channel(const Channel&) = delete;
     Channel& operator=(const Channel&) = delete;
 
-    /// Returns the data of the next datagram, and after exchange() what came back.
+    /// Returns the data of the next datagram, and after exchange() the answer.
     std::uint8_t* data() noexcept { return data_.data(); }
     const std::uint8_t* data() const noexcept { return data_.data(); }
 
@@ -60,7 +60,7 @@ public:
         task_ = make();
         task_.begin();
     }
-    /// Ends the task where it waits. A datagram under way is ignored when it comes back.
+    /// Ends the task where it waits. A datagram under way is ignored when it arrives.
     void stop() noexcept {
         stage_ = Stage::idle, resume_ = {}, generation_++;
         task_.reset();
@@ -80,7 +80,7 @@ public:
     void set_active_flag(std::uint8_t* flag) noexcept { active_ = flag; }
     void set_now(std::int64_t now_ns) noexcept { now_ns_ = now_ns; }
     void set_sent(std::int64_t now_ns) noexcept { stage_ = Stage::sent, sent_ns_ = now_ns; }
-    /// Takes the datagram that came back; its data must be in data(). Resumes the task.
+    /// Takes the answer; its data must be in data(). Resumes the task.
     void arrive(std::uint16_t wkc) noexcept { finish({true, wkc}); }
     /// Takes the loss of the datagram: it waits to be sent again, or the task is resumed.
     void lose() noexcept {

@@ -31,12 +31,14 @@ class CoeAccess {
 public:
     virtual ~CoeAccess() = default;
     /// Reads an object into `to`; `complete`: all its sub-indexes. [realtime]
-    virtual Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete, std::span<std::uint8_t> to) noexcept = 0;
+    virtual Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
+        std::span<std::uint8_t> to) noexcept = 0;
     /// Writes an object. [realtime]
     virtual Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                                      std::span<const std::uint8_t> from) noexcept = 0;
     /// Writes a value over another protocol than CoE: SoE, AoE. [realtime]
-    virtual Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept { co_return SdoResult{SdoResult::Outcome::refused}; }
+    virtual Task<SdoResult> write_other(Channel&, BusSlave&,
+        const StartupWrite&) noexcept { co_return SdoResult{SdoResult::Outcome::refused}; }
 };
 
 }  // namespace hal::ethercat::master

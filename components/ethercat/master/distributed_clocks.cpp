@@ -51,7 +51,8 @@ Task<void> wait_for_helpers(Channel& c, Bus& bus) noexcept {
 int choose_reference(const Bus& bus) noexcept {
     if (bus.setup.lead == ClockLead::none) return -1;
     if (bus.setup.reference_slave && *bus.setup.reference_slave < bus.device_of.size())
-        if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 && bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) return n;
+        if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 &&
+            bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) return n;
     int first = -1;
     for (const std::uint16_t number : bus.by_position) {
         const Device& d = *bus.devices[number];
@@ -151,7 +152,8 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const Dc& dc = *config.dc;
     const auto cycle = static_cast<std::uint64_t>(dc.sync0_cycle_ns > 0 ? dc.sync0_cycle_ns : bus.setup.cycle_ns);
     co_await write<std::uint8_t>(c, d.slave, registers::dc_activation, 0);
-    if ((dc.assign_activate & 0xff) != 0) co_await write(c, d.slave, registers::dc_cyclic_unit_control, static_cast<std::uint8_t>(dc.assign_activate & 0xff));
+    if ((dc.assign_activate & 0xff) != 0) co_await write(c, d.slave, registers::dc_cyclic_unit_control,
+        static_cast<std::uint8_t>(dc.assign_activate & 0xff));
     put(c.data(), static_cast<std::uint32_t>(cycle));
     put(c.data() + 4, static_cast<std::uint32_t>(dc.sync1_cycle_ns > 0 ? dc.sync1_cycle_ns + dc.sync1_shift_ns : dc.sync1_shift_ns));
     Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_sync0_cycle), 8);

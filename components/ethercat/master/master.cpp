@@ -33,7 +33,8 @@ void Master::receive(std::int64_t now_ns) noexcept {
     take_clock(bus);
     judge_counters(bus);
     if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) bus.bus_channel.wake();
-    if (const auto resumed = bus.engine.resumed(); resumed != resumed_) resumed_ = resumed, bus.update_status();  // only tasks change states
+    if (const auto resumed = bus.engine.resumed(); resumed != resumed_) resumed_ = resumed,
+        bus.update_status();  // only tasks change states
     if (links_checked_++ % link_check_cycles != 0) return;
     const auto link = [&](ethernet::Port* port, bool& was, std::int64_t number) {
         if (port == nullptr) return;
@@ -47,7 +48,8 @@ void Master::receive(std::int64_t now_ns) noexcept {
 
 void Master::transmit(std::int64_t now_ns) noexcept {
     Bus& bus = *bus_;
-    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational, bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
+    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational,
+        bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
                         static_cast<std::uint64_t>(now_ns + bus.epoch_ns));
 }
 

@@ -71,12 +71,15 @@ public:
     Phase dc_phase() const noexcept;
 
     // Slaves as found, for tools and mailbox clients.
-    std::size_t found() const noexcept;                               ///< Returns the number of slaves on the bus after the scan. [realtime]
+    /// Returns the number of slaves on the bus after the scan. [realtime]
+    std::size_t found() const noexcept;
     BusSlave& found(std::size_t position) noexcept;                   ///< Returns the slave at a position below found(). [realtime]
-    BusSlave* slave(std::size_t slave) noexcept;                      ///< Returns the slave that is Setup::slaves[slave]; nullptr: missing. [realtime]
+    /// Returns the slave that is Setup::slaves[slave]; nullptr: missing. [realtime]
+    BusSlave* slave(std::size_t slave) noexcept;
     /// Returns the channel of a slave. It belongs to the start-up while idle() is false. [realtime]
     Channel& channel(const BusSlave& slave) noexcept;
-    bool idle(const BusSlave& slave) const noexcept;                  ///< Returns whether no start-up or check works on the slave. [realtime]
+    /// Returns whether no start-up or check works on the slave. [realtime]
+    bool idle(const BusSlave& slave) const noexcept;
 
 private:
     std::unique_ptr<Bus> bus_;

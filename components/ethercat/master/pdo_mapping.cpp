@@ -30,7 +30,8 @@ Task<SdoResult> read_value(Channel& c, Bus& bus, Device& d, std::uint16_t index,
     value = 0;
     SdoResult r = co_await bus.coe.upload(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
     if (r) value = get<std::uint32_t>(bytes.data());
-    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 && (r.abort == object_missing || r.abort == sub_missing)) r.outcome = SdoResult::Outcome::done;
+    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 &&
+        (r.abort == object_missing || r.abort == sub_missing)) r.outcome = SdoResult::Outcome::done;
     co_return r;
 }
 

@@ -154,7 +154,8 @@ void ProcessImage::build_frames(unsigned every) noexcept {
     finish();
 }
 
-void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::uint32_t at, std::uint32_t length, const Block& b) noexcept {
+void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::uint32_t at, std::uint32_t length,
+    const Block& b) noexcept {
     Datagram& d = datagrams_[datagrams_used_++];
     d = {};
     const std::uint8_t* data = writer.add(command, 0, at, static_cast<std::uint16_t>(length));
@@ -268,11 +269,13 @@ void ProcessImage::copy_present(const Datagram& d, const std::uint8_t* data) noe
 }
 
 void ProcessImage::merge(const Frame& frame, std::uint8_t* first, const std::uint8_t* second) const noexcept {
-    const auto add_wkc = [&](std::size_t at) { put(first + at, static_cast<std::uint16_t>(get<std::uint16_t>(first + at) + get<std::uint16_t>(second + at))); };
+    const auto add_wkc = [&](std::size_t at) { put(first + at,
+        static_cast<std::uint16_t>(get<std::uint16_t>(first + at) + get<std::uint16_t>(second + at))); };
     const auto clock = [&](std::uint16_t at) {
         if (at == 0) return;
         const std::size_t wkc = at + datagram_header_bytes + clock_bytes;
-        if (get<std::uint16_t>(second + wkc) > get<std::uint16_t>(first + wkc)) std::memcpy(first + at + datagram_header_bytes, second + at + datagram_header_bytes, clock_bytes);
+        if (get<std::uint16_t>(second + wkc) > get<std::uint16_t>(first + wkc)) std::memcpy(first + at + datagram_header_bytes,
+            second + at + datagram_header_bytes, clock_bytes);
         add_wkc(wkc);
     };
     clock(frame.clock_write);

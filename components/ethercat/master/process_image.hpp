@@ -71,7 +71,7 @@ public:
     void build() noexcept;
     /// Changes how a slave counts in the working counters. [realtime]
     void set_counting(std::size_t slave, bool writes, bool reads, bool starting) noexcept;
-    /// Clears the inputs of a lost slave's mailbox status, so that nobody waits for a mail that is not there. [realtime]
+    /// Clears the inputs of a lost slave's mailbox status, so that no client waits for a missing mail. [realtime]
     void clear_mailbox_status(std::size_t slave) noexcept;
     /// Addresses the datagrams of the reference clock; 0: nobody. [realtime]
     void set_reference(std::uint16_t station, bool write_time) noexcept;

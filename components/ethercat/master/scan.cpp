@@ -54,7 +54,8 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
         bus.events.report(Event::sii_failed, Events::of_position + s.position, sii.control, 8);
         co_return false;
     }
-    std::memcpy(&s.vendor, words, 4), std::memcpy(&s.product, words + 2, 4), std::memcpy(&s.revision, words + 4, 4), std::memcpy(&s.serial, words + 6, 4);
+    std::memcpy(&s.vendor, words, 4), std::memcpy(&s.product, words + 2, 4), std::memcpy(&s.revision, words + 4, 4),
+        std::memcpy(&s.serial, words + 6, 4);
     for (std::uint16_t word = 0x14; word < 0x20; word = static_cast<std::uint16_t>(word + 4)) {
         sii = co_await sii_read(c, s.station, word);
         if (!sii.ok) co_return false;
@@ -216,7 +217,8 @@ void assign(Bus& bus) noexcept {
         d.slave.complete_access = want.complete_access;
         d.slave.mailbox_status = nullptr;
         bus.device_of[n] = d.slave.number;
-        if (((d.slave.features & registers::no_lrw) != 0 || (d.slave.sii_flags & 2) != 0) && !bus.image.slave(n).no_lrw && bus.engine.idle()) {
+        if (((d.slave.features & registers::no_lrw) != 0 || (d.slave.sii_flags & 2) != 0) && !bus.image.slave(n).no_lrw &&
+            bus.engine.idle()) {
             bus.image.set_no_lrw(n);
             bus.image.build();
         }

@@ -6,7 +6,8 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::uint8_t mailbox_out_control = 0x26, mailbox_in_control = 0x22, outputs_control = 0x64, outputs_unwatched = 0x24, inputs_control = 0x20;
+constexpr std::uint8_t mailbox_out_control = 0x26, mailbox_in_control = 0x22, outputs_control = 0x64, outputs_unwatched = 0x24,
+    inputs_control = 0x20;
 constexpr std::uint8_t fmmu_reads = 1, fmmu_writes = 2;
 
 void put_sync_manager(std::uint8_t* to, std::uint16_t start, std::uint16_t length, std::uint8_t control) noexcept {
@@ -87,7 +88,8 @@ Task<bool> set_process_data(Channel& c, Bus& bus, Device& d) noexcept {
     for (std::size_t n = 0; n < config.sync_managers.size(); ++n) {
         const auto& area = image.areas[n];
         if (area.bytes == 0) continue;
-        put_fmmu(c.data(), area.at, static_cast<std::uint16_t>(area.bytes), start_of(config.sync_managers[n], d.slave), area.output ? fmmu_writes : fmmu_reads);
+        put_fmmu(c.data(), area.at, static_cast<std::uint16_t>(area.bytes), start_of(config.sync_managers[n], d.slave),
+            area.output ? fmmu_writes : fmmu_reads);
         a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::fmmu_at(fmmu++)), 16);
         if (a.wkc != 1) co_return false;
     }
@@ -111,7 +113,8 @@ Task<bool> startup_writes(Channel& c, Bus& bus, Device& d, State before) noexcep
         if (w.protocol == StartupWrite::Protocol::reg) {
             if (w.data.size() > Channel::largest) continue;
             std::memcpy(c.data(), w.data.data(), w.data.size());
-            const Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, w.index), static_cast<std::uint16_t>(w.data.size()));
+            const Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, w.index),
+                static_cast<std::uint16_t>(w.data.size()));
             if (a.wkc == 1) continue;
             bus.report(Event::startup_write_failed, d, object, 0);
             co_return false;

@@ -70,8 +70,10 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     if (place == nullptr) {
         for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {  // the position is known, the slave is another one
             const int device = bus.device_of[n];
-            if (bus.setup.slaves[n].position != position || (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present)) continue;
-            if (device >= 0 && found.product != bus.unknown_product) matches(bus, bus.setup.slaves[n], found, bus.devices[static_cast<std::size_t>(device)].get());
+            if (bus.setup.slaves[n].position != position || (device >= 0 &&
+                bus.devices[static_cast<std::size_t>(device)]->slave.present)) continue;
+            if (device >= 0 && found.product != bus.unknown_product) matches(bus, bus.setup.slaves[n], found,
+                bus.devices[static_cast<std::size_t>(device)].get());
         }
         if (std::exchange(bus.unknown_product, found.product) != found.product)
             bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor, found.product);
@@ -93,7 +95,7 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     co_return d.slave.number;
 }
 
-/// Walks along the line after a change, and takes in whoever is new or back.
+/// Walks along the line after a change, and takes in slaves that are new or returned.
 Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
     bool returned = false;
     std::vector<std::uint16_t>& line = bus.by_position;
@@ -104,7 +106,8 @@ Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
         if (!a.arrived || a.wkc != 1) break;
         const auto station = get<std::uint16_t>(c.data());
         std::size_t number = static_cast<std::size_t>(station) - first_station;
-        const bool known = station >= first_station && number < bus.devices.size() && (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
+        const bool known = station >= first_station && number < bus.devices.size() &&
+            (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
                            std::find(line.begin(), line.end(), number) == line.end();
         if (!known) {
             const int taken = co_await take_in(c, bus, position);
@@ -192,7 +195,8 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
             present += d.slave.present ? 1 : 0;
             at_rest &= !d.slave.present || d.status.operational;
         }
-        const bool all_fine = at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
+        const bool all_fine = at_rest && count == bus.known && present == count &&
+            states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
         if (all_fine && bus.status.wkc_state != WkcState::part) continue;
 
         for (const auto& device : bus.devices) {
@@ -207,7 +211,8 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         const bool somebody_waits = present < count || bus.status.responding > present;
         if (!somebody_waits || c.now_ns() - rediscovered < rediscover_every_ns) continue;
         rediscovered = c.now_ns();
-        const bool returned = co_await rediscover(c, bus, bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
+        const bool returned = co_await rediscover(c, bus,
+            bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
         if (!returned) continue;
         co_await find_ports(c, bus, true);
         start_returned(bus);

@@ -33,7 +33,8 @@ bool find_tree(std::span<BusSlave* const> line) noexcept {
         bool found = false;
         for (std::size_t p = n; p-- > 0 && !found;) {
             BusSlave& parent = *line[p];
-            for (unsigned port = next_port(parent.dl_status, parent.entry_port); port != parent.entry_port; port = next_port(parent.dl_status, port)) {
+            for (unsigned port = next_port(parent.dl_status,
+                parent.entry_port); port != parent.entry_port; port = next_port(parent.dl_status, port)) {
                 if (parent.neighbour[port] >= 0) continue;
                 parent.neighbour[port] = s.number;
                 s.neighbour[s.entry_port] = parent.number;

@@ -15,7 +15,7 @@ constexpr std::int64_t acyclic_timeout_ns = 2'000'000;
 constexpr bool counts_positions(Command c) noexcept {
     return c == Command::aprd || c == Command::apwr || c == Command::aprw || c == Command::armw;
 }
-/// The data sent does not matter, and bytes that no slave touches must come back as zeros.
+/// The data sent does not matter, and bytes that no slave touches must return as zeros.
 constexpr bool only_reads(Command c) noexcept {
     return c == Command::aprd || c == Command::fprd || c == Command::brd || c == Command::lrd || c == Command::nop;
 }
@@ -63,7 +63,8 @@ std::uint8_t WireEngine::send(std::span<const std::uint8_t> frame, bool backup) 
     return copies;
 }
 
-void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames, std::uint64_t dc_time_ns) noexcept {
+void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames,
+    std::uint64_t dc_time_ns) noexcept {
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
     if (process_data) {
