@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// The state of the bus and of its slaves as pins.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "ethercat/master/status.hpp"
+#include "hal/component.hpp"
+
+namespace hal::ethercat {
+
+/// Pins of the bus.
+struct BusPins {
+    BusPins(Component& c, const Function& f)
+        : state(c, f, "state", "lowest state of the configured slaves: 1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 none"),
+          link_up(c, f, "link-up", "the port has a link"),
+          all_op(c, f, "all-op", "every slave that is not optional is in its target state and exchanges process data"),
+          responding(c, f, "slaves-responding", "slaves that answered the newest broadcast"),
+          expected(c, f, "slaves-expected", "slaves of the configuration that are not optional"),
+          wkc(c, f, "wkc", "working counter of all process data, newest cycle"),
+          wkc_expected(c, f, "wkc-expected", "its value when all slaves that are started exchange process data"),
+          wkc_state(c, f, "wkc-state", "0 none, 1 part, 2 complete"),
+          sent(c, f, "frames-sent", "frames sent"),
+          lost(c, f, "frames-lost", "frames that did not return in time"),
+          foreign(c, f, "frames-foreign", "EtherCAT frames of another master, or damaged ones"),
+          dc_synchronised(c, f, "dc-synchronised", "every slave with a clock is within the window"),
+          dc_deviation(c, f, "dc-sync-diff", "largest deviation of the slaves' clocks; 4294967295: no data", {.unit = "ns"}),
+          phase(c, f, "pll-err", "how late the cycle begins on the grid of the reference clock", {.unit = "ns"}),
+          ring_broken(c, f, "ring-broken", "with a backup port: the ring is broken; the slaves are reached from both ends") {}
+
+    /// [realtime]
+    void show(const master::BusStatus& s) noexcept {
+        state = static_cast<std::uint32_t>(s.state);
+        link_up = s.link, all_op = s.operational;
+        responding = s.responding, expected = s.expected;
+        wkc = s.wkc, wkc_expected = s.wkc_expected, wkc_state = static_cast<std::uint32_t>(s.wkc_state);
+        sent = s.frames_sent, lost = s.lost, foreign = s.foreign;
+        dc_synchronised = s.dc_synchronised, dc_deviation = s.dc_deviation_ns;
+        ring_broken = s.ring_broken;
+    }
+
+    Out<std::uint32_t> state;
+    Out<bool>          link_up, all_op;
+    Out<std::uint32_t> responding, expected, wkc, wkc_expected, wkc_state;
+    Out<std::uint64_t> sent, lost, foreign;
+    Out<bool>          dc_synchronised;
+    Out<std::uint32_t> dc_deviation;
+    Out<std::int32_t>  phase;
+    Out<bool>          ring_broken;
+};
+
+/// Pins of one slave.
+struct SlavePins {
+    SlavePins(Component& c, const Function& f, const std::string& name)
+        : online(c, f, (name + ".online").c_str(), "the slave answers"),
+          operational(c, f, (name + ".operational").c_str(), "the slave is in its target state and exchanges process data", {.safe = false}),
+          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 unknown"),
+          al_code(c, f, (name + ".al-status-code").c_str(), "reason of the newest rejected or lost state (0134h); 0: none"),
+          dc_deviation(c, f, (name + ".dc-sync-diff").c_str(), "deviation of its clock; 4294967295: no data", {.unit = "ns"}),
+          losses(c, f, (name + ".losses").c_str(), "how often the slave was lost"),
+          crc_errors(c, f, (name + ".crc-errors").c_str(), "damaged frames that it received, all ports; which port: hal ethercat crc"),
+          lost_links(c, f, (name + ".lost-links").c_str(), "lost links, all ports") {}
+
+    /// [realtime]
+    void show(const master::SlaveStatus& s) noexcept {
+        online = s.online, operational = s.operational;
+        state = static_cast<std::uint32_t>(s.state), al_code = s.al_code;
+        dc_deviation = s.dc_deviation_ns, losses = s.losses;
+        std::uint64_t errors = 0, links = 0;
+        for (const master::PortErrors& p : s.ports) errors += p.invalid_frames + p.rx_errors, links += p.lost_links;
+        crc_errors = errors, lost_links = links;
+    }
+
+    Out<bool>          online, operational;
+    Out<std::uint32_t> state, al_code, dc_deviation, losses;
+    Out<std::uint64_t> crc_errors, lost_links;
+};
+
+}  // namespace hal::ethercat
