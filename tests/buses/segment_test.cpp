@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The Ethernet segment in memory: times, stations, queues, disturbances.
-#include "link/segment.hpp"
+#include "segment_world.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,43 +12,7 @@
 namespace hal::ethernet {
 namespace {
 
-constexpr std::int64_t ms = 1'000'000, us = 1'000;
-constexpr std::int64_t minimum_ns = 84 * 80;       // a frame of 60 bytes at 100 Mbit/s
-constexpr std::int64_t one_way_ns = 2 * minimum_ns + 2 * us;  // both lines and the switch
-
-using Bytes = std::vector<std::uint8_t>;
-
-std::unique_ptr<Port> open_or_fail(const std::string& address, const Options& o = {}) {
-    auto opened = open(address, o);
-    EXPECT_TRUE(opened) << opened.problem;
-    return std::move(opened.port);
-}
-std::string fresh() {  // a segment of its own for every test
-    static int count = 0;
-    return "sim:segment" + std::to_string(++count);
-}
-Bytes frame(const Address& to, const Port& from, std::uint16_t type, Bytes payload) {
-    Bytes f(to.begin(), to.end());
-    f.insert(f.end(), from.address().begin(), from.address().end());
-    f.push_back(static_cast<std::uint8_t>(type >> 8)), f.push_back(static_cast<std::uint8_t>(type));
-    f.insert(f.end(), payload.begin(), payload.end());
-    return f;
-}
-struct Got {
-    Bytes bytes;
-    std::int64_t time_ns;
-    std::uint8_t first() const { return bytes[14]; }
-};
-std::vector<Got> all(Port& port, std::int64_t now) {
-    std::vector<Got> got;
-    while (const auto a = port.receive(now)) got.push_back({{a->bytes.begin(), a->bytes.end()}, a->time_ns});
-    return got;
-}
-std::string firsts(const std::vector<Got>& got) {
-    std::string s;
-    for (const auto& g : got) s += static_cast<char>('0' + g.first());
-    return s;
-}
+using namespace segment_world;
 
 TEST(Segment, a_frame_takes_its_time_on_two_lines_and_in_the_switch) {
     const auto net = fresh();
@@ -375,61 +339,6 @@ TEST(Segment, serves_threads_of_one_process) {
     sender.join();
     EXPECT_TRUE(in_order);
     EXPECT_EQ(b->statistics().lost, 0U);
-}
-
-/// Sends every frame back by its port, `delay_ns` after its first bit, with 1 added to the first byte.
-struct Echo : Responder {
-    Port* port = nullptr;
-    std::int64_t delay_ns = 0, first_bit_ns = 0;
-    int calls = 0;
-    void arrived(std::span<std::uint8_t> bytes, std::int64_t at_ns) noexcept override {
-        ++calls, first_bit_ns = at_ns;
-        ++bytes[14];
-        port->send(bytes, {.at_ns = at_ns + delay_ns}, at_ns);
-    }
-};
-
-TEST(Segment, a_responder_makes_it_a_cable_on_which_a_reply_leaves_while_the_frame_arrives) {
-    const auto net = fresh();
-    auto a = open_or_fail(net), b = open_or_fail(net);
-    Echo echo;
-    echo.port = b.get(), echo.delay_ns = us;
-    ASSERT_TRUE(b->segment()->respond(&echo));
-    EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {7}), {}, ms), Sent::queued);
-    EXPECT_TRUE(all(*a, ms + us + minimum_ns - 1).empty());
-    const auto got = all(*a, ms + us + minimum_ns + 1);
-    ASSERT_EQ(got.size(), 1U);
-    EXPECT_EQ(got[0].time_ns, ms + us + minimum_ns);
-    EXPECT_EQ(got[0].first(), 8);
-    EXPECT_EQ(echo.first_bit_ns, ms);
-    EXPECT_TRUE(all(*b, 2 * ms).empty()) << "the responder took it";
-}
-
-TEST(Segment, frames_in_a_row_come_back_in_order_within_one_call) {
-    const auto net = fresh();
-    auto a = open_or_fail(net), b = open_or_fail(net);
-    Echo echo;
-    echo.port = b.get();
-    ASSERT_TRUE(b->segment()->respond(&echo));
-    for (std::uint8_t i = 0; i < 8; ++i) EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {i}), {}, ms), Sent::queued);
-    EXPECT_EQ(firsts(all(*a, 2 * ms)), "12345678");
-}
-
-TEST(Segment, has_one_responder_and_is_a_switch_again_without_it) {
-    const auto net = fresh();
-    auto a = open_or_fail(net), b = open_or_fail(net);
-    Echo first, second;
-    first.port = b.get(), second.port = a.get();
-    EXPECT_TRUE(b->segment()->respond(&first));
-    EXPECT_FALSE(a->segment()->respond(&second));
-    EXPECT_TRUE(b->segment()->respond(nullptr));
-    EXPECT_TRUE(a->segment()->respond(&second));
-    a.reset();
-    a = open_or_fail(net);
-    EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {7}), {}, 3 * ms), Sent::queued);
-    EXPECT_TRUE(all(*b, 3 * ms + one_way_ns - 1).empty());
-    EXPECT_EQ(all(*b, 3 * ms + one_way_ns).size(), 1U);
-    EXPECT_EQ(first.calls + second.calls, 0);
 }
 
 }  // namespace

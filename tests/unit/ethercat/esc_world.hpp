@@ -53,7 +53,7 @@ struct World {
     esc::End end = esc::End::primary;
     esc::Line::Passage out;
     std::array<std::uint8_t, largest_frame_bytes> frame{};
-    std::vector<std::uint8_t> data;   ///< of the datagram that came back
+    std::vector<std::uint8_t> data;   ///< of the answer
     std::uint16_t event = 0;
 
     struct Item { Command command; std::uint32_t address; std::vector<std::uint8_t> data; std::uint16_t wkc = 0; };

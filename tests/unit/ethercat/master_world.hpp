@@ -19,7 +19,7 @@ using namespace hal::ethercat::master;
 
 /// Follows every request; in SAFE-OP and OP it returns its outputs, plus one, as inputs.
 struct Firmware : esc::Application {
-    std::uint16_t refuse = 0, code = 0;  ///< state that is refused
+    std::uint16_t refuse = 0, code = 0;  ///< state that is rejected
     bool echo = true;
     std::uint16_t device_id = 0;
     std::array<std::uint8_t, 64> bytes{};
