@@ -25,7 +25,7 @@ TEST(SegmentResponder, a_responder_makes_it_a_cable_on_which_a_reply_leaves_whil
     Echo echo;
     echo.port = b.get(), echo.delay_ns = us;
     ASSERT_TRUE(b->segment()->respond(&echo));
-    EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {7}), {}, ms), Sent::queued);
+    EXPECT_EQ(a->send(frame_to(broadcast, *a, 0x88b5, {7}), {}, ms), Sent::queued);
     EXPECT_TRUE(all(*a, ms + us + minimum_ns - 1).empty());
     const auto got = all(*a, ms + us + minimum_ns + 1);
     ASSERT_EQ(got.size(), 1U);
@@ -41,7 +41,7 @@ TEST(SegmentResponder, frames_in_a_row_come_back_in_order_within_one_call) {
     Echo echo;
     echo.port = b.get();
     ASSERT_TRUE(b->segment()->respond(&echo));
-    for (std::uint8_t i = 0; i < 8; ++i) EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {i}), {}, ms), Sent::queued);
+    for (std::uint8_t i = 0; i < 8; ++i) EXPECT_EQ(a->send(frame_to(broadcast, *a, 0x88b5, {i}), {}, ms), Sent::queued);
     EXPECT_EQ(firsts(all(*a, 2 * ms)), "12345678");
 }
 
@@ -56,7 +56,7 @@ TEST(SegmentResponder, has_one_responder_and_is_a_switch_again_without_it) {
     EXPECT_TRUE(a->segment()->respond(&second));
     a.reset();
     a = open_or_fail(net);
-    EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {7}), {}, 3 * ms), Sent::queued);
+    EXPECT_EQ(a->send(frame_to(broadcast, *a, 0x88b5, {7}), {}, 3 * ms), Sent::queued);
     EXPECT_TRUE(all(*b, 3 * ms + one_way_ns - 1).empty());
     EXPECT_EQ(all(*b, 3 * ms + one_way_ns).size(), 1U);
     EXPECT_EQ(first.calls + second.calls, 0);

@@ -17,7 +17,7 @@ using namespace segment_world;
 TEST(Segment, a_frame_takes_its_time_on_two_lines_and_in_the_switch) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net);
-    EXPECT_EQ(a->send(frame(broadcast, *a, 0x88b5, {7}), {}, ms), Sent::queued);
+    EXPECT_EQ(a->send(frame_to(broadcast, *a, 0x88b5, {7}), {}, ms), Sent::queued);
     EXPECT_TRUE(all(*b, ms + one_way_ns - 1).empty());
     const auto got = all(*b, ms + one_way_ns);
     ASSERT_EQ(got.size(), 1U);
@@ -34,7 +34,7 @@ TEST(Segment, a_frame_takes_its_time_on_two_lines_and_in_the_switch) {
 TEST(Segment, a_slower_switch_keeps_a_frame_longer) {
     const auto net = fresh();
     auto a = open_or_fail(net + "?forward=12.5us"), b = open_or_fail(net);
-    a->send(frame(broadcast, *a, 0x88b5, {7}), {}, ms);
+    a->send(frame_to(broadcast, *a, 0x88b5, {7}), {}, ms);
     const auto got = all(*b, 2 * ms);
     ASSERT_EQ(got.size(), 1U);
     EXPECT_EQ(got[0].time_ns, ms + 2 * minimum_ns + 12'500);
@@ -47,7 +47,7 @@ TEST(Segment, a_slower_switch_keeps_a_frame_longer) {
 TEST(Segment, a_long_frame_takes_longer_and_a_faster_line_less) {
     auto net = fresh();
     auto a = open_or_fail(net + "?speed=1000"), b = open_or_fail(net);
-    a->send(frame(broadcast, *a, 0x88b5, Bytes(1500)), {}, ms);
+    a->send(frame_to(broadcast, *a, 0x88b5, Bytes(1500)), {}, ms);
     const auto got = all(*b, 2 * ms);
     ASSERT_EQ(got.size(), 1U);
     EXPECT_EQ(got[0].time_ns, ms + 2 * 1538 * 8 + 2 * us);
@@ -60,9 +60,9 @@ TEST(Segment, a_long_frame_takes_longer_and_a_faster_line_less) {
 TEST(Segment, the_switch_sends_a_frame_to_whom_it_is_for_and_an_unknown_one_to_nobody) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net), c = open_or_fail(net), ear = open_or_fail(net + "?promiscuous");
-    a->send(frame(b->address(), *a, 0x88b5, {1}), {}, ms);
-    a->send(frame({2, 9, 9, 9, 9, 9}, *a, 0x88b5, {2}), {}, ms);
-    a->send(frame({1, 0, 0x5e, 0, 0, 1}, *a, 0x88b5, {3}), {}, ms);
+    a->send(frame_to(b->address(), *a, 0x88b5, {1}), {}, ms);
+    a->send(frame_to({2, 9, 9, 9, 9, 9}, *a, 0x88b5, {2}), {}, ms);
+    a->send(frame_to({1, 0, 0x5e, 0, 0, 1}, *a, 0x88b5, {3}), {}, ms);
     EXPECT_EQ(firsts(all(*b, 2 * ms)), "13");
     EXPECT_EQ(firsts(all(*c, 2 * ms)), "3");
     EXPECT_EQ(firsts(all(*ear, 2 * ms)), "123");
@@ -71,7 +71,7 @@ TEST(Segment, the_switch_sends_a_frame_to_whom_it_is_for_and_an_unknown_one_to_n
 TEST(Segment, types_choose_what_a_port_receives) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net, {.types = {0x9021, 0x9022}});
-    for (std::uint8_t i = 0; i < 4; ++i) a->send(frame(broadcast, *a, static_cast<std::uint16_t>(0x9020 + i), {i}), {}, ms);
+    for (std::uint8_t i = 0; i < 4; ++i) a->send(frame_to(broadcast, *a, static_cast<std::uint16_t>(0x9020 + i), {i}), {}, ms);
     EXPECT_EQ(firsts(all(*b, 2 * ms)), "12");
 }
 
@@ -82,13 +82,13 @@ TEST(Segment, users_of_one_station_share_its_line_and_its_address) {
     EXPECT_EQ(bus->address(), can->address());
     EXPECT_EQ(bus->segment()->port(), can->segment()->port());
     EXPECT_NE(b->segment()->port(), can->segment()->port());
-    bus->send(frame(broadcast, *bus, 0x9021, {1}), {}, ms);
-    can->send(frame(broadcast, *can, 0x9023, {2}), {}, ms);
+    bus->send(frame_to(broadcast, *bus, 0x9021, {1}), {}, ms);
+    can->send(frame_to(broadcast, *can, 0x9023, {2}), {}, ms);
     const auto got = all(*b, 2 * ms);
     ASSERT_EQ(firsts(got), "12");
     EXPECT_EQ(got[1].time_ns - got[0].time_ns, minimum_ns);  // one after the other
     EXPECT_TRUE(all(*can, 2 * ms).empty());
-    b->send(frame(can->address(), *b, 0x9023, {3}), {}, 2 * ms);
+    b->send(frame_to(can->address(), *b, 0x9023, {3}), {}, 2 * ms);
     EXPECT_TRUE(all(*bus, 3 * ms).empty());
     EXPECT_EQ(firsts(all(*can, 3 * ms)), "3");
     const auto problem = open(net + "/slave?mac=02:00:00:00:00:07").problem;
@@ -98,7 +98,7 @@ TEST(Segment, users_of_one_station_share_its_line_and_its_address) {
 TEST(Segment, a_frame_leaves_at_its_time_and_is_stamped_then) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net);
-    Bytes first = frame(broadcast, *a, 0x9021, Bytes(20)), second = first;
+    Bytes first = frame_to(broadcast, *a, 0x9021, Bytes(20)), second = first;
     first[14] = 1, second[14] = 2;
     EXPECT_EQ(a->send(first, {.at_ns = 3 * ms, .stamp_at = 22, .stamp_add_ns = 5}, ms), Sent::queued);
     EXPECT_EQ(a->send(second, {.at_ns = 2 * ms}, ms), Sent::queued);
@@ -115,7 +115,7 @@ TEST(Segment, a_frame_leaves_at_its_time_and_is_stamped_then) {
 TEST(Segment, a_frame_later_than_its_guard_is_dropped_and_counted) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net);
-    const auto f = frame(broadcast, *a, 0x9021, {1});
+    const auto f = frame_to(broadcast, *a, 0x9021, {1});
     EXPECT_EQ(a->send(f, {.at_ns = ms, .guard_ns = 10 * us}, ms + 11 * us), Sent::late);
     EXPECT_EQ(a->send(f, {.at_ns = ms, .guard_ns = 20 * us}, ms + 11 * us), Sent::queued);
     EXPECT_EQ(a->send(f, {.at_ns = 2 * ms}, ms + 11 * us), Sent::queued);
@@ -142,7 +142,7 @@ TEST(Segment, what_is_no_frame_is_refused) {
 TEST(Segment, a_full_queue_drops_and_counts_at_both_ends) {
     const auto net = fresh();
     auto a = open_or_fail(net + "?sendqueue=8"), b = open_or_fail(net + "?receivequeue=4");
-    const auto f = frame(broadcast, *a, 0x9021, {1});
+    const auto f = frame_to(broadcast, *a, 0x9021, {1});
     for (int i = 0; i < 8; ++i) EXPECT_EQ(a->send(f, {}, ms), Sent::queued);
     EXPECT_EQ(a->send(f, {}, ms), Sent::full);
     EXPECT_EQ(all(*b, 9 * ms).size(), 4U);
@@ -155,8 +155,8 @@ TEST(Segment, a_full_queue_drops_and_counts_at_both_ends) {
 TEST(Segment, two_senders_meet_on_the_line_of_their_receiver) {
     const auto net = fresh();
     auto c = open_or_fail(net), a = open_or_fail(net), b = open_or_fail(net);
-    b->send(frame(c->address(), *b, 0x9021, {2}), {}, ms);
-    a->send(frame(c->address(), *a, 0x9021, {1}), {}, ms);
+    b->send(frame_to(c->address(), *b, 0x9021, {2}), {}, ms);
+    a->send(frame_to(c->address(), *a, 0x9021, {1}), {}, ms);
     const auto got = all(*c, 2 * ms);
     ASSERT_EQ(firsts(got), "12");  // of one instant: in order of the stations, not of the calls
     EXPECT_EQ(got[0].time_ns, ms + one_way_ns);
@@ -172,7 +172,7 @@ TEST(Segment, every_nth_frame_is_lost_doubled_delayed_cut_or_garbled) {
         segment.calm();
         EXPECT_EQ(segment.disturb(d), 0);
         for (int i = 0; i < 100; ++i) {
-            a->send(frame(broadcast, *a, 0x9021, {static_cast<std::uint8_t>(i), 0x55}), {}, now += ms);
+            a->send(frame_to(broadcast, *a, 0x9021, {static_cast<std::uint8_t>(i), 0x55}), {}, now += ms);
             all(*c, now);
         }
         now += 20 * ms;
@@ -202,7 +202,7 @@ TEST(Segment, every_nth_frame_is_lost_doubled_delayed_cut_or_garbled) {
     EXPECT_EQ(b->statistics().errors, 50U);
     int wrong = 0;
     for (const auto& g : run({.fault = Fault::garble, .every = 2})) {
-        auto wanted = frame(broadcast, *a, 0x9021, {g.bytes[14], 0x55});
+        auto wanted = frame_to(broadcast, *a, 0x9021, {g.bytes[14], 0x55});
         wanted.resize(60);
         int different = 0;
         for (std::size_t i = 0; i < 60; ++i) different += wanted[i] != g.bytes[i];
@@ -220,8 +220,8 @@ TEST(Segment, every_nth_frame_is_lost_doubled_delayed_cut_or_garbled) {
 TEST(Segment, a_cut_cable_isolates_its_station_and_heals) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net), c = open_or_fail(net);
-    const auto f = frame(broadcast, *a, 0x9021, {1});
-    b->send(frame(broadcast, *b, 0x9021, {2}), {.at_ns = 3 * ms}, ms);
+    const auto f = frame_to(broadcast, *a, 0x9021, {1});
+    b->send(frame_to(broadcast, *b, 0x9021, {2}), {.at_ns = 3 * ms}, ms);
     a->segment()->cut(b->segment()->port(), true);
     EXPECT_FALSE(b->statistics().up);
     EXPECT_EQ(b->send(f, {}, 2 * ms), Sent::down);
@@ -240,11 +240,11 @@ TEST(Segment, a_babbling_station_fills_the_lines_of_the_others_but_not_the_memor
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net), c = open_or_fail(net);
     all(*c, ms);
-    a->segment()->babble(a->segment()->port(), frame(broadcast, *a, 0x1234, {9}), 1);
+    a->segment()->babble(a->segment()->port(), frame_to(broadcast, *a, 0x1234, {9}), 1);
     std::size_t babbled = 0, others = 0;
     std::int64_t slowest = 0;
     for (int i = 2; i < 100; ++i) {
-        b->send(frame(c->address(), *b, 0x9021, {1}), {}, i * ms);
+        b->send(frame_to(c->address(), *b, 0x9021, {1}), {}, i * ms);
         for (const auto& g : all(*c, (i + 1) * ms)) {
             ++(g.first() == 9 ? babbled : others);
             if (g.first() == 1) slowest = std::max(slowest, g.time_ns - i * ms);
@@ -255,7 +255,7 @@ TEST(Segment, a_babbling_station_fills_the_lines_of_the_others_but_not_the_memor
     EXPECT_GT(slowest, one_way_ns);
     a->segment()->calm();
     all(*c, 110 * ms);
-    b->send(frame(c->address(), *b, 0x9021, {1}), {}, 120 * ms);
+    b->send(frame_to(c->address(), *b, 0x9021, {1}), {}, 120 * ms);
     EXPECT_EQ(firsts(all(*c, 121 * ms)), "1");
 }
 
@@ -264,7 +264,7 @@ TEST(Segment, stamps_scatter_when_asked_to_and_nothing_else_does) {
     auto a = open_or_fail(net), b = open_or_fail(net + "?noise=1us"), c = open_or_fail(net);
     double sum = 0, squares = 0;
     for (int i = 1; i <= 1000; ++i) {
-        a->send(frame(broadcast, *a, 0x9021, {1}), {}, i * ms);
+        a->send(frame_to(broadcast, *a, 0x9021, {1}), {}, i * ms);
         const auto got = all(*b, i * ms + ms / 2), exact = all(*c, i * ms + ms / 2);
         ASSERT_EQ(got.size(), 1U);
         ASSERT_EQ(exact.at(0).time_ns, i * ms + one_way_ns);
@@ -290,7 +290,7 @@ TEST(Segment, the_order_of_the_calls_of_one_instant_changes_nothing) {
                 const int n = turned ? 3 - k : k;
                 auto& port = *ports[static_cast<std::size_t>(n)];
                 for (const auto& g : all(port, now)) of[n] += std::to_string(g.first()) + "@" + std::to_string(g.time_ns) + " ";
-                port.send(frame(broadcast, port, 0x9021, {static_cast<std::uint8_t>(n)}), {.at_ns = now + (cycle % 3) * 20 * us}, now);
+                port.send(frame_to(broadcast, port, 0x9021, {static_cast<std::uint8_t>(n)}), {.at_ns = now + (cycle % 3) * 20 * us}, now);
             }
             for (const auto& t : of) text += t + "\n";
         }
@@ -305,13 +305,13 @@ TEST(Segment, a_port_that_is_closed_sends_what_is_due_and_nothing_after) {
     const auto net = fresh();
     auto a = open_or_fail(net), b = open_or_fail(net);
     all(*b, ms);
-    a->send(frame(broadcast, *a, 0x9021, {1}), {}, ms);
-    a->send(frame(broadcast, *a, 0x9021, {2}), {.at_ns = 5 * ms}, ms);
+    a->send(frame_to(broadcast, *a, 0x9021, {1}), {}, ms);
+    a->send(frame_to(broadcast, *a, 0x9021, {2}), {.at_ns = 5 * ms}, ms);
     a.reset();
     EXPECT_EQ(firsts(all(*b, 9 * ms)), "1");
     auto c = open_or_fail(net);  // takes its number
     EXPECT_EQ(to_string(c->address()), "02:48:41:4c:00:01");
-    c->send(frame(broadcast, *c, 0x9021, {3}), {}, 10 * ms);
+    c->send(frame_to(broadcast, *c, 0x9021, {3}), {}, 10 * ms);
     EXPECT_EQ(firsts(all(*b, 11 * ms)), "3");
 }
 
@@ -322,7 +322,7 @@ TEST(Segment, serves_threads_of_one_process) {
     std::atomic<std::int64_t> now{ms};
     std::thread sender([&] {
         for (int i = 0; i < count; ++i) {
-            Bytes f = frame(broadcast, *a, 0x9021, {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i >> 8)});
+            Bytes f = frame_to(broadcast, *a, 0x9021, {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i >> 8)});
             while (a->send(f, {}, now.load()) != Sent::queued) now.fetch_add(us), std::this_thread::yield();
             now.fetch_add(10);
         }

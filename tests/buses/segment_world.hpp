@@ -26,7 +26,7 @@ inline std::string fresh() {  // a segment of its own for every test
     static int count = 0;
     return "sim:segment" + std::to_string(++count);
 }
-inline Bytes frame(const Address& to, const Port& from, std::uint16_t type, Bytes payload) {
+inline Bytes frame_to(const Address& to, const Port& from, std::uint16_t type, Bytes payload) {
     Bytes f(to.begin(), to.end());
     f.insert(f.end(), from.address().begin(), from.address().end());
     f.push_back(static_cast<std::uint8_t>(type >> 8)), f.push_back(static_cast<std::uint8_t>(type));
