@@ -130,6 +130,18 @@ inline constexpr CodePage code_pages[] = {
     {"eds-value",
      "A value is not a number, exceeds its data type or its limits, or is written in a form that other tools interpret differently.\n\n"
      "Numbers are decimal, or hexadecimal with 0x. A leading 0 makes a number octal, as in C; `$NODEID+0x180` adds the node ID."},
+    {"ethercat-line",
+     "A line of an EtherCAT configuration (`NAME.ethercat`) is invalid at its position: it is neither a [section] nor KEY = VALUE, or the "
+     "section, key or element is unknown or a duplicate.\n\ndocs/ethercat-configuration.md lists sections and keys, also those of LinuxCNC's "
+     "`ethercat-conf.xml`."},
+    {"ethercat-object",
+     "The object is missing in the description of the slave, cannot be mapped to a PDO, or exceeds what the PDO can hold.\n\n"
+     "Objects are hexadecimal: `6040` or `60FE:1`. Without a description an object needs its type: `2000:1 u16`."},
+    {"ethercat-slave",
+     "Slaves of an EtherCAT configuration conflict or are incomplete: a duplicate position, alias or name, or a missing identity."},
+    {"ethercat-value",
+     "The value of a key of an EtherCAT configuration is invalid. The help line shows the valid values.\n\n"
+     "Times have a unit (ns, us, ms, s); objects are hexadecimal, other numbers decimal, or hexadecimal with 0x."},
     {"function-in-thread",
      "A function runs in one thread, at one position. This one is already in a thread.\n\n"
      "Move it with `delf FUNCTION THREAD` followed by addf."},
