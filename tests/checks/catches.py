@@ -64,6 +64,13 @@ BAD_INCLUDES = {
     "components/canopen/device/drive/bad.hpp": SPDX + '#include "canopen/device/circle.hpp"\n',
     "components/canopen/device/circle.hpp": SPDX + '#include "drive/bad.hpp"\n',
     "components/astrology/moon.cpp": SPDX,
+    "components/ethercat/wire/frame.hpp": SPDX,
+    "components/ethercat/master/bad.cpp": SPDX + '#include "ethercat/esc/line.hpp"\n#include "ethercat/devices/servo.hpp"\n',
+    "components/ethercat/esc/line.hpp": SPDX,
+    "components/ethercat/esc/bad.cpp": SPDX + '#include "ethercat/master/master.hpp"\n',
+    "components/ethercat/devices/servo.hpp": SPDX,
+    "components/ethercat/devices/bad.cpp": SPDX + '#include "ethercat/master/master.hpp"\n',
+    "components/ethercat/master/master.hpp": SPDX,
     "tools/bad.cpp": SPDX + 'bool b = a.starts_with("sim:");\n',
 }
 
@@ -75,10 +82,14 @@ def check_includes(root):
     got = run(includes, root)
     expect("forbidden includes", got, 1, "runtime/base/bad.hpp:2:", "runtime/base/bad.hpp:3:", "runtime/execute/bad.cpp:2:",
            "runtime/model/bad.cpp:3:", "components/astrology/moon.cpp: components/astrology has no row",
-           "components/canopen/master/boot/bad.cpp:2:", "components/logic/or2.cpp:2:", "components/math/sum2.cpp:2:",
+           "components/canopen/master/boot/bad.cpp:2:", "components/ethercat/devices/bad.cpp:2:", "components/ethercat/esc/bad.cpp:2:",
+           "components/ethercat/master/bad.cpp:2:", "components/ethercat/master/bad.cpp:3:", "components/logic/or2.cpp:2:", "components/math/sum2.cpp:2:",
            "components/math/sum2.cpp:3:", "components/math/sum2.cpp:4:", "tools/bad.cpp:2: tests the prefix",
            "folders that include each other: components/canopen/device, components/canopen/device/drive",
            "    components/canopen/device/circle.hpp:2:", "    components/canopen/device/drive/bad.hpp:2:",
+           "folders that include each other: components/ethercat/devices, components/ethercat/esc, components/ethercat/master",
+           "    components/ethercat/devices/bad.cpp:2:", "    components/ethercat/esc/bad.cpp:2:", "    components/ethercat/master/bad.cpp:2:",
+           "    components/ethercat/master/bad.cpp:3:",
            "folders that include each other: runtime/execute, runtime/machine, runtime/model",
            "    runtime/execute/bad.cpp:2:", "    runtime/machine/session.hpp:2:", "    runtime/model/bad.cpp:3:")
     for words in includes.BANS.values():

@@ -3,7 +3,8 @@
 """Runs the examples of the components' manuals: examples.py [HAL] [COMPONENT...]
 
 The indented lines of a component's text that are commands are its example. They run on the virtual clock for 20 cycles, behind the
-threads they name; every component must have an example. Prints which have none and which fail.
+threads they name; every component must have an example. A line `NAME.ENDING`: before indented lines makes them a file beside the example.
+Prints which have none and which fail.
 """
 import os
 import re
@@ -46,6 +47,12 @@ def example_of(text):
     return lines if any(line.startswith("loadrt") for line in lines) else []
 
 
+def files_of(text):
+    """Name to content of the files that the text shows."""
+    shown = re.findall(r"^`([\w.-]+)`:\n\n((?:    .*\n|\n(?=    ))+)", text, re.MULTILINE)
+    return {name: re.sub(r"^    ", "", content, flags=re.MULTILINE) for name, content in shown}
+
+
 def period_of(thread):
     return next((period for name, period in PERIODS.items() if thread.startswith(name)), PERIODS["servo"])
 
@@ -80,6 +87,8 @@ def check(hal, name):
     if not any(one == name.replace("-", "_") or family == "conv" and one.startswith("conv_") for one in loaded):
         return "its example does not load it"
     with tempfile.TemporaryDirectory() as folder:
+        for other, content in files_of(text).items():
+            (Path(folder) / other).write_text(content)
         (Path(folder) / "example.hal").write_text(netlist(lines))
         done = run(hal, "sim", "example.hal", folder=folder)
         return None if done.returncode == 0 else f"exit status {done.returncode}\n{netlist(lines)}\n{done.stderr.strip()}"

@@ -30,7 +30,7 @@ public:
                     " below a [slave …], or delete the section");
         if (slaves_.empty() && bus_ != nullptr)
             report_.error(Topic::line, bus_->at, "the configuration has no slave",
-                "write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
+                "write [slave 0 NAME] and below it esi = FILE");
         check_bus(out_.buses[0], report_);
         out_.messages = std::move(report_.all);
         text::sort(out_.messages);  // a line of a type is read once for each slave of it

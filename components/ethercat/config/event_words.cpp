@@ -55,16 +55,16 @@ std::string of_slave(const Happened& w) {
     case Event::slave_missing:
         return "is not on the bus; check its supply and cable, or write `optional = yes` in its section";
     case Event::unknown_slave:
-        return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add it, or `hal ethercat config`";
+        return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add it";
     case Event::wrong_vendor: return identity_words("vendor", first, second, "vendor");
     case Event::wrong_product: return identity_words("product code", first, second, "product");
     case Event::wrong_revision: return identity_words("revision", first, second, "revision");
     case Event::wrong_serial: return identity_words("serial number", first, second, "serial");
     case Event::duplicate_alias:
         return "has the alias " + std::to_string(first) + ", which the slave at position " + std::to_string(second) +
-               " has too; give each its own: hal ethercat alias";
+               " has too; give each its own";
     case Event::sii_failed:
-        return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it, then hal ethercat sii-read";
+        return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
     case Event::no_mailbox: return "has no mailbox, but the configuration writes objects at start; remove its `sdo` lines";
     case Event::too_few_fmmus:
         return "has " + std::to_string(first) + " FMMUs, its process data needs " + std::to_string(second) + "; use fewer sync managers";
@@ -112,12 +112,13 @@ std::string of_bus(const Happened& w, const master::Setup& setup, const std::str
     case Event::wkc_incomplete: {
         const auto domain = static_cast<std::size_t>(first >> 16);
         return "domain '" + (domain < setup.domains.size() ? setup.domains[domain].name : std::to_string(domain)) + "': working counter " +
-               std::to_string(first & 0xffff) + " instead of " + std::to_string(second) + ": some slaves do not exchange process data";
+               std::to_string(first & 0xffff) + " instead of " + std::to_string(second) +
+               ((first & 0xffff) < second ? ": some slaves do not exchange process data" : ": a slave answers that is not started yet");
     }
     case Event::wkc_complete: {
         const auto domain = static_cast<std::size_t>(first >> 16);
         return "domain '" + (domain < setup.domains.size() ? setup.domains[domain].name : std::to_string(domain)) +
-               "': all slaves exchange process data";
+               "': every slave that is started exchanges process data";
     }
     case Event::dc_synchronised: return "all clocks are synchronised, largest deviation " + microseconds(first);
     case Event::ring_closed: return "the ring is closed again";

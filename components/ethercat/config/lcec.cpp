@@ -151,7 +151,7 @@ private:
         if (!generic && !drive)
             error(Topic::slave, node, info_.type.empty() ? "missing attribute 'type' of <slave>" : "unsupported slave type '" + info_.type +
                 "'",
-                  "write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"; hal ethercat config writes them from the bus");
+                  "write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"");
         if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic ||
             drive)) s.identity.vendor = static_cast<std::uint32_t>(*vid);
         if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic ||

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a bus needs of the time of a cycle: frames, wire time at 100 Mbit/s, latency. For `hal ethercat plan`.
+// What a bus needs of the time of a cycle: frames, wire time at 100 Mbit/s, latency.
 #pragma once
 
 #include <string>

@@ -59,7 +59,7 @@ struct SlavePins {
           al_code(c, f, (name + ".al-status-code").c_str(), "reason of the newest rejected or lost state (0134h); 0: none"),
           dc_deviation(c, f, (name + ".dc-sync-diff").c_str(), "deviation of its clock; 4294967295: no data", {.unit = "ns"}),
           losses(c, f, (name + ".losses").c_str(), "how often the slave was lost"),
-          crc_errors(c, f, (name + ".crc-errors").c_str(), "damaged frames that it received, all ports; which port: hal ethercat crc"),
+          crc_errors(c, f, (name + ".crc-errors").c_str(), "damaged frames that it received, all ports"),
           lost_links(c, f, (name + ".lost-links").c_str(), "lost links, all ports") {}
 
     /// [realtime]

@@ -196,21 +196,29 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Ethercat, "ethercat", "EtherCAT master: process data of slaves as pins", R"(
-Brings the slaves of a bus to OP and exchanges their process data in every cycle. A configuration file beside the netlist, `machine.ethercat`,
-lists the slaves and the objects that become pins (docs/ethercat-configuration.md). LinuxCNC's `ethercat-conf.xml` is read as well; one instance
-drives one of its masters.
+Brings the slaves of a bus to OP and exchanges their process data in every cycle. A configuration file beside the netlist lists the slaves and the
+objects that become pins (docs/ethercat-configuration.md). LinuxCNC's `ethercat-conf.xml` is read as well; one instance drives one of its masters.
 
-```
-[bus]
-link  = sim:machine        # eth:enp3s0 on a machine
-cycle = 1ms
-[slave 0 x]
-vendor  = 0x00000539
-product = 0x02200001
-outputs = 6040 u16 controlword, 607A s32 target-position
-inputs  = 6041 u16 statusword, 6064 s32 position-actual-value
-dc      = sync0
-```
+`machine.ethercat`:
+
+    [bus]
+    link  = sim:machine        # eth:enp3s0 on a machine
+    cycle = 1ms
+    [slave 0 x]
+    vendor  = 0x00ffffff
+    device  = cia402
+    outputs = 6040 607A
+    inputs  = 6041 6064
+    dc      = sync0
+
+The netlist, with an emulated drive:
+
+    loadrt ethercat_segment devices="servo" link=sim:machine
+    loadrt ethercat config=machine.ethercat
+    addf ethercat.0.receive servo-thread
+    addf ethercat.0.transmit servo-thread
+    addf ethercat-segment.0.update servo-thread
+    net x-status ethercat.0.x.statusword
 
 `receive` belongs to the beginning of the thread, `transmit` to its end; the period of the thread is the cycle. Slaves are started in parallel, while
 others already exchange data; one that was lost is started again. Until a slave is `operational` its outputs are off and its inputs keep their last
@@ -221,4 +229,4 @@ With `dc` in the configuration the threads of this machine follow the reference 
 At the end, and as a reaction to a fault, the slaves leave OP: their outputs are off.
 
 EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH, Germany.
-)");
+)")

@@ -30,7 +30,7 @@ struct EthercatArguments {
         const hal::Texts texts(component_);
         if (file.get().empty()) {
             if (texts.offered())
-                throw std::invalid_argument("missing configuration; type: loadrt ethercat config=FILE.ethercat; to write one from the bus: hal ethercat config");
+                throw std::invalid_argument("missing configuration; type: loadrt ethercat config=FILE.ethercat");
             return {};
         }
         const std::string path = texts.find(file.get());

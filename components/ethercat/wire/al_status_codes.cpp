@@ -7,21 +7,21 @@ namespace {
 
 constexpr const char* see_manual = "see the manual of the device";
 constexpr const char* power_cycle = "power-cycle the device";
-constexpr const char* check_mapping = "compare its PDOs with the configuration: hal ethercat pdos";
-constexpr const char* check_dc = "compare `dc` and the cycle with what the device supports: hal ethercat upload 0x1C32";
+constexpr const char* check_mapping = "compare its PDOs with the configuration";
+constexpr const char* check_dc = "compare `dc` and the cycle with what the device supports (object 0x1C32)";
 
 constexpr AlStatusCode al_status_rows[] = {
     {0x0001, "unspecified error", "the device gives no reason", see_manual},
     {0x0002, "no memory", "the firmware ran out of memory", "map fewer objects"},
     {0x0003, "invalid device setup", "settings in the device contradict each other", see_manual},
-    {0x0006, "SII and firmware do not match", "the EEPROM belongs to another firmware", "write the SII image of this firmware: hal ethercat sii-write"},
-    {0x0007, "firmware update failed", "the update did not finish; the old firmware runs", "repeat the update: hal ethercat foe-write"},
-    {0x0011, "invalid requested state change", "the device does not go from its state to this one", "go to INIT first: hal ethercat states INIT"},
+    {0x0006, "SII and firmware do not match", "the EEPROM belongs to another firmware", "write the SII image of this firmware"},
+    {0x0007, "firmware update failed", "the update did not finish; the old firmware runs", "repeat the update"},
+    {0x0011, "invalid requested state change", "the device does not go from its state to this one", "request INIT first"},
     {0x0012, "unknown requested state", "the device does not know this state", see_manual},
     {0x0013, "bootstrap not supported", "the device has no BOOT state", "update its firmware in PRE-OP"},
-    {0x0014, "no valid firmware", "an update was interrupted", "write the firmware in BOOT: hal ethercat foe-write"},
-    {0x0015, "invalid mailbox configuration in BOOT", "sync managers 0 and 1 differ from the bootstrap mailbox of the SII", "check the SII: hal ethercat sii-read"},
-    {0x0016, "invalid mailbox configuration in PRE-OP", "sync managers 0 and 1 differ from the mailbox of the SII", "check the SII: hal ethercat sii-read"},
+    {0x0014, "no valid firmware", "an update was interrupted", "write the firmware in BOOT"},
+    {0x0015, "invalid mailbox configuration in BOOT", "sync managers 0 and 1 differ from the bootstrap mailbox of the SII", "check the SII"},
+    {0x0016, "invalid mailbox configuration in PRE-OP", "sync managers 0 and 1 differ from the mailbox of the SII", "check the SII"},
     {0x0017, "invalid sync manager configuration", "a sync manager differs from what the device expects", check_mapping},
     {0x0018, "no valid inputs available", "the device cannot measure now", see_manual},
     {0x0019, "no valid outputs", "no valid output data arrived in time", "check that the thread runs and the functions of the bus are added to it"},
@@ -32,9 +32,9 @@ constexpr AlStatusCode al_status_rows[] = {
     {0x001e, "invalid input configuration", "the length of the inputs differs from the PDO mapping", check_mapping},
     {0x001f, "invalid watchdog configuration", "the device does not accept the watchdog time", "change or remove `watchdog`"},
     {0x0020, "device needs a cold start", "a setting takes effect at power-on only", power_cycle},
-    {0x0021, "device needs INIT", "a setting takes effect in INIT only", "hal ethercat states INIT, then start again"},
-    {0x0022, "device needs PRE-OP", "a setting takes effect in PRE-OP only", "hal ethercat states PREOP, then start again"},
-    {0x0023, "device needs SAFE-OP", "a setting takes effect in SAFE-OP only", "hal ethercat states SAFEOP, then start again"},
+    {0x0021, "device needs INIT", "a setting takes effect in INIT only", "take it to INIT, then start again"},
+    {0x0022, "device needs PRE-OP", "a setting takes effect in PRE-OP only", "take it to PRE-OP, then start again"},
+    {0x0023, "device needs SAFE-OP", "a setting takes effect in SAFE-OP only", "take it to SAFE-OP, then start again"},
     {0x0024, "invalid input mapping", "an object cannot be mapped to the inputs", check_mapping},
     {0x0025, "invalid output mapping", "an object cannot be mapped to the outputs", check_mapping},
     {0x0026, "inconsistent settings", "settings contradict each other", see_manual},
@@ -61,10 +61,10 @@ constexpr AlStatusCode al_status_rows[] = {
     {0x0045, "SoE mailbox error", "an SoE message was invalid", see_manual},
     {0x004f, "VoE mailbox error", "a VoE message was invalid", see_manual},
     {0x0050, "no access to the EEPROM", "the EEPROM does not answer the firmware", power_cycle},
-    {0x0051, "EEPROM error", "the content of the EEPROM is invalid", "write its SII image: hal ethercat sii-write"},
+    {0x0051, "EEPROM error", "the content of the EEPROM is invalid", "write its SII image"},
     {0x0060, "device restarted", "the firmware restarted by itself", "check the supply of the device"},
     {0x0061, "device identification updated", "its identification switch was changed", power_cycle},
-    {0x0070, "module list differs", "the modules behind the coupler are not those of 0xF030", "compare 0xF030 with 0xF050: hal ethercat upload"},
+    {0x0070, "module list differs", "the modules behind the coupler are not those of 0xF030", "compare 0xF030 with 0xF050"},
     {0x00f0, "controller available", "the controller of the device is ready for a state change", "request the state again"},
 };
 

@@ -100,7 +100,7 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:1:1: error: missing section [bus]; write [bus] and below it link = eth:enp3s0 and cycle = 1ms\n"
               "m.ethercat:2:1: error: unknown section 'slav'; did you mean 'slave'?");
     EXPECT_EQ(errors("[bus]\n"),
-        "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE; hal ethercat config writes a file from the bus");
+        "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE");
     EXPECT_EQ(errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
               "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
               "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"

@@ -23,7 +23,7 @@ std::string words(Event event, std::uint32_t slave, std::int64_t first = 0, std:
 TEST(EthercatEventWords, Refused_state_names_slave_state_code_cause_and_remedy) {
     EXPECT_EQ(words(Event::state_refused, 1, 4, 0x001e),
               "slave 4 (x-axis) rejects SAFE-OP with AL status code 0x001E (invalid input configuration): the length of the inputs differs from "
-              "the PDO mapping; compare its PDOs with the configuration: hal ethercat pdos");
+              "the PDO mapping; compare its PDOs with the configuration");
     EXPECT_EQ(words(Event::state_refused, 1, 8, 0x8123),
               "slave 4 (x-axis) rejects OP with AL status code 0x8123; see the manual of the drive");
 }
@@ -33,7 +33,7 @@ TEST(EthercatEventWords, Wrong_device_names_what_was_found_and_expected) {
               "slave 0 has the product code 0x00000402, the configuration expects 0x00000403; it stays in INIT: connect the right device, or "
               "correct `product`");
     EXPECT_EQ(words(Event::unknown_slave, Events::of_position + 7, 0x2, 0x7d83052),
-              "slave at position 7 is not in the configuration (vendor 0x00000002, product 0x07D83052); add it, or `hal ethercat config`");
+              "slave at position 7 is not in the configuration (vendor 0x00000002, product 0x07D83052); add it");
 }
 
 TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {

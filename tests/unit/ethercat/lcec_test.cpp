@@ -80,8 +80,7 @@ TEST(Lcec, Errors_name_the_element_and_its_line) {
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\" alias=\"4\"/>"),
               "c.xml:2:2: error: unknown attribute 'alias' of <slave>; the attributes are: idx, type, name, vid, pid, configPdos, syncUnit, syncUnitCycle");
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"EL1008\"/>"),
-              "c.xml:2:2: error: unsupported slave type 'EL1008'; write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"; hal ethercat config writes them "
-              "from the bus");
+              "c.xml:2:2: error: unsupported slave type 'EL1008'; write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"");
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\"><idnConfig drive=\"0\" idn=\"15\"/></slave>"),
               "c.xml:2:48: error: <idnConfig> is unsupported: the format has no usable state attribute; use a .ethercat file with idn S-0-15 = 07 00");
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"generic\" vid=\"xy\" pid=\"2\"/>"),

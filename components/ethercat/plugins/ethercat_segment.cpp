@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ethercat/devices/registry.hpp"
+#include "ethercat/devices/servo.hpp"
+#include "ethercat/esc/line.hpp"
+#include "ethercat/esc/responder.hpp"
+#include "hal/component.hpp"
+
+namespace {
+
+using namespace hal::ethercat;
+
+/// Pins of one emulated slave.
+struct SlavePins {
+    SlavePins(hal::Component& c, const hal::Function& f, const std::string& name)
+        : power(c, f, (name + ".power").c_str(), "FALSE: the slave has no power; its settings and volatile objects are lost", {.initial = true}),
+          cable(c, f, (name + ".cable").c_str(), "FALSE: the cable to the slave before it is broken", {.initial = true}),
+          drift(c, f, (name + ".drift").c_str(), "error of its oscillator", {.unit = "ppm"}),
+          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP") {}
+
+    hal::In<bool>           power, cable;
+    hal::In<double>         drift;
+    hal::Out<std::uint32_t> state;
+    bool                    was_power = true, was_cable = true;
+    double                  was_drift = 0;
+};
+
+/// Pins of one axis of a servo drive.
+struct AxisPins {
+    AxisPins(hal::Component& c, const hal::Function& f, const std::string& name, devices::ServoAxis& its_axis)
+        : axis(its_axis),
+          position(c, f, (name + "position").c_str(), "position of the motor", {.unit = "counts"}),
+          velocity(c, f, (name + "velocity").c_str(), "velocity of the motor", {.unit = "counts/s"}),
+          statusword(c, f, (name + "statusword").c_str(), "6041h"),
+          inputs(c, f, (name + "inputs").c_str(), "digital inputs of the drive (60FDh)"),
+          error_code(c, f, (name + "fail").c_str(), "a change to another number than 0 raises a fault with this error code (603Fh)") {}
+
+    devices::ServoAxis&     axis;
+    hal::Out<double>        position, velocity;
+    hal::Out<std::uint32_t> statusword;
+    hal::In<std::uint32_t>  inputs, error_code;
+    std::uint32_t           was_error = 0;
+};
+
+/// Pin of one channel of an I/O device.
+template <class Pin>
+struct Channel {
+    devices::IoBehaviour& io;
+    unsigned              number;
+    Pin                   pin;
+    Channel(hal::Component& c, const hal::Function& f, const std::string& name, const char* about, devices::IoBehaviour& its_io, unsigned n)
+        : io(its_io), number(n), pin(c, f, name.c_str(), about) {}
+};
+
+class EthercatSegment : public hal::Component {
+public:
+    explicit EthercatSegment(const hal_host* host) : Component(host) {
+        std::string text = devices_.get();
+        for (char& c : text)
+            if (c == ',') c = '\n';
+        const devices::LineDescription description = devices::read_line(text);
+        if (!description.messages.empty())
+            throw hal::ArgumentError("devices", "devices=\"" + devices_.get() + "\": " + description.messages.front().sentence + "; " +
+                                                    description.messages.front().help);
+        line_devices_ = devices::make_line(description);
+        for (std::size_t n = 0; n < line_devices_.size(); ++n) declare(n);
+    }
+
+    void start() {
+        hal::ethernet::Options options;
+        options.promiscuous = true;
+        options.send_capacity = options.receive_capacity = 256;
+        primary_ = open(link_.get(), options);
+        if (!backup_.get().empty()) secondary_ = open(backup_.get(), options);
+        line_.emplace();
+        for (devices::Device& d : line_devices_)
+            line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+        if (secondary_ && !line_devices_.empty() && !line_->close_ring(static_cast<unsigned>(line_devices_.size() - 1), 1))
+            throw std::runtime_error("backup=" + backup_.get() + ": the last device has no second port; put one with two ports at the end");
+        const std::int64_t now = primary_->segment()->time_ns();
+        line_->power_on(now == hal::ethernet::unclocked ? 0 : now);
+        connection_ = std::make_unique<esc::LineOnSegments>(*line_, *primary_, secondary_.get());
+        if (!connection_->connected()) throw std::runtime_error(link_.get() + " already has emulated slaves; choose another name");
+        for (SlavePins& pins : slaves_) pins.was_power = pins.was_cable = true, pins.was_drift = 0;
+    }
+
+    void stop() noexcept {
+        connection_.reset();
+        line_.reset();
+        primary_.reset(), secondary_.reset();
+    }
+
+    void update(hal::Cycle cycle) noexcept {
+        if (!line_) return;
+        primary_->receive(cycle.start_ns());  // frames of a master that is gone pass too
+        for (unsigned n = 0; n < slaves_.size(); ++n) {
+            using Kind = esc::LineCommand::Kind;
+            SlavePins& pins = slaves_[n];
+            if (pins.power != pins.was_power && line_->post({.kind = Kind::power, .slave = n, .on = pins.power})) pins.was_power = pins.power;
+            if (pins.cable != pins.was_cable && line_->post({.kind = Kind::cable, .slave = n, .port = 0, .on = pins.cable})) pins.was_cable = pins.cable;
+            const double drift = std::isfinite(pins.drift.get()) ? pins.drift.get() : 0.0;
+            if (drift != pins.was_drift && line_->post({.kind = Kind::drift, .slave = n, .value = drift})) pins.was_drift = drift;
+            pins.state = static_cast<std::uint32_t>(line_devices_[n].firmware->state());
+        }
+        for (AxisPins& pins : axes_) {
+            pins.position = pins.axis.position(), pins.velocity = pins.axis.velocity(), pins.statusword = pins.axis.statusword();
+            pins.axis.set_inputs(pins.inputs);
+            if (pins.error_code != pins.was_error && pins.error_code != 0) pins.axis.fail(static_cast<std::uint16_t>(pins.error_code));
+            pins.was_error = pins.error_code;
+        }
+        for (auto& c : digital_in_) c.io.set_input(c.number, c.pin ? 1 : 0);
+        for (auto& c : digital_out_) c.pin = c.io.output(c.number) != 0;
+        for (auto& c : analog_in_) c.io.set_input(c.number, c.pin);
+        for (auto& c : analog_out_) c.pin = c.io.output(c.number);
+    }
+
+private:
+    static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
+        if (!hal::ethernet::describe(address).in_memory)
+            throw std::runtime_error(address + " is not a segment in memory; write link=sim:NAME");
+        auto opened = hal::ethernet::open(address, options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        return std::move(opened.port);
+    }
+
+    /// Declares the pins of a device. [setup]
+    void declare(std::size_t n) {
+        const devices::Device& device = line_devices_[n];
+        const std::string      name = "slave-" + std::to_string(n);
+        slaves_.emplace_back(*this, update_, name);
+        devices::Behaviour& behaviour = device.firmware->behaviour();
+        if (auto* servo = dynamic_cast<devices::Servo*>(&behaviour)) {
+            for (unsigned a = 0; a < servo->axes(); ++a)
+                axes_.emplace_back(*this, update_, name + (servo->axes() > 1 ? ".axis-" + std::to_string(a) + "." : "."), servo->axis(a));
+        } else if (auto* io = dynamic_cast<devices::IoBehaviour*>(&behaviour)) {
+            for (unsigned c = 0; c < io->channels(); ++c) {
+                const std::string number = (c < 10 ? "0" : "") + std::to_string(c);
+                if (device.name == "digital_in") digital_in_.emplace_back(*this, update_, name + ".in-" + number, "terminal of the input", *io, c);
+                else if (device.name == "digital_out")
+                    digital_out_.emplace_back(*this, update_, name + ".out-" + number, "terminal of the output", *io, c);
+                else if (device.name == "analog_in")
+                    analog_in_.emplace_back(*this, update_, name + ".analog-in-" + number, "terminal of the input, in counts", *io, c);
+                else analog_out_.emplace_back(*this, update_, name + ".analog-out-" + number, "terminal of the output, in counts", *io, c);
+            }
+        }
+    }
+
+    hal::TextArgument devices_{*this, "devices", "coupler",
+                               "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out bits=8, analog_in channels=4, "
+                               "analog_out channels=2, servo axes=1, mailbox_device; all take alias= and serial=, a servo dc=required"};
+    hal::TextArgument link_{*this, "link", "sim:ethercat", "segment in memory where the master is"};
+    hal::TextArgument backup_{*this, "backup", "", "segment in memory of the master's second port, which closes a ring"};
+    hal::Function     update_{*this, "update", &EthercatSegment::update, "copies values between pins and devices; in the thread of the master"};
+
+    std::vector<devices::Device> line_devices_;
+    // Deques: a pin may not move once it is declared.
+    std::deque<SlavePins>                        slaves_;
+    std::deque<AxisPins>                         axes_;
+    std::deque<Channel<hal::In<bool>>>           digital_in_;
+    std::deque<Channel<hal::Out<bool>>>          digital_out_;
+    std::deque<Channel<hal::In<std::int32_t>>>   analog_in_;
+    std::deque<Channel<hal::Out<std::int32_t>>>  analog_out_;
+    std::unique_ptr<hal::ethernet::Port>         primary_, secondary_;
+    std::optional<esc::Line>                     line_;
+    std::unique_ptr<esc::LineOnSegments>         connection_;
+};
+
+}  // namespace
+
+HAL_COMPONENT(EthercatSegment, "ethercat_segment", "Emulated EtherCAT slaves on a segment in memory", R"(
+A line of EtherCAT slaves for machines without the hardware: controllers with registers, sync managers, FMMUs, EEPROM, watchdog and distributed
+clocks, and the firmware of couplers, digital and analogue I/O and CiA 402 servo drives. Frames are answered while they pass, with the delays of
+cables and devices, at the same times in every run of `hal sim`.
+
+    loadrt ethercat_segment devices="coupler, digital_in bits=16, servo axes=2" link=sim:line
+    addf ethercat-segment.0.update servo-thread
+    setp ethercat-segment.0.slave-2.axis-0.inputs 1
+
+A master on the same segment is `loadrt ethercat config=machine.ethercat link=sim:line`.
+
+Slaves are counted from 0 along the line. `slave-N.power` and `slave-N.cable` switch a slave off and break its cable. With `backup` the line is a ring
+with both ports of the master.
+)");
