@@ -80,6 +80,9 @@ std::string of_slave(const Happened& w) {
         return "did not keep the PDO mapping: " + object_words(first) + " reads " + hex(second, 8) + "; this PDO is fixed, use its own entries";
     case Event::too_many_entries:
         return "does not take " + std::to_string(second) + " entries in PDO " + hex(first, 4) + "; spread them over several PDOs";
+    case Event::fixed_size:
+        return "has no mailbox to change its PDO mapping: sync manager " + std::to_string(first >> 16) + " has " + std::to_string(second) +
+               (second == 1 ? " byte" : " bytes") + ", the configuration needs " + std::to_string(first & 0xffff) + "; list all of its own objects";
     case Event::slave_lost: return "does not answer; check its supply and the cable to it";
     case Event::slave_returned: return "answers again";
     case Event::slave_operational: return "is operational after " + std::to_string(second) + " ms";

@@ -124,7 +124,8 @@ void Firmware::watch(esc::Pdi& pdi) noexcept {
 }
 
 void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
-    if (state_ == State::op) outputs_.clear();
+    const bool leaves_op = state_ == State::op && to != State::op;
+    if (leaves_op) outputs_.clear();
     if (to == State::init) mailbox_running_ = false;
     if (to == State::boot) start_mailbox(design_.sii.boot);
     if (to == State::preop && state_ == State::init && design_.sii.has_mailbox()) start_mailbox(design_.sii.mailboxes);
@@ -137,14 +138,17 @@ void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
     state_ = to;
     if (to != State::op) received_ = received_ && to == State::safeop;
     shown_.store(to, std::memory_order_relaxed);
+    if (leaves_op) step(pdi, 0, false);  // below SAFE-OP it is the last one: outputs are off
     pdi.set_al_status(static_cast<std::uint16_t>(to), 0);
 }
 
 void Firmware::fail(esc::Pdi& pdi, State stay, std::uint16_t code) noexcept {
     if (stay != state_) {
-        if (state_ == State::op) outputs_.clear(), received_ = false;
+        const bool leaves_op = state_ == State::op;
+        if (leaves_op) outputs_.clear(), received_ = false;
         state_ = stay;
         shown_.store(stay, std::memory_order_relaxed);
+        if (leaves_op) step(pdi, 0, false);
     }
     error_ = true;
     pdi.set_al_status(static_cast<std::uint16_t>(static_cast<unsigned>(stay) | al_error), code);

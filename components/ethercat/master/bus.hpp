@@ -33,6 +33,7 @@ struct Device {
     bool synchronised = false; ///< its clock was within the window
     bool helping = false;      ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0; ///< of the newest start-up
+    std::int64_t sync_begins_ns = 0;  ///< when its SYNC signals begin, on the clock of the cycle; 0: it has none
     unsigned attempts = 0;     ///< start-ups in a row that failed
     std::array<std::array<std::uint8_t, 4>, 4> last_errors{};  ///< counters of 0300h as last read, per port
 };

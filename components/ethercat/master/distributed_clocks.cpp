@@ -148,6 +148,7 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
 
 Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave& config = *bus.config(d);
+    d.sync_begins_ns = 0;
     if (!config.dc || config.dc->assign_activate == 0) co_return true;
     const Dc& dc = *config.dc;
     const auto cycle = static_cast<std::uint64_t>(dc.sync0_cycle_ns > 0 ? dc.sync0_cycle_ns : bus.setup.cycle_ns);
@@ -160,6 +161,7 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     if (a.wkc != 1) co_return false;
     // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but for their shift.
     const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(sync_start_ns)) / cycle * cycle + cycle + static_cast<std::uint64_t>(dc.sync0_shift_ns);
+    d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
     a = co_await write(c, d.slave, registers::dc_start_time, start);
     if (a.wkc != 1) co_return false;
     a = co_await write(c, d.slave, registers::dc_activation, static_cast<std::uint8_t>(dc.assign_activate >> 8));

@@ -27,6 +27,7 @@ enum class Event : std::uint8_t {
     mapping_failed,                ///< [index << 8 | sub, abort code]
     mapping_differs,               ///< read back other than written [index << 8 | sub, value read]
     too_many_entries,              ///< [PDO, entries]
+    fixed_size,                    ///< no mailbox to change the mapping [sync manager << 16 | bytes of the setup, bytes of the slave]
     slave_lost, slave_returned,    ///< [position, -]
     slave_operational,             ///< [position, ms since its start-up began]
     wkc_incomplete, wkc_complete,  ///< of a domain [domain << 16 | counter, expected]

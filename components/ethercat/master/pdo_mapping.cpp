@@ -148,6 +148,17 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, u
     co_return now == Compared::same;
 }
 
+/// Compares the process data of a slave that cannot change it with what its SII states; 0 bytes there: not stated.
+bool has_fixed_size(Bus& bus, Device& d, const SyncManager& sm) noexcept {
+    std::size_t bits = 0;
+    for (const Pdo& pdo : sm.pdos)
+        for (const Entry& e : pdo.entries) bits += e.bits;
+    const std::size_t fixed = sm.number < d.slave.sii_sync_managers ? d.slave.sii[sm.number].length : 0;
+    if (fixed == 0 || fixed == (bits + 7) / 8) return true;
+    bus.report(Event::fixed_size, d, sm.number << 16 | static_cast<std::int64_t>((bits + 7) / 8), static_cast<std::int64_t>(fixed));
+    return false;
+}
+
 }  // namespace
 
 Task<bool> map_process_data(Channel& c, Bus& bus, Device& d) noexcept {
@@ -157,8 +168,8 @@ Task<bool> map_process_data(Channel& c, Bus& bus, Device& d) noexcept {
         for (const Pdo& pdo : sm.pdos) any |= pdo.write_mapping;
         if (!any) continue;
         if (!d.slave.mailbox.usable() || (d.slave.protocols & coe_supported) == 0) {
-            bus.report(Event::no_mailbox, d, assignment_of(sm.number) << 8);
-            co_return false;
+            if (!has_fixed_size(bus, d, sm)) co_return false;
+            continue;
         }
         const bool ok = co_await map_manager(c, bus, d, sm, config.entries_per_pdo);
         if (!ok) co_return false;

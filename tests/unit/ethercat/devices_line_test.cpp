@@ -287,4 +287,15 @@ TEST(DeviceLine, Description_reports_what_is_invalid) {
     EXPECT_EQ(bad.messages[3].sentence, "option 'bits' has no value; write bits=VALUE");
 }
 
+TEST_F(Devices, Outputs_are_off_as_soon_as_the_master_takes_the_slave_to_init) {
+    start("digital_out");
+    to_op({0xff});
+    outputs({0xff});
+    w.line.advance(w.now_ns += 2'000'000);
+    auto& io = static_cast<IoBehaviour&>(device.firmware->behaviour());
+    ASSERT_EQ(io.output(0), 1);
+    request(State::init);
+    EXPECT_EQ(io.output(0), 0);
+}
+
 }  // namespace

@@ -169,4 +169,19 @@ TEST(EthercatMaster, Exchanges_a_slow_domain_in_every_nth_cycle_once_operational
     EXPECT_NEAR(static_cast<double>(w.master->domain(1).exchanges - slow), 10.0, 1.0);
 }
 
+TEST(EthercatStart, A_slave_without_mailbox_keeps_its_process_data_whatever_the_setup_would_map) {
+    for (const std::uint16_t bytes : {2, 3}) {
+        World w;
+        w.add(0x100);
+        auto setup = drives(1, bytes);
+        for (auto& sm : setup.slaves[0].sync_managers) sm.write_assignment = sm.pdos[0].write_mapping = true;
+        w.begin(setup);
+        EXPECT_EQ(w.operational(500), bytes == 2) << w.log.text();
+        if (bytes == 2) continue;
+        ASSERT_NE(w.log.last(Event::fixed_size), nullptr) << w.log.text();
+        EXPECT_EQ(w.log.last(Event::fixed_size)->first, 2 << 16 | 3);
+        EXPECT_EQ(w.log.last(Event::fixed_size)->second, 2);
+    }
+}
+
 }  // namespace
