@@ -29,6 +29,7 @@ struct Device {
     Channel channel;
     bool identified = false;   ///< the registers and the SII were read
     bool refused = false;      ///< is not the slave that the setup names; stays in INIT
+    bool times_read = false;   ///< its receive times are those of the newest latch
     bool clock_set = false;    ///< offset and delay are written
     bool synchronised = false; ///< its clock was within the window
     bool helping = false;      ///< the task on its channel works for that of the bus

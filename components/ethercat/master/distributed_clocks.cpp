@@ -14,12 +14,15 @@ constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start
 constexpr std::uint32_t tolerable_deviation_ns = 10'000;
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
-Task<void> read_times(Channel& c, BusSlave& s) noexcept {
+Task<void> read_times(Channel& c, Device& d) noexcept {
+    BusSlave& s = d.slave;
+    d.times_read = false;
     const Answer a = co_await read(c, s, registers::dc_receive_time, receive_time_bytes);
     if (a.wkc != 1) co_return;
     std::memcpy(s.receive_time.data(), c.data(), 16);
     s.local_time = get<std::uint64_t>(c.data() + 0x18);
     if (!s.has_dc64()) s.local_time = static_cast<std::uint32_t>(s.local_time);
+    d.times_read = true;
 }
 
 Task<void> set_clock(Channel& c, Device& d, std::uint64_t offset) noexcept {
@@ -83,7 +86,7 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
     const std::int64_t latched_ns = c.sent_ns();
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && d.slave.has_dc()) co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d.slave); });
+        if (d.slave.present && d.slave.has_dc()) co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d); });
     }
     co_await wait_for_helpers(c, bus);
     if (bus.reference < 0 || !bus.devices[static_cast<std::size_t>(bus.reference)]->slave.present) {
@@ -105,7 +108,7 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
         BusSlave& s = d.slave;
-        if (!s.present || !s.has_dc() || d.clock_set) continue;  // never those of running slaves
+        if (!s.present || !s.has_dc() || d.clock_set || !d.times_read) continue;  // never those of running slaves
         // The frame with the latch passed this slave a delay after it passed the reference clock.
         const auto system = static_cast<std::uint64_t>(latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) + s.delay_ns;
         const std::uint64_t offset = system - s.local_time;
@@ -140,6 +143,8 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
         if (c.now_ns() < until) continue;
         if (deviation <= tolerable_deviation_ns) break;
         bus.report(Event::dc_timeout, d, deviation, window);
+        d.clock_set = false;  // it is set again before the next start-up
+        bus.suspicious = true;
         co_return false;
     }
     d.synchronised = true;

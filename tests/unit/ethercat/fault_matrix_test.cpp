@@ -68,6 +68,16 @@ TEST(EthercatFaultMatrix, Each_nth_frame_of_each_kind_fails_while_booting_and_in
             }
 }
 
+TEST(EthercatFaultMatrix, A_clock_whose_times_were_not_read_is_not_set) {
+    for (unsigned every = 2; every <= 12; ++every) {
+        Machine m;
+        m.port.fault = Fault::lost, m.port.kind = Kind::clock, m.port.every = every;
+        m.run(300);
+        m.repair();
+        ASSERT_NE(m.recover(20'000), 0U) << every << m.events.text(m.setup);
+    }
+}
+
 TEST(EthercatFaultMatrix, Frames_cables_and_power_fail_at_random) {
     Summary summary;
     const auto until_ns = static_cast<std::int64_t>(hours() * 3600e9);
