@@ -16,15 +16,15 @@ constexpr unsigned column_of(State wanted) noexcept {
     return 0;
 }
 
-struct Way {
+struct Transition {
     Step step;
     bool there = false;
 };
-constexpr Way there(Step held) { return {held, true}; }
+constexpr Transition there(Step held) { return {held, true}; }
 
 /// The command in a state (row, in the order of State) that leads to the commanded one (column). Leaving operation enabled uses the ramps
 /// of the drive; no command leads through fault: only a reset leaves it.
-constexpr Way ways[9][5] = {
+constexpr Transition transitions[9][5] = {
     // off                          ready to switch on         switched on                operation enabled          quick stop
     {there(Step::disable_voltage), {Step::wait}, {Step::wait}, {Step::wait}, there(Step::quick_stop)},
     {there(Step::disable_voltage), {Step::shutdown}, {Step::shutdown}, {Step::shutdown}, there(Step::quick_stop)},
@@ -81,17 +81,17 @@ std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Tim
     if (state_ != before) forced_ = false;
     const bool off = wanted_ == State::switch_on_disabled, in_fault = state_ == State::fault;
 
-    Way way = ways[static_cast<unsigned>(state_)][column_of(wanted_)];
-    if (resetting_ && in_fault) way = {edge_low_ ? Step::wait : Step::fault_reset};
-    else if (in_fault && !way.there && !failure_) fail(Cause::drive_fault, statusword, error_code, 0);
-    if (forced_ && !way.there) way.step = Step::disable_voltage;
+    Transition transition = transitions[static_cast<unsigned>(state_)][column_of(wanted_)];
+    if (resetting_ && in_fault) transition = {edge_low_ ? Step::wait : Step::fault_reset};
+    else if (in_fault && !transition.there && !failure_) fail(Cause::drive_fault, statusword, error_code, 0);
+    if (forced_ && !transition.there) transition.step = Step::disable_voltage;
     edge_low_ = false;  // a cycle with bit 7 low makes the edge
-    reached_ = way.there && !resetting_;
+    reached_ = transition.there && !resetting_;
     if (failure_ && !off) return command::disable_voltage;  // gave up; the caller decides
 
-    if (fresh_ || state_ != before || way.step != step_) {
+    if (fresh_ || state_ != before || transition.step != step_) {
         since_ = now, fresh_ = false;
-        step_ = way.step;
+        step_ = transition.step;
         if (step_ != Step::wait) led_ = step_;
         return controlword(step_);
     }

@@ -31,7 +31,7 @@ public:
             };
             rows_.emplace_back(std::make_unique<Row>(component, name("z"), name("age"), name("new"), what));
         }
-        told_ = Vector::Zero(count);
+        reported_ = Vector::Zero(count);
     }
 
     /// Gives `past` what there is in this cycle. [realtime]
@@ -51,7 +51,7 @@ public:
         for (std::size_t i = 0; i < rows_.size(); ++i) {
             const bool fresh = rows_[i]->fresh;
             all = all && fresh, any = any || fresh;
-            told_(static_cast<Eigen::Index>(i)) = rows_[i]->z;
+            reported_(static_cast<Eigen::Index>(i)) = rows_[i]->z;
             numbers = numbers && std::isfinite(rows_[i]->z);
         }
         if (!any) return;
@@ -60,7 +60,7 @@ public:
             return;
         }
         Vector mixed;
-        multiply(mixed, mix, told_);
+        multiply(mixed, mix, reported_);
         bool known = true;
         for (Eigen::Index i = 0; i < mixed.size(); ++i) known = past.add(i, mixed(i), cycles(*rows_[0], cycle)) && known;
         if (!known) late = late + 1;
@@ -92,7 +92,7 @@ private:
     }
 
     std::vector<std::unique_ptr<Row>> rows_;
-    Vector                            told_;
+    Vector                            reported_;
     double                            silent_s_ = 0.0;
     std::uint32_t                     used_ = 0;
     bool                              ever_ = false;

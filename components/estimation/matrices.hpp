@@ -68,9 +68,9 @@ private:
             bool              word = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0]));
             for (const char c : name) word = word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
             if (!word)
-                say(begin, std::max(stop, begin + 1), "'" + name + "' is not a name of a matrix", "write NAME = numbers, as in: A = 0 1");
+                report_at(begin, std::max(stop, begin + 1), "'" + name + "' is not a name of a matrix", "write NAME = numbers, as in: A = 0 1");
             const std::string key = lower(name);
-            if (++defined_[key] == 2) say(begin, stop, "duplicate matrix '" + name + "'", "delete all but one of them");
+            if (++defined_[key] == 2) report_at(begin, stop, "duplicate matrix '" + name + "'", "delete all but one of them");
             open(name, begin, stop);
             at += equals + 1;
         }
@@ -97,7 +97,7 @@ private:
     void word(std::size_t at, std::size_t stop) {
         const std::string token(text_.substr(at, stop - at));
         if (!open_) {
-            if (!lost_) say(at, stop, "'" + token + "' outside a matrix", "write NAME = before the numbers, as in: A = 0 1");
+            if (!lost_) report_at(at, stop, "'" + token + "' outside a matrix", "write NAME = before the numbers, as in: A = 0 1");
             lost_ = true;
             return;
         }
@@ -107,7 +107,7 @@ private:
         }
         const auto   real = parse_real(token);
         const double number = real.value_or(0.0);
-        if (!real || !(std::fabs(number) < 1e300)) say(at, stop, "'" + token + "' is not a number", "write numbers as in -1.5 or 2e-3");
+        if (!real || !(std::fabs(number) < 1e300)) report_at(at, stop, "'" + token + "' is not a number", "write numbers as in -1.5 or 2e-3");
         if (numbers_.empty()) row_begin_ = at;
         row_end_ = stop;
         numbers_.push_back(number);
@@ -115,7 +115,7 @@ private:
     void row() {
         if (numbers_.empty()) return;
         if (!rows_.empty() && rows_[0].size() != numbers_.size())
-            say(row_begin_, row_end_,
+            report_at(row_begin_, row_end_,
                 "row " + std::to_string(rows_.size() + 1) + " of " + current_.name + " has " + counted(numbers_.size(), "number") +
                     ", its first has " + std::to_string(rows_[0].size()),
                 "all rows of a matrix must have the same length");
@@ -133,24 +133,24 @@ private:
         open_ = false;
         const std::size_t high = rows_.size(), wide = rows_.empty() ? 0 : rows_[0].size();
         if (high == 0)
-            say(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
+            report_at(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
                 "write them after the =, or in the lines below it");
         if (diagonal_ && high > 1)
-            say(current_.begin, current_.end, "'" + current_.name + "' has several rows after diag", "write one row after diag: diag 1 2 3");
+            report_at(current_.begin, current_.end, "'" + current_.name + "' has several rows after diag", "write one row after diag: diag 1 2 3");
         const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
         if (problems.empty()) {
             current_.value = Eigen::MatrixXd::Zero(index(diagonal_ ? wide : high), index(wide));
             for (std::size_t i = 0; i < high; ++i)
                 for (std::size_t j = 0; j < wide; ++j) current_.value(index(diagonal_ ? j : i), index(j)) = rows_[i][j];
             if (current_.value.rows() > most || current_.value.cols() > most)
-                say(current_.begin, current_.end,
+                report_at(current_.begin, current_.end,
                     current_.name + " is " + std::to_string(current_.value.rows()) + " x " + std::to_string(current_.value.cols()),
                     "matrices have at most " + std::to_string(most) + " rows and columns");
         }
         rows_.clear();
         found.push_back(std::move(current_));
     }
-    void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+    void report_at(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
         text::add(problems, begin, end, std::move(sentence), std::move(help));
     }
 

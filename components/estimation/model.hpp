@@ -44,10 +44,10 @@ public:
         while (const auto line = lines.next()) read_line(line->at.offset, line->at.offset + line->at.length);
         for (const State& s : states)
             if (!s.moves)
-                say(s.begin, s.end, "state '" + s.name + "' has no derivative",
+                report_at(s.begin, s.end, "state '" + s.name + "' has no derivative",
                     "write " + s.name + "' = FORMULA; 0 for a random walk");
-        if (states.empty()) say(0, 1, "the model has no states", "write state NAME = START sigma S noise N for each");
-        if (measures.empty() && problems.empty()) say(0, 1, "the model has no measurement", "write measure NAME = FORMULA sigma S");
+        if (states.empty()) report_at(0, 1, "the model has no states", "write state NAME = START sigma S noise N for each");
+        if (measures.empty() && problems.empty()) report_at(0, 1, "the model has no measurement", "write measure NAME = FORMULA sigma S");
     }
     /// Returns the number of variables: states, inputs, constants, in this order. [realtime]
     std::size_t variables() const noexcept { return most_slopes + most_inputs + constants.size(); }
@@ -68,7 +68,7 @@ private:
         while (stop < all.end && (std::isalnum(static_cast<unsigned char>(text_[stop])) || text_[stop] == '_')) ++stop;
         return {all.begin, stop};
     }
-    void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+    void report_at(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
         add({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
     }
     /// At least a letter wide, if there is one.
@@ -86,22 +86,22 @@ private:
         if (what == "input") return input(first.end, line.end);
         const std::size_t equals = text_.substr(line.begin, line.end - line.begin).find('=');
         if (equals == std::string_view::npos)
-            return say(line.begin, line.end, "invalid line", "write constant, input, state, measure or NAME' = FORMULA");
+            return report_at(line.begin, line.end, "invalid line", "write constant, input, state, measure or NAME' = FORMULA");
         const std::size_t sign = line.begin + equals;
         if (what == "constant") return constant(first.end, sign, line.end);
         if (what == "state") return state(first.end, sign, line.end);
         if (what == "measure") return measure(first.end, sign, line.end);
         if (first.end < line.end && text_[first.end] == '\'') return rate(first, sign, line.end);
-        say(first.begin, first.end, "unknown keyword '" + std::string(what) + "'",
+        report_at(first.begin, first.end, "unknown keyword '" + std::string(what) + "'",
             "the keywords are constant, input, state, measure, NAME'");
     }
     bool fresh(Words name, std::size_t limit, std::size_t count, const char* what) {
         const std::string text(piece(name));
-        if (text.empty()) return say(name.begin, name.end, "missing name", "names consist of letters, digits and _"), false;
+        if (text.empty()) return report_at(name.begin, name.end, "missing name", "names consist of letters, digits and _"), false;
         if (count >= limit)
-            return say(name.begin, name.end, "more than " + std::to_string(limit) + " " + what, "reduce the model"),
+            return report_at(name.begin, name.end, "more than " + std::to_string(limit) + " " + what, "reduce the model"),
                    false;
-        if (index_.contains(text) || text == "pi") return say(name.begin, name.end, "duplicate name '" + text + "'", "choose another name"), false;
+        if (index_.contains(text) || text == "pi") return report_at(name.begin, name.end, "duplicate name '" + text + "'", "choose another name"), false;
         return true;
     }
     void input(std::size_t begin, std::size_t end) {
@@ -125,7 +125,7 @@ private:
         for (std::size_t i = 0; i < constants.size(); ++i) values[most_slopes + most_inputs + i].value = constants[i];
         const double v = e(values.data(), 0).value;
         if (!std::isfinite(v))
-            say(formula.begin, formula.end, "the value is not finite",
+            report_at(formula.begin, formula.end, "the value is not finite",
                 "check for a division by 0 or the root of a negative number");
         return v;
     }
@@ -150,11 +150,11 @@ private:
         if (!fresh(name, most_slopes, states.size(), "states")) return;
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), noise = keyword(sign + 1, end, "noise");
         if (sigma == end || noise == end || noise < sigma)
-            return say(name.begin, end, "a state needs a start value, sigma and noise",
+            return report_at(name.begin, end, "a state needs a start value, sigma and noise",
                        "write state " + std::string(piece(name)) + " = 0 sigma 1 noise 0.1");
         const double start = fixed(trim(sign + 1, sigma)), wide = fixed(trim(sigma + 5, noise)), wanders = fixed(trim(noise + 5, end));
         if (wide < 0.0 || wanders < 0.0)
-            say(sigma, end, "sigma or noise is negative", "write 0 for an exact start value, and for a state without noise");
+            report_at(sigma, end, "sigma or noise is negative", "write 0 for an exact start value, and for a state without noise");
         index_[std::string(piece(name))] = static_cast<std::uint16_t>(states.size());
         states.push_back({std::string(piece(name)),
                           start,
@@ -177,28 +177,28 @@ private:
     void rate(Words name, std::size_t sign, std::size_t end) {
         for (State& s : states) {
             if (s.name != piece(name)) continue;
-            if (s.moves) return say(name.begin, name.end, "'" + s.name + "' has two derivatives", "delete one of them");
+            if (s.moves) return report_at(name.begin, name.end, "'" + s.name + "' has two derivatives", "delete one of them");
             s.moves = true;
             return formula(trim(sign + 1, end), s.rate);
         }
-        say(name.begin, name.end, "unknown state '" + std::string(piece(name)) + "'",
+        report_at(name.begin, name.end, "unknown state '" + std::string(piece(name)) + "'",
             "write state NAME = START sigma S noise N above this one");
     }
     void measure(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
-        if (piece(name).empty()) return say(begin, sign, "missing name", "names consist of letters, digits and _");
+        if (piece(name).empty()) return report_at(begin, sign, "missing name", "names consist of letters, digits and _");
         if (measures.size() >= most_measures)
-            return say(name.begin, name.end, "more than 12 measurements", "reduce the model");
+            return report_at(name.begin, name.end, "more than 12 measurements", "reduce the model");
         const std::size_t sigma = keyword(sign + 1, end, "sigma"), wrap = keyword(sign + 1, end, "wrap");
         if (sigma == end)
-            return say(name.begin, end, "a measurement needs a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
+            return report_at(name.begin, end, "a measurement needs a sigma", "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
         Measure m{std::string(piece(name)), fixed(trim(sigma + 5, wrap)), 0.0, {}};
-        if (!(m.sigma > 0.0)) say(sigma, end, "sigma must be positive", "write the noise of the measurement, as in sigma 0.01");
+        if (!(m.sigma > 0.0)) report_at(sigma, end, "sigma must be positive", "write the noise of the measurement, as in sigma 0.01");
         if (wrap != end) {
             const Words period = trim(wrap + 4, end);
             m.wrap = period.begin == period.end ? 2.0 * std::numbers::pi : fixed(period);
             if (!(m.wrap > 0.0))
-                say(wrap, end, "the wrap period must be positive", "write wrap for an angle, wrap 65536 for a 16-bit counter");
+                report_at(wrap, end, "the wrap period must be positive", "write wrap for an angle, wrap 65536 for a 16-bit counter");
         }
         formula(trim(sign + 1, sigma), m.value);
         measures.push_back(std::move(m));

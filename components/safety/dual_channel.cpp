@@ -73,14 +73,14 @@ struct DualChannel : hal::Component {
 
         // Within the discrepancy time the value is held, and the bit is FALSE if one of the two is.
         if (found == agree) good_ = chosen(second);
-        const bool well = fault_ == agree;
-        was_ok_ = well;
-        ok = well;
-        fault = !well;
+        const bool healthy = fault_ == agree;
+        was_ok_ = healthy;
+        ok = healthy;
+        fault = !healthy;
         differs = found != agree;
-        reason = !well ? fault_ : found == agree ? std::uint32_t{agree} : std::uint32_t{differ};
-        out = well || !use_substitute || !std::isfinite(substitute) ? good_ : substitute.get();
-        bit_out = well && first_bit && second_bit;
+        reason = !healthy ? fault_ : found == agree ? std::uint32_t{agree} : std::uint32_t{differ};
+        out = healthy || !use_substitute || !std::isfinite(substitute) ? good_ : substitute.get();
+        bit_out = healthy && first_bit && second_bit;
         difference = numbers ? apart : 0.0;
         largest = largest_;
         since = for_;

@@ -18,8 +18,8 @@ struct EstopLatch : hal::Component {
     void update(hal::Cycle) noexcept {
         const bool pressed = reset && !was_reset_;
         was_reset_ = reset;
-        const bool well = ok_in && !fault_in;
-        const bool ok = well && (ok_out || pressed);
+        const bool healthy = ok_in && !fault_in;
+        const bool ok = healthy && (ok_out || pressed);
         ok_out = ok;
         fault_out = !ok;
         if (ok) watchdog = !watchdog;

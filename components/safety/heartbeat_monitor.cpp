@@ -124,12 +124,12 @@ private:
     }
 
     void show(bool watched) noexcept {
-        const bool well = watched && fault_ == alive && good_ >= beats_needed && !first_;
-        was_ok_ = well;
-        ok = well;
+        const bool healthy = watched && fault_ == alive && good_ >= beats_needed && !first_;
+        was_ok_ = healthy;
+        ok = healthy;
         fault = watched ? fault_ != alive : enable.get();
         if (!watched) reason = enable ? bad_parameter : disabled;
-        else reason = fault_ != alive ? fault_ : well ? std::uint32_t{alive} : std::uint32_t{waiting};
+        else reason = fault_ != alive ? fault_ : healthy ? std::uint32_t{alive} : std::uint32_t{waiting};
         age = static_cast<double>(age_ns_) * 1e-9;
         interval = static_cast<double>(interval_ns_) * 1e-9;
     }

@@ -61,17 +61,17 @@ struct Interlock : hal::Component {
         if (!has_run_ ? start_needs_reset.get() : was_ok_ && !ok) waits_ = true;
         has_run_ = true;
         if (pressed && (tripped_ & stops) == 0) waits_ = false;
-        const bool well = (tripped_ & stops) == 0 && !waits_;
-        if (was_ok_ && !well) {
+        const bool healthy = (tripped_ & stops) == 0 && !waits_;
+        if (was_ok_ && !healthy) {
             trips = trips + 1;
             since_ = 0.0;
-        } else if (!well) {
+        } else if (!healthy) {
             since_ = std::min(since_ + dt, 1e9);
         }
-        if (well || (tripped_ & stops) == 0) first_ = 0;
+        if (healthy || (tripped_ & stops) == 0) first_ = 0;
         else if (first_ == 0) first_ = (fresh & stops) != 0 ? fresh & stops : tripped_ & stops;
-        was_ok_ = well;
-        show(well, now, stops, skipped != 0);
+        was_ok_ = healthy;
+        show(healthy, now, stops, skipped != 0);
     }
 
 private:
@@ -83,16 +83,16 @@ private:
         std::uint64_t found = 0;
         for (std::size_t i = 0; i < in.size(); ++i) {
             const std::uint64_t bit = std::uint64_t{1} << i;
-            const bool well = in[i] != ((invert & bit) != 0);
-            if (well || (watched & bit) == 0) bad_for_[i] = 0.0;
+            const bool healthy = in[i] != ((invert & bit) != 0);
+            if (healthy || (watched & bit) == 0) bad_for_[i] = 0.0;
             else if (!(delay[i] > 0.0) || (bad_for_[i] = std::min(bad_for_[i] + dt, 1e9)) > delay[i] + dt * 1e-6) found |= bit;
         }
         return found;
     }
 
-    void show(bool well, std::uint64_t now, std::uint64_t stops, bool skipping) noexcept {
-        ok = well;
-        ready = !well && (now & stops) == 0;
+    void show(bool healthy, std::uint64_t now, std::uint64_t stops, bool skipping) noexcept {
+        ok = healthy;
+        ready = !healthy && (now & stops) == 0;
         warning = (tripped_ & ~stops) != 0;
         bypassed = skipping;
         horn = unheard_ != 0;
@@ -100,7 +100,7 @@ private:
         first_mask = first_;
         bad = now;
         tripped = tripped_;
-        since = well ? 0.0 : since_;
+        since = healthy ? 0.0 : since_;
         const bool fast = phase_ns_ % (second_ns / 4) < second_ns / 8, slow = phase_ns_ < second_ns / 2;
         for (std::size_t i = 0; i < lamp.size(); ++i) {
             const std::uint64_t bit = std::uint64_t{1} << i;

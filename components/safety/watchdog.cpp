@@ -28,7 +28,7 @@ struct Watchdog : hal::Component {
         if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is detected later
         const bool restart = enable && !was_enabled_;
         was_enabled_ = enable;
-        bool well = enable && (ok || restart);
+        bool healthy = enable && (ok || restart);
         if (restart) tripped = -1;
         for (std::size_t i = 0; i < input.size(); ++i) {
             Watched& w = watched_[i];
@@ -36,10 +36,10 @@ struct Watchdog : hal::Component {
             else w.silent_ns += cycle.period_ns();
             w.level = input[i];
             if (w.silent_ns < w.limit_ns.load(std::memory_order_relaxed)) continue;
-            if (well) tripped = static_cast<std::int32_t>(i);
-            well = false;
+            if (healthy) tripped = static_cast<std::int32_t>(i);
+            healthy = false;
         }
-        ok = well;
+        ok = healthy;
     }
 
     void set_timeouts(hal::Cycle) noexcept {

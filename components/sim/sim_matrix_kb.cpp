@@ -27,18 +27,18 @@ struct SimMatrixKb : hal::Component {
         std::uint64_t now = 0;
         for (std::uint32_t key = 0; key < buttons.size(); ++key)
             if (*buttons[key]) now |= std::uint64_t{1} << key;
-        if (const std::uint64_t changed = now ^ told_; changed != 0) {  // one change per cycle
+        if (const std::uint64_t changed = now ^ reported_; changed != 0) {  // one change per cycle
             const auto key = static_cast<std::uint32_t>(__builtin_ctzll(changed));
             const std::uint64_t bit = std::uint64_t{1} << key;
             out = (now & bit ? 0xC0u : 0x80u) + key;
-            told_ ^= bit;
+            reported_ ^= bit;
         } else {
             out = now != 0 ? 0x40u : 0u;
         }
     }
 
 private:
-    std::uint64_t told_ = 0;
+    std::uint64_t reported_ = 0;
 };
 
 }  // namespace

@@ -60,7 +60,7 @@ struct Rig : testing::Test {
     }, [this](const Status& status) { published.push_back(status); }};
 
     Rig() {
-        worker.say_to([this](const std::string& line) { lines.push_back(line); });
+        worker.print_to([this](const std::string& line) { lines.push_back(line); });
     }
     void run(std::int64_t ns, std::int64_t step = 10 * ms) {
         for (const std::int64_t end = now + ns; now < end; now += step) worker.turn(now, false);

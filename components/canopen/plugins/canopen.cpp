@@ -77,7 +77,7 @@ public:
         link_ = std::move(opened);
         period_ = 0;
         unsent_ = unheard_ = 0;
-        notes_told_.assign(nodes_.size(), 0);
+        reported_notes_.assign(nodes_.size(), 0);
         reporter_->start();
         runner_->open(*link_);
         report_path_delays();
@@ -168,19 +168,19 @@ private:
 
     void follow(Time now) noexcept {
         switch (follower_->cycle(*runner_, now, period_)) {
-        case SyncFollower::Said::lost:
+        case SyncFollower::Notice::lost:
             raise("followed SYNC missing for {} s; threads run on their own clock until it returns",
                   follower_->silence(now));
             break;
-        case SyncFollower::Said::in_vain:
+        case SyncFollower::Notice::in_vain:
             raise("SYNC feedback loop: this machine produces the SYNC its own threads follow; write clock = own in the configuration",
                   not_a_number);
             break;
-        case SyncFollower::Said::unequal:
+        case SyncFollower::Notice::unequal:
             raise("cannot follow the SYNC: its period is not a multiple of the thread's; change the thread's period, or write clock = own",
                   not_a_number);
             break;
-        case SyncFollower::Said::nothing: break;
+        case SyncFollower::Notice::nothing: break;
         }
     }
 
@@ -234,8 +234,8 @@ private:
     }
     /// Reports each note about a node once, a suspected duplicate node ID after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
-        const unsigned fresh = s.notes & ~unsigned{notes_told_[place]};
-        notes_told_[place] = static_cast<std::uint8_t>((notes_told_[place] & ~note_duplicate_id) | s.notes);
+        const unsigned fresh = s.notes & ~unsigned{reported_notes_[place]};
+        reported_notes_[place] = static_cast<std::uint8_t>((reported_notes_[place] & ~note_duplicate_id) | s.notes);
         for (unsigned bit = 1; bit <= note_updated; bit <<= 1)
             if ((fresh & bit) != 0) reporter_->note(s, static_cast<Note>(bit));
         if ((fresh & note_duplicate_id) != 0) raise(messages_[place].suspected.c_str(), not_a_number);
@@ -297,7 +297,7 @@ private:
     std::unique_ptr<Reporter>    reporter_;
     std::unique_ptr<SharedLink>  link_;
     const hal_faults*            faults_ = nullptr;
-    std::vector<std::uint8_t>    notes_told_;  // bits of NodeStatus::notes, by node
+    std::vector<std::uint8_t>    reported_notes_;  // bits of NodeStatus::notes, by node
     Time                         period_ = 0, now_ = 0;
     Time                         unsent_ = 0, unheard_ = 0;  // time since transmit, since receive
     bool                         overran_ = false;

@@ -86,7 +86,7 @@ void Dictionary::finish() {
     initial_ = memory_;
 }
 
-void Dictionary::power_on() noexcept { std::memcpy(memory_.data(), initial_.data(), initial_.size()); }
+void Dictionary::power_on() noexcept { std::copy(initial_.begin(), initial_.end(), memory_.begin()); }
 
 const DictionaryObject* Dictionary::find(std::uint16_t index) const noexcept {
     const auto at = std::lower_bound(objects_.begin(), objects_.end(), index, [](const auto& o, std::uint16_t i) { return o.index < i; });

@@ -28,7 +28,7 @@ public:
     }
 
 protected:
-    void say(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
+    void report(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
         text::add(found_.problems, begin, end, std::move(sentence), std::move(help));
     }
     std::string of(Word w) const { return std::string(text_.substr(w.begin, std::min<std::size_t>(w.end - w.begin, 60))); }
@@ -38,27 +38,27 @@ protected:
         const auto        real = parse_real(token);
         to = real.value_or(0.0);
         if (real && std::fabs(to) < 1e12) return true;
-        say(w.begin, w.end, "'" + token + "' is not a number", "write numbers as in 600.5 or -2e-3");
+        report(w.begin, w.end, "'" + token + "' is not a number", "write numbers as in 600.5 or -2e-3");
         return false;
     }
     bool whole(Word w, int& to) {
         double value = 0;
         if (!number(w, value)) return false;
         if (value != std::floor(value) || value < 1 || value > 8192) {
-            say(w.begin, w.end, "'" + of(w) + "' is not a valid image width or height", "write an integer of 1..8192");
+            report(w.begin, w.end, "'" + of(w) + "' is not a valid image width or height", "write an integer of 1..8192");
             return false;
         }
         to = static_cast<int>(value);
         return true;
     }
     void missing(const char* name, const std::string& example) {
-        say(0, std::min<std::size_t>(text_.size(), 1), std::string("missing ") + name, "write a line: " + example);
+        report(0, std::min<std::size_t>(text_.size(), 1), std::string("missing ") + name, "write a line: " + example);
     }
     /// Rejects implausible cameras: a file of another kind, or numbers in the wrong order.
     void check() {
         const Camera& c = found_.camera;
         const auto    wrong = [&](Word at, const std::string& sentence, const std::string& help) {
-            say(at.begin, std::max(at.end, at.begin + 1), sentence, help);
+            report(at.begin, std::max(at.end, at.begin + 1), sentence, help);
         };
         if (!(c.fx > 0 && c.fy > 0))
             return wrong(focal_, "focal length is not positive", "write it in px, often about the image width");
@@ -142,20 +142,20 @@ private:
             distortion_ = all;
             for (std::size_t i = 1; i < words.size(); ++i) number(words[i], c.distortion[i - 1]);
         } else {
-            say(words[0].begin, words[0].end, "unknown key '" + name + "'", "the keys are size, focal, centre, distortion");
+            report(words[0].begin, words[0].end, "unknown key '" + name + "'", "the keys are size, focal, centre, distortion");
         }
     }
     bool counted(const std::vector<Word>& words, const std::string& name, std::size_t least, std::size_t most, const char* example) {
         const std::size_t count = words.size() - 1;
         if (count >= least && count <= most) return true;
         const std::string wants = least == most ? std::to_string(most) : std::to_string(least) + " to " + std::to_string(most);
-        say(words[0].begin, words.back().end,
+        report(words[0].begin, words.back().end,
             name + " has " + hal::counted(count, "number") + ", expected " + wants,
             std::string("write ") + example);
         return false;
     }
     bool once(bool twice, Word name) {
-        if (twice) say(name.begin, name.end, "duplicate key '" + of(name) + "'", "delete one of them");
+        if (twice) report(name.begin, name.end, "duplicate key '" + of(name) + "'", "delete one of them");
         return !twice;
     }
 };
@@ -171,7 +171,7 @@ public:
         } catch (const YAML::Exception& problem) {
             found_.problems.clear();
             const std::size_t at = problem.mark.is_null() ? 0 : std::min<std::size_t>(static_cast<std::size_t>(problem.mark.pos), text_.size());
-            say(at, std::min(at + 1, text_.size()), "invalid YAML: " + problem.msg, "OpenCV's calibration writes it");
+            report(at, std::min(at + 1, text_.size()), "invalid YAML: " + problem.msg, "OpenCV's calibration writes it");
         }
         return finish();
     }
@@ -186,10 +186,10 @@ private:
         std::vector<double> k, d;
         if (matrix(file, "camera_matrix", k, focal_)) {
             if (k.size() == 9 && (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1))
-                say(focal_.begin, focal_.end, "invalid camera_matrix", "its rows are fx 0 cx, 0 fy cy, 0 0 1");
+                report(focal_.begin, focal_.end, "invalid camera_matrix", "its rows are fx 0 cx, 0 fy cy, 0 0 1");
             else if (k.size() == 9) c.fx = k[0], c.cx = k[2], c.fy = k[4], c.cy = k[5];
             else
-                say(focal_.begin, focal_.end, "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9",
+                report(focal_.begin, focal_.end, "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9",
                     "it has 3 rows and 3 columns");
             centre_ = focal_;
         } else if (found_.problems.empty()) {
@@ -197,7 +197,7 @@ private:
         }
         bool plain = matrix(file, "distortion_coefficients", d, distortion_);
         if (plain && d.size() > 5 && std::any_of(d.begin() + 5, d.end(), [](double v) { return v != 0; })) {
-            say(distortion_.begin, distortion_.end, "the distortion has " + std::to_string(d.size()) + " coefficients",
+            report(distortion_.begin, distortion_.end, "the distortion has " + std::to_string(d.size()) + " coefficients",
                 "calibrate with k1 k2 p1 p2 k3 only");
             plain = false;
         }
@@ -219,7 +219,7 @@ private:
         at.end = std::min(at.begin + name.size(), text_.size());
         const YAML::Node data = node.IsMap() ? node["data"] : node;
         if (!data || !data.IsSequence() || data.size() > 64) {
-            say(at.begin, at.end, name + " has no data", "it is followed by rows:, cols:, dt: and data: [ numbers ]");
+            report(at.begin, at.end, name + " has no data", "it is followed by rows:, cols:, dt: and data: [ numbers ]");
             return false;
         }
         for (const YAML::Node& element : data) {
@@ -236,7 +236,7 @@ class YamlText : public Text {
 public:
     using Text::Text;
     CameraText read() {
-        say(0, 1, "a calibration in YAML: this build of Halcyon does not read it", "sudo apt-get install libyaml-cpp-dev, then build again; or write size, focal, centre and distortion");
+        report(0, 1, "a calibration in YAML: this build of Halcyon does not read it", "sudo apt-get install libyaml-cpp-dev, then build again; or write size, focal, centre and distortion");
         return std::move(found_);
     }
 };

@@ -50,13 +50,13 @@ public:
         return true;
     }
     Got next(std::int64_t now, std::int64_t timeout, Frame& frame) override {
-        if (const std::int64_t wait = told_end_ ? INT64_MAX : at(next_) - now; wait > 0) {
+        if (const std::int64_t wait = end_reported_ ? INT64_MAX : at(next_) - now; wait > 0) {
             if (timeout > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(wait, timeout)));
             if (wait > timeout) return Got::nothing;
             now += wait;
         }
         if (!loop_ && next_ >= files_.size()) {
-            told_end_ = true;
+            end_reported_ = true;
             fail(FrameError::ended, "all frames of " + shown_ + " were shown; to repeat them, write frames:" + shown_ + "?loop");
             return Got::bad;
         }
@@ -103,7 +103,7 @@ private:
 
     std::string               folder_, shown_;
     std::int64_t              period_ns_ = 0, delay_ns_ = 0, begin_ns_ = 0;
-    bool                      loop_ = false, begun_ = false, told_end_ = false;
+    bool                      loop_ = false, begun_ = false, end_reported_ = false;
     std::vector<std::string>  files_;
     std::uint64_t             next_ = 0;  // counts on over the end of the folder when it loops
     std::vector<std::uint8_t> bytes_;

@@ -56,10 +56,10 @@ void Worker::expect(int width, int height, std::string file) {
     file_ = std::move(file);
 }
 
-void Worker::say_to(const std::function<void(const std::string&)>& say) {
-    log_ = std::make_unique<hal::MessageLog>(instance_, [say](std::string line) {
+void Worker::print_to(const std::function<void(const std::string&)>& print) {
+    log_ = std::make_unique<hal::MessageLog>(instance_, [print](std::string line) {
         line.pop_back();
-        say(line);
+        print(line);
     });
 }
 
@@ -120,10 +120,10 @@ void Worker::open(std::int64_t now) {
         last_frame_ns_ = now;
         dropped_before_ = status_.dropped;
         equal_ = 0;
-        if (status_.error == FrameError::missing && !told_) status_.error = FrameError::none;  // nothing was wrong so far
+        if (status_.error == FrameError::missing && !reported_) status_.error = FrameError::none;  // nothing was wrong so far
         if (std::string remark = source_->remark(); remark != remark_) {  // once, not at each reconnection
             remark_ = std::move(remark);
-            if (!remark_.empty()) say(remark_);
+            if (!remark_.empty()) print(remark_);
         }
         return;
     }
@@ -156,7 +156,7 @@ void Worker::take(const Frame& frame, std::int64_t now) {
     try {
         detect_(frame);
         ++status_.frames;
-        well(now);
+        recovered(now);
     } catch (const std::exception& e) {
         ++status_.bad;
         report({FrameError::damaged, std::string("cannot process a frame: ") + e.what()}, now);
@@ -183,29 +183,29 @@ bool Worker::black(const Frame& frame) const {
 }
 
 void Worker::report(Problem problem, std::int64_t now) {
-    const bool known = told_ && problem.kind == status_.error;
-    if (status_.error == FrameError::none || !told_) since_ns_ = now;
+    const bool known = reported_ && problem.kind == status_.error;
+    if (status_.error == FrameError::none || !reported_) since_ns_ = now;
     status_.error = problem.kind;
     status_.ok = false;
-    told_ = true;
+    reported_ = true;
     std::int64_t& said = said_ns_[static_cast<std::size_t>(problem.kind)];
     if (known || now - said < quiet_for) return;
     said = now;
-    say(problem.text);
+    print(problem.text);
 }
 
-void Worker::well(std::int64_t now) {
-    const bool again = told_ && status_.error != FrameError::none;
+void Worker::recovered(std::int64_t now) {
+    const bool again = reported_ && status_.error != FrameError::none;
     // only after a problem that was logged: messages come in pairs
     if (again && said_ns_[static_cast<std::size_t>(status_.error)] >= since_ns_)
-        say((ever_ ? "frames are valid again after " : "first valid frame after ") + seconds(now - since_ns_));
+        print((ever_ ? "frames are valid again after " : "first valid frame after ") + seconds(now - since_ns_));
     status_.error = FrameError::none;
     status_.ok = ever_ = true;
-    told_ = false;
+    reported_ = false;
 }
 
 void Worker::publish() { publish_(status_); }
 
-void Worker::say(const std::string& sentence) { log_->print(sentence, now_); }
+void Worker::print(const std::string& sentence) { log_->print(sentence, now_); }
 
 }  // namespace hal::vision

@@ -33,8 +33,8 @@ public:
     /// Sets the number of identical frames that count as a frozen camera; 0: never. [helper thread]
     void          freeze_after(std::uint32_t frames) { frozen_after_ = frames; }
     std::uint32_t source_frozen_after() const { return source_->frozen_after(); }
-    /// Sends messages to `say` instead of standard error, for tests. [setup]
-    void say_to(const std::function<void(const std::string&)>& say);
+    /// Sends messages to `print` instead of standard error, for tests. [setup]
+    void print_to(const std::function<void(const std::string&)>& print);
 
     /// Does the work due at `now_ns`; waits for a frame, at most 0.1 s, if `may_wait`. [helper thread]
     void turn(std::int64_t now_ns, bool may_wait) noexcept;
@@ -49,9 +49,9 @@ private:
     bool black(const Frame& frame) const;
     bool frozen(const Frame& frame);
     void report(Problem problem, std::int64_t now_ns);
-    void well(std::int64_t now_ns);
+    void recovered(std::int64_t now_ns);
     void publish();
-    void say(const std::string& sentence);
+    void print(const std::string& sentence);
 
     const std::string                        instance_;
     std::unique_ptr<hal::MessageLog>         log_;
@@ -64,7 +64,7 @@ private:
     int                                      width_ = 0, height_ = 0;  // 0: any
     std::uint32_t                            frozen_after_ = 0, equal_ = 0, dropped_before_ = 0;
     std::uint64_t                            picture_ = 0;  // hash of the last frame
-    bool                                     open_ = false, told_ = false, ever_ = false;
+    bool                                     open_ = false, reported_ = false, ever_ = false;
     std::int64_t                             now_ = 0;  // of this turn
     std::int64_t                             try_again_ns_ = INT64_MIN, last_frame_ns_ = 0, since_ns_ = 0;
     std::int64_t                             said_ns_[frame_error_count];  // time of the last message about it

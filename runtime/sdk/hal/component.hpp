@@ -140,7 +140,7 @@ void store(hal_value* slot, T v) noexcept {
     __atomic_store(reinterpret_cast<T*>(slot), &v, __ATOMIC_RELAXED);
 }
 
-[[noreturn]] inline void refused() { throw std::runtime_error(""); }  // the host has recorded the reason already
+[[noreturn]] inline void rejected() { throw std::runtime_error(""); }  // the host has recorded the reason already
 
 template <class T>
 void declare(hal_pin& pin, hal_dir dir, const char* name, const char* doc, const PinOptions<T>& options, const void* function) {
@@ -157,7 +157,7 @@ void declare(hal_pin& pin, hal_dir dir, const char* name, const char* doc, const
     decl.function = function;
     pin.own = decl.initial;
     pin.slot = &pin.own;
-    if (!creating->pin(creating, &decl, &pin)) refused();
+    if (!creating->pin(creating, &decl, &pin)) rejected();
 }
 }  // namespace detail
 
@@ -228,7 +228,7 @@ protected:
     }
     void declare(void* self, const char* name, hal_step step, const char* doc, unsigned flags, hal_row row = nullptr) {
         const hal_function_decl decl{sizeof decl, flags, name, doc, step, self, this, row};
-        if (!detail::creating->function(detail::creating, &decl)) detail::refused();
+        if (!detail::creating->function(detail::creating, &decl)) detail::rejected();
     }
 };
 

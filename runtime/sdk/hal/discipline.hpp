@@ -27,7 +27,7 @@ public:
     void claim() {
         clock_ = hal::extension<hal_clock>("hal.clock/1");
         if (!clock_) throw std::runtime_error("this host does not support external clock adjustment");
-        if (!clock_->claim(clock_, detail::creating)) detail::refused();
+        if (!clock_->claim(clock_, detail::creating)) detail::rejected();
     }
     /// Delays all later deadlines of all threads by `ns` (negative: advances them), limited to limit_ns() per cycle. [realtime]
     void step(std::int64_t ns) const noexcept {

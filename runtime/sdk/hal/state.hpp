@@ -25,7 +25,7 @@ public:
         decl.initial = detail::to_value<T>(initial);
         pin_.own = decl.initial;
         pin_.slot = &pin_.own;
-        if (!detail::creating->pin(detail::creating, &decl, &pin_)) detail::refused();
+        if (!detail::creating->pin(detail::creating, &decl, &pin_)) detail::rejected();
     }
     State(const State&) = delete;
 

@@ -52,7 +52,7 @@ public:
         throw std::invalid_argument(file + ": " + problems.front().sentence + "; " + problems.front().help);
     }
     /// Ends the constructor after an error was reported. [setup]
-    [[noreturn]] static void fail() { detail::refused(); }
+    [[noreturn]] static void fail() { detail::rejected(); }
 
 private:
     const hal_texts* texts_;

@@ -91,14 +91,14 @@ struct Cell : Bed {
 };
 
 /// Captures standard error.
-struct Said {
-    Said() { testing::internal::CaptureStderr(); }
+struct Notice {
+    Notice() { testing::internal::CaptureStderr(); }
     std::string text() { return testing::internal::GetCapturedStderr(); }
 };
 
 TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.run(4000 * ms);
     EXPECT_EQ(
         "tdma.2: configured by 02:00:00:00:00:01 as station x: 1 slot, cycle 1000 us\n"
@@ -122,7 +122,7 @@ TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
 
 TEST(Rtcfg_server, does_not_invite_a_station_that_already_sends) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.x.in_cycle = nullptr;
     cell.x.station.accompany(nullptr, nullptr);
     ASSERT_TRUE(cell.x.station.reconfigure(config::setup_of(cell.reading.schedule, 1)));  // from its own file
@@ -146,7 +146,7 @@ TEST(Rtcfg_server, does_not_invite_a_station_that_already_sends) {
 
 TEST(Rtcfg_server, reports_a_dead_station_and_configures_it_again) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.run(4000 * ms);
     cell.x.off = cell.x.port.cut = true;
     cell.run(400 * ms);
@@ -167,7 +167,7 @@ TEST(Rtcfg_server, reports_a_dead_station_and_configures_it_again) {
 
 TEST(Rtcfg_server, finds_running_stations_after_a_restart) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.run(4000 * ms);
     cell.service->begin();
     EXPECT_EQ(0U, cell.service->server().ready());
@@ -180,7 +180,7 @@ TEST(Rtcfg_server, finds_running_stations_after_a_restart) {
 
 TEST(Rtcfg_server, repeats_lost_frames) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.wire.fault = [&cell](Wire::Frame& f) { return f.bytes[13] != 0x22 || cell.wire.random() % 4 != 0; };
     cell.run(30'000 * ms);
     EXPECT_EQ(cell.file, cell.received());
@@ -212,7 +212,7 @@ TEST(Rtcfg_service, of_a_backup_omits_files_that_only_the_master_has) {
 
 TEST(Rtcfg_client, ignores_a_second_server_and_another_configuration_while_running) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.run(4000 * ms);
     ASSERT_TRUE(cell.x.station.ready());
     const std::string other = "cycle 2000\nslave:\nslot 0 900\n";
@@ -234,7 +234,7 @@ TEST(Rtcfg_client, ignores_a_second_server_and_another_configuration_while_runni
 
 TEST(Rtcfg_client, reports_an_invalid_configuration_once_and_accepts_the_next) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.m.off = true;
     const std::string wrong = "cycle 1000\nslave:\nslott 0 900\n";
     rtcfg::Message m;
@@ -248,7 +248,7 @@ TEST(Rtcfg_client, reports_an_invalid_configuration_once_and_accepts_the_next) {
         said.text());
     EXPECT_EQ(State::unconfigured, cell.x.status().state);
     EXPECT_EQ(5U, cell.at_x.applicant.foreign());
-    Said again;
+    Notice again;
     cell.m.off = false;
     cell.m.next = cell.m.port.clock().local(cell.now);
     cell.run(4000 * ms);
@@ -258,7 +258,7 @@ TEST(Rtcfg_client, reports_an_invalid_configuration_once_and_accepts_the_next) {
 
 TEST(Rtcfg_client, reports_at_most_three_invalid_configurations) {
     Cell cell;
-    Said said;
+    Notice said;
     cell.m.off = true;
     for (int i = 0; i < 50; ++i) {
         const std::string wrong = "cy\x1b[2Jcle " + std::to_string(i) + "\nslave:\nslott 0 900\n";
@@ -279,7 +279,7 @@ TEST(Rtcfg_client, reports_at_most_three_invalid_configurations) {
 
 TEST(Rtcfg_client, stays_configured_under_random_frames) {
     Cell cell;
-    Said said;
+    Notice said;
     for (int i = 0; i < 20'000; ++i) {
         std::vector<std::uint8_t> frame(14 + cell.wire.random() % 80);
         for (auto& byte : frame) byte = static_cast<std::uint8_t>(cell.wire.random());

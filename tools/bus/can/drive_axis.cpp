@@ -122,15 +122,15 @@ bool SdoAxis::tell(const AxisOrders& orders) {
         return told = value, true;
     };
     const auto mode = static_cast<std::int8_t>(orders.mode);
-    if (mode != 0 && !told_.mode && feedback_.mode == orders.mode) told_.mode = mode;
-    if (mode != 0 && !put(told_.mode, mode, object::modes_of_operation)) return false;
+    if (mode != 0 && !reported_.mode && feedback_.mode == orders.mode) reported_.mode = mode;
+    if (mode != 0 && !put(reported_.mode, mode, object::modes_of_operation)) return false;
     if (machine_.active()) {
-        if (orders.mode == Mode::profile_position && !put(told_.position, orders.target_position, object::target_position)) return false;
-        if (orders.mode == Mode::profile_velocity && !put(told_.velocity, orders.target_velocity, object::target_velocity)) return false;
-        if (orders.mode == Mode::profile_torque && !put(told_.torque, orders.target_torque, object::target_torque)) return false;
-        if (orders.mode == Mode::velocity && !put(told_.vl, orders.vl_target_velocity, object::vl_target_velocity)) return false;
+        if (orders.mode == Mode::profile_position && !put(reported_.position, orders.target_position, object::target_position)) return false;
+        if (orders.mode == Mode::profile_velocity && !put(reported_.velocity, orders.target_velocity, object::target_velocity)) return false;
+        if (orders.mode == Mode::profile_torque && !put(reported_.torque, orders.target_torque, object::target_torque)) return false;
+        if (orders.mode == Mode::velocity && !put(reported_.vl, orders.vl_target_velocity, object::vl_target_velocity)) return false;
     }
-    return put(told_.controlword, orders.controlword, object::controlword);
+    return put(reported_.controlword, orders.controlword, object::controlword);
 }
 
 bool SdoAxis::standing() { return monotonic_ns() - rest_since_ >= rest_ns; }

@@ -88,7 +88,7 @@ private:
         std::optional<std::int8_t> mode;
         std::optional<std::int32_t> position, velocity;
         std::optional<std::int16_t> torque, vl;
-    } told_;
+    } reported_;
     std::uint64_t emergencies_ = 0;
     std::int32_t rest_position_ = 0;
     std::int64_t rest_since_ = 0, moved_at_ = 0, allowed_ = 0, deadline_ = INT64_MAX;

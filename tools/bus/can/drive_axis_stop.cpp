@@ -60,7 +60,7 @@ bool SdoAxis::quick_stop() {
 bool SdoAxis::secure(std::string& what) {
     interrupted = nullptr;
     touched_ = adopted_ = false;
-    told_ = {};
+    reported_ = {};
     if (!look()) {  // the response may be lost although the command arrives
         const std::uint16_t at = of_axis(object::controlword, axis_);
         for (const std::uint16_t order : {command::quick_stop, command::disable_voltage}) {

@@ -158,7 +158,7 @@ void TdmaStation::take_over() noexcept {
 void TdmaStation::look() noexcept {
     const std::int64_t now = link::monotonic_ns();
     if (applicant_) applicant_->work(now);
-    for (tdma::Happened h; told_.pop(h);)
+    for (tdma::Happened h; reported_.pop(h);)
         if (const std::string sentence = words_(h); !sentence.empty()) log_.print(tdma::subject(h), sentence, now);
     if (lacks_slot_.exchange(false))
         log_.print("the new schedule has no slot " + std::to_string(*slot_) + " for this station, which sends in it; add one, or restart this node", now);

@@ -41,11 +41,11 @@ private:
     std::int64_t sleep_until(std::int64_t local_ns) const noexcept;  ///< Returns the time after it.
     void take_over() noexcept;  ///< Switches to a new schedule. [realtime]
     void look() noexcept;       ///< Reads files and prints messages, outside the loop.
-    void on_event(tdma::Event event, const tdma::Address& who, tdma::Time value) noexcept override { told_.push({event, who, value}); }
+    void on_event(tdma::Event event, const tdma::Address& who, tdma::Time value) noexcept override { reported_.push({event, who, value}); }
 
     const tdma::config::Schedule schedule_;  // empty if received from the master
     const tdma::EventWords words_{schedule_, "start this node again"};
-    hal::Queue<tdma::Happened> told_{64};  // filled by the loop
+    hal::Queue<tdma::Happened> reported_{64};  // filled by the loop
     hal::MessageLog log_{"hal node"};
     std::optional<unsigned> slot_;  // slot of its frames, if chosen by the station
     std::atomic<bool> lacks_slot_{false};

@@ -10,17 +10,17 @@ namespace hal::canopen::config {
 
 namespace {
 
-enum class Way : std::uint8_t { kept, sent, received };  // by the node
+enum class Direction : std::uint8_t { kept, sent, received };  // by the node
 
 struct Row {
     std::uint16_t index;
     std::uint8_t  first, last;  // sub-indices; 0, 0: a plain variable
     const char*   name;          // with a # for the sub-index
     Type          type;
-    Way           way;
+    Direction           direction;
 };
 using enum Type;
-using enum Way;
+using enum Direction;
 
 constexpr Row drive[] = {
     {0x6007, 0, 0, "Abort connection option code", integer16, kept},
@@ -159,8 +159,8 @@ void add(std::vector<Known>& all, std::span<const Row> rows, std::uint16_t offse
             k.single = row.last == 0;
             k.name = prefix + dashed(name), k.about = name;
             k.type = row.type;
-            k.to_node = row.way == received, k.from_node = row.way != kept;
-            k.writable = row.way != sent;
+            k.to_node = row.direction == received, k.from_node = row.direction != kept;
+            k.writable = row.direction != sent;
             all.push_back(std::move(k));
         }
 }

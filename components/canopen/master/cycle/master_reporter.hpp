@@ -23,33 +23,33 @@ public:
           setup_(config.setup()),
           file_(file),
           instance_(instance),
-          told_(std::move(instance), [this](const Event& e) { return words(e); }, 512, [](const Event& e) { return subject(e); }) {}
+          reported_(std::move(instance), [this](const Event& e) { return words(e); }, 512, [](const Event& e) { return subject(e); }) {}
 
-    void start() { told_.start(); }           // [setup]
-    void stop() noexcept { told_.stop(); }    // [setup]
+    void start() { reported_.start(); }           // [setup]
+    void stop() noexcept { reported_.stop(); }    // [setup]
 
     // By the cycle. [realtime]
-    void node(const NodeStatus& s) noexcept { told_.tell({Event::node, s, {}, {}, {}, 0}); }
+    void node(const NodeStatus& s) noexcept { reported_.tell({Event::node, s, {}, {}, {}, 0}); }
     /// What should be known of it: one bit of its notes.
     void note(NodeStatus s, Note one) noexcept {
         s.notes = one;
-        told_.tell({Event::note, s, {}, {}, {}, 0});
+        reported_.tell({Event::note, s, {}, {}, {}, 0});
     }
-    void network(const NetworkStatus& n, const NodeStatus& s) noexcept { told_.tell({Event::network, s, n, {}, {}, 0}); }
-    void emergency(const NodeStatus& s, const Emergency& e) noexcept { told_.tell({Event::emergency, s, {}, e, {}, 0}); }
+    void network(const NetworkStatus& n, const NodeStatus& s) noexcept { reported_.tell({Event::network, s, n, {}, {}, 0}); }
+    void emergency(const NodeStatus& s, const Emergency& e) noexcept { reported_.tell({Event::emergency, s, {}, e, {}, 0}); }
     /// `had`: it was in order, now or earlier.
-    void bus(can::State state, bool had) noexcept { told_.tell({had ? Event::bus : Event::waiting, {}, {}, {}, state, 0}); }
+    void bus(can::State state, bool had) noexcept { reported_.tell({had ? Event::bus : Event::waiting, {}, {}, {}, state, 0}); }
     void rejected(const can::Rejected& what) noexcept {
         Event e;
         e.kind = Event::rejected, e.of_link = what;
-        told_.tell(e);
+        reported_.tell(e);
     }
-    void cycle(Time period) noexcept { told_.tell({Event::cycle, {}, {}, {}, {}, period}); }
+    void cycle(Time period) noexcept { reported_.tell({Event::cycle, {}, {}, {}, {}, period}); }
     /// One of its two functions does not run.
-    void missing(bool sends) noexcept { told_.tell({sends ? Event::no_transmit : Event::no_receive, {}, {}, {}, {}, 0}); }
-    void foreign(const RunnerEvents::Foreign& f) noexcept { told_.tell({Event::foreign, {}, {}, {}, {}, 0, 0, {}, f}); }
+    void missing(bool sends) noexcept { reported_.tell({sends ? Event::no_transmit : Event::no_receive, {}, {}, {}, {}, 0}); }
+    void foreign(const RunnerEvents::Foreign& f) noexcept { reported_.tell({Event::foreign, {}, {}, {}, {}, 0, 0, {}, f}); }
     void flying(const FlyingMaster& f) noexcept {
-        if (f.master() != 0) told_.tell({Event::flying, {}, {}, {}, {}, 0, f.master()});
+        if (f.master() != 0) reported_.tell({Event::flying, {}, {}, {}, {}, 0, f.master()});
     }
 
 private:
@@ -109,11 +109,11 @@ private:
             if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
             char         text[120];
             const double after = static_cast<double>(n.operational_since - n.begun) * 1e-9;
-            if (n.begun == operational_told_)
+            if (n.begun == operational_reported_)
                 std::snprintf(text, sizeof text, "the network is operational again: %u of %u nodes", n.operational, n.nodes);
             else
                 std::snprintf(text, sizeof text, "the network is operational: %u of %u nodes, after %.2f s", n.operational, n.nodes, after);
-            operational_told_ = n.begun;
+            operational_reported_ = n.begun;
             return text;
         }
         case Event::emergency: {
@@ -192,8 +192,8 @@ private:
     const config::MasterConfig& config_;
     const MasterSetup           setup_;
     const std::string           file_, instance_;
-    Time                        operational_told_ = -1;  // start whose operational network was reported
-    hal::Reporter<Event>        told_;                   // the last: its thread uses the others
+    Time                        operational_reported_ = -1;  // start whose operational network was reported
+    hal::Reporter<Event>        reported_;                   // the last: its thread uses the others
 };
 
 }  // namespace hal::canopen

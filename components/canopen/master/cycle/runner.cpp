@@ -193,7 +193,7 @@ void Runner::take_wishes() noexcept {
                     if (slots_[part.placed].node == n) device_.pdos().trigger(out.sent->number);
         if (now && was_operational_[n] == 0)
             for (Alone& a : alone_)
-                if (slots_[a.slot].node == n) a.told = false;
+                if (slots_[a.slot].node == n) a.sent = false;
         was_operational_[n] = now ? 1 : 0;
         if (now) ever_operational_[n] = 1;
     }
@@ -212,11 +212,11 @@ void Runner::tell_alone(Time now) noexcept {
         Alone&      a = alone_[next_alone_ % alone_.size()];
         const Slot& s = slots_[a.slot];
         const auto  value = static_cast<std::uint32_t>(number_in(*s.entry) & (~std::uint64_t{0} >> (64 - s.object->bits)));
-        if (!statuses_[s.node]->operational || (a.told && value == a.said)) continue;
+        if (!statuses_[s.node]->operational || (a.sent && value == a.announced)) continue;
         const auto sent = device_.pdos().tpdo(a.number);
         if (a.inhibit != 0 && sent.count != 0 && now - sent.last < a.inhibit) continue;
         if (!device_.pdos().send_dam(a.number, statuses_[s.node]->id, s.object->index, s.object->sub, value)) return;
-        a.said = value, a.told = true;
+        a.announced = value, a.sent = true;
     }
 }
 
@@ -311,7 +311,7 @@ void Runner::send(Time now) noexcept {
 /// What is sent on a change only was lost with what was kept back.
 void Runner::tell_again() noexcept {
     for (const Output& out : outputs_) device_.pdos().trigger(out.sent->number);
-    for (Alone& a : alone_) a.told = false;
+    for (Alone& a : alone_) a.sent = false;
 }
 
 /// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would wait in the queue, and move the

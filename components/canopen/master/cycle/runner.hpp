@@ -137,8 +137,8 @@ private:
         unsigned      number = 0;  // of our TPDO
         std::size_t   slot = 0;
         Time          inhibit = 0;
-        std::uint32_t said = 0;
-        bool          told = false;  // since the node is operational
+        std::uint32_t announced = 0;
+        bool          sent = false;  // since the node is operational
     };
     void begin(Time now) noexcept;
     void boot(Time now) noexcept;
@@ -185,7 +185,7 @@ private:
     bool                           steps_changed_ = true, sync_open_ = false;
     /// What others sent under an identifier of ours.
     struct ForeignCount {
-        Time          last = 0, told = 0;
+        Time          last = 0, sent = 0;
         std::uint32_t frames = 0;
     };
     std::vector<ForeignCount>      foreign_;     // by identifier

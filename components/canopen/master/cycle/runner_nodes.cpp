@@ -43,12 +43,12 @@ void Runner::note_foreign(const can::Frame& f, Time now) noexcept {
     const bool    begins = c.last == 0 || now - c.last > second;
     c.frames = begins ? 1 : c.frames + 1;
     c.last = now;
-    if (!begins && now - c.told < second) return;
+    if (!begins && now - c.sent < second) return;
     RunnerEvents::Foreign what{.id = static_cast<std::uint16_t>(f.id), .frames = c.frames, .begins = begins};
     std::copy_n(f.data.begin(), 2, what.data.begin());
     what.sync = produces_ && f.id == sync_frame_.id;
     what.rpdo = ours_to_nodes_[f.id];
-    c.told = now, c.frames = 0;
+    c.sent = now, c.frames = 0;
     events_.on_foreign(what);
 }
 

@@ -13,7 +13,7 @@ namespace hal::canopen {
 /// Keeps the cycles of the thread at a constant delay after the SYNC, and reports the error.
 class SyncFollower {
 public:
-    enum class Said : std::uint8_t {
+    enum class Notice : std::uint8_t {
         nothing,
         lost,      ///< five SYNCs in a row missing: the threads run by their own clock
         in_vain,   ///< feedback loop: the SYNC follows these threads
@@ -35,24 +35,24 @@ public:
     }
 
     /// Once a cycle, after Runner::receive(). [realtime]
-    Said cycle(const Runner& runner, Time start, Time period) noexcept {
+    Notice cycle(const Runner& runner, Time start, Time period) noexcept {
         const Time every = config_.sync_period > 0 ? config_.sync_period : period;
         if (every % period != 0) {
             const bool told = std::exchange(unequal_, true);
-            return told ? Said::nothing : Said::unequal;
+            return told ? Notice::nothing : Notice::unequal;
         }
-        Said said = Said::nothing;
+        Notice notice = Notice::nothing;
         if (runner.syncs_heard() != seen_) {
             seen_ = runner.syncs_heard();
             ours_ = runner.sync_is_ours();
             if (ours_) following_ = false;
-            else said = take(runner.sync_came(), every, start, period);
+            else notice = take(runner.sync_came(), every, start, period);
         } else if (following_) {
-            said = miss(every, start);
+            notice = miss(every, start);
         }
         locked_ = ours_ || beat_.locked();
         rate_ = beat_.rate() * 1e6;
-        return said;
+        return notice;
     }
     /// Returns the time since the newest SYNC in s. [realtime]
     double silence(Time now) const noexcept { return static_cast<double>(now - came_) * 1e-9; }
@@ -60,7 +60,7 @@ public:
 private:
     static constexpr unsigned most_missed = 5;
 
-    Said take(Time came, Time every, Time start, Time period) noexcept {
+    Notice take(Time came, Time every, Time start, Time period) noexcept {
         const Time phase = config_.sync_phase >= 0 ? config_.sync_phase : period / 2;
         Time       error = (came + phase - start) % period;  // cycles follow each other, so it counts within half of one
         if (error >= (period + 1) / 2) error -= period;
@@ -71,18 +71,18 @@ private:
         const bool was_in_vain = beat_.in_vain();
         clock_.step(beat_.follow(error, every, clock_.limit_ns()));
         error_ = static_cast<double>(error) * 1e-3;
-        return beat_.in_vain() && !was_in_vain ? Said::in_vain : Said::nothing;
+        return beat_.in_vain() && !was_in_vain ? Notice::in_vain : Notice::nothing;
     }
 
-    Said miss(Time every, Time start) noexcept {
-        if (start - came_ <= static_cast<Time>(missed_ + 2) * every) return Said::nothing;
+    Notice miss(Time every, Time start) noexcept {
+        if (start - came_ <= static_cast<Time>(missed_ + 2) * every) return Notice::nothing;
         if (++missed_ < most_missed) {
             clock_.step(beat_.coast(every, clock_.limit_ns()));
-            return Said::nothing;
+            return Notice::nothing;
         }
         beat_.lose();
         following_ = false;
-        return Said::lost;
+        return Notice::lost;
     }
 
     const config::MasterConfig& config_;

@@ -24,7 +24,7 @@ public:
     }
 
 private:
-    void say(Severity severity, const Span& at, std::string sentence, std::string help, std::string label = {}) {
+    void report(Severity severity, const Span& at, std::string sentence, std::string help, std::string label = {}) {
         out_.add(severity, Topic::schedule, at, std::move(sentence), std::move(help), std::move(label));
     }
 
@@ -43,11 +43,11 @@ private:
 
     void within(const plan::Entry& e) {
         if (e.at >= s_.cycle)
-            return say(Severity::error, e.at_line,
+            return report(Severity::error, e.at_line,
                        called(e) + " begins at " + microseconds(e.at) + ", after the end of the cycle of " + microseconds(s_.cycle),
                        "choose an offset below " + microseconds(s_.cycle));
         if (e.until + s_.guard <= s_.cycle) return;
-        say(Severity::error, e.at_line,
+        report(Severity::error, e.at_line,
             called(e) + " extends into the next cycle: " + microseconds(e.at) + " + " + length(e) + " + guard " + microseconds(s_.guard) +
                 " = " + microseconds(e.until + s_.guard) + "; the cycle is " + microseconds(s_.cycle),
             fitting(e, s_.cycle - e.at));
@@ -79,27 +79,27 @@ private:
                 help += "; or give slot " + std::to_string(a.id) + " of " + s_.stations[a.station].name + " a size of " +
                         std::to_string(bytes - 14);
         }
-        say(Severity::error, at, called(b) + " begins at " + microseconds(b.at) + ", before the end of " + called(a) + ": " + why, help,
+        report(Severity::error, at, called(b) + " begins at " + microseconds(b.at) + ", before the end of " + called(a) + ": " + why, help,
             "conflicts with line " + std::to_string(a.at_line.line));
     }
 
     void station(const StationEntry& e) {
         if (e.slots.empty() && e.role == Role::backup)
-            say(Severity::error, e.at,
+            report(Severity::error, e.at,
                 "'" + e.name +
                     "' has no slot for the calibration; an uncalibrated backup cannot take over",
                 "write slot 0 OFFSET below it");
         if (e.slots.empty() && e.role == Role::slave)
-            say(Severity::warning, e.at, "'" + e.name + "' has no slot: it cannot send and cannot be calibrated",
+            report(Severity::warning, e.at, "'" + e.name + "' has no slot: it cannot send and cannot be calibrated",
                 "write slot 0 OFFSET below it");
         if (e.phase + e.lead >= s_.cycle)
-            say(Severity::error, e.at,
+            report(Severity::error, e.at,
                 "the thread of '" + e.name + "' ends " + microseconds(e.phase) + " + " + microseconds(e.lead) +
                     " after the sync; the cycle is " + microseconds(s_.cycle),
                 "phase + lead must be less than the cycle");
         for (const SlotEntry& slot : e.slots)
             if (slot.setup.id == tunnel_slot && slot.setup.size < smallest_ip_mtu + rtmac_bytes)
-                say(Severity::error, slot.at,
+                report(Severity::error, slot.at,
                     "slot 1 carries IP packets, but its " + std::to_string(slot.setup.size) + " bytes are too few: IP needs " +
                         std::to_string(smallest_ip_mtu) + " and the RTmac header " + std::to_string(rtmac_bytes),
                     "use a size of at least " + std::to_string(smallest_ip_mtu + rtmac_bytes) + ", or another slot number");
@@ -116,19 +116,19 @@ private:
             const Time          before = i == 0 ? 0 : list[i - 1]->backup_offset;
             const std::string   whose = i == 0 ? "the master's sync" : "the sync of " + list[i - 1]->name;
             if (e.phase > 0 && e.phase < before + arrives)
-                say(Severity::error, e.backup_at,
+                report(Severity::error, e.backup_at,
                     "the thread of '" + e.name + "' checks " + microseconds(e.phase) + " after the beginning of the cycle, but " + whose +
                         " arrives after " + microseconds(before) + " + " + microseconds(s_.path(60)) + " + guard " +
                         microseconds(s_.guard) + " = " + microseconds(before + arrives),
                     "the smallest backup-offset that works is " + microseconds(needed(before + arrives)));
             if (e.phase > 0 && e.phase + e.lead >= e.backup_offset)
-                say(Severity::error, e.backup_at,
+                report(Severity::error, e.backup_at,
                     "'" + e.name + "' decides on the take-over " + microseconds(e.phase + e.lead) +
                         " after the beginning of the cycle, but its backup-offset is " + microseconds(e.backup_offset),
                     "phase + lead must be less than backup-offset");
         }
         if (s_.master() == nullptr && s_.stations.size() > 1)
-            say(Severity::warning, s_.stations.front().at, "no master in this file: the stations wait for an external one",
+            report(Severity::warning, s_.stations.front().at, "no master in this file: the stations wait for an external one",
                 "write master: and its slots");
     }
     static Time needed(Time phase) { return 2 * phase <= 200'000 ? 2 * phase : phase + 100'000; }

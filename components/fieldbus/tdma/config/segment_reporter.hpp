@@ -15,16 +15,16 @@ public:
     /// The schedule outlives it; `known_as` as of EventWords. [setup]
     Reporter(const std::string& instance, const config::Schedule& schedule, std::string known_as = {})
         : words_(schedule, "setp " + instance + ".reset TRUE", std::move(known_as)),
-          told_(instance, [this](const Happened& h) { return words_(h); }, 256, [](const Happened& h) { return subject(h); }) {}
+          reported_(instance, [this](const Happened& h) { return words_(h); }, 256, [](const Happened& h) { return subject(h); }) {}
 
-    void start() { told_.start(); }         // [setup]
-    void stop() noexcept { told_.stop(); }  // [setup]
+    void start() { reported_.start(); }         // [setup]
+    void stop() noexcept { reported_.stop(); }  // [setup]
     /// By the cycle. [realtime]
-    void event(Event event, const Address& who, Time value) noexcept { told_.tell({event, who, value}); }
+    void event(Event event, const Address& who, Time value) noexcept { reported_.tell({event, who, value}); }
 
 private:
     const EventWords        words_;
-    hal::Reporter<Happened> told_;  // the last: its thread uses the words
+    hal::Reporter<Happened> reported_;  // the last: its thread uses the words
 };
 
 }  // namespace hal::tdma
