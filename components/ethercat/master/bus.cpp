@@ -29,8 +29,12 @@ std::uint64_t Bus::dc_now() const noexcept {
 }
 
 bool Bus::clocks_missing() const noexcept {
-    if (reference < 0) return false;
-    if (!devices[static_cast<std::size_t>(reference)]->slave.present) return true;
+    if (reference < 0) {  // those that were found at first had no clock
+        const auto wants = [](const Slave& s) { return s.dc.has_value(); };
+        if (setup.lead == ClockLead::none || std::none_of(setup.slaves.begin(), setup.slaves.end(), wants)) return false;
+    } else if (!devices[static_cast<std::size_t>(reference)]->slave.present) {
+        return true;
+    }
     return std::any_of(by_position.begin(), by_position.end(), [&](std::uint16_t n) {
         const Device& d = *devices[n];
         return d.slave.present && d.identified && d.slave.has_dc() && !d.clock_set;

@@ -5,6 +5,7 @@
 // Another one reads error counters and clock deviations in turn. All of them run in the thread of the cycle.
 #pragma once
 
+#include <bitset>
 #include <memory>
 #include <vector>
 
@@ -65,6 +66,7 @@ struct Bus {
     std::int64_t epoch_ns = 0;                     ///< system time of the clocks minus the clock of the cycle
     std::int64_t skew_ns = 0;                      ///< system time minus the clock of the cycle, by the newest frame; 0: not known
     std::uint32_t unknown_product = 0;             ///< of the slave last reported as unknown, so that it is reported once
+    std::bitset<1024> unreadable;                  ///< positions of slaves whose EEPROM was reported as unreadable, so that it is reported once
     bool reported_empty = false;
     bool ring_changed = false;                     ///< the newest broadcast found the ring in another state
 

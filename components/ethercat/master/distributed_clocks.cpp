@@ -115,6 +115,16 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         co_await start_or_do(c, bus, d, [&d, offset](Channel& on) { return set_clock(on, d, offset); });
     }
     co_await wait_for_helpers(c, bus);
+    // A slave before the reference clock does not get its time, because a frame passes it first: the first clock leads again once it is set.
+    // Not in a ring, where the order depends on the side that a frame comes from.
+    if (!bus.setup.reference_slave && !bus.engine.redundant())
+        if (const int first = choose_reference(bus); first >= 0 && first != bus.reference) {
+            const Device& d = *bus.devices[static_cast<std::size_t>(first)];
+            if (d.clock_set && d.slave.has_dc64()) {
+                bus.reference = first;
+                bus.report(Event::reference_clock, d, 1);
+            }
+        }
     const BusSlave& leader = bus.devices[static_cast<std::size_t>(bus.reference)]->slave;
     bus.image.set_reference(leader.station, bus.setup.lead == ClockLead::thread);
     bus.status.dc_active = true;

@@ -51,9 +51,12 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
         std::memcpy(words + (word - 8), sii.words.data(), 8);
     }
     if (!sii.ok) {
-        bus.events.report(Event::sii_failed, Events::of_position + s.position, sii.control, 8);
+        if (s.position < bus.unreadable.size() && !bus.unreadable.test(s.position))
+            bus.events.report(Event::sii_failed, Events::of_position + s.position, sii.control, 8);
+        if (s.position < bus.unreadable.size()) bus.unreadable.set(s.position);
         co_return false;
     }
+    if (s.position < bus.unreadable.size()) bus.unreadable.reset(s.position);
     std::memcpy(&s.vendor, words, 4), std::memcpy(&s.product, words + 2, 4), std::memcpy(&s.revision, words + 4, 4),
         std::memcpy(&s.serial, words + 6, 4);
     for (std::uint16_t word = 0x14; word < 0x20; word = static_cast<std::uint16_t>(word + 4)) {
@@ -103,10 +106,9 @@ Task<void> scan_one(Channel& c, Bus& bus, Device& d) noexcept {
     put(c.data(), d.slave.station);
     const Answer a = co_await c.exchange(Command::apwr, at_position(d.slave.position, registers::station_address), 2);
     if (a.wkc != 1) co_return;
-    const bool ok = co_await identify(c, bus, d.slave);
-    d.identified = ok;
-    d.slave.present = true;
-    d.status.online = true;
+    d.identified = co_await identify(c, bus, d.slave);
+    if (!d.identified) co_return;  // supervise() tries it again
+    d.slave.present = d.status.online = true;
     co_await read_state(c, bus, d);
 }
 
@@ -121,6 +123,7 @@ Task<bool> scan(Channel& c, Bus& bus) noexcept {
         d->identified = d->refused = d->clock_set = d->synchronised = false;
     }
     std::fill(bus.device_of.begin(), bus.device_of.end(), -1);
+    bus.unreadable.reset();
     c.data()[0] = 0;
     Answer a = co_await c.exchange(Command::brd, at_position(0, registers::type), 1);
     bus.status.responding = a.arrived ? a.wkc : std::uint16_t{0};

@@ -46,6 +46,7 @@ Task<bool> clear_settings(Channel& c, Bus& bus, Device& d) noexcept {
 
 Task<bool> set_mailbox(Channel& c, Bus&, Device& d) noexcept {
     const MailboxArea& m = d.slave.area();
+    d.slave.mailbox_status = nullptr;  // the FMMU that carried it is cleared
     if (!m.usable()) co_return true;
     put_sync_manager(c.data(), m.out_start, m.out_size, mailbox_out_control);
     put_sync_manager(c.data() + 8, m.in_start, m.in_size, mailbox_in_control);

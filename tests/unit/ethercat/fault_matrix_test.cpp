@@ -81,7 +81,7 @@ TEST(EthercatFaultMatrix, A_clock_whose_times_were_not_read_is_not_set) {
 TEST(EthercatFaultMatrix, Frames_cables_and_power_fail_at_random) {
     Summary summary;
     const auto until_ns = static_cast<std::int64_t>(hours() * 3600e9);
-    for (unsigned seed = 1; seed <= 4 || summary.virtual_ns < until_ns; ++seed) {
+    for (unsigned seed = 1; seed <= 8 || summary.virtual_ns < until_ns; ++seed) {
         Machine m;
         std::mt19937 generator(seed);
         const auto random = [&](unsigned below) { return static_cast<unsigned>(generator() % below); };
