@@ -150,16 +150,18 @@ void Core::import() noexcept {
         if (!(channel.middle.load(std::memory_order_acquire) & plan::Channel::fresh)) continue;
         channel.front = channel.middle.exchange(channel.front, std::memory_order_acq_rel) & 3;
         const hal_value* values = channel.buffers[channel.front].get();
-        for (std::size_t i = 0; i < from.to.size(); ++i) *from.to[i] = values[i];
+        for (std::size_t i = 0; i < from.to.size(); ++i) __atomic_store_n(&from.to[i]->raw, values[i].raw, __ATOMIC_RELAXED);
     }
-    for (const plan::CellImport& from : plan_->cell_imports) from.to->raw = __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED);
+    for (const plan::CellImport& from : plan_->cell_imports)
+        __atomic_store_n(&from.to->raw, __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED), __ATOMIC_RELAXED);
 }
 
 void Core::publish(plan::Plan& plan) noexcept {
     for (plan::Export& to : plan.exports) {
         plan::Channel& channel = *to.channel;
         hal_value* values = channel.buffers[channel.back].get();
-        for (std::size_t i = 0; i < to.from.size(); ++i) values[i] = *to.from[i];
+        // the supervisor publishes too, while a function that hung may come back and write its pins
+        for (std::size_t i = 0; i < to.from.size(); ++i) values[i].raw = __atomic_load_n(&to.from[i]->raw, __ATOMIC_RELAXED);
         channel.back = channel.middle.exchange(channel.back | plan::Channel::fresh, std::memory_order_acq_rel) & 3;
     }
 }
