@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "event_words.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "ethercat/wire/al_status_codes.hpp"
 #include "ethercat/wire/coe.hpp"
+#include "ethercat/wire/soe.hpp"
 
 namespace hal::ethercat::config {
 
@@ -20,11 +22,14 @@ std::string hex(std::int64_t value, int digits) {
 }
 
 /// Returns "0x6040:0" for index << 8 | sub.
-std::string object_words(std::int64_t index_and_sub) { return hex(index_and_sub >> 8, 4) + ":" + std::to_string(index_and_sub & 0xff); }
+std::string object_words(std::int64_t index_and_sub) {
+    return hex(index_and_sub >> 8 & 0xffff, 4) + ":" + std::to_string(index_and_sub & 0xff);
+}
 
 std::string al_words(std::int64_t code) {
     const auto* row = al_status(static_cast<std::uint16_t>(code));
     std::string text = "AL status code " + hex(code, 4);
+    if (code == 0) return "without an error code: another master asked for it, or the device did";
     if (row == nullptr) return text + "; see the manual of the drive";
     return text + " (" + row->text + "): " + row->cause + "; " + row->remedy;
 }
@@ -33,6 +38,67 @@ std::string abort_words(std::int64_t code) {
     const auto number = static_cast<std::uint32_t>(code);
     if (number == 0) return "no answer from its mailbox";
     return "SDO abort " + hex(code, 8) + " (" + coe::abort_text(number) + ")";
+}
+
+std::string bytes_words(std::size_t bytes) { return std::to_string(bytes) + (bytes == 1 ? " byte" : " bytes"); }
+
+/// Returns what the master wrote into the sync managers, where a state was rejected because of them.
+std::string configured_words(std::int64_t code, const master::Slave& slave) {
+    if (code != 0x17 && code != 0x1d && code != 0x1e && code != 0x24 && code != 0x25) return {};
+    std::string list;
+    for (const auto& sm : slave.sync_managers) {
+        std::size_t bits = 0;
+        for (const auto& pdo : sm.pdos)
+            for (const auto& e : pdo.entries) bits += e.bits;
+        list += (list.empty() ? "" : " and ") + bytes_words((bits + 7) / 8) + (sm.output ? " of outputs" : " of inputs") + " in sync manager " +
+                std::to_string(sm.number);
+    }
+    return ", which has " + (list.empty() ? "no process data" : list);
+}
+
+/// What was written at start: `sdo`, `idn` and `register` lines, commands of the description.
+std::string write_words(std::int64_t object, std::int64_t code, const master::Slave& slave) {
+    using Protocol = master::StartupWrite::Protocol;
+    const auto at = std::find_if(slave.startup.begin(), slave.startup.end(), [&](const auto& w) { return (w.index << 8 | w.sub) == object; });
+    if (at == slave.startup.end()) return "rejects the start-up write of " + object_words(object) + ": " + abort_words(code);
+    std::string what = object_words(object), why = abort_words(code);
+    if (at->protocol == Protocol::soe) {
+        what = std::string("IDN ") + (soe::is_product(at->index) ? "P-" : "S-") + std::to_string(soe::set_of(at->index)) + "-" +
+               std::to_string(soe::number_of(at->index)) + " of drive " + std::to_string(at->sub);
+        if (code != 0) why = "SoE error " + hex(code, 4) + " (" + soe::error_text(static_cast<std::uint16_t>(code)) + ")";
+    } else if (at->protocol == Protocol::reg) {
+        what = "register " + hex(at->index, 4), why = "it does not answer";
+    }
+    std::uint64_t number = 0;
+    for (std::size_t n = std::min<std::size_t>(at->data.size(), 8); n-- > 0;) number = number << 8 | at->data[n];
+    const std::string value = at->complete || at->data.size() > 8 ? bytes_words(at->data.size())
+                                                                  : hex(static_cast<std::int64_t>(number), static_cast<int>(2 * at->data.size()));
+    return "rejects " + value + " for " + what + ": " + why + "; " +
+           (at->line != 0 ? "correct or delete line " + std::to_string(at->line) + " of the configuration" : "its description asks for it: check its `esi`");
+}
+
+/// A value that was written to a mapping (16xxh, 1Axxh) or an assignment (1C12h, 1C13h).
+std::string mapped_words(std::int64_t value, std::int64_t object) {
+    const std::int64_t index = object >> 8;
+    if ((object & 0xff) == 0 && value == 0) return index >= 0x1c10 ? "clearing the assignment" : "clearing the mapping";
+    if ((object & 0xff) == 0) return std::to_string(value & 0xff) + (index >= 0x1c10 ? " PDOs" : " entries");
+    if (index >= 0x1c10) return "PDO " + hex(value & 0xffff, 4);
+    return "object " + hex(value >> 16 & 0xffff, 4) + ":" + std::to_string(value >> 8 & 0xff) + " with " + std::to_string(value & 0xff) + " bits";
+}
+
+std::string rejected_mapping_words(std::int64_t first, std::int64_t code) {
+    const std::int64_t value = first >> 24, object = first & 0xff'ffff, entry = object & 0xff, index = object >> 8;
+    std::string text = "rejects " + mapped_words(value, object) + " at " + object_words(object) + ": " + abort_words(code);
+    if (code == 0) return text + "; power-cycle it";
+    const bool assignment = index >= 0x1c00, input = index >= 0x1a00;
+    text += std::string("; correct `") + (assignment ? "outputs` or `inputs" : input ? "inputs" : "outputs") + "` in its section";
+    const auto number = static_cast<std::uint32_t>(code);
+    // Slaves report a full PDO in several ways; few entries fit into any.
+    const bool full = number == coe::abort::pdo_too_long || (entry == 0 && (number == coe::abort::range || number == coe::abort::too_high)) ||
+                      (entry > 4 && number == coe::abort::no_sub);
+    const std::int64_t fits = entry == 0 ? (value & 0xff) - 1 : entry - 1;
+    if (full && !assignment && fits > 0) text += ", or, if the PDO is full, write `entries-per-pdo = " + std::to_string(fits) + "`";
+    return text;
 }
 
 std::string state_words(std::int64_t state) { return to_string(static_cast<State>(state & 0x0f)); }
@@ -45,39 +111,45 @@ std::string microseconds(std::int64_t ns) {
 
 std::string identity_words(const char* what, std::int64_t found, std::int64_t expected, const char* key) {
     return std::string("has the ") + what + " " + hex(found, 8) + ", the configuration expects " + hex(expected, 8) +
-           "; it stays in INIT: connect the right device, or correct `" + key + "`";
+           "; it stays in INIT: connect the right device, or write `" + key + " = " + hex(found, 8) + "` or the `esi` of this device";
 }
 
 /// What happened to one slave; it follows the slave's name.
-std::string of_slave(const Happened& w) {
+std::string of_slave(const Happened& w, const master::Setup& setup) {
+    static const master::Slave unnamed;
+    const master::Slave& slave = w.slave < setup.slaves.size() ? setup.slaves[w.slave] : unnamed;
     const auto first = w.first, second = w.second;
     switch (w.event) {
     case Event::slave_missing:
         return "is not on the bus; check its supply and cable, or write `optional = yes` in its section";
     case Event::unknown_slave:
-        return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add it";
+        return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add [slave " +
+               std::to_string(w.slave - Events::of_position) + " NAME], or write `other-slaves = accept` in [bus]";
     case Event::wrong_vendor: return identity_words("vendor", first, second, "vendor");
     case Event::wrong_product: return identity_words("product code", first, second, "product");
     case Event::wrong_revision: return identity_words("revision", first, second, "revision");
     case Event::wrong_serial: return identity_words("serial number", first, second, "serial");
     case Event::duplicate_alias:
-        return "has the alias " + std::to_string(first) + ", which the slave at position " + std::to_string(second) +
-               " has too; give each its own";
+        return "is not unique: the slave at position " + std::to_string(second) + " has the " +
+               (slave.identity.device_id ? "device ID " : "alias ") + std::to_string(first) +
+               " too; neither is started: give each its own, power-cycle both and load the master again";
     case Event::sii_failed:
         return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
-    case Event::no_mailbox: return "has no mailbox, but the configuration writes objects at start; remove its `sdo` lines";
+    case Event::no_mailbox:
+        return "has no mailbox, but the configuration writes " + object_words(first) + " at start; delete its `sdo` and `idn` lines";
     case Event::too_few_fmmus:
         return "has " + std::to_string(first) + " FMMUs, its process data needs " + std::to_string(second) + "; use fewer sync managers";
     case Event::too_few_sync_managers:
         return "has " + std::to_string(first) + " sync managers, the configuration needs " + std::to_string(second) + "; correct its PDOs";
-    case Event::state_refused: return "rejects " + state_words(first) + " with " + al_words(second);
+    case Event::state_refused: return "rejects " + state_words(first) + " with " + al_words(second) + configured_words(second, slave);
     case Event::state_timeout:
         return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) + ": raise its time-out, or power-cycle it";
-    case Event::fell_back: return "left its state by itself and is in " + state_words(first) + ", " + al_words(second);
-    case Event::startup_write_failed: return "rejects the start-up write of " + object_words(first) + ": " + abort_words(second);
-    case Event::mapping_failed: return "rejects the PDO mapping at " + object_words(first) + ": " + abort_words(second);
+    case Event::fell_back: return "left its state and is in " + state_words(first) + ", " + al_words(second);
+    case Event::startup_write_failed: return write_words(first, second, slave);
+    case Event::mapping_failed: return rejected_mapping_words(first, second);
     case Event::mapping_differs:
-        return "did not keep the PDO mapping: " + object_words(first) + " reads " + hex(second, 8) + "; this PDO is fixed, use its own entries";
+        return "did not keep the PDO mapping: " + object_words(first) + " is " + hex(second, 8) + " instead of " + hex(first >> 24, 8) +
+               "; this PDO is fixed: list its own entries";
     case Event::too_many_entries:
         return "does not take " + std::to_string(second) + " entries in PDO " + hex(first, 4) + "; spread them over several PDOs";
     case Event::fixed_size:
@@ -87,6 +159,9 @@ std::string of_slave(const Happened& w) {
     case Event::slave_returned: return "answers again";
     case Event::slave_operational: return "is operational after " + std::to_string(second) + " ms";
     case Event::dc_unsupported: return "has no distributed clock, but the configuration has `dc`; remove that line";
+    case Event::dc_not_set:
+        return "has a clock that could not be set within " + std::to_string(first) +
+               " ms: its receive times were not readable, or the ring is broken; it is not started: check its cables, or remove `dc`";
     case Event::dc_timeout:
         return "deviates by " + microseconds(first) + " from the reference clock, more than the window of " + microseconds(second) +
                "; it is not started: check the cycle of the thread, or raise `sync-window`";
@@ -107,11 +182,10 @@ std::string of_bus(const Happened& w, const master::Setup& setup, const std::str
     case Event::link_restored: return (first == 0 ? link : backup) + " has a link again";
     case Event::no_slaves: return "no slave answers on " + link + "; check cable and supply of the first slave";
     case Event::scanned:
-        if (first == second) return "found " + std::to_string(first) + (first == 1 ? " slave" : " slaves") + " on " + link;
-        return "found " + std::to_string(first) + (first == 1 ? " slave" : " slaves") + " on " + link + ", the configuration has " + std::to_string(second);
+        return "found " + std::to_string(first) + (first == 1 ? " slave" : " slaves") + " on " + link;  // others name what is missing
     case Event::too_many_slaves:
         return "found " + std::to_string(first) + " slaves on " + link + ", more than the " + std::to_string(second) +
-               " this master has space for; add them to the configuration";
+               " this master has space for; add the others to the configuration";
     case Event::wkc_incomplete: {
         const auto domain = static_cast<std::size_t>(first >> 16);
         return "domain '" + (domain < setup.domains.size() ? setup.domains[domain].name : std::to_string(domain)) + "': working counter " +
@@ -125,6 +199,9 @@ std::string of_bus(const Happened& w, const master::Setup& setup, const std::str
     }
     case Event::dc_synchronised: return "all clocks are synchronised, largest deviation " + microseconds(first);
     case Event::ring_closed: return "the ring is closed again";
+    case Event::other_master:
+        return "another EtherCAT master sends on " + link + " (" + std::to_string(first) +
+               " of its frames in a second): stop it, or give each master its own link";
     case Event::topology_changed:
         return "the number of slaves on " + link + " changed from " + std::to_string(first) + " to " + std::to_string(second);
     default: return {};
@@ -137,13 +214,16 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     if (slave >= Events::of_position && slave != Events::bus) return "slave at position " + std::to_string(slave - Events::of_position);
     if (slave >= setup.slaves.size()) return "slave " + std::to_string(slave);
     const master::Slave& s = setup.slaves[slave];
-    return "slave " + std::to_string(s.position) + (s.name.empty() ? "" : " (" + s.name + ")");
+    const std::string where = s.identity.device_id ? "id=" + std::to_string(*s.identity.device_id)
+                              : s.identity.alias   ? "alias=" + std::to_string(*s.identity.alias)
+                                                   : std::to_string(s.position);
+    return "slave " + where + (s.name.empty() ? "" : " (" + s.name + ")");
 }
 
 std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup) {
     const std::string bus = of_bus(what, setup, link, backup);
     if (!bus.empty()) return bus;
-    const std::string text = of_slave(what);
+    const std::string text = of_slave(what, setup);
     return text.empty() ? text : slave_words(what.slave, setup) + " " + text;
 }
 

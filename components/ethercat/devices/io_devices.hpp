@@ -44,6 +44,7 @@ struct DeviceOptions {
     std::uint16_t alias = 0;
     std::uint32_t serial = 0;
     bool dc_required = false;
+    std::uint32_t modes = 0x3a5;  ///< of a servo (6502h)
 };
 
 /// A device: its description and its behaviour.

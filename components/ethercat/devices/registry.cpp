@@ -21,7 +21,7 @@ constexpr DeviceRow device_rows[] = {
     {"digital_out", "bits", [](const DeviceOptions& o) { return make_digital(o, true); }},
     {"analog_in", "channels", [](const DeviceOptions& o) { return make_analog(o, false); }},
     {"analog_out", "channels", [](const DeviceOptions& o) { return make_analog(o, true); }},
-    {"servo", "axes dc", make_servo},
+    {"servo", "axes dc modes", make_servo},
     {"mailbox_device", "", make_mailbox_device},
 };
 
@@ -49,7 +49,7 @@ std::string set_option(DeviceOptions& o, std::string_view key, std::string_view 
         o.dc_required = value == "required";
         return {};
     }
-    const std::uint64_t most = key == "bits" ? 64 : key == "channels" ? 16 : key == "axes" ? 8 : key == "alias" ? 0xffff : 0xffffffff;
+    const std::uint64_t most = key == "bits" ? 64 : key == "channels" ? 16 : key == "axes" ? 8 : key == "modes" ? 0x3ff : key == "alias" ? 0xffff : 0xffffffff;
     const std::uint64_t least = key == "alias" || key == "serial" ? 0 : 1;
     const auto number = parse_natural(value);
     if (!number || *number < least || *number > most)
@@ -57,6 +57,7 @@ std::string set_option(DeviceOptions& o, std::string_view key, std::string_view 
             std::to_string(most);
     if (key == "bits") o.bits = static_cast<unsigned>(*number);
     else if (key == "channels") o.channels = static_cast<unsigned>(*number);
+    else if (key == "modes") o.modes = static_cast<std::uint32_t>(*number);
     else if (key == "axes") o.axes = static_cast<unsigned>(*number);
     else if (key == "alias") o.alias = static_cast<std::uint16_t>(*number);
     else o.serial = static_cast<std::uint32_t>(*number);

@@ -29,7 +29,7 @@ ServoAxis::ServoAxis(Dictionary& d, unsigned axis) {
           at(o402::following_error_window), at(o402::profile_velocity), at(o402::profile_acceleration), at(o402::profile_deceleration),
           at(o402::quick_stop_deceleration), at(o402::max_profile_velocity), at(o402::software_position_limit, 1),
           at(o402::software_position_limit, 2), at(o402::homing_method), at(o402::homing_speeds, 1), at(o402::home_offset),
-          at(o402::digital_inputs), at(o402::digital_outputs, 1), at(o402::max_torque), at(o402::position_demand)};
+          at(o402::digital_inputs), at(o402::digital_outputs, 1), at(o402::max_torque), at(o402::position_demand), at(o402::supported_modes)};
 }
 
 void ServoAxis::power_on() noexcept {
@@ -37,6 +37,8 @@ void ServoAxis::power_on() noexcept {
     control_ = 0, mode_ = 0, velocity_ = demand_ = goal_ = torque_ = 0;
     offset_ = 0, position_ = std::round(position_);  // the shaft stays where it is, an absolute encoder reads it
     acknowledged_ = moving_to_goal_ = homed_ = homing_ = following_fault_ = limited_ = reached_ = false;
+    put(d_.status, status_bits()), put(d_.position, static_cast<std::int32_t>(std::llround(position_)));  // read by SDOs before SAFE-OP
+    shown_status_.store(get<std::uint16_t>(d_.status), std::memory_order_relaxed);
 }
 
 void ServoAxis::fault(std::uint16_t code, Step& s) noexcept {
@@ -194,7 +196,8 @@ void ServoAxis::step(Step& s) noexcept {
     if (const auto code = fault_request_.exchange(0, std::memory_order_relaxed)) fault(code, s);
     walk(s);
     const auto wanted_mode = static_cast<std::int8_t>(*d_.mode);
-    if (wanted_mode != mode_ && (wanted_mode == 0 || (0x3a5U >> (wanted_mode - 1) & 1) != 0)) {
+    const auto modes = get<std::uint32_t>(d_.modes);
+    if (wanted_mode != mode_ && (wanted_mode == 0 || (wanted_mode > 0 && wanted_mode <= 10 && (modes >> (wanted_mode - 1) & 1) != 0))) {
         mode_ = wanted_mode, homed_ = homing_ = moving_to_goal_ = false, goal_ = position_;
     }
     const bool enabled = state_ == DriveState::operation_enabled;

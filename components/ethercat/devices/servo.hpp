@@ -42,7 +42,7 @@ private:
             *target_torque,
             *velocity_offset, *position_offset, *error_code, *following_error, *following_window, *profile_velocity, *profile_acceleration,
             *profile_deceleration, *quick_deceleration, *max_velocity, *low_limit, *high_limit, *homing_method, *homing_speed, *home_offset,
-            *digital_in, *digital_out, *torque_limit, *demand;
+            *digital_in, *digital_out, *torque_limit, *demand, *modes;
     } d_{};
     DriveState state_{};
     std::uint16_t control_ = 0;

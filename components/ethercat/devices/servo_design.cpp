@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "ethercat/devices/servo.hpp"
 
+#include <bit>
+
 namespace hal::ethercat::devices {
 
 namespace o402 = canopen::cia402::object;
 
 namespace {
 
-void add_axis(Dictionary& d, unsigned axis) {
+void add_axis(Dictionary& d, unsigned axis, std::uint32_t modes) {
     namespace t = coe::type;
     namespace access = coe::access;
     constexpr std::uint16_t ro = access::read | access::tx_mappable, rw = access::read_write, rx = rw | access::rx_mappable,
@@ -21,7 +23,7 @@ void add_axis(Dictionary& d, unsigned axis) {
     add(o402::quick_stop_option, "Quick stop option code", t::s16, rw, 2), add(o402::halt_option, "Halt option code", t::s16, rw, 1);
     add(o402::fault_reaction_option, "Fault reaction option code", t::s16, rw, 2);
     add(o402::modes_of_operation, "Modes of operation", t::s8, rx);
-    d.limit(0, 10);
+    d.limit(0, std::bit_width(modes & 0x3a5U));
     add(o402::modes_of_operation_display, "Modes of operation display", t::s8, ro);
     add(o402::position_demand, "Position demand value", t::s32, ro), add(o402::position_actual, "Position actual value", t::s32, ro);
     add(o402::following_error_window, "Following error window", t::u32, rw, 0xffffffff), add(o402::following_error_timeout,
@@ -49,7 +51,7 @@ void add_axis(Dictionary& d, unsigned axis) {
     d.record(at(o402::digital_outputs), "Digital outputs", 2);
     d.sub(1, "Physical outputs", t::u32, rx), d.sub(2, "Bit mask", t::u32, rw, 0xffffffff);
     add(o402::target_velocity, "Target velocity", t::s32, rx);
-    add(o402::supported_modes, "Supported drive modes", t::u32, access::read, 0x3a5);
+    add(o402::supported_modes, "Supported drive modes", t::u32, access::read, modes & 0x3a5U);
 }
 
 void add_sync(Dictionary& d, std::uint16_t index, const char* name, bool output) {
@@ -70,7 +72,7 @@ Parts make_servo(const DeviceOptions& options) {
     auto& d = b.dictionary();
     d.variable(0x1000, "Device type", coe::type::u32, coe::access::read, canopen::cia402::servo_drive | canopen::cia402::profile_number);
     add_sync(d, 0x1c32, "SM output parameter", true), add_sync(d, 0x1c33, "SM input parameter", false);
-    for (unsigned n = 0; n < options.axes; ++n) add_axis(d, n);
+    for (unsigned n = 0; n < options.axes; ++n) add_axis(d, n, options.modes);
     for (unsigned n = 0; n < options.axes; ++n) {
         const auto at = [&](std::uint16_t index) { return canopen::cia402::of_axis(index, n); };
         const std::string axis = options.axes == 1 ? "" : " axis " + std::to_string(n + 1);

@@ -31,7 +31,7 @@ std::uint64_t Bus::dc_now() const noexcept {
 bool Bus::clocks_missing() const noexcept {
     if (reference < 0) {  // those that were found at first had no clock
         const auto wants = [](const Slave& s) { return s.dc.has_value(); };
-        if (setup.lead == ClockLead::none || std::none_of(setup.slaves.begin(), setup.slaves.end(), wants)) return false;
+        if (std::none_of(setup.slaves.begin(), setup.slaves.end(), wants)) return false;
     } else if (!devices[static_cast<std::size_t>(reference)]->slave.present) {
         return true;
     }

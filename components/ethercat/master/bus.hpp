@@ -129,6 +129,7 @@ Task<bool> read_state(Channel&, Bus&, Device&) noexcept;      ///< Reads AL stat
 Task<bool> set_mailbox(Channel&, Bus&, Device&) noexcept;     ///< Sync managers 0 and 1.
 Task<bool> set_process_data(Channel&, Bus&, Device&) noexcept;///< Sync managers 2.., FMMUs, watchdog.
 Task<bool> clear_settings(Channel&, Bus&, Device&) noexcept;  ///< Disables sync managers, FMMUs and SYNC signals.
+Task<void> clear_process_data(Channel&, Bus&, Device&) noexcept;///< Disables the FMMUs.
 Task<bool> startup_writes(Channel&, Bus&, Device&, State before) noexcept;
 
 // pdo_mapping.cpp

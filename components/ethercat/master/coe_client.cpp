@@ -33,6 +33,11 @@ bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index, st
     return service == coe::Service::sdo_response || service == coe::Service::sdo_request;
 }
 
+Task<SdoResult> CoeClient::write_other(Channel& channel, BusSlave& slave, const StartupWrite& write) noexcept {
+    const SdoResult result = co_await soe_.write(channel, slave, write.sub, write.index, soe::element::value, write.data);
+    co_return result;
+}
+
 Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub, bool complete,
                                   std::span<std::uint8_t> to) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);

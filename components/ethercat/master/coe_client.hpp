@@ -6,6 +6,7 @@
 #include <span>
 
 #include "ethercat/master/mailbox.hpp"
+#include "ethercat/master/soe_client.hpp"
 #include "ethercat/wire/coe.hpp"
 #include "hal/queue.hpp"
 
@@ -59,6 +60,7 @@ public:
         std::span<std::uint8_t> to) noexcept override;
     Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                              std::span<const std::uint8_t> from) noexcept override;
+    Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;  ///< An IDN: by SoE.
 
     /// Reads a list of indexes; `length` of the result counts bytes, two for each index.
     Task<MailboxResult> list(Channel&, BusSlave&, coe::List which, std::span<std::uint8_t> to) noexcept;
@@ -79,6 +81,7 @@ private:
                                     std::span<std::uint8_t> head, std::span<std::uint8_t> to) noexcept;
 
     Mailboxes& mailboxes_;
+    SoeClient soe_{mailboxes_};
 };
 
 }  // namespace hal::ethercat::master

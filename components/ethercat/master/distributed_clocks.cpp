@@ -52,7 +52,6 @@ Task<void> wait_for_helpers(Channel& c, Bus& bus) noexcept {
 }
 
 int choose_reference(const Bus& bus) noexcept {
-    if (bus.setup.lead == ClockLead::none) return -1;
     if (bus.setup.reference_slave && *bus.setup.reference_slave < bus.device_of.size())
         if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 &&
             bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) return n;
@@ -152,7 +151,8 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
         }
         if (c.now_ns() < until) continue;
         if (deviation <= tolerable_deviation_ns) break;
-        bus.report(Event::dc_timeout, d, deviation, window);
+        if (deviation == UINT32_MAX) bus.report(Event::dc_not_set, d, synchronise_timeout_ns / millisecond);
+        else bus.report(Event::dc_timeout, d, deviation, window);
         d.clock_set = false;  // it is set again before the next start-up
         bus.suspicious = true;
         co_return false;

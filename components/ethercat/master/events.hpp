@@ -15,17 +15,17 @@ enum class Event : std::uint8_t {
     slave_missing,                 ///< not on the bus at start [position, -]
     unknown_slave,                 ///< not in the setup [vendor, product]
     wrong_vendor, wrong_product, wrong_revision, wrong_serial,  ///< [found, expected]
-    duplicate_alias,               ///< [alias, position of the second]
+    duplicate_alias,               ///< alias or device identification [number, position of the second]
     sii_failed,                    ///< EEPROM not readable [0502h, word]
-    no_mailbox,                    ///< start-up writes for a slave without mailbox
+    no_mailbox,                    ///< start-up writes for a slave without mailbox [index << 8 | sub, -]
     too_few_fmmus, too_few_sync_managers,  ///< [present, needed]
     state_reached,                 ///< [State, -]
     state_refused,                 ///< [State requested, AL status code]
     state_timeout,                 ///< [State requested, AL status]
     fell_back,                     ///< left its state by itself [AL status, AL status code]
     startup_write_failed,          ///< [index << 8 | sub, abort code]
-    mapping_failed,                ///< [index << 8 | sub, abort code]
-    mapping_differs,               ///< read back other than written [index << 8 | sub, value read]
+    mapping_failed,                ///< [value << 24 | index << 8 | sub, abort code]
+    mapping_differs,               ///< read back other than written [value << 24 | index << 8 | sub, value read]
     too_many_entries,              ///< [PDO, entries]
     fixed_size,                    ///< no mailbox to change the mapping [sync manager << 16 | bytes of the setup, bytes of the slave]
     slave_lost, slave_returned,    ///< [position, -]
@@ -34,9 +34,11 @@ enum class Event : std::uint8_t {
     reference_clock,               ///< `slave` leads [64 bit: 1, -]
     dc_unsupported,                ///< configured, but the slave has no clock
     dc_timeout,                    ///< clock not within the window in time [deviation ns, window ns]
+    dc_not_set,                    ///< the time of its clock could not be set [ms waited, -]
     dc_synchronised,               ///< all slaves [largest deviation ns, -]
     ring_broken, ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]
     topology_changed,              ///< [slaves before, slaves now]
+    other_master,                  ///< EtherCAT frames that are not ours [frames in the last second, -]
     start_up_failed,               ///< gives up for now and starts again later [State it was in, seconds to the next try]
 };
 

@@ -21,7 +21,7 @@ void Master::attach(ethernet::Port& primary, ethernet::Port* backup) {
     bus_->engine.attach(primary, backup);
     bus_->engine.ready();
     bus_->status.redundant = backup != nullptr;
-    bus_->status.link = primary.statistics().up;
+    bus_->status.link = true;  // receive() reports a missing one
 }
 void Master::add(Channel& channel) { bus_->engine.add(channel); }
 void Master::set_epoch(std::int64_t epoch_ns) { bus_->epoch_ns = epoch_ns; }

@@ -20,7 +20,7 @@ Task<SdoResult> write_value(Channel& c, Bus& bus, Device& d, std::uint16_t index
     std::array<std::uint8_t, sizeof(T)> bytes{};
     put(bytes.data(), value);
     const SdoResult r = co_await bus.coe.download(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
-    if (!r) bus.report(Event::mapping_failed, d, index << 8 | static_cast<int>(sub), r.abort);
+    if (!r) bus.report(Event::mapping_failed, d, static_cast<std::int64_t>(value) << 24 | index << 8 | static_cast<int>(sub), r.abort);
     co_return r;
 }
 
@@ -45,14 +45,14 @@ Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std
         co_return Compared::failed;
     }
     if ((value & 0xff) != count) {
-        if (report) bus.report(Event::mapping_differs, d, index << 8, value & 0xff);
+        if (report) bus.report(Event::mapping_differs, d, static_cast<std::int64_t>(count) << 24 | index << 8, value & 0xff);
         co_return Compared::differs;
     }
     for (std::size_t n = 0; n < count; ++n) {
         r = co_await read_value(c, bus, d, index, static_cast<unsigned>(n + 1), value);
         const bool same = r && value == want(n);
         if (same) continue;
-        if (report) bus.report(Event::mapping_differs, d, index << 8 | static_cast<int>(n + 1), value);
+        if (report) bus.report(Event::mapping_differs, d, static_cast<std::int64_t>(want(n)) << 24 | index << 8 | static_cast<int>(n + 1), value);
         co_return Compared::differs;
     }
     co_return Compared::same;

@@ -128,8 +128,8 @@ Task<bool> scan(Channel& c, Bus& bus) noexcept {
     Answer a = co_await c.exchange(Command::brd, at_position(0, registers::type), 1);
     bus.status.responding = a.arrived ? a.wkc : std::uint16_t{0};
     if (!a.arrived || a.wkc == 0) {
-        if (!bus.reported_empty) bus.report(Event::no_slaves);
-        bus.reported_empty = true;
+        if (!bus.reported_empty && bus.status.link) bus.report(Event::no_slaves);
+        bus.reported_empty = bus.reported_empty || bus.status.link;
         co_return false;
     }
     bus.reported_empty = false;
@@ -198,10 +198,13 @@ void assign(Bus& bus) noexcept {
             Device& d = *bus.devices[number];
             if (!d.slave.present || !d.identified || d.slave.configured >= 0) continue;
             if (!is_at_its_place(want, d.slave)) continue;
-            if (found != nullptr)
-                bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(n), d.slave.alias, d.slave.position);
-            else
+            if (found == nullptr) {
                 found = &d;
+                continue;
+            }
+            if (!d.refused) bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(n),
+                want.identity.device_id ? d.slave.device_id : d.slave.alias, d.slave.position);
+            d.refused = found->refused = true;  // ambiguous: neither is started
         }
         if (found == nullptr) {
             if (!want.optional) bus.events.report(Event::slave_missing, static_cast<std::uint32_t>(n), want.position, 0);
@@ -228,7 +231,7 @@ void assign(Bus& bus) noexcept {
     }
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && d.identified && d.slave.configured < 0 && !bus.setup.accept_other_slaves && !bus.setup.slaves.empty())
+        if (d.slave.present && d.identified && d.slave.configured < 0 && !d.refused && !bus.setup.accept_other_slaves && !bus.setup.slaves.empty())
             bus.report(Event::unknown_slave, d, d.slave.vendor, d.slave.product);
     }
 }

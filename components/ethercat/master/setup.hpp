@@ -126,7 +126,7 @@ struct Domain {
 enum class ClockLead : std::uint8_t {
     reference,  ///< the threads follow the reference clock
     thread,     ///< the reference clock follows the threads
-    none,       ///< distributed clocks run free
+    none,       ///< neither: the slaves follow the reference clock, which runs free
 };
 
 struct Setup {

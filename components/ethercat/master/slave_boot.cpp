@@ -119,7 +119,7 @@ Task<void> boot(Channel& c, Bus& bus, Device& d) noexcept {
             ++d.status.losses;
             co_return;
         }
-        if (d.slave.configured >= 0) bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), false, false, false);
+        co_await clear_process_data(c, bus, d);  // it must neither count nor take outputs
         ++d.attempts;
         const std::int64_t pause = retry_after_ns * std::min(d.attempts, 10U);
         bus.report(Event::start_up_failed, d, code(d.slave.state), pause / (1000 * millisecond));

@@ -44,6 +44,17 @@ Task<bool> clear_settings(Channel& c, Bus& bus, Device& d) noexcept {
     co_return managers == 0 || a.wkc == 1;
 }
 
+Task<void> clear_process_data(Channel& c, Bus& bus, Device& d) noexcept {
+    if (bus.config(d) == nullptr) co_return;
+    const auto fmmus = static_cast<std::uint16_t>(16 * std::min<unsigned>(d.slave.fmmus, 16));
+    d.slave.mailbox_status = nullptr;
+    bus.image.clear_mailbox_status(static_cast<std::size_t>(d.slave.configured));
+    std::memset(c.data(), 0, 256);
+    co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::fmmu), fmmus);
+    co_await c.sleep(0);  // a frame with process data may have passed before
+    bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), false, false, false);
+}
+
 Task<bool> set_mailbox(Channel& c, Bus&, Device& d) noexcept {
     const MailboxArea& m = d.slave.area();
     d.slave.mailbox_status = nullptr;  // the FMMU that carried it is cleared

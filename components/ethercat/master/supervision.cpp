@@ -13,6 +13,7 @@ constexpr std::int64_t look_every_ns = 10 * millisecond, empty_retry_ns = 100 * 
 constexpr std::int64_t counters_every_ns = 1'000 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
+constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may be damaged ones
 
 /// Finds the tree; `changed`: the ports may have changed since the slaves were identified.
 Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
@@ -221,13 +222,20 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
 }
 
 Task<void> watch(Channel& c, Bus& bus) noexcept {
+    std::uint64_t foreign = bus.status.foreign;
+    bool other = false;
     while (true) {
         const std::int64_t began = c.now_ns();
+        const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
+        const bool was_other = std::exchange(other, more >= other_master_frames);
+        if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
         std::uint32_t largest = 0;
-        bool any = false;
+        bool any = false, all = true;
         for (const auto& device : bus.devices) {
             Device& d = *device;
             if (!d.slave.present || !d.identified) continue;
+            const Slave* config = bus.config(d);
+            all &= config == nullptr || !config->dc || d.clock_set || d.refused;
             Answer a = co_await read(c, d.slave, registers::rx_errors, 20);
             if (a.wkc == 1) {
                 std::array<std::uint8_t, 20> now{};
@@ -260,7 +268,7 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
             }
         }
         bus.status.dc_deviation_ns = any ? largest : UINT32_MAX;
-        const bool synchronised = any && largest <= bus.setup.sync_window_ns;
+        const bool synchronised = any && all && largest <= bus.setup.sync_window_ns;
         if (synchronised && !bus.status.dc_synchronised) bus.report(Event::dc_synchronised, largest);
         bus.status.dc_synchronised = synchronised;
         co_await c.sleep(std::max<std::int64_t>(began + counters_every_ns - c.now_ns(), 0));

@@ -24,6 +24,8 @@ constexpr bool only_reads(Command c) noexcept {
 
 void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
     primary_ = &primary, backup_ = backup;
+    // Masters that begin at the same time must not take each other's frames for their own.
+    for (const std::uint8_t byte : primary.address()) next_index_ = static_cast<std::uint8_t>(next_index_ * 31 + byte);
     if (backup != nullptr) halves_.resize(image_.datagrams().size() + 1 + setup_.slaves.size());
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "ethercat/config/event_filter.hpp"
 #include "ethercat/config/event_words.hpp"
 #include "ethercat/master/coe_client.hpp"
 #include "ethercat/master/mailbox.hpp"
@@ -54,6 +55,11 @@ public:
         period_words_ = "the period of the thread is {} us, the cycle of the configuration " + std::to_string(bus_.setup.cycle_ns / 1000) +
                         " us; change one of them: cycle in [bus]; nothing is exchanged";
         link_words_ = bus_.link + " has no link; no process data is exchanged";
+        other_words_ = "another EtherCAT master sends on " + bus_.link + "; the slaves obey both";
+        no_transmit_words_ = "'" + name_ + ".receive' runs, but '" + name_ + ".transmit' does not; nothing is sent; type: addf " + name_ +
+                             ".transmit THREAD";
+        no_receive_words_ = "'" + name_ + ".transmit' runs, but '" + name_ + ".receive' does not; nothing is sent; type: addf " + name_ +
+                            ".receive THREAD";
     }
 
     void start() {
@@ -73,6 +79,8 @@ public:
         for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
         if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
         period_reported_ = was_fresh_ = false;
+        unsent_ = unreceived_ = 0;
+        filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
         reporter_.start();
         master_->attach(*primary_, backup_.get());
@@ -90,6 +98,8 @@ public:
 
     void receive(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
+        unreceived_ = 0;
+        if (++unsent_ == tolerated_cycles) raise(no_transmit_words_);
         master_->receive(cycle.start_ns());
         follow(cycle);
         bus_pins_.show(master_->status());
@@ -99,6 +109,9 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
+        unsent_ = 0;
+        if (++unreceived_ == tolerated_cycles) raise(no_receive_words_);
+        if (unreceived_ > 2) return;  // outputs must not move without their inputs
         entries_.take(areas_);
         master_->transmit(cycle.start_ns());
     }
@@ -108,6 +121,7 @@ public:
     }
 
 private:
+    static constexpr unsigned tolerated_cycles = 100;  ///< without the other function, while the netlist is loaded
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
     struct Place {
         std::size_t slave = 0, sync_manager = 0;
@@ -161,11 +175,12 @@ private:
 
     // Events of the master. [realtime]
     void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
-        reporter_.tell({event, slave, first, second});
+        if (filter_.is_new(event, slave, first, second)) reporter_.tell({event, slave, first, second});
         const bool named = slave < slaves_.size();
         if (event == Event::slave_lost && named) raise(lost_words_[slave]);
         if (event == Event::fell_back && named) raise(left_words_[slave], static_cast<double>(second));
         if (event == Event::link_lost && first == 0) raise(link_words_);
+        if (event == Event::other_master) raise(other_words_);
     }
 
     const std::string name_ = hal::own_name("ethercat.0");
@@ -180,7 +195,9 @@ private:
     std::vector<Place>    places_;  // of the process data, in the order of areas_
     std::vector<std::span<std::uint8_t>> areas_;
     std::vector<std::string> lost_words_, left_words_;
-    std::string              link_words_, period_words_;
+    std::string              link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_;
+    config::EventFilter      filter_{0};
+    unsigned                 unsent_ = 0, unreceived_ = 0;
 
     std::unique_ptr<hal::ethernet::Port> primary_, backup_;
     std::unique_ptr<master::Mailboxes>   mailboxes_;
@@ -188,7 +205,8 @@ private:
     std::unique_ptr<Master>              master_;
     std::optional<hal::DisciplinedClock> clock_;
     hal::Discipline                      discipline_;
-    hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) { return config::event_words(h, bus_.setup, bus_.link, bus_.backup); }};
+    hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) { return config::event_words(h, bus_.setup, bus_.link, bus_.backup); }, 256,
+                                                    [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
     const hal_faults*                    faults_ = nullptr;
     bool                                 was_fresh_ = false, simulated_ = false, period_reported_ = false;
 };

@@ -65,9 +65,9 @@ public:
         for (char& c : text)
             if (c == ',') c = '\n';
         const devices::LineDescription description = devices::read_line(text);
-        if (!description.messages.empty())
-            throw hal::ArgumentError("devices", "devices=\"" + devices_.get() + "\": " + description.messages.front().sentence + "; " +
-                                                    description.messages.front().help);
+        for (const auto& m : description.messages)
+            if (m.severity == hal::Severity::error)  // duplicate aliases may be wanted
+                throw hal::ArgumentError("devices", "devices=\"" + devices_.get() + "\": " + m.sentence + "; " + m.help);
         line_devices_ = devices::make_line(description);
         for (std::size_t n = 0; n < line_devices_.size(); ++n) declare(n);
     }
@@ -79,6 +79,7 @@ public:
         primary_ = open(link_.get(), options);
         if (!backup_.get().empty()) secondary_ = open(backup_.get(), options);
         line_.emplace();
+        frames_ = 0, silent_ = 0;
         for (devices::Device& d : line_devices_)
             line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
         if (secondary_ && !line_devices_.empty() && !line_->close_ring(static_cast<unsigned>(line_devices_.size() - 1), 1))
@@ -99,6 +100,8 @@ public:
     void update(hal::Cycle cycle) noexcept {
         if (!line_) return;
         primary_->receive(cycle.start_ns());  // frames of a master that is gone pass too
+        silent_ = line_->frames() == frames_ ? silent_ + 1 : 0, frames_ = line_->frames();
+        if (silent_ >= silent_cycles) line_->advance(cycle.start_ns());  // frames move its time; without them its watchdogs run all the same
         for (unsigned n = 0; n < slaves_.size(); ++n) {
             using Kind = esc::LineCommand::Kind;
             SlavePins& pins = slaves_[n];
@@ -121,6 +124,8 @@ public:
     }
 
 private:
+    static constexpr unsigned silent_cycles = 10;
+
     static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
         if (!hal::ethernet::describe(address).in_memory)
             throw std::runtime_error(address + " is not a segment in memory; write link=sim:NAME");
@@ -153,7 +158,7 @@ private:
 
     hal::TextArgument devices_{*this, "devices", "coupler",
                                "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out bits=8, analog_in channels=4, "
-                               "analog_out channels=2, servo axes=1, mailbox_device; all take alias= and serial=, a servo dc=required"};
+                               "analog_out channels=2, servo axes=1, mailbox_device; all take alias= and serial=, a servo dc=required and modes= (6502h)"};
     hal::TextArgument link_{*this, "link", "sim:ethercat", "segment in memory where the master is"};
     hal::TextArgument backup_{*this, "backup", "", "segment in memory of the master's second port, which closes a ring"};
     hal::Function     update_{*this, "update", &EthercatSegment::update, "copies values between pins and devices; in the thread of the master"};
@@ -168,6 +173,8 @@ private:
     std::deque<Channel<hal::Out<std::int32_t>>>  analog_out_;
     std::unique_ptr<hal::ethernet::Port>         primary_, secondary_;
     std::optional<esc::Line>                     line_;
+    std::uint64_t                                frames_ = 0;
+    unsigned                                     silent_ = 0;
     std::unique_ptr<esc::LineOnSegments>         connection_;
 };
 

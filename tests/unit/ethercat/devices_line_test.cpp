@@ -274,6 +274,14 @@ TEST_F(Devices, Other_protocols_answer) {
     EXPECT_EQ(back[299], frame[299]);
 }
 
+TEST_F(Devices, Servo_reports_switch_on_disabled_in_PRE_OP_on_every_axis) {
+    start("servo", {.axes = 2});
+    to_preop();
+    for (unsigned axis = 0; axis < 2; ++axis) EXPECT_EQ(dynamic_cast<Servo&>(device.firmware->behaviour()).axis(axis).statusword(), 0x250) << axis;
+    EXPECT_EQ(upload(0x6041, 0) & 0xffff, 0x250U);
+    EXPECT_EQ(upload(0x6841, 0) & 0xffff, 0x250U);
+}
+
 TEST(DeviceLine, Description_reports_what_is_invalid) {
     const auto good = read_line("# line\ncoupler\nservo axes=2 alias=5 serial=1 dc=required\ndigital_in bits=16\n");
     EXPECT_TRUE(good.messages.empty());

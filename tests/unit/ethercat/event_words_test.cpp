@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "ethercat/config/event_filter.hpp"
 #include "ethercat/config/event_words.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ std::string words(Event event, std::uint32_t slave, std::int64_t first = 0, std:
 TEST(EthercatEventWords, Refused_state_names_slave_state_code_cause_and_remedy) {
     EXPECT_EQ(words(Event::state_refused, 1, 4, 0x001e),
               "slave 4 (x-axis) rejects SAFE-OP with AL status code 0x001E (invalid input configuration): the length of the inputs differs from "
-              "the PDO mapping; compare its PDOs with the configuration");
+              "the PDO mapping; compare its PDOs with the configuration, which has no process data");
     EXPECT_EQ(words(Event::state_refused, 1, 8, 0x8123),
               "slave 4 (x-axis) rejects OP with AL status code 0x8123; see the manual of the drive");
 }
@@ -31,25 +32,74 @@ TEST(EthercatEventWords, Refused_state_names_slave_state_code_cause_and_remedy) 
 TEST(EthercatEventWords, Wrong_device_names_what_was_found_and_expected) {
     EXPECT_EQ(words(Event::wrong_product, 0, 0x402, 0x403),
               "slave 0 has the product code 0x00000402, the configuration expects 0x00000403; it stays in INIT: connect the right device, or "
-              "correct `product`");
+              "write `product = 0x00000402` or the `esi` of this device");
     EXPECT_EQ(words(Event::unknown_slave, Events::of_position + 7, 0x2, 0x7d83052),
-              "slave at position 7 is not in the configuration (vendor 0x00000002, product 0x07D83052); add it");
+              "slave at position 7 is not in the configuration (vendor 0x00000002, product 0x07D83052); add [slave 7 NAME], or "
+              "write `other-slaves = accept` in [bus]");
 }
 
 TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
     EXPECT_EQ(words(Event::startup_write_failed, 1, 0x606000, 0x06020000).substr(0, 86),
               "slave 4 (x-axis) rejects the start-up write of 0x6060:0: SDO abort 0x06020000 (object ");
-    EXPECT_EQ(words(Event::mapping_failed, 1, 0x160001, 0),
-              "slave 4 (x-axis) rejects the PDO mapping at 0x1600:1: no answer from its mailbox");
+    EXPECT_EQ(words(Event::mapping_failed, 1, 0x60400010LL << 24 | 0x160001, 0),
+              "slave 4 (x-axis) rejects object 0x6040:0 with 16 bits at 0x1600:1: no answer from its mailbox; power-cycle it");
+    EXPECT_EQ(words(Event::mapping_failed, 1, 0x1600LL << 24 | 0x1c1201, 0x06090030),
+              "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 (value out of range); correct `outputs` or `inputs` in its section");
+    EXPECT_EQ(words(Event::mapping_failed, 1, 12LL << 24 | 0x1a0000, 0x06040042),
+              "slave 4 (x-axis) rejects 12 entries at 0x1A00:0: SDO abort 0x06040042 (mapped objects exceed the PDO length); correct `inputs` in its section, or, if the "
+              "PDO is full, write `entries-per-pdo = 11`");
+    EXPECT_EQ(words(Event::mapping_differs, 1, 0x60640020LL << 24 | 0x1a0002, 0x60410010),
+              "slave 4 (x-axis) did not keep the PDO mapping: 0x1A00:2 is 0x60410010 instead of 0x60640020; this PDO is fixed: list its own entries");
+    EXPECT_EQ(words(Event::dc_not_set, 1, 5000), "slave 4 (x-axis) has a clock that could not be set within 5000 ms: its receive times were not "
+              "readable, or the ring is broken; it is not started: check its cables, or remove `dc`");
 }
 
 TEST(EthercatEventWords, Bus_events_name_the_port_and_the_domain) {
     EXPECT_EQ(words(Event::link_lost, Events::bus, 1), "eth:enp4s0 has no link; check the cable to the first slave");
     EXPECT_EQ(words(Event::scanned, Events::bus, 1, 1), "found 1 slave on eth:enp3s0");
-    EXPECT_EQ(words(Event::scanned, Events::bus, 3, 2), "found 3 slaves on eth:enp3s0, the configuration has 2");
+    EXPECT_EQ(words(Event::scanned, Events::bus, 3, 2), "found 3 slaves on eth:enp3s0");
     EXPECT_EQ(words(Event::wkc_incomplete, Events::bus, 3, 6),
               "domain 'default': working counter 3 instead of 6: some slaves do not exchange process data");
     EXPECT_EQ(words(Event::dc_synchronised, Events::bus, 240), "all clocks are synchronised, largest deviation 0.24 us");
+}
+
+TEST(EthercatEventWords, Start_up_writes_name_value_and_line) {
+    using Protocol = master::StartupWrite::Protocol;
+    master::Setup setup;
+    setup.slaves.resize(1);
+    master::StartupWrite w;
+    w.index = 0x6060, w.data = {8}, w.line = 12;
+    setup.slaves[0].startup.push_back(w);
+    w.index = 0x8096, w.sub = 1, w.data = {7, 0}, w.protocol = Protocol::soe, w.line = 0;
+    setup.slaves[0].startup.push_back(w);
+    w.index = 0x420, w.sub = 0, w.protocol = Protocol::reg, w.line = 14;
+    setup.slaves[0].startup.push_back(w);
+    const auto of = [&](std::int64_t object, std::int64_t code) {
+        return config::event_words({Event::startup_write_failed, 0, object, code}, setup, "eth:enp3s0");
+    };
+    EXPECT_EQ(of(0x606000, 0x06090031), "slave 0 rejects 0x08 for 0x6060:0: SDO abort 0x06090031 (value too high); correct or delete line 12 of the "
+              "configuration");
+    EXPECT_EQ(of(0x809601, 0x7004), "slave 0 rejects 0x0007 for IDN P-0-150 of drive 1: SoE error 0x7004 (value is read-only); its description asks "
+              "for it: check its `esi`");
+    EXPECT_EQ(of(0x42000, 0), "slave 0 rejects 0x0007 for register 0x0420: it does not answer; correct or delete line 14 of the configuration");
+}
+
+TEST(EthercatEventWords, One_cause_is_news_once_until_the_slave_is_operational) {
+    config::EventFilter filter(2);
+    const auto is_new = [&](Event event, std::int64_t first = 0, std::int64_t second = 0) { return filter.is_new(event, 1, first, second); };
+    EXPECT_TRUE(is_new(Event::state_refused, 4, 0x1d));
+    EXPECT_FALSE(is_new(Event::start_up_failed, 2, 1)) << "the cause is known";
+    EXPECT_FALSE(is_new(Event::state_refused, 4, 0x1d));
+    EXPECT_TRUE(is_new(Event::state_refused, 8, 0x1d)) << "another cause";
+    EXPECT_TRUE(is_new(Event::dc_timeout, 2000, 1000));
+    EXPECT_FALSE(is_new(Event::dc_timeout, 2001, 1000));
+    EXPECT_TRUE(filter.is_new(Event::state_refused, 0, 4, 0x1d)) << "another slave";
+    EXPECT_TRUE(is_new(Event::slave_operational));
+    EXPECT_TRUE(is_new(Event::state_refused, 4, 0x1d));
+    EXPECT_TRUE(is_new(Event::slave_returned));
+    EXPECT_TRUE(is_new(Event::start_up_failed, 2, 1)) << "nothing else was reported";
+    EXPECT_FALSE(is_new(Event::start_up_failed, 2, 2));
+    EXPECT_TRUE(filter.is_new(Event::unknown_slave, Events::of_position + 1, 2, 3));
 }
 
 TEST(EthercatEventWords, Every_event_but_a_reached_state_has_a_sentence) {

@@ -54,6 +54,34 @@ TEST(EthercatClocks, The_reference_follows_the_thread_by_choice) {
     EXPECT_NEAR(static_cast<double>(w.master->dc_phase().error_ns), 0.0, 5000.0);
 }
 
+TEST(EthercatClocks, Slaves_agree_where_nobody_follows) {
+    World w;
+    for (unsigned n = 0; n < 3; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 40.0 * n});
+    auto setup = with_clocks(3);
+    setup.lead = ClockLead::none;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    w.run(2000);
+    EXPECT_TRUE(w.master->status().dc_synchronised) << w.master->status().dc_deviation_ns;
+}
+
+TEST(EthercatClocks, A_clock_that_cannot_be_set_is_reported_as_that_and_set_later) {
+    World w;
+    for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 10.0 * n});
+    w.line.close_ring(3, 1);
+    w.begin(with_clocks(4), true);
+    ASSERT_TRUE(w.operational(8000)) << w.log.text();
+    w.line.set_power(2, false, w.now_ns);
+    w.run(200);
+    w.line.set_cable(3, 0, false);  // while the ring is broken no delays are measured
+    w.line.set_power(2, true, w.now_ns);
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::dc_not_set) != 0; }, 8000)) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::dc_not_set)->slave, 2U);
+    EXPECT_EQ(w.log.count(Event::dc_timeout), 0U);
+    w.line.set_cable(3, 0, true);
+    EXPECT_TRUE(w.operational(20000)) << w.log.text();
+}
+
 TEST(EthercatClocks, A_slave_without_clock_that_needs_one_is_reported) {
     World w;
     w.add(0x100);

@@ -106,6 +106,86 @@ TEST(EthercatMaster, Reports_a_refused_state_with_its_code_and_tries_again) {
     EXPECT_TRUE(w.operational()) << w.log.text();
 }
 
+TEST(EthercatMaster, Waits_for_no_state_without_a_timeout) {
+    for (const std::uint16_t state : {2, 4, 8}) {
+        World w;
+        Firmware& f = w.add(0x100);
+        f.ignore = state;
+        auto setup = drives(1);
+        setup.slaves[0].timeouts.to_preop = 300, setup.slaves[0].timeouts.to_safeop_op = 500;
+        w.begin(setup);
+        ASSERT_TRUE(w.until([&] { return w.log.count(Event::state_timeout) != 0; }, 800)) << state << ": " << w.log.text();
+        EXPECT_EQ(w.log.last(Event::state_timeout)->first, state);
+        w.run(5000);
+        EXPECT_FALSE(w.master->status().operational);
+        EXPECT_GE(w.log.count(Event::state_timeout), 2U) << "it is tried again";
+        f.ignore = 0;
+        EXPECT_TRUE(w.operational(15000)) << state << ": " << w.log.text();
+    }
+}
+
+TEST(EthercatMaster, A_slave_that_fails_leaves_the_working_counter_of_the_others_complete) {
+    World w;
+    w.add(0x100);
+    Firmware& f = w.add(0x101);
+    f.refuse = 4, f.code = 0x1d;
+    w.begin(drives(2));
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::start_up_failed) != 0 && w.master->slave_status(0).operational; }));
+    w.run(5);
+    w.log.all.clear();
+    unsigned incomplete = 0;
+    for (unsigned n = 0; n < 700; ++n) w.cycle(), incomplete += w.master->status().wkc_state != WkcState::complete;
+    EXPECT_EQ(incomplete, 0U);
+    EXPECT_EQ(w.log.count(Event::wkc_incomplete), 0U) << w.log.text();
+}
+
+TEST(EthercatMaster, Slaves_of_the_same_alias_are_both_not_started) {
+    World w;
+    w.add(0x100, 5);
+    w.add(0x100, 5);
+    auto setup = drives(1);
+    setup.slaves[0].identity.alias = 5;
+    w.begin(setup);
+    w.run(2000);
+    ASSERT_EQ(w.log.count(Event::duplicate_alias), 1U) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::duplicate_alias)->second, 1);
+    EXPECT_EQ(w.log.count(Event::unknown_slave), 0U);
+    for (std::size_t n = 0; n < 2; ++n) EXPECT_EQ(w.line.controller(n).al_status() & 0x0f, 1);
+}
+
+TEST(EthercatMaster, A_port_without_link_is_reported_and_no_missing_slaves) {
+    World w;
+    w.add(0x100);
+    w.primary.up = false;
+    w.begin(drives(1));
+    w.run(500);
+    EXPECT_EQ(w.log.count(Event::link_lost), 1U);
+    EXPECT_EQ(w.log.count(Event::no_slaves), 0U);
+    EXPECT_FALSE(w.master->status().link);
+    w.primary.up = true;
+    EXPECT_TRUE(w.operational()) << w.log.text();
+    EXPECT_EQ(w.log.count(Event::link_restored), 1U);
+}
+
+TEST(EthercatMaster, Two_masters_that_begin_together_notice_each_other) {
+    World w;
+    w.add(0x100);
+    EndPort second(w.line, esc::End::primary);
+    second.mine[5] = 2;
+    w.primary.other_master = &second, second.other_master = &w.primary;
+    Log log;
+    hal::ethercat::master::Master other(drives(1), second.mine, log, w.objects);
+    w.begin(drives(1));
+    other.attach(second);
+    for (unsigned n = 0; n < 2500; ++n) {
+        w.cycle();
+        other.receive(w.now_ns), other.transmit(w.now_ns);
+    }
+    EXPECT_EQ(w.log.count(Event::other_master), 1U) << w.log.text();
+    EXPECT_EQ(log.count(Event::other_master), 1U) << log.text();
+    EXPECT_EQ(w.log.count(Event::no_slaves), 0U) << "the other master's frames are not answers";
+}
+
 TEST(EthercatMaster, Writes_only_mappings_that_differ_and_reads_them_back) {
     for (const bool assignment_first : {true, false}) {
         World w;

@@ -20,6 +20,7 @@ using namespace hal::ethercat::master;
 /// Follows every request; in SAFE-OP and OP it returns its outputs, plus one, as inputs.
 struct Firmware : esc::Application {
     std::uint16_t refuse = 0, code = 0;  ///< state that is rejected
+    std::uint16_t ignore = 0;            ///< state whose request is never answered
     bool echo = true;
     std::uint16_t device_id = 0;
     std::array<std::uint8_t, 64> bytes{};
@@ -30,6 +31,8 @@ struct Firmware : esc::Application {
             const auto state = static_cast<std::uint16_t>(*control & 0x0f);
             if ((*control & al_identify) != 0)
                 pdi.set_al_status(static_cast<std::uint16_t>(state | al_identify), device_id);
+            else if (state == ignore)
+                return;
             else if (state == refuse)
                 pdi.set_al_status(static_cast<std::uint16_t>((pdi.al_status() & 0x0f) | 0x10), code);
             else
@@ -80,7 +83,9 @@ inline Slave drive(std::uint16_t position, std::uint16_t bytes = 2) {
 struct EndPort final : hal::ethernet::Port {
     esc::Line& line;
     esc::End end;
-    EndPort* other = nullptr;
+    EndPort* other = nullptr;         ///< at the other end of a ring
+    EndPort* other_master = nullptr;  ///< on the same cable
+    bool up = true;
     std::deque<std::vector<std::uint8_t>> arrived;
     std::vector<std::uint8_t> current;
     hal::ethernet::Address mine{2, 0, 0, 0, 0, 1};
@@ -90,12 +95,14 @@ struct EndPort final : hal::ethernet::Port {
     const hal::ethernet::Address& address() const noexcept override { return mine; }
     hal::ethernet::Sent send(std::span<const std::uint8_t> frame, const hal::ethernet::Launch&, std::int64_t now_ns) noexcept override {
         ++sent;
+        if (!up) return hal::ethernet::Sent::down;
         std::vector<std::uint8_t> copy(frame.begin(), frame.end());
         const auto passage = line.process(copy, end, now_ns);
         if (passage.lost || (lose_every != 0 && sent % lose_every == 0)) return hal::ethernet::Sent::queued;
         EndPort* to = passage.end == end ? this : other;
         if (to == nullptr) return hal::ethernet::Sent::queued;
         to->arrived.push_back(copy);
+        if (other_master != nullptr) other_master->arrived.push_back(copy);
         if (double_every != 0 && sent % double_every == 0) to->arrived.push_back(copy);
         return hal::ethernet::Sent::queued;
     }
@@ -106,7 +113,11 @@ struct EndPort final : hal::ethernet::Port {
         return hal::ethernet::Arrival{current, now_ns};
     }
     bool wait(std::int64_t) noexcept override { return false; }
-    hal::ethernet::Statistics statistics() const noexcept override { return {}; }
+    hal::ethernet::Statistics statistics() const noexcept override {
+        hal::ethernet::Statistics s;
+        s.up = up;
+        return s;
+    }
     const hal::ethernet::Description& description() const noexcept override { return about; }
 };
 
