@@ -5,7 +5,7 @@ import subprocess
 import sys
 import unittest
 
-from harness import Case, HAL, wait_until
+from harness import Case, HAL
 from own_network import own_network
 
 CONFIG = """[bus]
@@ -48,13 +48,13 @@ class EthercatLink(Case):
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def lines_until(self, machine, last):
-        """The messages of the master up to one that contains a word; the machine is stopped then."""
+        """The messages of the master up to one that contains some words; the machine is stopped then."""
         lines = []
         for line in machine.stdout:
-            if line.startswith("machine:"):
+            if line.startswith("machine:"):  # others are of the faults
                 lines.append(line)
-            if last in line:
-                break
+                if last in line:
+                    break
         machine.terminate()
         machine.communicate(timeout=60)
         return lines
@@ -89,7 +89,7 @@ class EthercatLink(Case):
         (self.folder / "two.hal").write_text(NETLIST.replace("names=machine config=machine.ethercat", "names=machine,other config=machine.ethercat,other.ethercat")
                                              .replace("start", "addf other.receive bus\naddf other.transmit bus\nstart"))
         (self.folder / "other.ethercat").write_text(CONFIG.replace("wire0", "wire1"))
-        lines = self.lines_until(self.run_machine(netlist="two.hal"), "machine: another EtherCAT master")
+        lines = self.lines_until(self.run_machine(netlist="two.hal"), "another EtherCAT master")
         self.assertRegex(lines[-1], r"^machine: another EtherCAT master sends on eth:wire0 \(\d+ of its frames in a second\): stop it, or give each "
                                     r"master its own link$")
 
