@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Reads a `.ethercat` file: its sections, and which of them make up a slave.
+#include <algorithm>
+#include <cstdio>
 #include <set>
 
 #include "ethercat/config/config_text.hpp"
@@ -133,6 +135,8 @@ private:
             return report_.error(Topic::line, where.at, "invalid slave section: expected a position of 0..65535 and a name",
                 "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
         const auto value = static_cast<std::uint16_t>(*number);
+        if (by == "alias" && value == 0)
+            return report_.error(Topic::line, where.at, "alias 0 means that a slave has none", "write its position, as in [slave 0 NAME]");
         if (by == "alias") slave.identity.alias = value;
         else if (by == "id") slave.identity.device_id = value;
         else slave.position = value;
@@ -211,8 +215,35 @@ const esi::File* Descriptions::get(const Word& file, Report& report) {
     return at->second ? &*at->second : nullptr;
 }
 
+namespace {
+
+/// The outputs of a slave must arrive before its watchdog ends: 100 ms, unless it is set.
+void check_watchdog(const Bus& bus, std::size_t n, Report& report) {
+    const master::Slave& s = bus.setup.slaves[n];
+    constexpr std::int64_t unit_ns = 40;  // of the divider, which counts from 2
+    constexpr std::uint16_t usual_divider = 2498, usual_intervals = 1000;
+    const std::int64_t watchdog_ns = unit_ns * (s.watchdog.divider.value_or(usual_divider) + 2) * s.watchdog.intervals.value_or(usual_intervals);
+    const bool watched = std::any_of(s.sync_managers.begin(), s.sync_managers.end(), [](const master::SyncManager& sm) {
+        return sm.output && sm.watchdog && (sm.control == 0 || (sm.control & 0x40) != 0) && !sm.pdos.empty();
+    });
+    if (!watched || watchdog_ns == 0 || s.target != State::op || s.domain >= bus.setup.domains.size()) return;
+    const std::int64_t every_ns = bus.setup.cycle_ns * bus.setup.domains[s.domain].every;
+    if (every_ns < watchdog_ns) return;
+    const auto milliseconds = [](std::int64_t ns) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.6gms", static_cast<double>(ns) * 1e-6);
+        return std::string(text);
+    };
+    report.error(Topic::slave, bus.slaves[n].at,
+                 "the outputs of '" + s.name + "' are sent every " + milliseconds(every_ns) + ", but its watchdog ends after " + milliseconds(watchdog_ns),
+                 "write watchdog = " + milliseconds(std::min<std::int64_t>(5 * every_ns, 6553'000'000)) + " in its section, watchdog = none, or a shorter cycle");
+}
+
+}  // namespace
+
 void check_bus(const Bus& bus, Report& report) {
     const auto& slaves = bus.setup.slaves;
+    for (std::size_t i = 0; i < slaves.size(); ++i) check_watchdog(bus, i, report);
     for (std::size_t i = 0; i < slaves.size(); ++i)
         for (std::size_t j = 0; j < i; ++j) {
             const std::string first = "first in line " + std::to_string(bus.slaves[j].at.line);

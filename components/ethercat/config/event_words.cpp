@@ -91,7 +91,7 @@ std::string rejected_mapping_words(std::int64_t first, std::int64_t code) {
     std::string text = "rejects " + mapped_words(value, object) + " at " + object_words(object) + ": " + abort_words(code);
     if (code == 0) return text + "; power-cycle it";
     const bool assignment = index >= 0x1c00, input = index >= 0x1a00;
-    text += std::string("; correct `") + (assignment ? "outputs` or `inputs" : input ? "inputs" : "outputs") + "` in its section";
+    text += std::string("; correct `") + (assignment ? "outputs` or `inputs` or their `sync-manager" : input ? "inputs" : "outputs") + "` in its section";
     const auto number = static_cast<std::uint32_t>(code);
     // Slaves report a full PDO in several ways; few entries fit into any.
     const bool full = number == coe::abort::pdo_too_long || (entry == 0 && (number == coe::abort::range || number == coe::abort::too_high)) ||
@@ -140,7 +140,8 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
     case Event::too_few_fmmus:
         return "has " + std::to_string(first) + " FMMUs, its process data needs " + std::to_string(second) + "; use fewer sync managers";
     case Event::too_few_sync_managers:
-        return "has " + std::to_string(first) + " sync managers, the configuration needs " + std::to_string(second) + "; correct its PDOs";
+        return "has " + std::to_string(first) + " sync managers, the configuration needs " + std::to_string(second) +
+               "; correct `outputs.sync-manager` or `inputs.sync-manager` in its section";
     case Event::state_refused: return "rejects " + state_words(first) + " with " + al_words(second) + configured_words(second, slave);
     case Event::state_timeout:
         return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) + ": raise its time-out, or power-cycle it";

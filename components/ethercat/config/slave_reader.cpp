@@ -234,6 +234,8 @@ private:
         if (words.size() > 1) {
             const auto shift = signed_duration(words[1].text);
             if (!shift || words.size() > 2) return keys_.reject(*line, "a mode and a shift, as in sync0 250us");
+            const std::int64_t cycle = in_.bus.setup.cycle_ns;
+            if (*shift >= cycle || *shift <= -cycle) return keys_.reject(*line, "a shift that is shorter than the cycle");
             dc.sync0_shift_ns = *shift;
         }
         std::uint64_t activate = 0;

@@ -175,7 +175,9 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_sync0_cycle), 8);
     if (a.wkc != 1) co_return false;
     // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but for their shift.
-    const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(sync_start_ns)) / cycle * cycle + cycle + static_cast<std::uint64_t>(dc.sync0_shift_ns);
+    const auto grid = static_cast<std::int64_t>(cycle);
+    const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);  // of any length: it begins soon
+    const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(sync_start_ns)) / cycle * cycle + cycle + shift;
     d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
     a = co_await write(c, d.slave, registers::dc_start_time, start);
     if (a.wkc != 1) co_return false;

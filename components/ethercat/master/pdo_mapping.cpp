@@ -167,6 +167,10 @@ Task<bool> map_process_data(Channel& c, Bus& bus, Device& d) noexcept {
         bool any = sm.write_assignment;
         for (const Pdo& pdo : sm.pdos) any |= pdo.write_mapping;
         if (!any) continue;
+        if (sm.number >= d.slave.sync_managers) {
+            bus.report(Event::too_few_sync_managers, d, d.slave.sync_managers, sm.number + 1);
+            co_return false;
+        }
         if (!d.slave.mailbox.usable() || (d.slave.protocols & coe_supported) == 0) {
             if (!has_fixed_size(bus, d, sm)) co_return false;
             continue;

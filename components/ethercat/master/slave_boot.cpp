@@ -57,7 +57,7 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     ok = co_await startup_writes(c, bus, d, State::op);
     if (!ok) co_return false;
     for (unsigned cycles = 0; cycles < 3 || !bus.outputs_valid; ++cycles) co_await c.sleep(0);  // valid outputs reach it before OP
-    if (d.sync_begins_ns > c.now_ns()) co_await c.sleep_until(d.sync_begins_ns);
+    if (d.sync_begins_ns > c.now_ns()) co_await c.sleep_until(d.sync_begins_ns + bus.setup.cycle_ns);  // after the first one
     ok = co_await synchronise(c, bus, d);  // a clock may have jumped while the slave waited for its SYNC signals
     if (!ok) co_return false;
     ok = co_await request_state(c, bus, d, State::op, t.to_safeop_op);

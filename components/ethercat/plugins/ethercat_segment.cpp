@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <memory>
@@ -21,8 +22,8 @@ struct SlavePins {
     SlavePins(hal::Component& c, const hal::Function& f, const std::string& name)
         : power(c, f, (name + ".power").c_str(), "FALSE: the slave has no power; its settings and volatile objects are lost", {.initial = true}),
           cable(c, f, (name + ".cable").c_str(), "FALSE: the cable to the slave before it is broken", {.initial = true}),
-          drift(c, f, (name + ".drift").c_str(), "error of its oscillator", {.unit = "ppm"}),
-          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP") {}
+          drift(c, f, (name + ".drift").c_str(), "error of its oscillator, at most 100000", {.unit = "ppm"}),
+          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 no power") {}
 
     hal::In<bool>           power, cable;
     hal::In<double>         drift;
@@ -76,6 +77,7 @@ public:
         hal::ethernet::Options options;
         options.promiscuous = true;
         options.send_capacity = options.receive_capacity = 256;
+        if (link_.get() == backup_.get()) throw std::runtime_error("backup=" + backup_.get() + " is the link itself; choose another name");
         primary_ = open(link_.get(), options);
         if (!backup_.get().empty()) secondary_ = open(backup_.get(), options);
         line_.emplace();
@@ -107,9 +109,9 @@ public:
             SlavePins& pins = slaves_[n];
             if (pins.power != pins.was_power && line_->post({.kind = Kind::power, .slave = n, .on = pins.power})) pins.was_power = pins.power;
             if (pins.cable != pins.was_cable && line_->post({.kind = Kind::cable, .slave = n, .port = 0, .on = pins.cable})) pins.was_cable = pins.cable;
-            const double drift = std::isfinite(pins.drift.get()) ? pins.drift.get() : 0.0;
+            const double drift = std::isfinite(pins.drift.get()) ? std::clamp(pins.drift.get(), -most_drift, most_drift) : 0.0;
             if (drift != pins.was_drift && line_->post({.kind = Kind::drift, .slave = n, .value = drift})) pins.was_drift = drift;
-            pins.state = static_cast<std::uint32_t>(line_devices_[n].firmware->state());
+            pins.state = pins.power ? static_cast<std::uint32_t>(line_devices_[n].firmware->state()) : 0U;
         }
         for (AxisPins& pins : axes_) {
             pins.position = pins.axis.position(), pins.velocity = pins.axis.velocity(), pins.statusword = pins.axis.statusword();
@@ -125,6 +127,7 @@ public:
 
 private:
     static constexpr unsigned silent_cycles = 10;
+    static constexpr double   most_drift = 100'000;  ///< ppm
 
     static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
         if (!hal::ethernet::describe(address).in_memory)

@@ -128,6 +128,14 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:6:6: error: 'DIO-8' has no distributed clocks; delete the line\n"
               "m.ethercat:7:1: error: duplicate slave name 'a'; first in line 2\n"
               "m.ethercat:7:1: error: duplicate position 0; first in line 2");
+    EXPECT_EQ(errors(a + "dc = sync0 2ms\n"), "m.ethercat:5:6: error: invalid dc 'sync0 2ms'; write a shift that is shorter than the cycle");
+    EXPECT_EQ(errors("[bus]\ncycle = 1ms\nsync-window = 1ns\n[slave alias=0 a]\ndevice = cia402\n"),
+              "m.ethercat:3:15: error: invalid sync-window '1ns'; write a time of 10ns..1s, as in 1ms or 250us\n"
+              "m.ethercat:4:8: error: alias 0 means that a slave has none; write its position, as in [slave 0 NAME]");
+    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\n"),
+              "m.ethercat:4:1: error: the outputs of 'a' are sent every 100ms, but its watchdog ends after 100ms; write watchdog = 500ms in its section, "
+              "watchdog = none, or a shorter cycle");
+    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\nwatchdog = 500ms\n"), "");
     EXPECT_EQ(errors("[bus]\n[slave 0]\ndevice = x\n[slave z]\n[slave 1]\ntype = q\n"),
               "m.ethercat:3:10: error: unknown device 'x'; write device = cia402, or esi = FILE for a device with a description\n"
               "m.ethercat:4:8: error: invalid slave section: expected a position of 0..65535 and a name; write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]\n"

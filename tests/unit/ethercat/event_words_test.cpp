@@ -44,7 +44,8 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
     EXPECT_EQ(words(Event::mapping_failed, 1, 0x60400010LL << 24 | 0x160001, 0),
               "slave 4 (x-axis) rejects object 0x6040:0 with 16 bits at 0x1600:1: no answer from its mailbox; power-cycle it");
     EXPECT_EQ(words(Event::mapping_failed, 1, 0x1600LL << 24 | 0x1c1201, 0x06090030),
-              "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 (value out of range); correct `outputs` or `inputs` in its section");
+              "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 (value out of range); correct `outputs` or `inputs` or "
+              "their `sync-manager` in its section");
     EXPECT_EQ(words(Event::mapping_failed, 1, 12LL << 24 | 0x1a0000, 0x06040042),
               "slave 4 (x-axis) rejects 12 entries at 0x1A00:0: SDO abort 0x06040042 (mapped objects exceed the PDO length); correct `inputs` in its section, or, if the "
               "PDO is full, write `entries-per-pdo = 11`");
