@@ -10,7 +10,7 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start_ns = 100 * millisecond;
+constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start_ns = 100 * millisecond, sync_start_cycles = 10;
 constexpr std::uint32_t tolerable_deviation_ns = 10'000;
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
@@ -177,7 +177,9 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but for their shift.
     const auto grid = static_cast<std::int64_t>(cycle);
     const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);  // of any length: it begins soon
-    const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(sync_start_ns)) / cycle * cycle + cycle + shift;
+    // Each write takes a cycle, and some are repeated: the start must still be in the future when the unit is activated.
+    const std::int64_t ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
+    const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / cycle * cycle + cycle + shift;
     d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
     a = co_await write(c, d.slave, registers::dc_start_time, start);
     if (a.wkc != 1) co_return false;

@@ -82,6 +82,20 @@ TEST(EthercatClocks, A_clock_that_cannot_be_set_is_reported_as_that_and_set_late
     EXPECT_TRUE(w.operational(20000)) << w.log.text();
 }
 
+TEST(EthercatClocks, Sync_signals_begin_in_the_future_at_any_cycle) {
+    for (const std::int64_t cycle_ns : {100'000LL, 50'000'000LL, 1'000'000'000LL}) {
+        World w;
+        w.cycle_ns = cycle_ns;
+        for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+        auto setup = with_clocks(2);
+        setup.cycle_ns = cycle_ns;
+        w.begin(setup);
+        ASSERT_TRUE(w.operational(8000)) << cycle_ns << ": " << w.log.text();
+        w.run(20);
+        for (std::size_t n = 0; n < 2; ++n) EXPECT_GT(w.line.controller(n).sync().pulses, 5U) << cycle_ns << " " << n;
+    }
+}
+
 TEST(EthercatClocks, A_slave_without_clock_that_needs_one_is_reported) {
     World w;
     w.add(0x100);

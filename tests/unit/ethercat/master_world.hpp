@@ -174,7 +174,7 @@ struct World {
     Objects objects;
     Log log;
     std::unique_ptr<hal::ethercat::master::Master> master;
-    std::int64_t now_ns = 0;
+    std::int64_t now_ns = 0, cycle_ns = 1'000'000;
     std::uint64_t cycles = 0;
 
     Firmware& add(std::uint32_t product, std::uint16_t alias = 0, bool mailbox = false, esc::Settings settings = {}) {
@@ -189,7 +189,7 @@ struct World {
         master->attach(primary, ring ? &backup : nullptr);
     }
     void cycle() {
-        now_ns += 1'000'000;
+        now_ns += cycle_ns;
         line.advance(now_ns);
         master->receive(now_ns);
         master->transmit(now_ns);
