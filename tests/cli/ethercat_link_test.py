@@ -84,6 +84,17 @@ class EthercatLink(Case):
         text, _ = self.run_machine().communicate(timeout=60)
         self.assertRegex(text, r"'machine' \(ethercat\) cannot start: eth:wire7: no interface 'wire7'; interfaces are .*wire0")
 
+    def test_functions_in_different_threads_send_nothing(self):
+        (self.folder / "machine.ethercat").write_text(CONFIG.replace("eth:wire0", "sim:line"))
+        (self.folder / "apart.hal").write_text(NETLIST.replace("period1=1000000", "period1=1000000 name2=other period2=1000000")
+                                               .replace("machine.transmit bus", "machine.transmit other"))
+        machine = self.run_machine(netlist="apart.hal")
+        fault = next((line for line in machine.stdout if line.startswith("fault:")), "")
+        machine.terminate()
+        machine.communicate(timeout=60)
+        self.assertRegex(fault, r"^fault: machine: 'machine.receive' and 'machine.transmit' are in different threads at cycle [\d ]+; nothing is sent; "
+                                    r"type: delf machine.transmit THREAD, and add it to the thread of the other; see: show pin machine")
+
     def test_two_masters_on_one_interface_name_each_other(self):
         ip("link", "set", "wire1", "up")
         (self.folder / "two.hal").write_text(NETLIST.replace("names=machine config=machine.ethercat", "names=machine,other config=machine.ethercat,other.ethercat")

@@ -166,6 +166,9 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
     case Event::dc_timeout:
         return "deviates by " + microseconds(first) + " from the reference clock, more than the window of " + microseconds(second) +
                "; it is not started: check the cycle of the thread, or raise `sync-window`";
+    case Event::dc_lost:
+        return "is operational, but its clock deviates by " + microseconds(first) + " from the reference clock, more than " + microseconds(second) +
+               "; check that the thread misses no cycles, and its manual for what it does without synchronisation";
     case Event::ring_broken:
         return "is the last that the primary port reaches: the ring is broken behind it; all slaves still exchange data, repair the cable";
     case Event::start_up_failed:

@@ -21,7 +21,7 @@
 namespace hal::ethercat::master {
 
 inline constexpr std::uint16_t first_station = 0x1001;
-inline constexpr std::int64_t millisecond = 1'000'000;
+inline constexpr std::int64_t millisecond = 1'000'000, tolerable_deviation_ns = 10'000;
 
 /// A place for a slave on the bus.
 struct Device {
@@ -33,6 +33,7 @@ struct Device {
     bool times_read = false;   ///< its receive times are those of the newest latch
     bool clock_set = false;    ///< offset and delay are written
     bool synchronised = false; ///< its clock was within the window
+    bool drifted = false;      ///< its clock is far beyond the window, while it is operational
     bool helping = false;      ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0; ///< of the newest start-up
     std::int64_t sync_begins_ns = 0;  ///< when its SYNC signals begin, on the clock of the cycle; 0: it has none
@@ -68,6 +69,7 @@ struct Bus {
     std::uint32_t unknown_product = 0;             ///< of the slave last reported as unknown, so that it is reported once
     std::bitset<1024> unreadable;                  ///< positions of slaves whose EEPROM was reported as unreadable, so that it is reported once
     bool reported_empty = false;
+    unsigned reported_many = 0;                    ///< slaves that were reported as too many
     bool ring_changed = false;                     ///< the newest broadcast found the ring in another state
 
     const Slave* config(const Device& d) const noexcept {

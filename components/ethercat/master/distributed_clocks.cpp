@@ -11,7 +11,6 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start_ns = 100 * millisecond, sync_start_cycles = 10;
-constexpr std::uint32_t tolerable_deviation_ns = 10'000;
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
 Task<void> read_times(Channel& c, Device& d) noexcept {

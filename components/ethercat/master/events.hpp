@@ -35,6 +35,7 @@ enum class Event : std::uint8_t {
     dc_unsupported,                ///< configured, but the slave has no clock
     dc_timeout,                    ///< clock not within the window in time [deviation ns, window ns]
     dc_not_set,                    ///< the time of its clock could not be set [ms waited, -]
+    dc_lost,                       ///< clock far beyond the window while operational [deviation ns, window ns]
     dc_synchronised,               ///< all slaves [largest deviation ns, -]
     ring_broken, ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]
     topology_changed,              ///< [slaves before, slaves now]

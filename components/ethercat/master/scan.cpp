@@ -135,9 +135,11 @@ Task<bool> scan(Channel& c, Bus& bus) noexcept {
     bus.reported_empty = false;
     bus.known = a.wkc;
     if (bus.known > bus.devices.size()) {
-        bus.report(Event::too_many_slaves, bus.known, static_cast<std::int64_t>(bus.devices.size()));
+        if (std::exchange(bus.reported_many, bus.known) != bus.known)
+            bus.report(Event::too_many_slaves, bus.known, static_cast<std::int64_t>(bus.devices.size()));
         co_return false;
     }
+    bus.reported_many = 0;
     co_await write_all<std::uint8_t>(c, registers::loop_control, 0);
     co_await write_all<std::uint8_t>(c, registers::dl_alias_enable, 0);
     co_await clear_all(c, registers::rx_errors, 20);

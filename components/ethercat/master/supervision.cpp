@@ -221,6 +221,19 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
     }
 }
 
+/// Reports a slave that is not in step any more although it is in OP.
+static void judge_clock(Bus& bus, Device& d) noexcept {
+    const Slave* config = bus.config(d);
+    const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns), deviation = d.status.dc_deviation_ns;
+    if (config == nullptr || !config->dc || d.slave.number == bus.reference) return;
+    if (d.status.operational && !d.drifted && deviation > window) {
+        d.drifted = true;
+        bus.report(Event::dc_lost, d, deviation, window);
+    } else if (deviation <= bus.setup.sync_window_ns || !d.status.operational) {
+        d.drifted = false;
+    }
+}
+
 Task<void> watch(Channel& c, Bus& bus) noexcept {
     std::uint64_t foreign = bus.status.foreign;
     bool other = false;
@@ -262,6 +275,7 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
                 a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
                 if (a.wkc == 1) {
                     d.status.dc_deviation_ns = get<std::uint32_t>(c.data()) & 0x7fff'ffff;
+                    judge_clock(bus, d);
                     if (d.slave.number != bus.reference) largest = std::max(largest, d.status.dc_deviation_ns);
                     any = true;
                 }

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include <pthread.h>
+
 #include <array>
+#include <atomic>
 #include <ctime>
 #include <deque>
 #include <limits>
@@ -49,6 +52,7 @@ public:
             }
             const std::string who = config::slave_words(static_cast<std::uint32_t>(s), bus_.setup);
             lost_words_.push_back(who + " does not answer; its inputs keep their last values");
+            clock_words_.push_back(who + " is out of step, its clock deviates by {} us");
             left_words_.push_back(who + " left its state with AL status code {x}; its outputs are off");
         }
         areas_.resize(places_.size());
@@ -60,6 +64,8 @@ public:
                              ".transmit THREAD";
         no_receive_words_ = "'" + name_ + ".transmit' runs, but '" + name_ + ".receive' does not; nothing is sent; type: addf " + name_ +
                             ".receive THREAD";
+        apart_words_ = "'" + name_ + ".receive' and '" + name_ + ".transmit' are in different threads; nothing is sent; type: delf " + name_ +
+                       ".transmit THREAD, and add it to the thread of the other";
     }
 
     void start() {
@@ -79,7 +85,7 @@ public:
         for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
         if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
         period_reported_ = was_fresh_ = false;
-        unsent_ = unreceived_ = 0;
+        unsent_ = unreceived_ = apart_ = 0;
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
         reporter_.start();
@@ -99,6 +105,7 @@ public:
     void receive(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
         unreceived_ = 0;
+        receiver_.store(pthread_self(), std::memory_order_relaxed);
         if (++unsent_ == tolerated_cycles) raise(no_transmit_words_);
         master_->receive(cycle.start_ns());
         follow(cycle);
@@ -111,7 +118,9 @@ public:
         if (!master_ || !fits(cycle)) return;
         unsent_ = 0;
         if (++unreceived_ == tolerated_cycles) raise(no_receive_words_);
-        if (unreceived_ > 2) return;  // outputs must not move without their inputs
+        apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
+        if (apart_ == tolerated_cycles) raise(apart_words_);
+        if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
         entries_.take(areas_);
         master_->transmit(cycle.start_ns());
     }
@@ -179,6 +188,7 @@ private:
         const bool named = slave < slaves_.size();
         if (event == Event::slave_lost && named) raise(lost_words_[slave]);
         if (event == Event::fell_back && named) raise(left_words_[slave], static_cast<double>(second));
+        if (event == Event::dc_lost && named) raise(clock_words_[slave], static_cast<double>(first) * 1e-3);
         if (event == Event::link_lost && first == 0) raise(link_words_);
         if (event == Event::other_master) raise(other_words_);
     }
@@ -194,10 +204,11 @@ private:
     EntryPins             entries_{*this, receive_, transmit_};
     std::vector<Place>    places_;  // of the process data, in the order of areas_
     std::vector<std::span<std::uint8_t>> areas_;
-    std::vector<std::string> lost_words_, left_words_;
-    std::string              link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_;
+    std::vector<std::string> lost_words_, left_words_, clock_words_;
+    std::string              link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_, apart_words_;
     config::EventFilter      filter_{0};
-    unsigned                 unsent_ = 0, unreceived_ = 0;
+    unsigned                 unsent_ = 0, unreceived_ = 0, apart_ = 0;
+    std::atomic<pthread_t>   receiver_{};
 
     std::unique_ptr<hal::ethernet::Port> primary_, backup_;
     std::unique_ptr<master::Mailboxes>   mailboxes_;

@@ -51,6 +51,8 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
               "PDO is full, write `entries-per-pdo = 11`");
     EXPECT_EQ(words(Event::mapping_differs, 1, 0x60640020LL << 24 | 0x1a0002, 0x60410010),
               "slave 4 (x-axis) did not keep the PDO mapping: 0x1A00:2 is 0x60410010 instead of 0x60640020; this PDO is fixed: list its own entries");
+    EXPECT_EQ(words(Event::dc_lost, 1, 123'000, 10'000), "slave 4 (x-axis) is operational, but its clock deviates by 123 us from the reference clock, "
+              "more than 10 us; check that the thread misses no cycles, and its manual for what it does without synchronisation");
     EXPECT_EQ(words(Event::dc_not_set, 1, 5000), "slave 4 (x-axis) has a clock that could not be set within 5000 ms: its receive times were not "
               "readable, or the ring is broken; it is not started: check its cables, or remove `dc`");
 }

@@ -96,6 +96,31 @@ TEST(EthercatClocks, Sync_signals_begin_in_the_future_at_any_cycle) {
     }
 }
 
+TEST(EthercatClocks, A_clock_that_leaves_the_window_in_OP_is_reported_once) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    w.begin(with_clocks(2));
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    w.run(3000);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 0U) << w.log.text();
+    w.line.controller(1).set_drift(50'000, w.now_ns);
+    w.run(5000);
+    ASSERT_EQ(w.log.count(Event::dc_lost), 1U) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::dc_lost)->slave, 1U);
+    EXPECT_GT(w.log.last(Event::dc_lost)->first, 10'000);
+    EXPECT_FALSE(w.master->status().dc_synchronised);
+    w.line.set_power(1, false, w.now_ns);
+    w.run(200);
+    w.line.controller(1).set_drift(0, w.now_ns);
+    w.line.set_power(1, true, w.now_ns);
+    ASSERT_TRUE(w.operational(20000)) << w.log.text();
+    w.run(2000);
+    EXPECT_TRUE(w.master->status().dc_synchronised);
+    w.line.controller(1).set_drift(50'000, w.now_ns);
+    w.run(5000);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 2U) << "again";
+}
+
 TEST(EthercatClocks, A_slave_without_clock_that_needs_one_is_reported) {
     World w;
     w.add(0x100);

@@ -153,6 +153,23 @@ TEST(EthercatMaster, Slaves_of_the_same_alias_are_both_not_started) {
     for (std::size_t n = 0; n < 2; ++n) EXPECT_EQ(w.line.controller(n).al_status() & 0x0f, 1);
 }
 
+TEST(EthercatMaster, Too_many_slaves_are_reported_once_and_again_when_they_are_others) {
+    World w;
+    for (unsigned n = 0; n < 5; ++n) w.add(0x100 + n);
+    auto setup = drives(1);
+    setup.most_slaves = 3;
+    w.begin(setup);
+    w.run(2000);
+    ASSERT_EQ(w.log.count(Event::too_many_slaves), 1U);
+    EXPECT_EQ(w.log.last(Event::too_many_slaves)->first, 5);
+    EXPECT_EQ(w.log.last(Event::too_many_slaves)->second, 3);
+    w.line.set_cable(4, 0, false);
+    w.run(1000);
+    EXPECT_EQ(w.log.count(Event::too_many_slaves), 2U);
+    w.line.set_cable(3, 0, false);
+    EXPECT_TRUE(w.operational()) << w.log.text();
+}
+
 TEST(EthercatMaster, A_port_without_link_is_reported_and_no_missing_slaves) {
     World w;
     w.add(0x100);
