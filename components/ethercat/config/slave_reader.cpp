@@ -70,6 +70,9 @@ private:
             if (name != nullptr)
                 report_.error(Topic::slave, name->value.at, "'" + esi->value.text + "' does not describe a device '" + name->value.text +
                     "'", suggestion(name->value.text, names, "the devices are"));
+            else if (const Line* product = keys_.find("product"))
+                report_.error(Topic::slave, product->value.at, "'" + esi->value.text + "' does not describe a product " + product->value.text,
+                    "the devices are: " + listed(names));
             else
                 report_.error(Topic::slave, esi->value.at, "'" + esi->value.text + "' describes several devices",
                     "write device = NAME; the devices are: " + listed(names));

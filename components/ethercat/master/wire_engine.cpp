@@ -2,6 +2,7 @@
 #include "ethercat/master/wire_engine.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "ethercat/wire/registers.hpp"
 
@@ -10,6 +11,7 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::size_t  first_datagram = ethernet_header_bytes + ecat_header_bytes;
+constexpr std::size_t  frame_overhead = 24, datagram_overhead = datagram_header_bytes + 2;  ///< preamble, check sequence, gap; header and counter
 constexpr std::int64_t acyclic_timeout_ns = 2'000'000;
 
 constexpr bool counts_positions(Command c) noexcept {
@@ -24,6 +26,9 @@ constexpr bool only_reads(Command c) noexcept {
 
 void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
     primary_ = &primary, backup_ = backup;
+    // Slaves work at 100 Mbit/s; only an emulated line is faster. What does not fit into a cycle would delay the process data of the next.
+    const std::int64_t speed = primary.statistics().speed != 0 ? primary.statistics().speed : 100;
+    wire_bytes_ = static_cast<std::size_t>(setup_.cycle_ns * speed / 8000 * 4 / 5);
     // Masters that begin at the same time must not take each other's frames for their own.
     for (const std::uint8_t byte : primary.address()) next_index_ = static_cast<std::uint8_t>(next_index_ * 31 + byte);
     if (backup != nullptr) halves_.resize(image_.datagrams().size() + 1 + setup_.slaves.size());
@@ -69,6 +74,7 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
     std::uint64_t dc_time_ns) noexcept {
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
+    std::size_t cyclic_bytes = 0;
     if (process_data) {
         const auto frames = image_.frames();
         for (std::size_t n = 0; n < frames.size(); ++n) {
@@ -79,22 +85,25 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
             image_.fill(frame, static_cast<std::uint8_t>(index), dc_time_ns);
             Flight& f = flights_[static_cast<std::size_t>(index)];
             f.copies = send({frame.bytes.data(), frame.size}, true);
+            cyclic_bytes += frame.size + frame_overhead;
             f.place = static_cast<std::uint16_t>(n), f.sent_ns = now_ns;
             if (f.copies != 0) f.kind = Flight::Kind::cyclic, ++in_flight_;
         }
         ++cycle_;
     }
-    send_acyclic(acyclic_frames);
+    send_acyclic(acyclic_frames, wire_bytes_ - std::min(wire_bytes_, cyclic_bytes));
 }
 
-void WireEngine::send_acyclic(unsigned frames) noexcept {
+void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
+    bool first = true;
     for (std::size_t place = 0; place < acyclic_.size() && frames > 0; ++place) {
         AcyclicFrame& frame = acyclic_[place];
         if (!frame.free) continue;
         const int index = take_index();
         if (index < 0) return;
         bool backup = false;
-        if (!pack(frame, static_cast<std::uint8_t>(index), backup)) return;
+        if (!pack(frame, static_cast<std::uint8_t>(index), backup, bytes, std::exchange(first, false))) return;
+        bytes -= std::min<std::size_t>(bytes, frame.size + frame_overhead);
         Flight& f = flights_[static_cast<std::size_t>(index)];
         f.copies = send({frame.bytes.data(), frame.size}, backup);
         f.place = static_cast<std::uint16_t>(place), f.sent_ns = now_ns_;
@@ -104,10 +113,11 @@ void WireEngine::send_acyclic(unsigned frames) noexcept {
     }
 }
 
-/// Fills a frame with waiting datagrams, in turn. Those that count positions do not share a frame with others, as they leave on one port.
-bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup) noexcept {
+/// Fills a frame of at most `most` bytes on the wire with waiting datagrams, in turn; the `first` one of a cycle may be longer. Those that count positions do not share a frame with others, as they leave on one port.
+bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept {
     FrameWriter writer(frame.bytes, primary_->address());
     frame.count = 0;
+    std::size_t bytes = first_datagram + frame_overhead;
     const std::size_t channels = channels_.size();
     std::size_t at = next_channel_ < channels ? next_channel_ : 0, next = at;
     for (std::size_t seen = 0; seen < channels && frame.count < most_items; ++seen, at = at + 1 == channels ? 0 : at + 1) {
@@ -116,11 +126,14 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup) noe
         if (c.stage() != Channel::Stage::waiting) continue;
         const bool both = use_backup_ && backup_ != nullptr && !counts_positions(c.command());
         if (frame.count != 0 && both != backup) continue;
+        const std::size_t needed = c.length() + datagram_overhead;
+        if (bytes + needed > most && !(first && frame.count == 0)) continue;
         if (c.length() > writer.space() || (c.length() == 0 && writer.space() == 0)) continue;
         std::uint8_t* data = writer.add(c.command(), index, c.address(), c.length());
         if (data == nullptr) continue;
         if (!only_reads(c.command())) std::memcpy(data, c.data(), c.length());
         backup = both;
+        bytes += needed;
         if (c.command() == Command::brd && c.address() == at_position(0, registers::al_status)) primary_wkc_ = -1;
         c.set_sent(now_ns_);
         frame.items[frame.count++] = {&c, c.generation(), static_cast<std::uint16_t>(data - frame.bytes.data()), c.length()};

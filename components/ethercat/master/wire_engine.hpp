@@ -85,8 +85,8 @@ private:
     void merge_acyclic(AcyclicFrame&, const std::uint8_t* second) noexcept;
     void expire() noexcept;
     void wake() noexcept;
-    void send_acyclic(unsigned frames) noexcept;
-    bool pack(AcyclicFrame&, std::uint8_t index, bool& backup) noexcept;
+    void send_acyclic(unsigned frames, std::size_t bytes) noexcept;
+    bool pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept;
     std::uint8_t send(std::span<const std::uint8_t> frame, bool backup) noexcept;
     int take_index() noexcept;
 
@@ -106,6 +106,7 @@ private:
     std::size_t next_channel_ = 0;
     unsigned in_flight_ = 0;
     int primary_wkc_ = -1;
+    std::size_t wire_bytes_ = SIZE_MAX;  // that fit a cycle, with a reserve
     std::uint8_t next_index_ = 0;
     bool use_backup_ = false;
 };

@@ -109,6 +109,8 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:4:10: error: 'servo.xml' does not describe a device 'SERVO-2'; did you mean 'SERVO-1'?");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\n"),
         "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
+    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\nproduct = 9\n"),
+        "m.ethercat:4:11: error: 'servo.xml' does not describe a product 9; the devices are: SERVO-1, DIO-8");
     const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
     EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),
               "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; write its type, as in 6072 u16; the types are bit, u8, u16, u32, u64, "
