@@ -31,6 +31,7 @@
 #include "bus/can/send.hpp"
 #include "bus/can/sniff.hpp"
 #include "bus/can/tdma.hpp"
+#include "bus/ethercat/options.hpp"
 #include "bus/node/kinds.hpp"
 #include "cli/capabilities.hpp"
 #include "cli/option_set.hpp"
@@ -126,6 +127,15 @@ constexpr Subcommand table[] = {
     command<EdsCheckOptions, ON_BUS(run_can_eds_check)>("can eds check", "FILE…", "check a device description and summarise it"),
     command<CanopenCheckOptions, ON_BUS(run_canopen_check)>("canopen check", "FILE…", "check a network configuration and list its pins"),
     command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>("canopen plan", "FILE [--cycle TIME] [--json]", "compute worst-case response times of all messages of a bus"),
+#ifdef HALCYON_ETHERCAT
+    command<EthercatOptions, ON_BUS(run_ethercat_scan)>("ethercat scan", "ADDRESS|--emulate LINE [--json]", "show the slaves of an EtherCAT bus as a tree: states, names, ports, delays"),
+    command<EthercatOptions, ON_BUS(run_ethercat_slaves)>("ethercat slaves", "ADDRESS|--emulate LINE [--json]", "list the slaves: position, alias, state, name"),
+    command<EthercatOptions, ON_BUS(run_ethercat_states)>("ethercat states", "ADDRESS|--emulate LINE [--json]", "print the states of the slaves, with the cause of an error"),
+    command<EthercatSlaveOptions, ON_BUS(run_ethercat_upload)>("ethercat upload", "ADDRESS|--emulate LINE [-p N] INDEX SUB [--type TYPE] [--json]", "read an object of a slave"),
+    command<EthercatSlaveOptions, ON_BUS(run_ethercat_download)>("ethercat download", "ADDRESS|--emulate LINE [-p N] INDEX SUB VALUE [--type TYPE] [--json]", "write an object of a slave"),
+    command<EthercatSlaveOptions, ON_BUS(run_ethercat_reg_read)>("ethercat reg-read", "ADDRESS|--emulate LINE [-p N] REGISTER [BYTES] [--json]", "read registers of a slave"),
+    command<EthercatSlaveOptions, ON_BUS(run_ethercat_sii_read)>("ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "read the EEPROM of a slave (SII)"),
+#endif
     command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
     command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
     command<TdmaPingOptions, run_tdma_ping>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "measure the round-trip time to a station of a segment"),
@@ -150,6 +160,9 @@ struct Group {
 constexpr Group groups[] = {
     {"can", "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
     {"canopen", "check and plan a CANopen network"},
+#ifdef HALCYON_ETHERCAT
+    {"ethercat", "EtherCAT bus tools: scan, slaves, states, upload, download, reg-read, sii-read"},
+#endif
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults"},
 };

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// Options of the `hal ethercat` commands. Compiled into `hal` for its help: no bus library here.
+#pragma once
+
+#include <string>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+/// Options of all commands: which bus, and the form of the output.
+struct EthercatOptions : Options {
+    std::string emulate;  ///< description of an emulated line, or a file with one; empty: not given
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS", "eth:enp3s0 or udp:HOST; not with --emulate", false);
+        declare_bus(set);
+    }
+
+protected:
+    void declare_bus(OptionSet& set) {
+        set.value("--emulate", emulate, "LINE", "emulate these devices instead of a bus: \"coupler, servo axes=2\", or a file with one device per line");
+        set.flag("--json", json, "print JSON");
+    }
+};
+
+/// Options of the commands that concern one slave.
+struct EthercatSlaveOptions : EthercatOptions {
+    int position = -1;  ///< -1: not given
+    std::string type;
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS ARG", "eth:enp3s0 or udp:HOST, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…", false);
+        declare_bus(set);
+        set.value("-p,--position", position, "N", "position of the slave, counted from 0; not needed for a single slave").in(0, 65535);
+        set.value("-t,--type", type, "TYPE", "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
+    }
+};
+
+/// Each returns the exit code.
+int run_ethercat_scan(const EthercatOptions&);
+int run_ethercat_slaves(const EthercatOptions&);
+int run_ethercat_states(const EthercatOptions&);
+int run_ethercat_upload(const EthercatSlaveOptions&);
+int run_ethercat_download(const EthercatSlaveOptions&);
+int run_ethercat_reg_read(const EthercatSlaveOptions&);
+int run_ethercat_sii_read(const EthercatSlaveOptions&);
+
+}  // namespace hal::tools

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// A bus as used by one command: the master engine without a configuration, its cycle run in this thread while a request waits. The slaves are
+// scanned and brought to PRE-OP. Everything here is [setup]; everything has a timeout.
+//
+//     EthercatSession session;
+//     if (!session.open(options)) return 1;                                    // the reason is printed
+//     master::MailboxRequest request; ...
+//     if (!session.run(request)) ...
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bus/ethercat/options.hpp"
+#include "ethercat/devices/registry.hpp"
+#include "ethercat/esc/responder.hpp"
+#include "ethercat/master/master.hpp"
+#include "ethercat/master/request_queue.hpp"
+#include "ethercat/wire/sii.hpp"
+
+namespace hal::tools {
+
+class EthercatSession : private ethercat::master::Events {
+public:
+    EthercatSession();
+    ~EthercatSession() override;
+
+    /// Opens the bus that the options name and brings its slaves to PRE-OP. Returns false after printing the reason.
+    bool open(const EthercatOptions&);
+    /// Returns the positional arguments behind the address.
+    const std::vector<std::string>& arguments() const { return arguments_; }
+    std::size_t size() const { return master_->found(); }
+    ethercat::master::BusSlave& slave(std::size_t position) { return master_->found(position); }
+    /// Returns the slave that --position names, or the only one; nullptr after printing the reason.
+    ethercat::master::BusSlave* chosen(const EthercatSlaveOptions&);
+
+    /// Serves a mailbox request; false: no time left. Its result is in the request.
+    bool run(ethercat::master::MailboxRequest&);
+    /// Reads registers of a slave; nullopt: no answer.
+    std::optional<std::vector<std::uint8_t>> registers(const ethercat::master::BusSlave&, std::uint16_t address, std::uint16_t length);
+    /// Reads the whole SII of a slave; nullopt: no answer.
+    std::optional<std::vector<std::uint8_t>> sii(const ethercat::master::BusSlave&);
+
+private:
+    void report(ethercat::master::Event, std::uint32_t, std::int64_t, std::int64_t) noexcept override {}
+    bool emulate(const EthercatOptions&);
+    void cycle();
+    bool until(const std::function<bool()>& done, std::int64_t timeout_ns);
+
+    std::vector<std::string> arguments_;
+    std::vector<ethercat::devices::Device> devices_;
+    std::unique_ptr<ethernet::Port> line_port_, port_;
+    std::optional<ethercat::esc::Line> line_;
+    std::unique_ptr<ethercat::esc::LineOnSegments> connection_;
+    ethercat::master::Mailboxes mailboxes_;
+    ethercat::master::RequestServer server_;
+    ethercat::master::RequestPort& requests_;
+    ethercat::master::Channel channel_;
+    std::unique_ptr<ethercat::master::Master> master_;
+    std::int64_t now_ns_ = 0;
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+// `hal ethercat upload`, `download`, `reg-read` and `sii-read`: values of one slave.
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fmt/core.h>
+#include <optional>
+#include <unistd.h>
+
+#include "bus/ethercat/session.hpp"
+#include "cli/output.hpp"
+#include "commands/json_text.hpp"
+#include "ethercat/wire/coe.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using ethercat::master::BusSlave;
+using ethercat::master::MailboxRequest;
+using Outcome = ethercat::master::MailboxResult::Outcome;
+using Bytes = std::vector<std::uint8_t>;
+
+enum class Form : std::uint8_t { logic, sign, number, real, text, octets };
+struct ValueType {
+    const char* name;
+    Form form;
+    std::size_t bytes;       ///< 0: any
+    std::uint16_t coe_type;  ///< as SDO information reports it
+};
+namespace code = ethercat::coe::type;
+constexpr ValueType value_types[] = {
+    {"bool", Form::logic, 1, code::boolean}, {"int8", Form::sign, 1, code::s8}, {"int16", Form::sign, 2, code::s16}, {"int32", Form::sign, 4, code::s32},
+    {"int64", Form::sign, 8, code::s64}, {"uint8", Form::number, 1, code::u8}, {"uint16", Form::number, 2, code::u16},
+    {"uint32", Form::number, 4, code::u32}, {"uint64", Form::number, 8, code::u64}, {"float", Form::real, 4, code::real32},
+    {"double", Form::real, 8, code::real64}, {"string", Form::text, 0, code::visible_string}, {"octet_string", Form::octets, 0, code::octet_string}};
+
+std::optional<std::uint64_t> number(const std::string& text, std::uint64_t most) {
+    char* end = nullptr;
+    errno = 0;
+    const std::uint64_t value = std::strtoull(text.c_str(), &end, 0);
+    if (text.empty() || text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || value > most) return std::nullopt;
+    return value;
+}
+
+std::string hex_bytes(const Bytes& bytes) {
+    std::string text;
+    for (const std::uint8_t b : bytes) text += fmt::format("{}0x{:02x}", text.empty() ? "" : " ", b);
+    return text;
+}
+
+std::uint64_t little_endian(const Bytes& bytes) {
+    std::uint64_t value = 0;
+    for (std::size_t n = std::min<std::size_t>(bytes.size(), 8); n-- > 0;) value = value << 8 | bytes[n];
+    return value;
+}
+
+/// Returns the value as `upload` shows it; `plain` is its second half, as JSON.
+std::string value_words(const Bytes& bytes, const ValueType& type, std::string& plain) {
+    if (type.form == Form::text) {
+        const auto end = std::find(bytes.begin(), bytes.end(), 0);
+        const std::string text(bytes.begin(), end);
+        json_quote(plain, text);
+        return text;
+    }
+    if (type.form == Form::octets || bytes.size() != type.bytes) {
+        json_quote(plain, hex_bytes(bytes));
+        return hex_bytes(bytes);
+    }
+    const std::uint64_t raw = little_endian(bytes);
+    if (type.form == Form::real) {
+        const double value = type.bytes == 4 ? static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw))) : std::bit_cast<double>(raw);
+        const std::string text = fmt::format("{}", value);
+        if (std::isfinite(value)) plain += text;
+        else json_quote(plain, text);
+        return text;
+    }
+    const auto unused = static_cast<unsigned>(64 - 8 * type.bytes);
+    plain += type.form == Form::sign ? fmt::format("{}", static_cast<std::int64_t>(raw << unused) >> unused) : fmt::format("{}", raw);
+    return fmt::format("0x{:0{}x} {}", raw, 2 * type.bytes, plain);
+}
+
+/// Returns the bytes of a typed value; nullopt: invalid or out of range.
+std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type) {
+    Bytes bytes;
+    if (type.form == Form::text) return Bytes(text.begin(), text.end());
+    char* end = nullptr;
+    errno = 0;
+    if (type.form == Form::octets) {
+        for (const char* at = text.c_str(); *at != '\0'; at = end) {
+            const unsigned long value = std::strtoul(at, &end, 16);
+            if (end == at || value > 0xff) return std::nullopt;
+            bytes.push_back(static_cast<std::uint8_t>(value));
+            while (*end == ' ') ++end;
+        }
+        return bytes.empty() ? std::nullopt : std::optional(bytes);
+    }
+    std::uint64_t raw = 0;
+    const auto bits = static_cast<unsigned>(8 * type.bytes);
+    if (type.form == Form::real) {
+        const double value = std::strtod(text.c_str(), &end);
+        if (end == text.c_str() || *end != '\0') return std::nullopt;
+        raw = type.bytes == 4 ? std::bit_cast<std::uint32_t>(static_cast<float>(value)) : std::bit_cast<std::uint64_t>(value);
+    } else if (type.form == Form::sign) {
+        const std::int64_t value = std::strtoll(text.c_str(), &end, 0);
+        const std::int64_t least = bits == 64 ? INT64_MIN : -(std::int64_t{1} << (bits - 1));
+        if (end == text.c_str() || *end != '\0' || errno != 0 || value < least || value > -(least + 1)) return std::nullopt;
+        raw = static_cast<std::uint64_t>(value);
+    } else {
+        const auto value = number(text, type.form == Form::logic ? 1 : bits == 64 ? UINT64_MAX : (std::uint64_t{1} << bits) - 1);
+        if (!value) return std::nullopt;
+        raw = *value;
+    }
+    for (std::size_t n = 0; n < type.bytes; ++n) bytes.push_back(static_cast<std::uint8_t>(raw >> 8 * n));
+    return bytes;
+}
+
+/// Prints why a request to the mailbox failed; returns the exit code.
+int fail_mailbox(const Options& options, const BusSlave& s, const std::string& what, const ethercat::master::MailboxResult& result) {
+    const std::string who = fmt::format("slave {}: {}: ", s.position, what);
+    switch (result.outcome) {
+    case Outcome::aborted:
+        return fail(options, fmt::format("{}SDO transfer aborted with code 0x{:08X}: {}", who, result.abort, ethercat::coe::abort_text(result.abort)));
+    case Outcome::timed_out: return fail(options, who + "no answer from its mailbox; see: hal ethercat states");
+    case Outcome::lost: return fail(options, who + "it no longer responds; check its supply and cable");
+    default: return fail(options, who + (s.mailbox.usable() ? "rejected by the mailbox" : "the slave has no mailbox"));
+    }
+}
+
+/// Returns the type that --type names, or that the slave reports; nullptr after printing the reason.
+const ValueType* type_of(const EthercatSlaveOptions& options, EthercatSession& session, const BusSlave& s, std::uint16_t index, std::uint8_t sub) {
+    if (!options.type.empty()) {
+        for (const ValueType& t : value_types)
+            if (options.type == t.name) return &t;
+        return fail(options, fmt::format("unknown type '{}'; see: hal help ethercat upload", options.type)), nullptr;
+    }
+    Bytes name(256);
+    MailboxRequest request;
+    request.kind = MailboxRequest::Kind::entry;
+    request.slave = s.number, request.index = index, request.sub = sub, request.data = name;
+    if (session.run(request) && request.result)
+        for (const ValueType& t : value_types)
+            if (request.entry.type == t.coe_type) return &t;
+    return &value_types[std::size(value_types) - 1];
+}
+
+/// One SDO transfer as the arguments describe it.
+int transfer(const EthercatSlaveOptions& options, bool download) {
+    EthercatSession session;
+    if (!session.open(options)) return 1;
+    const auto& words = session.arguments();
+    if (words.size() != (download ? 3U : 2U))
+        return fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program, download ? " VALUE" : ""));
+    const auto index = number(words[0], 0xffff), sub = number(words[1], 0xff);
+    if (!index) return fail(options, fmt::format("invalid index '{}'; write 0..0xffff", words[0]));
+    if (!sub) return fail(options, fmt::format("invalid sub-index '{}'; write 0..255", words[1]));
+    const BusSlave* s = session.chosen(options);
+    if (s == nullptr) return 1;
+    const std::string what = fmt::format("0x{:04X}:{}", *index, *sub);
+    const ValueType* type = type_of(options, session, *s, static_cast<std::uint16_t>(*index), static_cast<std::uint8_t>(*sub));
+    if (type == nullptr) return 1;
+    Bytes bytes(65536);
+    if (download) {
+        if (const auto value = value_bytes(words[2], *type)) bytes = *value;
+        else return fail(options, fmt::format("invalid value '{}' for {}, type {}; --type selects another one", words[2], what, type->name));
+    }
+    MailboxRequest request;
+    request.kind = download ? MailboxRequest::Kind::sdo_download : MailboxRequest::Kind::sdo_upload;
+    request.slave = s->number, request.index = static_cast<std::uint16_t>(*index), request.sub = static_cast<std::uint8_t>(*sub), request.data = bytes;
+    if (!session.run(request)) return fail(options, fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
+    if (!request.result) return fail_mailbox(options, *s, what, request.result);
+    if (!download) bytes.resize(request.result.length);
+    std::string plain;
+    const std::string text = value_words(bytes, *type, plain);
+    if (options.json)
+        return print(fmt::format("{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n", s->position, *index, *sub, type->name, plain)) ? 0 : 1;
+    return download || print(text + "\n") ? 0 : 1;
+}
+
+}  // namespace
+
+int run_ethercat_upload(const EthercatSlaveOptions& options) { return transfer(options, false); }
+int run_ethercat_download(const EthercatSlaveOptions& options) { return transfer(options, true); }
+
+int run_ethercat_reg_read(const EthercatSlaveOptions& options) {
+    EthercatSession session;
+    if (!session.open(options)) return 1;
+    const auto& words = session.arguments();
+    const auto address = number(words.empty() ? "" : words[0], 0xffff);
+    const auto length = words.size() == 2 ? number(words[1], ethercat::master::Channel::largest) : std::optional<std::uint64_t>(2);
+    if (words.size() > 2 || !address || !length || *length == 0)
+        return fail(options, "type: hal ethercat reg-read ADDRESS -p N REGISTER [BYTES]; registers are 0..0xffff, at most 1486 bytes (default 2)");
+    const BusSlave* s = session.chosen(options);
+    if (s == nullptr) return 1;
+    const auto bytes = session.registers(*s, static_cast<std::uint16_t>(*address), static_cast<std::uint16_t>(*length));
+    if (!bytes) return fail(options, fmt::format("slave {}: no answer to a read of register 0x{:04X}, {} bytes; does the device have it?", s->position, *address, *length));
+    if (options.json) return print(fmt::format("{{\"position\":{},\"register\":{},\"bytes\":\"{}\"}}\n", s->position, *address, hex_bytes(*bytes))) ? 0 : 1;
+    return print(hex_bytes(*bytes) + "\n") ? 0 : 1;
+}
+
+int run_ethercat_sii_read(const EthercatSlaveOptions& options) {
+    EthercatSession session;
+    if (!session.open(options)) return 1;
+    if (!session.arguments().empty()) return fail(options, fmt::format("unexpected argument '{}'", session.arguments().front()));
+    const BusSlave* s = session.chosen(options);
+    if (s == nullptr) return 1;
+    const auto bytes = session.sii(*s);
+    if (!bytes) return fail(options, fmt::format("slave {}: its EEPROM is not readable; switch it off and on", s->position));
+    if (options.json) return print(fmt::format("{{\"position\":{},\"bytes\":\"{}\"}}\n", s->position, hex_bytes(*bytes))) ? 0 : 1;
+    if (::isatty(STDOUT_FILENO) != 0) return fail(options, "the SII is binary; redirect it: > slave.sii");
+    return print(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size())) ? 0 : 1;
+}
+
+}  // namespace hal::tools
