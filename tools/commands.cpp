@@ -130,11 +130,15 @@ constexpr Subcommand table[] = {
 #ifdef HALCYON_ETHERCAT
     command<EthercatOptions, ON_BUS(run_ethercat_scan)>("ethercat scan", "ADDRESS|--emulate LINE [--json]", "show the slaves of an EtherCAT bus as a tree: states, names, ports, delays"),
     command<EthercatOptions, ON_BUS(run_ethercat_slaves)>("ethercat slaves", "ADDRESS|--emulate LINE [--json]", "list the slaves: position, alias, state, name"),
-    command<EthercatOptions, ON_BUS(run_ethercat_states)>("ethercat states", "ADDRESS|--emulate LINE [--json]", "print the states of the slaves, with the cause of an error"),
-    command<EthercatSlaveOptions, ON_BUS(run_ethercat_upload)>("ethercat upload", "ADDRESS|--emulate LINE [-p N] INDEX SUB [--type TYPE] [--json]", "read an object of a slave"),
-    command<EthercatSlaveOptions, ON_BUS(run_ethercat_download)>("ethercat download", "ADDRESS|--emulate LINE [-p N] INDEX SUB VALUE [--type TYPE] [--json]", "write an object of a slave"),
-    command<EthercatSlaveOptions, ON_BUS(run_ethercat_reg_read)>("ethercat reg-read", "ADDRESS|--emulate LINE [-p N] REGISTER [BYTES] [--json]", "read registers of a slave"),
-    command<EthercatSlaveOptions, ON_BUS(run_ethercat_sii_read)>("ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "read the EEPROM of a slave (SII)"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_states)>("ethercat states", "ADDRESS|--emulate LINE [-p N] [STATE] [--json]", "print the states of the slaves with the cause of an error, or request a state"),
+    command<EthercatOptions, ON_BUS(run_ethercat_crc)>("ethercat crc", "ADDRESS|--emulate LINE [--json]", "print the error counters of all ports and name the faulty cable"),
+    command<EthercatValueOptions, ON_BUS(run_ethercat_upload)>("ethercat upload", "ADDRESS|--emulate LINE [-p N] INDEX SUB [--type TYPE] [--json]", "read an object of a slave"),
+    command<EthercatValueOptions, ON_BUS(run_ethercat_download)>("ethercat download", "ADDRESS|--emulate LINE [-p N] INDEX SUB VALUE [--type TYPE] [--json]", "write an object of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_read)>("ethercat reg-read", "ADDRESS|--emulate LINE [-p N] REGISTER [BYTES] [--json]", "read registers of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_write)>("ethercat reg-write", "ADDRESS|--emulate LINE [-p N] REGISTER BYTE… [--json]", "write registers of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_read)>("ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "read the EEPROM of a slave (SII)"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_write)>("ethercat sii-write", "ADDRESS|--emulate LINE [-p N] FILE [--json]", "write the EEPROM of a slave (SII)"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_alias)>("ethercat alias", "ADDRESS|--emulate LINE [-p N] ALIAS [--json]", "write the alias of a slave to its EEPROM"),
 #endif
     command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
     command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
@@ -161,7 +165,7 @@ constexpr Group groups[] = {
     {"can", "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
     {"canopen", "check and plan a CANopen network"},
 #ifdef HALCYON_ETHERCAT
-    {"ethercat", "EtherCAT bus tools: scan, slaves, states, upload, download, reg-read, sii-read"},
+    {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias"},
 #endif
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults"},

@@ -26,14 +26,22 @@ protected:
 };
 
 /// Options of the commands that concern one slave.
-struct EthercatSlaveOptions : EthercatOptions {
+struct EthercatPositionOptions : EthercatOptions {
     int position = -1;  ///< -1: not given
-    std::string type;
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS ARG", "eth:enp3s0 or udp:HOST, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…", false);
         declare_bus(set);
         set.value("-p,--position", position, "N", "position of the slave, counted from 0; not needed for a single slave").in(0, 65535);
+    }
+};
+
+/// Options of the commands for values.
+struct EthercatValueOptions : EthercatPositionOptions {
+    std::string type;
+
+    void declare(OptionSet& set) override {
+        EthercatPositionOptions::declare(set);
         set.value("-t,--type", type, "TYPE", "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
     }
 };
@@ -41,10 +49,14 @@ struct EthercatSlaveOptions : EthercatOptions {
 /// Each returns the exit code.
 int run_ethercat_scan(const EthercatOptions&);
 int run_ethercat_slaves(const EthercatOptions&);
-int run_ethercat_states(const EthercatOptions&);
-int run_ethercat_upload(const EthercatSlaveOptions&);
-int run_ethercat_download(const EthercatSlaveOptions&);
-int run_ethercat_reg_read(const EthercatSlaveOptions&);
-int run_ethercat_sii_read(const EthercatSlaveOptions&);
+int run_ethercat_states(const EthercatPositionOptions&);
+int run_ethercat_crc(const EthercatOptions&);
+int run_ethercat_upload(const EthercatValueOptions&);
+int run_ethercat_download(const EthercatValueOptions&);
+int run_ethercat_reg_read(const EthercatPositionOptions&);
+int run_ethercat_reg_write(const EthercatPositionOptions&);
+int run_ethercat_sii_read(const EthercatPositionOptions&);
+int run_ethercat_sii_write(const EthercatPositionOptions&);
+int run_ethercat_alias(const EthercatPositionOptions&);
 
 }  // namespace hal::tools

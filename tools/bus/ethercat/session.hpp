@@ -14,12 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "bus/ethercat/options.hpp"
-#include "ethercat/devices/registry.hpp"
-#include "ethercat/esc/responder.hpp"
+#include "bus/ethercat/access.hpp"
 #include "ethercat/master/master.hpp"
 #include "ethercat/master/request_queue.hpp"
-#include "ethercat/wire/sii.hpp"
 
 namespace hal::tools {
 
@@ -31,36 +28,26 @@ public:
     /// Opens the bus that the options name and brings its slaves to PRE-OP. Returns false after printing the reason.
     bool open(const EthercatOptions&);
     /// Returns the positional arguments behind the address.
-    const std::vector<std::string>& arguments() const { return arguments_; }
+    const std::vector<std::string>& arguments() const { return access_.arguments(); }
     std::size_t size() const { return master_->found(); }
     ethercat::master::BusSlave& slave(std::size_t position) { return master_->found(position); }
     /// Returns the slave that --position names, or the only one; nullptr after printing the reason.
-    ethercat::master::BusSlave* chosen(const EthercatSlaveOptions&);
+    ethercat::master::BusSlave* chosen(const EthercatPositionOptions&);
 
     /// Serves a mailbox request; false: no time left. Its result is in the request.
     bool run(ethercat::master::MailboxRequest&);
-    /// Reads registers of a slave; nullopt: no answer.
-    std::optional<std::vector<std::uint8_t>> registers(const ethercat::master::BusSlave&, std::uint16_t address, std::uint16_t length);
-    /// Reads the whole SII of a slave; nullopt: no answer.
-    std::optional<std::vector<std::uint8_t>> sii(const ethercat::master::BusSlave&);
 
 private:
     void report(ethercat::master::Event, std::uint32_t, std::int64_t, std::int64_t) noexcept override {}
-    bool emulate(const EthercatOptions&);
     void cycle();
     bool until(const std::function<bool()>& done, std::int64_t timeout_ns);
 
-    std::vector<std::string> arguments_;
-    std::vector<ethercat::devices::Device> devices_;
-    std::unique_ptr<ethernet::Port> line_port_, port_;
-    std::optional<ethercat::esc::Line> line_;
-    std::unique_ptr<ethercat::esc::LineOnSegments> connection_;
+    EthercatAccess access_;
     ethercat::master::Mailboxes mailboxes_;
     ethercat::master::RequestServer server_;
     ethercat::master::RequestPort& requests_;
     ethercat::master::Channel channel_;
     std::unique_ptr<ethercat::master::Master> master_;
-    std::int64_t now_ns_ = 0;
 };
 
 }  // namespace hal::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal ethercat upload`, `download`, `reg-read` and `sii-read`: values of one slave.
+// `hal ethercat upload` and `download`: objects of one slave.
 #include <algorithm>
 #include <bit>
 #include <cerrno>
@@ -8,11 +8,10 @@
 #include <cstring>
 #include <fmt/core.h>
 #include <optional>
-#include <unistd.h>
 
 #include "bus/ethercat/session.hpp"
+#include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
-#include "commands/json_text.hpp"
 #include "ethercat/wire/coe.hpp"
 
 namespace hal::tools {
@@ -38,20 +37,6 @@ constexpr ValueType value_types[] = {
     {"uint32", Form::number, 4, code::u32}, {"uint64", Form::number, 8, code::u64}, {"float", Form::real, 4, code::real32},
     {"double", Form::real, 8, code::real64}, {"string", Form::text, 0, code::visible_string}, {"octet_string", Form::octets, 0, code::octet_string}};
 
-std::optional<std::uint64_t> number(const std::string& text, std::uint64_t most) {
-    char* end = nullptr;
-    errno = 0;
-    const std::uint64_t value = std::strtoull(text.c_str(), &end, 0);
-    if (text.empty() || text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || value > most) return std::nullopt;
-    return value;
-}
-
-std::string hex_bytes(const Bytes& bytes) {
-    std::string text;
-    for (const std::uint8_t b : bytes) text += fmt::format("{}0x{:02x}", text.empty() ? "" : " ", b);
-    return text;
-}
-
 std::uint64_t little_endian(const Bytes& bytes) {
     std::uint64_t value = 0;
     for (std::size_t n = std::min<std::size_t>(bytes.size(), 8); n-- > 0;) value = value << 8 | bytes[n];
@@ -67,8 +52,8 @@ std::string value_words(const Bytes& bytes, const ValueType& type, std::string& 
         return text;
     }
     if (type.form == Form::octets || bytes.size() != type.bytes) {
-        json_quote(plain, hex_bytes(bytes));
-        return hex_bytes(bytes);
+        json_quote(plain, hex_words(bytes));
+        return hex_words(bytes);
     }
     const std::uint64_t raw = little_endian(bytes);
     if (type.form == Form::real) {
@@ -110,7 +95,7 @@ std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type)
         if (end == text.c_str() || *end != '\0' || errno != 0 || value < least || value > -(least + 1)) return std::nullopt;
         raw = static_cast<std::uint64_t>(value);
     } else {
-        const auto value = number(text, type.form == Form::logic ? 1 : bits == 64 ? UINT64_MAX : (std::uint64_t{1} << bits) - 1);
+        const auto value = ethercat_number(text, type.form == Form::logic ? 1 : bits == 64 ? UINT64_MAX : (std::uint64_t{1} << bits) - 1);
         if (!value) return std::nullopt;
         raw = *value;
     }
@@ -131,7 +116,7 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
 }
 
 /// Returns the type that --type names, or that the slave reports; nullptr after printing the reason.
-const ValueType* type_of(const EthercatSlaveOptions& options, EthercatSession& session, const BusSlave& s, std::uint16_t index, std::uint8_t sub) {
+const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session, const BusSlave& s, std::uint16_t index, std::uint8_t sub) {
     if (!options.type.empty()) {
         for (const ValueType& t : value_types)
             if (options.type == t.name) return &t;
@@ -148,13 +133,13 @@ const ValueType* type_of(const EthercatSlaveOptions& options, EthercatSession& s
 }
 
 /// One SDO transfer as the arguments describe it.
-int transfer(const EthercatSlaveOptions& options, bool download) {
+int transfer(const EthercatValueOptions& options, bool download) {
     EthercatSession session;
     if (!session.open(options)) return 1;
     const auto& words = session.arguments();
     if (words.size() != (download ? 3U : 2U))
         return fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program, download ? " VALUE" : ""));
-    const auto index = number(words[0], 0xffff), sub = number(words[1], 0xff);
+    const auto index = ethercat_number(words[0], 0xffff), sub = ethercat_number(words[1], 0xff);
     if (!index) return fail(options, fmt::format("invalid index '{}'; write 0..0xffff", words[0]));
     if (!sub) return fail(options, fmt::format("invalid sub-index '{}'; write 0..255", words[1]));
     const BusSlave* s = session.chosen(options);
@@ -182,36 +167,7 @@ int transfer(const EthercatSlaveOptions& options, bool download) {
 
 }  // namespace
 
-int run_ethercat_upload(const EthercatSlaveOptions& options) { return transfer(options, false); }
-int run_ethercat_download(const EthercatSlaveOptions& options) { return transfer(options, true); }
-
-int run_ethercat_reg_read(const EthercatSlaveOptions& options) {
-    EthercatSession session;
-    if (!session.open(options)) return 1;
-    const auto& words = session.arguments();
-    const auto address = number(words.empty() ? "" : words[0], 0xffff);
-    const auto length = words.size() == 2 ? number(words[1], ethercat::master::Channel::largest) : std::optional<std::uint64_t>(2);
-    if (words.size() > 2 || !address || !length || *length == 0)
-        return fail(options, "type: hal ethercat reg-read ADDRESS -p N REGISTER [BYTES]; registers are 0..0xffff, at most 1486 bytes (default 2)");
-    const BusSlave* s = session.chosen(options);
-    if (s == nullptr) return 1;
-    const auto bytes = session.registers(*s, static_cast<std::uint16_t>(*address), static_cast<std::uint16_t>(*length));
-    if (!bytes) return fail(options, fmt::format("slave {}: no answer to a read of register 0x{:04X}, {} bytes; does the device have it?", s->position, *address, *length));
-    if (options.json) return print(fmt::format("{{\"position\":{},\"register\":{},\"bytes\":\"{}\"}}\n", s->position, *address, hex_bytes(*bytes))) ? 0 : 1;
-    return print(hex_bytes(*bytes) + "\n") ? 0 : 1;
-}
-
-int run_ethercat_sii_read(const EthercatSlaveOptions& options) {
-    EthercatSession session;
-    if (!session.open(options)) return 1;
-    if (!session.arguments().empty()) return fail(options, fmt::format("unexpected argument '{}'", session.arguments().front()));
-    const BusSlave* s = session.chosen(options);
-    if (s == nullptr) return 1;
-    const auto bytes = session.sii(*s);
-    if (!bytes) return fail(options, fmt::format("slave {}: its EEPROM is not readable; switch it off and on", s->position));
-    if (options.json) return print(fmt::format("{{\"position\":{},\"bytes\":\"{}\"}}\n", s->position, hex_bytes(*bytes))) ? 0 : 1;
-    if (::isatty(STDOUT_FILENO) != 0) return fail(options, "the SII is binary; redirect it: > slave.sii");
-    return print(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size())) ? 0 : 1;
-}
+int run_ethercat_upload(const EthercatValueOptions& options) { return transfer(options, false); }
+int run_ethercat_download(const EthercatValueOptions& options) { return transfer(options, true); }
 
 }  // namespace hal::tools

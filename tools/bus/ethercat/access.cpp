@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include "bus/ethercat/access.hpp"
+
+#include <filesystem>
+#include <fmt/core.h>
+
+#include "cli/output.hpp"
+#include "ethercat/wire/frames.hpp"
+#include "hal/clock.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+constexpr std::int64_t listening_ns = 200'000'000, emulated_step_ns = 100'000;
+constexpr const char* emulated_segment = "sim:hal-ethercat";
+
+}  // namespace
+
+bool EthercatAccess::emulate(const EthercatOptions& options) {
+    std::string text = options.emulate;
+    if (std::filesystem::is_regular_file(text)) {
+        if (!read_file(options.emulate, text)) return fail(options, text), false;
+    } else {
+        for (char& c : text)
+            if (c == ',') c = '\n';
+    }
+    const auto description = ethercat::devices::read_line(text);
+    if (!description.messages.empty()) {
+        const auto& message = description.messages.front();
+        return fail(options, fmt::format("--emulate: {}; {}", message.sentence, message.help)), false;
+    }
+    devices_ = ethercat::devices::make_line(description);
+    ethernet::Options how;
+    how.promiscuous = true;
+    auto opened = ethernet::open(emulated_segment, how);
+    if (!opened) return fail(options, opened.problem), false;
+    line_port_ = std::move(opened.port);
+    line_.emplace();
+    for (auto& d : devices_) line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+    line_->power_on(0);
+    connection_ = std::make_unique<ethercat::esc::LineOnSegments>(*line_, *line_port_);
+    return true;
+}
+
+bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
+    arguments_ = options.words;
+    address_ = emulated_segment;
+    if (!options.emulate.empty()) {
+        if (!emulate(options)) return false;
+    } else {
+        if (arguments_.empty())
+            return fail(options, "missing address: type eth:INTERFACE, or --emulate \"coupler, servo\" to try it without hardware"), false;
+        address_ = arguments_.front();
+        arguments_.erase(arguments_.begin());
+        if (ethernet::describe(address_).in_memory)
+            return fail(options, fmt::format("'{}' is a segment in memory, which belongs to another process; type eth:INTERFACE, or --emulate "
+                                             "\"coupler, servo\" for an emulated line", address_)), false;
+    }
+    ethernet::Options how;
+    how.types = {ethercat::ethertype};
+    auto opened = ethernet::open(address_, how);
+    if (!opened) return fail(options, opened.problem), false;
+    port_ = std::move(opened.port);
+    if (emulated()) return true;
+    now_ns_ = monotonic_ns();
+    if (!port_->statistics().up)
+        return fail(options, fmt::format("{} has no link; check the cable and the supply of the first slave", address_)), false;
+    if (alone && receive(now_ns_ + listening_ns))
+        return fail(options, fmt::format("another EtherCAT master is active on {}, and this command changes states; stop it first", address_)), false;
+    return true;
+}
+
+void EthercatAccess::pass(std::int64_t ns) {
+    now_ns_ += ns;
+    if (line_) line_port_->receive(now_ns_);
+    else
+        while (monotonic_ns() < now_ns_) port_->wait(now_ns_);
+}
+
+std::optional<std::vector<std::uint8_t>> EthercatAccess::receive(std::int64_t until_ns) {
+    for (;;) {
+        if (!line_) now_ns_ = monotonic_ns();
+        if (const auto arrival = port_->receive(now_ns_)) return std::vector<std::uint8_t>(arrival->bytes.begin(), arrival->bytes.end());
+        if (now_ns_ >= until_ns) return std::nullopt;
+        if (line_) pass(emulated_step_ns);
+        else port_->wait(until_ns);
+    }
+}
+
+}  // namespace hal::tools
