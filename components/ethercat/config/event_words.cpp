@@ -170,6 +170,7 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
         return "is operational, but its clock deviates by " + microseconds(first) + " from the reference clock, more than " + microseconds(second) +
                "; check that the thread misses no cycles, and its manual for what it does without synchronisation";
     case Event::ring_broken:
+        if (w.slave == Events::bus) return {};
         return "is the last that the primary port reaches: the ring is broken behind it; all slaves still exchange data, repair the cable";
     case Event::start_up_failed:
         return "could not be started; it was in " + state_words(first) + " and is started again in " + std::to_string(second) + " s";
@@ -202,6 +203,9 @@ std::string of_bus(const Happened& w, const master::Setup& setup, const std::str
                "': every slave that is started exchanges process data";
     }
     case Event::dc_synchronised: return "all clocks are synchronised, largest deviation " + microseconds(first);
+    case Event::ring_broken:
+        if (w.slave != Events::bus) return {};
+        return link + " reaches no slave: the ring is broken there; all slaves still exchange data, repair the cable";
     case Event::ring_closed: return "the ring is closed again";
     case Event::other_master:
         return "another EtherCAT master sends on " + link + " (" + std::to_string(first) +

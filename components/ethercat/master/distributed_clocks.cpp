@@ -11,6 +11,7 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start_ns = 100 * millisecond, sync_start_cycles = 10;
+constexpr std::uint32_t usual_hop_ns = 700;       ///< a slave and a short cable
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
 Task<void> read_times(Channel& c, Device& d) noexcept {
@@ -48,6 +49,18 @@ Task<void> wait_for_helpers(Channel& c, Bus& bus) noexcept {
         while (d->helping && d->channel.busy()) co_await c.sleep(0);
         d->helping = false;
     }
+}
+
+/// Returns whether the delay of a slave follows from times of one latch: its own and those of all clocks between the reference and it.
+bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexcept {
+    constexpr std::uint32_t longest_ns = 100'000, longest_per_slave_ns = 20'000;  // more: the ports are others than those that were read
+    if (bus.engine.redundant()) return d.times_read;
+    std::size_t steps = 0;
+    for (int parent = d.slave.parent; parent >= 0 && steps < slaves; parent = bus.devices[static_cast<std::size_t>(parent)]->slave.parent, ++steps) {
+        const Device& before = *bus.devices[static_cast<std::size_t>(parent)];
+        if (before.slave.has_dc() && before.slave.present && !before.times_read) return false;
+    }
+    return d.times_read && d.slave.delay_ns <= longest_ns + longest_per_slave_ns * slaves;
 }
 
 int choose_reference(const Bus& bus) noexcept {
@@ -101,12 +114,17 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         if (number == bus.reference) reference = count;
         line[count++] = &bus.devices[number]->slave;
     }
-    find_delays({line.data(), count}, reference);
+    // On a ring no frame comes back to a port, so that nothing can be measured: the delay of a hop is taken as what is usual. The error is some
+    // 100 ns for each.
+    if (bus.engine.redundant())
+        for (std::size_t n = 0; n < count; ++n) line[n]->delay_ns = n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
+    else
+        find_delays({line.data(), count}, reference);
 
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
         BusSlave& s = d.slave;
-        if (!s.present || !s.has_dc() || d.clock_set || !d.times_read) continue;  // never those of running slaves
+        if (!s.present || !s.has_dc() || d.clock_set || !has_valid_delay(bus, d, count)) continue;  // never those of running slaves
         // The frame with the latch passed this slave a delay after it passed the reference clock.
         const auto system = static_cast<std::uint64_t>(latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) + s.delay_ns;
         const std::uint64_t offset = system - s.local_time;

@@ -187,7 +187,10 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         bus.status.responding = static_cast<std::uint16_t>(count);
         if (bus.engine.redundant()) judge_ring(bus, count);
         // On a broken ring the delays are others; they are frozen until it is closed.
-        if (bus.clocks_missing() && !bus.status.ring_broken) co_await start_clocks(c, bus);
+        if (bus.clocks_missing() && !bus.status.ring_broken) {
+            co_await find_ports(c, bus, true);  // a cable may have been closed without any slave lost
+            co_await start_clocks(c, bus);
+        }
 
         unsigned present = 0;
         bool at_rest = true;

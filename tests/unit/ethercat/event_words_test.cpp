@@ -63,6 +63,8 @@ TEST(EthercatEventWords, Bus_events_name_the_port_and_the_domain) {
     EXPECT_EQ(words(Event::scanned, Events::bus, 3, 2), "found 3 slaves on eth:enp3s0");
     EXPECT_EQ(words(Event::wkc_incomplete, Events::bus, 3, 6),
               "domain 'default': working counter 3 instead of 6: some slaves do not exchange process data");
+    EXPECT_EQ(words(Event::ring_broken, Events::bus, -1, 0),
+              "eth:enp3s0 reaches no slave: the ring is broken there; all slaves still exchange data, repair the cable");
     EXPECT_EQ(words(Event::dc_synchronised, Events::bus, 240), "all clocks are synchronised, largest deviation 0.24 us");
 }
 

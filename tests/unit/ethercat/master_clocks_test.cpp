@@ -121,6 +121,23 @@ TEST(EthercatClocks, A_clock_that_leaves_the_window_in_OP_is_reported_once) {
     EXPECT_EQ(w.log.count(Event::dc_lost), 2U) << "again";
 }
 
+TEST(EthercatClocks, A_ring_of_slaves_that_were_switched_on_at_other_times_is_in_step) {
+    World w;
+    for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.clock_start_ns = 777'000'000LL * n});
+    w.line.close_ring(3, 1);
+    w.begin(with_clocks(4), true);
+    ASSERT_TRUE(w.operational(8000)) << w.log.text();
+    w.line.set_power(2, false, w.now_ns);
+    w.run(3000);
+    w.line.set_power(2, true, w.now_ns);
+    ASSERT_TRUE(w.operational(8000)) << w.log.text();
+    w.run(1000);
+    for (std::size_t n = 1; n < 4; ++n) {
+        const auto apart = (w.line.controller(n).sync().last_pulse_ns - w.line.controller(0).sync().last_pulse_ns) % 1'000'000;
+        EXPECT_LT(std::min(std::abs(apart), 1'000'000 - std::abs(apart)), 2000) << n;
+    }
+}
+
 TEST(EthercatClocks, A_slave_without_clock_that_needs_one_is_reported) {
     World w;
     w.add(0x100);
