@@ -114,7 +114,7 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         if (number == bus.reference) reference = count;
         line[count++] = &bus.devices[number]->slave;
     }
-    // On a ring no frame comes back to a port, so that nothing can be measured: the delay of a hop is taken as what is usual. The error is some
+    // On a ring no frame returns to a port, so that nothing can be measured: the usual delay of a hop is taken. The error is some
     // 100 ns for each.
     if (bus.engine.redundant())
         for (std::size_t n = 0; n < count; ++n) line[n]->delay_ns = n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
