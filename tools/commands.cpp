@@ -139,6 +139,14 @@ constexpr Subcommand table[] = {
     command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_read)>("ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "read the EEPROM of a slave (SII)"),
     command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_write)>("ethercat sii-write", "ADDRESS|--emulate LINE [-p N] FILE [--json]", "write the EEPROM of a slave (SII)"),
     command<EthercatPositionOptions, ON_BUS(run_ethercat_alias)>("ethercat alias", "ADDRESS|--emulate LINE [-p N] ALIAS [--json]", "write the alias of a slave to its EEPROM"),
+    command<EthercatOptions, ON_BUS(run_ethercat_pdos)>("ethercat pdos", "ADDRESS|--emulate LINE [--json]", "list the process data of the slaves, as their EEPROMs have it"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_sdos)>("ethercat sdos", "ADDRESS|--emulate LINE [-p N] [--json]", "list the object dictionary of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_foe_read)>("ethercat foe-read", "ADDRESS|--emulate LINE [-p N] NAME [--json] > FILE", "read a file of a slave in PRE-OP"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_foe_write)>("ethercat foe-write", "ADDRESS|--emulate LINE [-p N] FILE [NAME] [--json]", "write a file to a slave in PRE-OP"),
+    command<EthercatOptions, ON_BUS(run_ethercat_config)>("ethercat config", "ADDRESS|--emulate LINE NAME [--json]", "write NAME.ethercat and a netlist to start from for the slaves of a bus"),
+    command<EthercatOptions, ON_BUS(run_ethercat_dc)>("ethercat dc", "ADDRESS|--emulate LINE [--json]", "print the deviations of the clocks of the slaves"),
+    command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>("ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
+    command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>("ethercat plan", "FILE [--json]", "compute frames, wire time, cycle time and latency of a bus"),
 #endif
     command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
     command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
@@ -165,7 +173,7 @@ constexpr Group groups[] = {
     {"can", "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
     {"canopen", "check and plan a CANopen network"},
 #ifdef HALCYON_ETHERCAT
-    {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias"},
+    {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, dc, check, plan"},
 #endif
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults"},

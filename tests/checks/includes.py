@@ -27,7 +27,8 @@ ROWS = {
     "tools/doc": ["tools/cli"],
     "tools/comp": ["tools/doc"],
     "tools/bus": ["tools/cli", "components/canopen/master", "components/canopen/device",
-                  "components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel"],  # hal can, hal node, hal tdma
+                  "components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel",
+                  "components/ethercat/master", "components/ethercat/devices", "components/ethercat/config"],  # hal can, ethercat, node, tdma
     "tools/python": ["runtime/control"],
     "drivers/link": [],
     "drivers/discipline": ["drivers/link"],

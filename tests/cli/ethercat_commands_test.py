@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
 """hal ethercat on an emulated line."""
 import json
+import os
+import subprocess
 import unittest
 
 from harness import Case
+from own_network import VARIABLE, own_network
 
 LINE = "coupler, servo axes=2, digital_in bits=8 alias=7, mailbox_device"
 
@@ -83,6 +86,75 @@ class Values(Ethercat):
         self.assertEqual("hal ethercat alias: slave 2 has alias 7 already; choose another one\n", self.refused("alias", "-p", 1, 7))
 
 
+class Objects(Ethercat):
+    def test_dictionary(self):
+        text = self.on("sdos", "-p", 1)
+        self.assertIn("0x1000 Device type\n  00  r-r-r-  UDINT    32 bit  Device type\n", text)
+        objects = {o["index"]: o for o in json.loads(self.on("sdos", "-p", 1, "--json"))}
+        self.assertEqual([0, 1, 2, 3, 4], [e["sub"] for e in objects[0x1018]["entries"]])
+        self.assertIn("it does not list its objects", self.refused("sdos", "-p", 0))
+
+    def test_files(self):
+        self.assertEqual("gain = 1\n", self.on("foe-read", "-p", 3, "parameters"))
+        (self.folder / "new.txt").write_text("gain = 2\n")
+        self.assertEqual("slave 3: 'parameters' written, 9 bytes\n", self.on("foe-write", "-p", 3, "new.txt", "parameters"))
+        self.assertEqual("hal ethercat foe-read: slave 3: file 'none': the slave ends the transfer with FoE error 0x8001 (file not found)\n",
+                         self.refused("foe-read", "-p", 3, "none"))
+        self.assertIn("rejected by the mailbox", self.refused("foe-read", "-p", 1, "none"))
+
+
+class Configuration(Ethercat):
+    def test_pdos(self):
+        self.assertIn("  1600 outputs, sync manager 2  Outputs axis 1\n    6040:0 UINT, 16 bit  Controlword\n", self.on("pdos"))
+        pdos = json.loads(self.on("pdos", "--json"))
+        self.assertEqual([0x6000] * 8, [e["index"] for p in pdos if p["position"] == 2 for e in p["entries"]])
+
+    def test_config_writes_files_that_run(self):
+        line = "coupler, servo axes=2, digital_in bits=8 alias=7, digital_out, analog_in channels=4, analog_out, mailbox_device"
+        said = self.on("config", "machine", line=line)
+        self.assertEqual("machine.ethercat and machine.hal written, 7 slaves; next: hal run machine.hal\n", said)
+        self.assertIn("'machine.ethercat' exists already", self.refused("config", "machine", line=line))
+        run = self.run_program("sim", "machine.hal", "--for", "5s")
+        self.assertEqual(0, run.returncode, run.stderr)
+        for number in range(7):
+            self.assertRegex(run.stdout + run.stderr, rf"slave {number} \([-a-z]+\) is operational", "all slaves are in OP")
+        self.assertIn("no faults", run.stdout + run.stderr)
+        self.assertIn("machine.ethercat: sim:machine, cycle 1000 us, 7 slaves\n  in  u32   servo.controlword  6040:0\n",
+                      self.good("ethercat", "check", "machine.ethercat"))
+        self.assertEqual(7, json.loads(self.good("ethercat", "check", "machine.ethercat", "--json"))[0]["slaves"])
+
+    def test_plan_shows_the_arithmetic(self):
+        self.on("config", "small", line="coupler, digital_in bits=8")
+        plan = self.good("ethercat", "plan", "small.ethercat")
+        self.assertIn("1 frame, 60 bytes: (60 + 1 x 24) x 80 ns = 6.72 us at 100 Mbit/s\n", plan)
+        report = json.loads(self.good("ethercat", "plan", "small.ethercat", "--json"))[0]
+        self.assertEqual((1, 60, 6720, True), (report["frames"], report["frame_bytes"], report["wire_ns"], report["fits"]))
+        text = (self.folder / "small.ethercat").read_text().replace("cycle = 1000us", "cycle = 50us")
+        (self.folder / "fast.ethercat").write_text(text)
+        self.assertIn("fast.ethercat: the cycle is too short; raise `cycle`", self.bad("ethercat", "plan", "fast.ethercat"))
+
+    def test_check_reports_the_place(self):
+        (self.folder / "wrong.ethercat").write_text("[bus]\nspeed = 3\n")
+        self.assertIn("wrong.ethercat:2:", self.bad("ethercat", "check", "wrong.ethercat"))
+        self.assertIn("cannot read 'none.ethercat'", self.bad("ethercat", "plan", "none.ethercat"))
+
+    def test_dc(self):
+        self.assertEqual("1  deviation 0 ns  delay 0 ns  SYNC off  Halcyon servo", self.on("dc").splitlines()[1])
+        self.assertEqual([1, 3], [row["position"] for row in json.loads(self.on("dc", "--json"))])
+
+
+class Interface(Ethercat):
+    def test_without_slaves_and_without_link(self):
+        if os.environ.get(VARIABLE) != "1":
+            self.skipTest("no network namespaces here")
+        subprocess.run("ip link add left type veth peer name right && ip link set left up", shell=True, check=True)
+        self.assertEqual("hal ethercat scan: eth:left has no link; check the cable and the supply of the first slave\n",
+                         self.bad("ethercat", "scan", "eth:left"))
+        subprocess.run("ip link set right up", shell=True, check=True)
+        self.assertEqual("hal ethercat scan: no slave responds on eth:left; check cable and supply, and that it is the right interface\n",
+                         self.bad("ethercat", "scan", "eth:left"))
+
+
 class Wrong(Ethercat):
     def test_no_bus(self):
         self.assertEqual("hal ethercat scan: missing address: type eth:INTERFACE, or --emulate \"coupler, servo\" to try it without hardware\n",
@@ -92,4 +164,5 @@ class Wrong(Ethercat):
 
 
 if __name__ == "__main__":
+    own_network()
     unittest.main()

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Writes a `.ethercat` file for slaves found on a bus or described in an ESI.
+#include <algorithm>
 #include <cstdio>
 
 #include "ethercat/config/config_text.hpp"
@@ -40,6 +41,19 @@ std::string objects(const std::string& key, const std::vector<sii::Pdo>& pdos, b
     return key + " = " + list + "\n";
 }
 
+/// Returns how many entries each of several assigned PDOs with consecutive numbers has; 0: they differ, or there is at most one.
+std::size_t entries_each(const std::vector<sii::Pdo>& pdos, std::size_t& most) {
+    std::vector<const sii::Pdo*> assigned;
+    for (const sii::Pdo& p : pdos)
+        if (p.sync_manager != 0xff) assigned.push_back(&p);
+    bool equal = assigned.size() > 1;
+    for (std::size_t i = 0; i < assigned.size(); ++i) {
+        most = std::max(most, assigned[i]->entries.size());
+        equal = equal && assigned[i]->entries.size() == assigned[0]->entries.size() && assigned[i]->index == assigned[0]->index + i;
+    }
+    return equal ? assigned[0]->entries.size() : 0;
+}
+
 std::string one_line(const std::string& text) {
     std::string out;
     for (const char c : text) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
@@ -67,6 +81,9 @@ std::string write(const std::string& link, std::int64_t cycle_ns, const std::vec
             const std::string outputs = objects("outputs", s.rx, with_types, options), inputs = objects("inputs", s.tx, with_types,
                 options);
             out += outputs + inputs + options;
+            std::size_t most = 0;  // a slave with a fixed assignment keeps it
+            const std::size_t each = std::max(entries_each(s.rx, most), entries_each(s.tx, most));
+            if (each != 0 && most == each) out += "entries-per-pdo = " + std::to_string(each) + "\n";
         }
         if (s.assign_activate != 0) out += "dc = sync0\nassign-activate = " + hex(s.assign_activate) + "\n";
     }

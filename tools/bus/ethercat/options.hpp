@@ -20,7 +20,8 @@ struct EthercatOptions : Options {
 
 protected:
     void declare_bus(OptionSet& set) {
-        set.value("--emulate", emulate, "LINE", "emulate these devices instead of a bus: \"coupler, servo axes=2\", or a file with one device per line");
+        set.value("--emulate", emulate, "LINE",
+                  "emulate these devices instead of a bus: \"coupler, servo axes=2\", or a file with one device per line");
         set.flag("--json", json, "print JSON");
     }
 };
@@ -30,7 +31,9 @@ struct EthercatPositionOptions : EthercatOptions {
     int position = -1;  ///< -1: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS ARG", "eth:enp3s0 or udp:HOST, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…", false);
+        set.words("ADDRESS ARG",
+                  "eth:enp3s0 or udp:HOST, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…",
+                  false);
         declare_bus(set);
         set.value("-p,--position", position, "N", "position of the slave, counted from 0; not needed for a single slave").in(0, 65535);
     }
@@ -42,7 +45,26 @@ struct EthercatValueOptions : EthercatPositionOptions {
 
     void declare(OptionSet& set) override {
         EthercatPositionOptions::declare(set);
-        set.value("-t,--type", type, "TYPE", "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
+        set.value("-t,--type", type, "TYPE",
+                  "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
+    }
+};
+
+/// Options of `check` and `plan`, which need no bus.
+struct EthercatCheckOptions : Options {
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "configurations, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
+        set.flag("--json", json, "print JSON");
+    }
+};
+struct EthercatPlanOptions : Options {
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "configuration of the bus, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
+        set.flag("--json", json, "print JSON");
     }
 };
 
@@ -58,5 +80,13 @@ int run_ethercat_reg_write(const EthercatPositionOptions&);
 int run_ethercat_sii_read(const EthercatPositionOptions&);
 int run_ethercat_sii_write(const EthercatPositionOptions&);
 int run_ethercat_alias(const EthercatPositionOptions&);
+int run_ethercat_pdos(const EthercatOptions&);
+int run_ethercat_sdos(const EthercatPositionOptions&);
+int run_ethercat_foe_read(const EthercatPositionOptions&);
+int run_ethercat_foe_write(const EthercatPositionOptions&);
+int run_ethercat_config(const EthercatOptions&);
+int run_ethercat_dc(const EthercatOptions&);
+int run_ethercat_check(const EthercatCheckOptions&);
+int run_ethercat_plan(const EthercatPlanOptions&);
 
 }  // namespace hal::tools

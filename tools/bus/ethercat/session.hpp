@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A bus as used by one command: the master engine without a configuration, its cycle run in this thread while a request waits. The slaves are
-// scanned and brought to PRE-OP. Everything here is [setup]; everything has a timeout.
+// A bus as used by one command: the master engine without a configuration, its cycle run in this thread while a request waits. The slaves
+// are scanned and brought to PRE-OP. Everything here is [setup]; everything has a timeout.
 //
 //     EthercatSession session;
 //     if (!session.open(options)) return 1;                                    // the reason is printed

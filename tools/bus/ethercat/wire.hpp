@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Datagrams by position, one at a time, without a master: no state and no address of a slave changes, and a running master goes on. Everything
-// here is [setup]; everything has a timeout.
+// Datagrams by position, one at a time, without a master: no state and no address of a slave changes, and a running master goes on.
+// Everything here is [setup]; everything has a timeout.
 //
 //     EthercatWire wire;
 //     if (!wire.open(options)) return 1;                               // the reason is printed
