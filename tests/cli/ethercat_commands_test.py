@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import unittest
+from xml.etree import ElementTree
 
 from harness import Case
 from own_network import VARIABLE, own_network
@@ -137,6 +138,20 @@ class Configuration(Ethercat):
         (self.folder / "wrong.ethercat").write_text("[bus]\nspeed = 3\n")
         self.assertIn("wrong.ethercat:2:", self.bad("ethercat", "check", "wrong.ethercat"))
         self.assertIn("cannot read 'none.ethercat'", self.bad("ethercat", "plan", "none.ethercat"))
+
+    def test_xml_is_a_description_that_a_configuration_can_use(self):
+        text = self.on("xml", "-p", 1)
+        device = ElementTree.fromstring(text).find("Descriptions/Devices/Device")
+        self.assertEqual(["#x1600", "#x1610"], [pdo.findtext("Index") for pdo in device.findall("RxPdo")])
+        self.assertEqual(text, json.loads(self.on("xml", "-p", 1, "--json"))["xml"])
+        (self.folder / "servo.xml").write_text(text)
+        (self.folder / "servo.ethercat").write_text("[bus]\nlink = sim:line\n[slave 0 x]\nesi = servo.xml\n")
+        self.assertIn("  in  u32   x.controlword  6040:0\n", self.good("ethercat", "check", "servo.ethercat"))
+
+    def test_graph_is_a_picture_with_all_slaves(self):
+        boxes = ElementTree.fromstring(self.on("graph")).findall("{http://www.w3.org/2000/svg}rect")
+        self.assertEqual(4, len(boxes))
+        self.assertEqual(4, json.loads(self.on("graph", "--json"))["svg"].count("<rect"))
 
     def test_dc(self):
         self.assertEqual("1  deviation 0 ns  delay 0 ns  SYNC off  Halcyon servo", self.on("dc").splitlines()[1])

@@ -85,6 +85,8 @@ int run_ethercat_sdos(const EthercatPositionOptions&);
 int run_ethercat_foe_read(const EthercatPositionOptions&);
 int run_ethercat_foe_write(const EthercatPositionOptions&);
 int run_ethercat_config(const EthercatOptions&);
+int run_ethercat_xml(const EthercatPositionOptions&);
+int run_ethercat_graph(const EthercatOptions&);
 int run_ethercat_dc(const EthercatOptions&);
 int run_ethercat_check(const EthercatCheckOptions&);
 int run_ethercat_plan(const EthercatPlanOptions&);
