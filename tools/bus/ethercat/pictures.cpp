@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // `hal ethercat xml` and `graph`: a device description from the EEPROM of a slave, and the topology as a picture.
+#include <algorithm>
+#include <iterator>
+
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
@@ -89,13 +92,14 @@ std::string topology_svg(EthercatWire& wire) {
             text += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", from + 3, y + box_height / 2 - 3, s.parent_port);
         }
         const char* fill = s.al_failed ? "#f4b6b6" : s.state == ethercat::State::op ? "#bfe5bf" : "#e6e6e6";
-        text += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\" stroke=\"#333\"/>\n", x, y, box_width, box_height,
-                            fill);
+        text += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\" stroke=\"#333\"/>\n", x, y, box_width,
+                            box_height, fill);
         text += fmt::format("<text x=\"{}\" y=\"{}\">{}  {}</text>\n", x + 8, y + 17, n, escaped(wire.name(n)));
         text += fmt::format("<text x=\"{}\" y=\"{}\">{}{}{}</text>\n", x + 8, y + 33, ethercat::to_string(s.state),
                             s.al_failed ? " + error" : "", s.has_dc() ? fmt::format(", delay {} ns", s.delay_ns) : "");
     }
-    return fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\">\n",
+    return fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" "
+                       "width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\">\n",
                        2 * margin + deepest * step + box_width, margin + wire.size() * row) +
         text + "</svg>\n";
 }
