@@ -51,7 +51,7 @@ class Slaves(Ethercat):
         self.assertEqual("hal ethercat states: unknown state 'run'; write INIT, PREOP, BOOT, SAFEOP or OP\n", self.refused("states", "run"))
 
     def test_crc_lists_the_ports_in_use(self):
-        self.assertTrue(self.on("crc").endswith("no cable is faulty\n"))
+        self.assertTrue(self.on("crc").endswith("no port has counted errors of its own\n"))
         report = json.loads(self.on("crc", "--json"))
         self.assertEqual([], report["cables"])
         self.assertEqual([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (3, 0)], [(p["position"], p["port"]) for p in report["ports"]])

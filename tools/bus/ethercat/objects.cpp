@@ -7,6 +7,7 @@
 #include "bus/ethercat/session.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
+#include "ethercat/wire/foe.hpp"
 #include "ethercat/wire/sii.hpp"
 
 namespace hal::tools {
@@ -31,14 +32,6 @@ std::string access_word(std::uint16_t access) {
     return text;
 }
 
-/// Returns what an error code of FoE means (ETG.1000.6, table 93).
-const char* foe_words(std::uint32_t code) {
-    constexpr const char* words[] = {"error of the slave", "file not found", "access denied", "disk full", "illegal request",
-                                     "wrong packet number", "file exists already", "no user", "only in state BOOT",
-                                     "not in state BOOT", "no rights", "program error"};
-    return code >= 0x8000 && code - 0x8000 < std::size(words) ? words[code - 0x8000] : "see the manual of the device";
-}
-
 /// Transfers a file; `bytes` is read or written. Returns false after printing the reason.
 bool transfer_file(const EthercatPositionOptions& options, EthercatSession& session, const BusSlave& s, bool write, const std::string& name,
                    std::vector<std::uint8_t>& bytes) {
@@ -54,7 +47,7 @@ bool transfer_file(const EthercatPositionOptions& options, EthercatSession& sess
     std::string why = "not finished within 60 s";
     if (finished && request.result.outcome == Outcome::aborted)
         why = fmt::format("the slave ends the transfer with FoE error 0x{:04X} ({}){}{}", request.result.abort,
-                          foe_words(request.result.abort),
+                          ethercat::foe::to_string(static_cast<ethercat::foe::Error>(request.result.abort)),
                           progress.text[0] != '\0' ? ": "
             : "",
                           progress.text.data());

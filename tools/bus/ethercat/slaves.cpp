@@ -216,7 +216,7 @@ int run_ethercat_crc(const EthercatOptions& options) {
         }
     }
     if (options.json) return print(fmt::format("{{\"ports\":[{}],\"cables\":[{}]}}\n", rows, cables)) ? 0 : 1;
-    return print(text + (cables.empty() ? "no cable is faulty\n" : "")) ? 0 : 1;
+    return print(text + (cables.empty() ? "no port has counted errors of its own\n" : "")) ? 0 : 1;
 }
 
 }  // namespace hal::tools
