@@ -32,6 +32,7 @@
 #include "bus/can/sniff.hpp"
 #include "bus/can/tdma.hpp"
 #include "bus/ethercat/options.hpp"
+#include "bus/node/ethercat_line.hpp"
 #include "bus/node/kinds.hpp"
 #include "cli/capabilities.hpp"
 #include "cli/option_set.hpp"
@@ -159,6 +160,7 @@ constexpr Subcommand table[] = {
     command<NodeOptions, ON_BUS(run_node_safe_io)>("node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "simulate an EN 50325-5 safety I/O node (for experiments only)"),
     command<Jr3NodeOptions, ON_BUS(run_node_jr3)>("node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "simulate a force/torque node with a JR3 sensor"),
     command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>("node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "simulate a device with a boot loader"),
+    command<EthercatLineOptions, ON_BUS(run_node_ethercat)>("node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]", "emulate a line of EtherCAT slaves on a network interface"),
     command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
     command<DoctorOptions, run_doctor>("doctor", "", "check whether this machine is fit for real time"),
@@ -178,7 +180,7 @@ constexpr Group groups[] = {
     {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, check, plan"},
 #endif
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
-    {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults"},
+    {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults; an EtherCAT line: ethercat"},
 };
 
 const Group* find_group(std::string_view name) {

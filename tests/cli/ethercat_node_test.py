@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""hal node ethercat: a line of emulated slaves on a veth pair, with our master at the other end; each is killed in turn."""
+import os
+import re
+import signal
+import subprocess
+import unittest
+
+from harness import HAL, ROOT, SANITIZED, Case, wait_until
+from own_network import VARIABLE, own_network
+
+MACHINE = ROOT / "halfiles/ethercat-servo"
+
+
+class Line(Case):
+    def setUp(self):
+        super().setUp()
+        if os.environ.get(VARIABLE) != "1":
+            self.skipTest("no network namespaces here; run it as root, or where user namespaces are allowed")
+        if SANITIZED:
+            self.skipTest("a master under a sanitizer misses its cycles")
+        pair = ["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"]
+        if subprocess.run(pair, capture_output=True).returncode != 0:
+            self.skipTest("no veth pairs here")
+        self.addCleanup(subprocess.run, ["ip", "link", "delete", "m0"])
+        for name in ("m0", "s0"):
+            subprocess.run(["ip", "link", "set", name, "up"], check=True)
+        for name in ("m0", "s0"):
+            wait_until(lambda: ",LOWER_UP" in subprocess.run(["ip", "link", "show", name], capture_output=True, text=True).stdout, f"{name} is up")
+        self.write("servo.line", (MACHINE / "servo.line").read_text())
+        self.write("servo.ethercat", (MACHINE / "servo.ethercat").read_text().replace("sim:servo", "eth:m0"))
+        self.write("servo.hal", "".join(line for line in (MACHINE / "servo.hal").read_text().splitlines(True)
+                                        if "ethercat_segment" not in line and "ethercat-segment" not in line))
+        self.logs = {}
+
+    def start(self, *words):
+        log = self.folder / f"{len(self.logs)}.txt"
+        with open(log, "w", encoding="utf-8") as out:
+            process = subprocess.Popen(["hal", *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
+                                       stdin=subprocess.DEVNULL, stdout=out, stderr=out, text=True)
+        self.addCleanup(self.end, process)
+        self.logs[process] = log
+        return process
+
+    @staticmethod
+    def end(process, number=signal.SIGTERM):
+        if process.poll() is None:
+            process.send_signal(number)
+        return process.wait(60)
+
+    def said(self, process):
+        return self.logs[process].read_text()
+
+    def expect(self, process, pattern, times=1):
+        wait_until(lambda: len(re.findall(pattern, self.said(process))) >= times or process.poll() is not None, f"{pattern} in {self.said(process)}")
+        self.assertGreaterEqual(len(re.findall(pattern, self.said(process))), times, self.said(process))
+
+    def node(self):
+        node = self.start("node", "ethercat", "servo.line", "--link", "eth:s0")
+        self.expect(node, "press Ctrl-C to end")
+        return node
+
+    def machine(self):
+        return self.start("run", "--name", "servo", "--no-picture", "servo.hal")
+
+    def pin(self, name):
+        return self.run_program("shell", "--name", "servo", "-s", "getp", name).stdout.strip()
+
+    def both(self, pin, value):
+        wait_until(lambda: all(self.pin(pin.replace("*", axis)) == value for axis in ("left", "right")), f"{pin} is {value}")
+
+    def test_watchdogs_turn_outputs_off_when_the_master_is_killed_and_a_new_one_reaches_OP(self):
+        node = self.node()
+        self.assertRegex(self.said(node), r"^EtherCAT line of 2 slaves on eth:s0 \(raw Ethernet\); press Ctrl-C to end\n   0  servo\n   1  servo\n")
+        machine = self.machine()
+        self.both("*.active", "TRUE")
+        for slave in "01":
+            self.expect(node, rf"slave {slave} \(servo\): OP\n")
+        machine.kill()
+        machine.wait()
+        for slave in "01":
+            self.expect(node, rf"slave {slave} \(servo\): SAFE-OP, error 0x001B: ")
+        operational = len(re.findall(r"slave 0 \(servo\): OP\n", self.said(node)))
+        self.machine()
+        self.expect(node, r"slave 0 \(servo\): OP\n", operational + 1)
+        self.both("*.active", "TRUE")
+        self.assertEqual(0, self.end(node, signal.SIGINT))
+        self.assertRegex(self.said(node), r"\n\d+\.\d s: [1-9]\d* frames passed, [1-9]\d* sent, \d+ lost here\n$")
+
+    def test_machine_reports_a_killed_line_and_starts_it_again(self):
+        node, machine = self.node(), self.machine()
+        self.both("*.active", "TRUE")
+        node.kill()
+        node.wait()
+        self.both("*.active", "FALSE")
+        self.both("ethercat.0.*.operational", "FALSE")
+        for axis in ("left", "right"):
+            self.expect(machine, rf"slave \d \({axis}\)")
+        self.node()
+        self.both("ethercat.0.*.operational", "TRUE")
+        self.assertEqual(["FALSE"] * 2, [self.pin("left.active"), self.pin("right.active")], "an axis stays off until it is switched on again")
+
+    def test_ends_by_itself_and_on_SIGTERM(self):
+        self.assertRegex(self.good("node", "ethercat", "servo.line", "--link", "eth:s0", "--for", "50ms"), r"\n0\.\d s: 0 frames passed, 0 sent, 0 lost here\n$")
+        self.assertEqual(0, self.end(self.node(), signal.SIGTERM))
+
+    def test_an_interface_that_is_missing(self):
+        self.assertIn("nothere", self.bad("node", "ethercat", "servo.line", "--link", "eth:nothere"))
+
+
+class WrongWords(Case):
+    def test_each_prints_what_to_type(self):
+        self.write("good.line", "servo\n")
+        self.write("bad.line", "coupler\nservoo axes=2\nservo axes=9\n")
+        self.write("empty.line", "# nothing\n")
+        say = "hal node ethercat: "
+        self.assertEqual(say + "missing --link; add --link eth:enp3s0, the interface towards the master\n", self.bad("node", "ethercat", "good.line"))
+        self.assertEqual(say + "cannot read 'none.line': No such file or directory\n", self.bad("node", "ethercat", "none.line", "--link", "eth:m0"))
+        first, second = self.bad("node", "ethercat", "bad.line", "--link", "eth:m0").splitlines()
+        self.assertRegex(first, r"^hal node ethercat: bad\.line:2:1: unknown device 'servoo'; use one of: coupler, digital_in, ")
+        self.assertRegex(second, r"^hal node ethercat: bad\.line:3:7: invalid value '9' of axes; use 1\.\.8; options of servo: ")
+        self.assertEqual(say + "empty.line: the line has no device; write one device per line\n", self.bad("node", "ethercat", "empty.line", "--link", "eth:m0"))
+        self.assertEqual(say + "'sim:line' is a segment in memory, which other programs cannot open; write --link eth:enp3s0, or emulate the line in the "
+                               "netlist of the master: loadrt ethercat_segment link=sim:line\n",
+                         self.bad("node", "ethercat", "good.line", "--link", "sim:line"))
+
+
+if __name__ == "__main__":
+    own_network()
+    unittest.main()

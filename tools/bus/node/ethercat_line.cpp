@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+#include "bus/node/ethercat_line.hpp"
+
+#include "cli/output.hpp"
+
+#if HALCYON_ETHERCAT
+#include <atomic>
+#include <fmt/core.h>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "cli/signals.hpp"
+#include "ethercat/devices/registry.hpp"
+#include "ethercat/esc/line.hpp"
+#include "ethercat/esc/responder.hpp"
+#include "ethercat/wire/al_status_codes.hpp"
+#include "ethercat/wire/registers.hpp"
+#include "link/ethernet.hpp"
+#include "link/system.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using namespace hal::ethercat;
+
+/// Copies AL status and its code out of the controllers, in the thread that serves the line.
+class StatusCopy final : public esc::ServeControl {
+public:
+    explicit StatusCopy(std::size_t slaves) : status_(slaves) {}
+
+    void work(esc::Line& line, std::int64_t) noexcept override {
+        for (std::size_t n = 0; n < status_.size(); ++n) {
+            esc::Controller& controller = line.controller(n);
+            const std::uint8_t* code = controller.memory(registers::al_status_code);
+            status_[n].store(controller.al_status() | static_cast<std::uint32_t>(code[0] | code[1] << 8) << 16, std::memory_order_relaxed);
+        }
+    }
+    /// Returns AL status in the low half, its code in the high half. [any]
+    std::uint32_t operator[](std::size_t slave) const noexcept { return status_[slave].load(std::memory_order_relaxed); }
+
+private:
+    std::vector<std::atomic<std::uint32_t>> status_;
+};
+
+std::unique_ptr<ethernet::Port> open_interface(const Options& options, const std::string& address) {
+    const ethernet::Description about = ethernet::describe(address);
+    if (about.in_memory) {
+        fail(options, fmt::format("'{}' is a segment in memory, which other programs cannot open; write --link eth:enp3s0, or emulate the line in the "
+                                  "netlist of the master: loadrt ethercat_segment link={}", address, address));
+        return nullptr;
+    }
+    ethernet::Options how;
+    how.types = {0x88a4};
+    how.promiscuous = true;
+    how.policy = ethernet::Policy::block;
+    how.send_capacity = how.receive_capacity = 256;
+    ethernet::Opened opened = ethernet::open(address, how);
+    if (!opened) fail(options, opened.problem);
+    return std::move(opened.port);
+}
+
+std::string state_words(std::uint32_t status) {
+    const auto code = static_cast<std::uint16_t>(status >> 16);
+    std::string text;
+    switch (status & 0xf) {
+    case 1: text = "INIT"; break;
+    case 2: text = "PRE-OP"; break;
+    case 3: text = "BOOT"; break;
+    case 4: text = "SAFE-OP"; break;
+    case 8: text = "OP"; break;
+    default: text = fmt::format("AL status 0x{:04X}", status & 0xffff);
+    }
+    if ((status & 0x10) != 0) {
+        const AlStatusCode* row = al_status(code);
+        text += fmt::format(", error 0x{:04X}{}{}", code, row == nullptr ? "" : ": ", row == nullptr ? "" : row->text);
+    }
+    return text;
+}
+
+/// Returns the terminals of an output device as text; empty for other devices.
+std::string output_words(const devices::Device& device) {
+    auto* io = dynamic_cast<const devices::IoBehaviour*>(&device.firmware->behaviour());
+    if (io == nullptr) return {};
+    std::string text;
+    for (unsigned c = 0; c < io->channels(); ++c) {
+        if (device.name == "digital_out") text += io->output(c) != 0 ? '1' : '0';
+        else if (device.name == "analog_out") text += fmt::format("{}{}", c == 0 ? "" : " ", io->output(c));
+    }
+    return text;
+}
+
+/// Prints what changes on the line: states at once, outputs at most once per second.
+class LineReporter {
+public:
+    LineReporter(const std::vector<devices::Device>& line, const StatusCopy& status, std::int64_t began)
+        : line_(line), status_(status), began_(began), seen_(line.size(), 1), outputs_(line.size()) {
+        for (std::size_t n = 0; n < line.size(); ++n) outputs_[n] = output_words(line[n]);
+    }
+
+    /// Returns false when standard output is closed.
+    bool look(std::int64_t now) {
+        std::string text;
+        const auto say = [&](std::size_t n, const std::string& what) {
+            text += fmt::format("{:9.3f} s  slave {} ({}): {}\n", static_cast<double>(now - began_) / 1e9, n, line_[n].name, what);
+        };
+        for (std::size_t n = 0; n < line_.size(); ++n) {
+            const std::uint32_t status = status_[n];
+            if (status == 0 || status == seen_[n]) continue;
+            seen_[n] = status;
+            say(n, state_words(status));
+        }
+        if (now - outputs_at_ >= 1'000'000'000)
+            for (std::size_t n = 0; n < line_.size(); ++n)
+                if (std::string words = output_words(line_[n]); words != outputs_[n]) {
+                    outputs_at_ = now;
+                    say(n, "outputs " + (outputs_[n] = std::move(words)));
+                }
+        return text.empty() || print(text);
+    }
+
+private:
+    const std::vector<devices::Device>& line_;
+    const StatusCopy& status_;
+    const std::int64_t began_;
+    std::vector<std::uint32_t> seen_;  // INIT is not reported at the start
+    std::vector<std::string> outputs_;
+    std::int64_t outputs_at_ = INT64_MIN / 2;
+};
+
+/// Reads the description of the line. Returns false after printing what is wrong.
+bool read_devices(const Options& options, std::vector<devices::Device>& to) {
+    if (options.words.size() != 1) return fail(options, "one line per process; write one FILE"), false;
+    const std::string& path = options.words.front();
+    std::string text;
+    if (!read_file(path, text)) return fail(options, fmt::format("cannot read '{}': {}", path, text)), false;
+    const devices::LineDescription description = devices::read_line(text);
+    bool good = true;
+    for (const auto& message : description.messages) {
+        const std::string place = message.at.line == 0 ? path : fmt::format("{}:{}:{}", path, message.at.line, message.at.column);
+        const bool is_error = message.severity == Severity::error;
+        good = good && !is_error;
+        fail(options, fmt::format("{}: {}{}; {}", place, is_error ? "" : "warning: ", message.sentence, message.help));
+    }
+    if (good) to = devices::make_line(description);
+    return good;
+}
+
+}  // namespace
+
+int run_node_ethercat(const EthercatLineOptions& options) {
+    if (options.link.empty()) return fail(options, "missing --link; add --link eth:enp3s0, the interface towards the master");
+    std::vector<devices::Device> devices;
+    if (!read_devices(options, devices)) return 1;
+    StopRequest stop;
+    const auto primary = open_interface(options, options.link);
+    if (!primary) return 1;
+    std::unique_ptr<ethernet::Port> secondary;
+    if (!options.backup.empty() && !(secondary = open_interface(options, options.backup))) return 1;
+
+    esc::Line line;
+    for (devices::Device& d : devices) line.add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+    if (secondary && !line.close_ring(static_cast<unsigned>(devices.size() - 1), 1))
+        return fail(options, "--backup: the last device has no second port; put one with two ports at the end");
+    const std::int64_t began = link::monotonic_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
+    line.power_on(began);
+
+    std::string text = fmt::format("EtherCAT line of {} slave{} on {}{}{} ({}); press Ctrl-C to end\n", devices.size(), devices.size() == 1 ? "" : "s",
+                                   primary->description().address, secondary ? " and " : "", secondary ? secondary->description().address : "",
+                                   primary->description().transport);
+    for (std::size_t n = 0; n < devices.size(); ++n) text += fmt::format("{:4}  {}\n", n, devices[n].name);
+    if (!print(text)) return 1;
+
+    StatusCopy status(devices.size());
+    LineReporter reporter(devices, status, began);
+    std::atomic<bool> ended{false};
+    std::thread server([&] { esc::serve(line, *primary, secondary.get(), ended, &status); });
+    bool is_read = true;
+    while (is_read && !stop.wait_ns(10'000'000) && link::monotonic_ns() < end) is_read = reporter.look(link::monotonic_ns());
+    ended = true;
+    server.join();
+    if (!is_read) return 1;
+    const std::int64_t now = link::monotonic_ns();
+    if (!reporter.look(now)) return 1;
+    const ethernet::Statistics s = primary->statistics();
+    return print(fmt::format("{:.1f} s: {} frames passed, {} sent, {} lost here\n", static_cast<double>(now - began) / 1e9, line.frames(),
+                             s.sent + (secondary ? secondary->statistics().sent : 0), s.lost + s.dropped)) ? 0 : 1;
+}
+
+}  // namespace hal::tools
+
+#else
+
+namespace hal::tools {
+
+int run_node_ethercat(const EthercatLineOptions& options) {
+    return fail(options, "this program was built without EtherCAT; type: sudo apt install libpugixml-dev, and build it again");
+}
+
+}  // namespace hal::tools
+
+#endif

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// `hal node ethercat`: a line of emulated EtherCAT slaves as a process, on a real interface.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+struct EthercatLineOptions : Options {
+    std::string link, backup;
+    std::int64_t for_ns = -1;  ///< -1: not given
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "the devices of the line, one per line: coupler, servo axes=2, digital_in bits=16 …");
+        set.value("--link", link, "ADDRESS", "interface of the first slave, to the master: eth:enp3s0");
+        set.value("--backup", backup, "ADDRESS", "interface of the last slave, to the second port of the master, which closes a ring: eth:enp4s0");
+        set.for_how_long(for_ns, "end after 10s, 2min … (default: until Ctrl-C)");
+    }
+};
+
+/// Serves the line until a signal or the end of --for. Returns the exit code.
+int run_node_ethercat(const EthercatLineOptions&);
+
+}  // namespace hal::tools
