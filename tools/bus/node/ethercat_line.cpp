@@ -154,6 +154,7 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     std::vector<devices::Device> devices;
     if (!read_devices(options, devices)) return 1;
     StopRequest stop;
+    stop.listen();
     const auto primary = open_interface(options, options.link);
     if (!primary) return 1;
     std::unique_ptr<ethernet::Port> secondary;
