@@ -160,7 +160,7 @@ void Core::publish(plan::Plan& plan) noexcept {
     for (plan::Export& to : plan.exports) {
         plan::Channel& channel = *to.channel;
         hal_value* values = channel.buffers[channel.back].get();
-        // the supervisor publishes too, while a function that hung may come back and write its pins
+        // the supervisor publishes too, while a function that hung may continue and write its pins
         for (std::size_t i = 0; i < to.from.size(); ++i) values[i].raw = __atomic_load_n(&to.from[i]->raw, __ATOMIC_RELAXED);
         channel.back = channel.middle.exchange(channel.back | plan::Channel::fresh, std::memory_order_acq_rel) & 3;
     }
