@@ -140,8 +140,8 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
     case Event::too_few_fmmus:
         return "has " + std::to_string(first) + " FMMUs, its process data needs " + std::to_string(second) + "; use fewer sync managers";
     case Event::too_few_sync_managers:
-        return "has " + std::to_string(first) + " sync managers, the configuration needs " + std::to_string(second) +
-               "; correct `outputs.sync-manager` or `inputs.sync-manager` in its section";
+        return "has " + std::to_string(first) + (first == 1 ? " sync manager" : " sync managers") + ", the configuration needs " +
+               std::to_string(second) + "; correct `outputs.sync-manager` or `inputs.sync-manager` in its section, which count from 0";
     case Event::state_refused: return "rejects " + state_words(first) + " with " + al_words(second) + configured_words(second, slave);
     case Event::state_timeout:
         return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) + ": raise its time-out, or power-cycle it";

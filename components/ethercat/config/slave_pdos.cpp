@@ -209,10 +209,28 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
                                         ? "the description has none in this direction" : "the PDOs are: " + listed(names));
             continue;
         }
-        master::Entry e;
-        if (entry(item, sm, e)) entries.push_back(std::move(e));
+        for (const Word& one : range(item)) {
+            master::Entry e;
+            if (!entry(one, sm, e)) break;
+            entries.push_back(std::move(e));
+        }
     }
     if (!entries.empty()) place(line, sm, entries);
+}
+
+std::vector<Word> SlavePdos::range(const Word& item) {
+    const std::size_t dots = item.text.find(".."), colon = item.text.rfind(':', dots), blank = std::min(item.text.find(' '), item.text.size());
+    if (dots > blank || colon == std::string::npos) return {item};
+    const auto first = address(item.text.substr(0, dots)), last = address(item.text.substr(0, colon + 1) + item.text.substr(dots + 2, blank - dots - 2));
+    if (!first || !last || first->sub > last->sub) {
+        in_.keys.report().error(Topic::object, item.at, "invalid range '" + item.text.substr(0, blank) + "'",
+                                "write the first and the last sub-index in hexadecimal, as in 6000:1..10 bit");
+        return {};
+    }
+    std::vector<Word> all;
+    for (unsigned sub = first->sub; sub <= last->sub; ++sub)
+        all.push_back({address_text(first->index, static_cast<std::uint8_t>(sub)) + item.text.substr(blank), item.at});
+    return all;
 }
 
 bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& e) {

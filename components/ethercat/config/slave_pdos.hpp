@@ -28,6 +28,7 @@ public:
 private:
     void direction(bool output);
     void list(const Line&, master::SyncManager&);
+    std::vector<Word> range(const Word&);  ///< `6000:1..10 bit` as single objects; an error: none
     bool entry(const Word&, master::SyncManager&, master::Entry&);
     void place(const Line&, master::SyncManager&, std::vector<master::Entry>&);
     const std::vector<esi::Pdo>& described(bool output) const;

@@ -48,9 +48,11 @@ void Master::receive(std::int64_t now_ns) noexcept {
 
 void Master::transmit(std::int64_t now_ns) noexcept {
     Bus& bus = *bus_;
-    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational,
-        bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
-                        static_cast<std::uint64_t>(now_ns + bus.epoch_ns));
+    // The time of the reference clock as this frame passes it. It is what slaves get that only the backup port reaches: the clock they follow
+    // must not change when a ring breaks.
+    const std::int64_t ahead = bus.setup.lead != ClockLead::thread && bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns;
+    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational, bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
+                        static_cast<std::uint64_t>(now_ns + ahead));
 }
 
 void Master::rescan() noexcept {
@@ -81,6 +83,11 @@ void Master::set_outputs_valid(bool valid) noexcept { bus_->outputs_valid = vali
 const Setup& Master::setup() const noexcept { return bus_->setup; }
 const BusStatus& Master::status() const noexcept { return bus_->status; }
 const DomainStatus& Master::domain(std::size_t n) const noexcept { return bus_->image.domain(n); }
+std::uint64_t Master::cycles_incomplete() const noexcept {
+    std::uint64_t sum = 0;
+    for (std::size_t n = 0; n < bus_->image.domain_count(); ++n) sum += bus_->image.domain(n).incomplete;
+    return sum;
+}
 void Master::reset_domain(std::size_t n) noexcept {
     DomainStatus& d = bus_->image.domain(n);
     d.was_complete = false;

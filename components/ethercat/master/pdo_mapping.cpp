@@ -153,6 +153,10 @@ bool has_fixed_size(Bus& bus, Device& d, const SyncManager& sm) noexcept {
     std::size_t bits = 0;
     for (const Pdo& pdo : sm.pdos)
         for (const Entry& e : pdo.entries) bits += e.bits;
+    if (d.slave.sii_sync_managers != 0 && sm.number >= d.slave.sii_sync_managers) {
+        bus.report(Event::too_few_sync_managers, d, d.slave.sii_sync_managers, sm.number + 1);
+        return false;
+    }
     const std::size_t fixed = sm.number < d.slave.sii_sync_managers ? d.slave.sii[sm.number].length : 0;
     if (fixed == 0 || fixed == (bits + 7) / 8) return true;
     bus.report(Event::fixed_size, d, sm.number << 16 | static_cast<std::int64_t>((bits + 7) / 8), static_cast<std::int64_t>(fixed));

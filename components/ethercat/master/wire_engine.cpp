@@ -46,7 +46,7 @@ int WireEngine::take_index() noexcept {
     for (std::size_t tries = 0; tries < indexes; ++tries) {
         const std::uint8_t index = next_index_++;
         Flight& f = flights_[index];
-        if (f.kind == Flight::Kind::cyclic || f.kind == Flight::Kind::acyclic) continue;
+        if (f.kind != Flight::Kind::none && f.kind != Flight::Kind::expired) continue;
         f = {};
         return index;
     }
@@ -171,6 +171,9 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
         if (!image_.matches(image_.frames()[f.place], bytes)) break;
         if (accept(f, number)) arrived_cyclic(f, bytes);
         return;
+    case Flight::Kind::complete:  // the frame that it would be compared with may have left again
+        if (accept(f, number)) f.kind = Flight::Kind::none, --in_flight_;
+        return;
     case Flight::Kind::acyclic: return arrived_acyclic(f, bytes, number);
     }
     ++status_.foreign;
@@ -205,7 +208,12 @@ void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept
     image_.take(frame, answer);
     const std::uint8_t* time = answer + frame.clock_read + datagram_header_bytes;
     if (get<std::uint16_t>(time + 8) != 0 && !clock_.fresh) clock_ = {true, get<std::uint64_t>(time), f.sent_ns, sent_after_ns_};
-    f.kind = Flight::Kind::none, f.merged = true;
+    f.merged = true;
+    if (f.copies != 0) {
+        f.kind = Flight::Kind::complete;
+        return;
+    }
+    f.kind = Flight::Kind::none;
     --in_flight_;
 }
 
@@ -269,13 +277,16 @@ void WireEngine::expire() noexcept {
     const std::int64_t timeout = std::max(acyclic_timeout_ns, 2 * setup_.cycle_ns);
     for (Flight& f : flights_) {
         if (f.kind == Flight::Kind::cyclic) {
-            if (f.merged && backup_ != nullptr) {  // the other copy is lost
+            if (f.merged && backup_ != nullptr) {  // the other copy is late or lost: this cycle does without it
                 complete_cyclic(f, halves_[f.place].data());
-                ++status_.lost;
             } else if (now_ns_ - f.sent_ns >= setup_.frame_timeout_ns) {
                 f.kind = Flight::Kind::expired, --in_flight_;
                 ++status_.lost;
             }
+        } else if (f.kind == Flight::Kind::complete) {
+            if (now_ns_ - f.sent_ns < setup_.frame_timeout_ns + setup_.cycle_ns) continue;
+            f.kind = Flight::Kind::expired, --in_flight_;
+            ++status_.lost;
         } else if (f.kind == Flight::Kind::acyclic && (f.copies == 0 || now_ns_ - f.sent_ns >= timeout)) {
             if (f.copies != 0) ++status_.lost;
             if (f.merged) {

@@ -67,7 +67,8 @@ private:
         bool free = true;
     };
     struct Flight {
-        enum class Kind : std::uint8_t { none, cyclic, acyclic, expired } kind = Kind::none;
+        /// complete: its data is taken, the second copy may still arrive
+        enum class Kind : std::uint8_t { none, cyclic, complete, acyclic, expired } kind = Kind::none;
         std::uint8_t copies = 0;     ///< that left and have not arrived
         std::uint8_t arrivals = 0;   ///< bit mask of the ports at which one arrived
         bool merged = false;         ///< one copy arrived

@@ -21,6 +21,7 @@ struct BusPins {
           wkc(c, f, "wkc", "working counter of all process data, newest cycle"),
           wkc_expected(c, f, "wkc-expected", "its value when all slaves that are started exchange process data"),
           wkc_state(c, f, "wkc-state", "0 none, 1 part, 2 complete"),
+          incomplete(c, f, "cycles-incomplete", "cycles in which a slave that is started did not exchange its process data"),
           sent(c, f, "frames-sent", "frames sent"),
           lost(c, f, "frames-lost", "frames that did not return in time"),
           foreign(c, f, "frames-foreign", "EtherCAT frames of another master, or damaged ones"),
@@ -30,7 +31,8 @@ struct BusPins {
           ring_broken(c, f, "ring-broken", "with a backup port: the ring is broken; the slaves are reached from both ends") {}
 
     /// [realtime]
-    void show(const master::BusStatus& s) noexcept {
+    void show(const master::BusStatus& s, std::uint64_t cycles_incomplete) noexcept {
+        incomplete = cycles_incomplete;
         state = static_cast<std::uint32_t>(s.state);
         link_up = s.link, all_op = s.operational;
         responding = s.responding, expected = s.expected;
@@ -43,7 +45,7 @@ struct BusPins {
     Out<std::uint32_t> state;
     Out<bool>          link_up, all_op;
     Out<std::uint32_t> responding, expected, wkc, wkc_expected, wkc_state;
-    Out<std::uint64_t> sent, lost, foreign;
+    Out<std::uint64_t> incomplete, sent, lost, foreign;
     Out<bool>          dc_synchronised;
     Out<std::uint32_t> dc_deviation;
     Out<std::int32_t>  phase;

@@ -109,7 +109,7 @@ public:
         if (++unsent_ == tolerated_cycles) raise(no_transmit_words_);
         master_->receive(cycle.start_ns());
         follow(cycle);
-        bus_pins_.show(master_->status());
+        bus_pins_.show(master_->status(), master_->cycles_incomplete());
         for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n));
         entries_.show(areas_);
     }

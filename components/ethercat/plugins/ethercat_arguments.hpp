@@ -24,6 +24,9 @@ struct EthercatArguments {
                              {.per_instance = true}};
     hal::Argument     number{component_, "master", 0, "of a configuration with several masters: which one, from 0", {.per_instance = true, .min = 0, .max = 63}};
 
+    hal::Argument     cycle{component_, "cycle", 0, "cycle time in ns, overrides the configuration; 0: as there",
+                            {.per_instance = true, .min = 0, .max = 1'000'000'000}};
+
     /// Reads the configuration. Reports every problem with its place in the file where the host can show it. Throws hal::ArgumentError, or the
     /// exception that ends the constructor once the problems are reported. [setup]
     config::Bus read() const {
@@ -44,6 +47,10 @@ struct EthercatArguments {
             throw hal::ArgumentError("master", "master=" + std::to_string(wanted) + ": the configuration has " +
                                                    std::to_string(reading.buses.size()) + (reading.buses.size() == 1 ? " master" : " masters"));
         config::Bus bus = std::move(reading.buses[wanted]);
+        const std::int64_t cycle_ns = cycle;
+        if (cycle_ns != 0 && reading.lcec)
+            throw hal::ArgumentError("cycle", "cycle=" + std::to_string(cycle_ns) + ": the cycle of this format is appTimePeriod; change it in the file");
+        if (cycle_ns != 0) bus.setup.cycle_ns = cycle_ns;
         if (!link.get().empty()) bus.link = link.get();
         if (!backup.get().empty()) bus.backup = backup.get();
         return bus;
