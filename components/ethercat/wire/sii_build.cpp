@@ -98,7 +98,8 @@ private:
         const General& g = from_.general;
         begin(static_cast<std::uint16_t>(Category::general));
         const std::uint8_t order = string(g.order);  // the first string, which SOEM shows as the name
-        add(string(g.group)), add(string(g.image)), add(order), add(string(g.name));
+        const std::uint8_t group = string(g.group);
+        add(group), add(string(g.image)), add(order), add(string(g.name));
         add<std::uint8_t>(0);
         add(g.coe_details), add<std::uint8_t>(g.foe), add<std::uint8_t>(g.eoe), add(g.soe_channels), add(g.ds402_channels);
         add<std::uint8_t>(0);
