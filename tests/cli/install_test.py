@@ -18,7 +18,7 @@ BUILD = HAL.parent.parent
 RUNUSER = shutil.which("runuser")
 MACHINES = "share/doc/Halcyon/halfiles"
 # Parts of machines, and those that need the network namespaces which bring-up makes.
-NOT_ALONE = {"ethernet-cnc/clock.hal", "ethernet-cnc/control.hal", "ethernet-cnc/wire.hal", "ethernet-furuta/control.hal",
+NOT_ALONE = {"ethercat-cnc/control.hal", "ethernet-cnc/clock.hal", "ethernet-cnc/control.hal", "ethernet-cnc/wire.hal", "ethernet-furuta/control.hal",
              "ethernet-furuta/rig.hal", "ethernet-furuta/swing-up-wire.hal", "ethernet-furuta/upright.hal", "ethernet-furuta/wire.hal"}
 HIDDEN = f'for folder in "$1" "$2"; do mount -t tmpfs none "$folder" || exit 99; done; user=$3; shift 3; exec {RUNUSER} -u "$user" -- env "HOME=$HOME" "$@"'
 OVERLAY = 'mount -t overlay -o "lowerdir=$1,upperdir=$2/upper,workdir=$2/work" overlay "$1" || exit 99; cd "$1"; shift 2; eval "$@"'
