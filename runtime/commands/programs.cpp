@@ -371,7 +371,7 @@ void command_unloadusr(Context& context) {
     const std::string& name = context.argument(0);
     const auto unload = [&](Programs::Entry& entry) {
         const std::string why = context.programs.unload(*context.transaction, entry);
-        if (!why.empty()) context.diagnostics.error("not-a-program", context.span(0), why, "", "end it as that user, or as root");
+        if (!why.empty()) context.diagnostics.error("not-permitted", context.span(0), why, "", "end it as that user, or as root");
     };
     if (name == "all") {
         for (const auto& each : context.programs.names()) unload(*context.programs.find(each));

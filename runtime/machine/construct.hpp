@@ -37,6 +37,16 @@ bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, Load
 /// Instances of `my_comp` and their pins are named my-comp…
 std::string dashed(std::string component);
 
+/// Why a constructor or start() fails: hal_rejection with its texts copied. Empty while nothing is known against the instance.
+struct Failure {
+    std::string text = {}, name = {}, code = {}, help = {};
+    hal_subject subject = HAL_SUBJECT_INSTANCE;
+    std::uint32_t begin = 0, end = 0;
+    bool empty() const { return text.empty(); }
+};
+/// Throws std::bad_alloc.
+Failure copy_of(const hal_rejection& rejection);
+
 /// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes with the commit. `sources` takes the
 /// texts that components find something wrong in.
 bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
@@ -45,8 +55,8 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
 /// Memory that lives as long as the instance; nullptr: there is none, or the request is senseless.
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept;
 
-/// Starts one instance: it may acquire hardware. Returns the reason of a failure, or an empty string.
-std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);
+/// Starts one instance: it may acquire hardware. Returns why it failed, or an empty Failure.
+Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);
 /// The instance that disciplines the threads (external clock reference), or nullptr.
 const Instance* clock_leader(const Model& model);
 /// [setup] Not while a thread runs its functions.

@@ -108,12 +108,10 @@ void record_failure(const hal_host* host, const char* reason) {
 }
 void record_rejection(const hal_host* host, const hal_rejection* rejection) {
     Construction& c = construction_of(host);
-    const auto text = [](const char* t) { return t ? t : ""; };
     guarded(c, false, [&] {
         if (rejection->size < sizeof *rejection)
             return refuse(c, "unsupported hal_rejection of " + std::to_string(rejection->size) + " bytes; rebuild the component");
-        return refuse(c, Failure{text(rejection->text), text(rejection->name), text(rejection->code), text(rejection->help), rejection->subject,
-                                 rejection->begin, rejection->end});
+        return refuse(c, copy_of(*rejection));
     });
 }
 
@@ -135,6 +133,12 @@ const void* extension_of(const hal_host*, const char* id) {
 }
 
 }  // namespace
+
+Failure copy_of(const hal_rejection& rejection) {
+    const auto text = [](const char* t) { return t ? t : ""; };
+    return {text(rejection.text), text(rejection.name), text(rejection.code), text(rejection.help), rejection.subject, rejection.begin,
+            rejection.end};
+}
 
 bool refuse(Construction& c, std::string why) { return refuse(c, Failure{.text = std::move(why)}); }
 

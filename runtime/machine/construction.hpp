@@ -27,14 +27,6 @@ struct DeclaredFunction {
     bool shared;
 };
 
-/// Why a constructor fails: hal_rejection with its texts copied. Empty while nothing is known against the instance.
-struct Failure {
-    std::string text = {}, name = {}, code = {}, help = {};
-    hal_subject subject = HAL_SUBJECT_INSTANCE;
-    std::uint32_t begin = 0, end = 0;
-    bool empty() const { return text.empty(); }
-};
-
 /// What one constructor declares while it runs.
 struct Construction {
     Model& model;

@@ -24,10 +24,10 @@ bool SessionState::start_replaced(Diagnostics& diagnostics) {
     const auto start = [&](const LoadedComponent& component) {
         for (const auto& instance : component.instances) {
             if (instance->started) continue;
-            if (const std::string why = start_instance(*instance, model, *executor, status); !why.empty())
+            if (const Failure why = start_instance(*instance, model, *executor, status); !why.empty())
                 diagnostics.error("start-failed", instance->loaded,
-                                  "'" + instance->name + "' (" + component.name + ") cannot start in its new version: " + why,
-                                  "loaded here", "the old version goes on");
+                                  "'" + instance->name + "' (" + component.name + ") cannot start in its new version: " + why.text,
+                                  "loaded here", why.help.empty() ? "the old version goes on" : why.help + "; the old version goes on");
         }
         return !diagnostics.failed();
     };
@@ -70,11 +70,11 @@ void SessionState::restart_replaced(Diagnostics& diagnostics) {
         for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) stop_instance(**it);
         for (const auto& instance : one.component->instances) {
             if (instance->started || !one.stopped) continue;
-            const std::string why = start_instance(*instance, model, *executor, status);
+            const Failure why = start_instance(*instance, model, *executor, status);
             if (why.empty()) continue;
             for (LoadedFunction* const function : instance->functions) function->halted = true;
             diagnostics.error("start-failed", instance->loaded,
-                              "'" + instance->name + "' (" + one.component->name + ") cannot start again in its old version: " + why,
+                              "'" + instance->name + "' (" + one.component->name + ") cannot start again in its old version: " + why.text,
                               "loaded here",
                               "its functions do not run; repair the plugin and 'reload " + one.component->name + "', or 'unload " +
                                   one.component->name + "'");

@@ -15,13 +15,23 @@ struct Starting {
     const Model& model;
     Executor& executor;
     const hal_status& status;
-    std::string failure;
+    Failure failure;
 
     bool fail(const char* reason) noexcept {
         try {
-            if (failure.empty()) failure = reason;
+            if (failure.empty()) failure.text = reason;
         } catch (const std::bad_alloc&) {}  // then it gives no reason
         return false;
+    }
+    void reject(const hal_rejection& rejection) noexcept {
+        if (!failure.empty()) return;
+        if (rejection.size < sizeof rejection) {
+            fail("its reason has an unknown format; rebuild the component");
+            return;
+        }
+        try {
+            failure = copy_of(rejection);
+        } catch (const std::bad_alloc&) {}
     }
 };
 
@@ -75,7 +85,7 @@ const Instance* clock_leader(const Model& model) {
     return nullptr;
 }
 
-std::string start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status) {
+Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status) {
     Starting starting{instance, model, executor, status, {}};
     executor.clock().claim = claim_clock;
     const hal_host host{
@@ -101,7 +111,7 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
         },
-        [](const hal_host* h, const hal_rejection* rejection) { static_cast<Starting*>(h->data)->fail(rejection->text ? rejection->text : ""); }};
+        [](const hal_host* h, const hal_rejection* rejection) { static_cast<Starting*>(h->data)->reject(*rejection); }};
     {
         const SetupCall call(instance.name, instance.component->name, "start");
         instance.started = instance.component->plugin->start(instance.memory, &host);
@@ -110,7 +120,8 @@ std::string start_instance(Instance& instance, const Model& model, Executor& exe
     instance.streams.clear();
     instance.path_delays.clear();
     instance.leads_clock = false;
-    return starting.failure.empty() ? "it gave no reason" : starting.failure;
+    if (starting.failure.empty()) starting.failure.text = "it gave no reason";
+    return starting.failure;
 }
 
 void stop_instance(Instance& instance) noexcept {

@@ -132,9 +132,9 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     for (Instance* const instance : edit->added_instances()) {
         if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance)
             continue;  // unloaded again in the same edit
-        if (const std::string why = start_instance(*instance, model, *executor, status); !why.empty())
-            diagnostics.error("start-failed", instance->loaded,
-                              "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why);
+        if (const Failure why = start_instance(*instance, model, *executor, status); !why.empty())
+            diagnostics.error(Code::named(why.code).value_or(Code("start-failed")), instance->loaded,
+                              "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why.text, "", why.help);
     }
     if (diagnostics.failed()) return false;
     touched = true;

@@ -255,6 +255,10 @@ inline constexpr CodePage code_pages[] = {
      "Components inside the runtime are unloaded by unloadrt or unload; `show comp` lists both, programs with the type User."},
     {"not-in-thread",
      "delf removes a function from its thread, but this function is not in the named thread."},
+    {"not-permitted",
+     "Linux lets a process send signals only to processes of its own user. The program registered with the machine as root or belongs to "
+     "another user, so the machine can neither end it nor release its name. It keeps running and keeps its pins.\n\n"
+     "`show comp` lists its process ID. End it as that user or with `sudo kill PID`; the machine then notices the closed connection."},
     {"open-transaction",
      "Edits between `begin` and `commit` are collected and take effect together. A second `begin` before `commit` is invalid, and a "
      "file that ends before its `commit` changes nothing with the collected edits.\n\n"

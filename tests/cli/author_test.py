@@ -103,6 +103,14 @@ class Author(Case):
         said = self.run_program("sim", "mine.hal", environment={"HALCYON_PLUGIN_PATH": str(self.folder / "plugins")}).stderr
         self.assertRegex(said, r"'mine\.0' \(mine\) cannot start: no device here \[start-failed\]")
 
+    def test_a_start_that_names_its_argument_keeps_the_help_of_its_author(self):
+        thrown = 'hal::ArgumentError("device", "device=/dev/mine0: no such device", "connect it, or load it with device=/dev/mine1")'
+        self.assertEqual(0, self.compile(GOOD + f"    void start() {{ throw {thrown}; }}\n").returncode)
+        self.write("mine.hal", "loadrt mine\n")
+        said = self.run_program("sim", "mine.hal", environment={"HALCYON_PLUGIN_PATH": str(self.folder / "plugins")}).stderr
+        self.assertRegex(said, r"'mine\.0' \(mine\) cannot start: device=/dev/mine0: no such device \[start-failed\]")
+        self.assertIn("help: connect it, or load it with device=/dev/mine1\n", said)
+
     def test_pins_of_all_functions_are_mentioned_to_the_author(self):
         done = self.compile(GOOD + '    hal::Function slow{*this, "slow", &Mine::step, "the same"};\n')
         self.assertEqual(0, done.returncode, done.stderr)

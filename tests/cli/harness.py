@@ -93,7 +93,7 @@ class Case(unittest.TestCase):
     def start(self, *words, name="hal", instance="default", loaded=True, **how):
         """Starts `hal run …` in the background and waits until its files are loaded and its threads run."""
         machine = subprocess.Popen([name, *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
-                                   stdin=how.get("stdin", subprocess.DEVNULL), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                   stdin=how.pop("stdin", subprocess.DEVNULL), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
         self.addCleanup(self.end, machine)
         if loaded:
             def ready():

@@ -106,6 +106,20 @@ class Names(LifeCase):
             wait_until(lambda: self.value("adder.in1") == str(turn), "the new program's value arrives")
             self.assertEqual(["uc", "sum2", "threads"], self.say("list", "comp").split())
 
+    @unittest.skipIf(os.geteuid() != 0, "starting programs of two users needs root")
+    def test_a_program_of_another_user_is_neither_ended_nor_forgotten(self):
+        os.chown(self.folder, 65534, 65534)
+        self.start("run", "--no-picture", self.write("machine.hal", SERVO + "start\n"), user=65534, group=65534, extra_groups=[])
+        program = self.background(*self.slow("uc"))
+        wait_until(lambda: self.state("uc") == "ready", "the program is ready")
+        for command in (("unloadusr", "uc"), ("unload", "uc"), ("unload", "all")):
+            said = self.refused(*command)
+            self.assertIn(f"'uc' (process {program.pid}) belongs to another user and cannot be ended from here [not-permitted]\n", said)
+            self.assertIn("help: end it as that user, or as root\n", said)
+        self.assertEqual(("ready", "1"), (self.state("uc"), self.value("uc.out")))
+        program.kill()
+        wait_until(lambda: "ready" not in self.state("uc"), "the machine notices its end")
+
     def test_it_is_restarted_under_load(self):
         self.machine()
         self.say("loadusr", "-Wn", "uc", *self.slow("uc"))

@@ -24,7 +24,7 @@ public:
     }
 
 private:
-    void say(Severity severity, Topic topic, const Span& at, std::string sentence, std::string help = "") {
+    void report(Severity severity, Topic topic, const Span& at, std::string sentence, std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
 
@@ -45,7 +45,7 @@ private:
         for (unsigned sub = 1; sub <= *mapped; ++sub) {
             const Entry* entry = object.find(static_cast<std::uint8_t>(sub));
             if (entry == nullptr) {
-                say(Severity::warning, Topic::object, object.at,
+                report(Severity::warning, Topic::object, object.at,
                     label(object.index) + " maps " + std::to_string(*mapped) + " objects, but sub-index " + hex(sub, 1).substr(2) +
                         " is not described");
                 break;
@@ -55,10 +55,10 @@ private:
             sum += one(object, *entry, static_cast<std::uint32_t>(*bits), receive);
         }
         if (sum > most_pdo_bits)
-            say(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
+            report(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
                 "that exceeds every frame");
         else if (sum > 64)
-            say(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
+            report(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
                 "a classic CAN frame carries 64, only CAN FD carries more");
     }
 
@@ -69,7 +69,7 @@ private:
         const unsigned    bits = word & 0xFF;
         const std::string here = label(object.index, entry.sub) + " maps " + (sub == 0 ? label(index) : label(index, sub));
         const auto        warn = [&](std::string sentence, std::string help = "") {
-            say(Severity::warning, Topic::object, entry.at, here + std::move(sentence), std::move(help));
+            report(Severity::warning, Topic::object, entry.at, here + std::move(sentence), std::move(help));
         };
         if (index < 0x20) {  // a dummy
             const DataType* type = data_type(index);
@@ -89,7 +89,7 @@ private:
         if (type != nullptr && type->bits != 0 && type->bits != bits)
             warn(" with " + std::to_string(bits) + " bits; it has " + std::to_string(type->bits),
                  "write " + hex((word & ~0xFFu) | type->bits, 8));
-        if (!target->pdo_mapping) say(Severity::note, Topic::object, entry.at, here + ", which has no PDOMapping=1");
+        if (!target->pdo_mapping) report(Severity::note, Topic::object, entry.at, here + ", which has no PDOMapping=1");
         if (receive ? !target->writable() : !target->readable())
             warn(receive ? ", which is not writable" : ", which is not readable",
                  "its AccessType is " + std::string(name_of(target->access)));
@@ -101,7 +101,7 @@ private:
             std::count_if(d_.objects.begin(), d_.objects.end(), [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
         if (said == static_cast<unsigned>(there) || d_.objects.empty()) return;
         if (said == 0 && d_.file.eds_version.empty()) return;  // a DCF made by hand
-        say(Severity::note, Topic::count, at,
+        report(Severity::note, Topic::count, at,
             "'" + std::string(key) + "' is " + std::to_string(said) + ", but " + std::to_string(there) + " are described",
             "write " + std::string(key) + "=" + std::to_string(there) + " in [DeviceInfo]");
     }

@@ -77,7 +77,7 @@ void Keys::cut_comment(IniKey& key) {
         Span at = key.value_at;
         at.offset += static_cast<std::uint32_t>(i), at.length -= static_cast<std::uint32_t>(i), at.column += static_cast<std::uint32_t>(i);
         const std::string value(trimmed(std::string_view(key.value).substr(0, i)));
-        say(Severity::note, Topic::syntax, at, "comment after the value of '" + key.name + "' ignored",
+        report(Severity::note, Topic::syntax, at, "comment after the value of '" + key.name + "' ignored",
             "write comments on lines of their own, with ';'");
         key.value = value;
         key.value_at.length = static_cast<std::uint32_t>(value.size());
@@ -108,19 +108,19 @@ std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::
     if (!number || number->node_id) {
         // 0007 as in a section's name, 1A00 without 0x
         const bool bare_hex = !key.value.empty() && key.value.size() <= 8 && std::all_of(key.value.begin(), key.value.end(), is_hex);
-        say(Severity::warning, Topic::value, key.value_at, in + " is not a number: '" + key.value.substr(0, 60) + "'",
+        report(Severity::warning, Topic::value, key.value_at, in + " is not a number: '" + key.value.substr(0, 60) + "'",
             bare_hex ? "write 0x" + key.value : "write it as in 12 or 0x0C");
         return {};
     }
     if (number->spelling == Spelling::octal)
-        say(Severity::warning, Topic::value, key.value_at,
+        report(Severity::warning, Topic::value, key.value_at,
             in + " begins with 0 and is read as octal: " + std::to_string(number->magnitude),
             "write " + hex(number->magnitude, 1) + ", or remove the 0");
     if (number->spelling == Spelling::decimal_with_zero)
-        say(Severity::warning, Topic::value, key.value_at,
+        report(Severity::warning, Topic::value, key.value_at,
             in + " begins with 0 but is not octal; read as decimal " + std::to_string(number->magnitude), "remove the 0");
     if ((number->negative && number->magnitude != 0) || number->magnitude > most) {
-        say(Severity::warning, Topic::value, key.value_at, in + " is out of range: '" + key.value + "'",
+        report(Severity::warning, Topic::value, key.value_at, in + " is out of range: '" + key.value + "'",
             "the range is 0.." + std::to_string(most));
         return {};
     }
@@ -146,12 +146,12 @@ bool Keys::flag(IniSection& section, std::string_view key, bool otherwise) {
     for (const std::string_view word : {"true", "yes", "y", "no", "false", "n"}) {
         if (!same_word(found->value, word)) continue;
         const bool yes = word[0] == 't' || word[0] == 'y';
-        say(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value + "'",
+        report(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value + "'",
             yes ? "write 1" : "write 0");
         return yes;
     }
     const bool yes = number && number->magnitude != 0;
-    say(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value.substr(0, 60) + "'",
+    report(Severity::warning, Topic::value, found->value_at, "'" + found->name + "' is 0 or 1, not '" + found->value.substr(0, 60) + "'",
         yes         ? "read as 1"
         : otherwise ? "read as 1, the default"
                     : "read as 0");
@@ -166,14 +166,14 @@ std::map<unsigned, IniKey*> Keys::list(IniSection& section, const char* count_ke
         if (!number || number->magnitude > 0xFFFF) continue;
         const auto [at, fresh] = out.emplace(static_cast<unsigned>(number->magnitude), &key);
         if (!fresh)
-            say(Severity::warning, Topic::count, key.at, "duplicate number " + key.name + " in [" + section.name + "]",
+            report(Severity::warning, Topic::count, key.at, "duplicate number " + key.name + " in [" + section.name + "]",
                 "the first one is used");
         key.used = true;
     }
     if (count_key == nullptr) return out;
     IniKey* count = section.find(count_key);
     if (count == nullptr) {
-        say(Severity::warning, Topic::missing, section.at, "'" + std::string(count_key) + "' is missing in [" + section.name + "]",
+        report(Severity::warning, Topic::missing, section.at, "'" + std::string(count_key) + "' is missing in [" + section.name + "]",
             "write " + std::string(count_key) + "=" + std::to_string(out.size()));
         return out;
     }
@@ -185,7 +185,7 @@ std::map<unsigned, IniKey*> Keys::list(IniSection& section, const char* count_ke
         said = *number;
     }
     if (count->value.empty() || said != out.size())
-        say(Severity::warning, Topic::count, count->value_at,
+        report(Severity::warning, Topic::count, count->value_at,
             "'" + count->name + "' of [" + section.name + "] is " + (count->value.empty() ? "empty" : std::to_string(said)) +
                 ", the section lists " + std::to_string(out.size()),
             "write " + count->name + "=" + std::to_string(out.size()));
@@ -203,7 +203,7 @@ Extras Keys::rest(IniSection& section, std::initializer_list<std::string_view> k
         if (key.used) continue;
         key.used = true;
         if (const auto close = similar(key.name, missing, 1); !close.empty())
-            say(Severity::warning, Topic::missing, key.at, "unknown key '" + key.name + "' in [" + section.name + "]",
+            report(Severity::warning, Topic::missing, key.at, "unknown key '" + key.name + "' in [" + section.name + "]",
                 "did you mean '" + close[0] + "'? The key was kept unchanged");
         out.emplace_back(key.name, key.value);
     }

@@ -22,10 +22,10 @@ void read_comments(Keys& keys, IniSection* section, std::vector<std::string>& ou
     IniKey*    counter = section->find("Lines");
     const auto count = keys.number(*section, "Lines", 0xFFFF);
     if (counter == nullptr)
-        keys.say(Severity::note, Topic::missing, section->at, "missing 'Lines' in [" + section->name + "]",
+        keys.report(Severity::note, Topic::missing, section->at, "missing 'Lines' in [" + section->name + "]",
                   "write Lines=" + std::to_string(lines.size()));
     else if (count && *count != lines.size())
-        keys.say(Severity::note, Topic::count, counter->value_at,
+        keys.report(Severity::note, Topic::count, counter->value_at,
                   "'Lines' of [" + section->name + "] is " + std::to_string(*count) + ", there are " + std::to_string(lines.size()),
                   "write Lines=" + std::to_string(lines.size()));
     unsigned next = 1;
@@ -56,7 +56,7 @@ Module module(Ini& ini, Keys& keys, unsigned n, std::vector<OtherSection>& other
         for (const auto& [number, key] : keys.list(*fixed, "NrOfEntries")) {
             const auto index = keys.parse(*fixed, *key, 0xFFFF);
             if (index && std::none_of(out.fixed.begin(), out.fixed.end(), [&](const Object& o) { return o.index == *index; }))
-                keys.say(Severity::warning, Topic::missing, key->value_at,
+                keys.report(Severity::warning, Topic::missing, key->value_at,
                           "object " + label(static_cast<std::uint16_t>(*index)) + " of module " + std::to_string(n) +
                               " is listed but not described");
         }
@@ -69,7 +69,7 @@ Module module(Ini& ini, Keys& keys, unsigned n, std::vector<OtherSection>& other
             if (!index) continue;
             IniSection* section = ini.find(extension + label(static_cast<std::uint16_t>(*index)));
             if (section == nullptr) {
-                keys.say(Severity::warning, Topic::missing, key->value_at,
+                keys.report(Severity::warning, Topic::missing, key->value_at,
                           "missing section [" + extension + label(static_cast<std::uint16_t>(*index)) + "]");
                 continue;
             }
@@ -98,7 +98,7 @@ void read_modules(Ini& ini, Keys& keys, DeviceDescription& out) {
         for (unsigned n = 1; n <= count; ++n) {
             if (ini.find("M" + std::to_string(n) + "ModuleInfo") != nullptr) numbers.insert(n);
             else if (n <= 1000)
-                keys.say(Severity::warning, Topic::missing, supported->at,
+                keys.report(Severity::warning, Topic::missing, supported->at,
                           "module " + std::to_string(n) + " is counted but not described",
                           "missing section [M" + std::to_string(n) + "ModuleInfo]");
         }
@@ -110,7 +110,7 @@ void read_modules(Ini& ini, Keys& keys, DeviceDescription& out) {
         const auto [rest, error] = std::from_chars(begin, end, n);
         if (error == std::errc() && same_word(std::string_view(rest, static_cast<std::size_t>(end - rest)), "ModuleInfo") &&
             numbers.insert(n).second)
-            keys.say(Severity::warning, Topic::count, section.at,
+            keys.report(Severity::warning, Topic::count, section.at,
                       "module " + std::to_string(n) + " is described but not counted in [SupportedModules]");
     }
     for (const unsigned n : numbers) out.modules.push_back(module(ini, keys, n, out.others));
@@ -119,7 +119,7 @@ void read_modules(Ini& ini, Keys& keys, DeviceDescription& out) {
             const auto n = keys.parse(*connected, *key, 0xFFFF);
             if (!n) continue;
             if (numbers.count(static_cast<unsigned>(*n)) == 0)
-                keys.say(Severity::warning, Topic::missing, key->value_at,
+                keys.report(Severity::warning, Topic::missing, key->value_at,
                           "slot " + std::to_string(slot) + " holds module " + std::to_string(*n) + ", which is not described");
             out.connected_modules.push_back(static_cast<unsigned>(*n));
         }

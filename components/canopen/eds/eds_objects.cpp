@@ -22,16 +22,16 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
     out.at = section.at;
     out.name = keys_.text(section, "ParameterName");
     if (out.name.empty())
-        keys_.say(Severity::warning, Topic::missing, section.at,
+        keys_.report(Severity::warning, Topic::missing, section.at,
                   "'ParameterName' of " + what + " is " + (section.find("ParameterName") != nullptr ? "empty" : "missing"),
                   "give the object a name");
     if (out.name.size() > longest_name)
-        keys_.say(Severity::note, Topic::value, section.find("ParameterName")->value_at,
+        keys_.report(Severity::note, Topic::value, section.find("ParameterName")->value_at,
                   "the name of " + what + " has " + std::to_string(out.name.size()) + " characters", "the limit is 241");
     bool given = false;
     out.type = object_type(section, what, given);
     if (is_sub && (out.type == ObjectType::array || out.type == ObjectType::record || out.type == ObjectType::defstruct)) {
-        keys_.say(Severity::warning, Topic::object, section.find("ObjectType")->value_at,
+        keys_.report(Severity::warning, Topic::object, section.find("ObjectType")->value_at,
                   what + " is a sub-index and cannot be of type " + std::string(name_of(out.type)),
                   "read as VAR; write ObjectType=0x7");
         out.type = ObjectType::var;
@@ -40,7 +40,7 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
     out.data_type = type_of(section, what, is_value);
     if (out.data_type == 0 && out.type == ObjectType::domain) out.data_type = 0x0F;
     if (const DataType* type = data_type(out.data_type); is_value && type != nullptr && type->kind == Kind::structure)
-        keys_.say(Severity::warning, Topic::object, section.find("DataType")->value_at,
+        keys_.report(Severity::warning, Topic::object, section.find("DataType")->value_at,
                   "data type " + hex(out.data_type) + " of " + what + " is a record, but a single value is required", "");
     out.access = access_of(section, what, is_value);
     out.pdo_mapping = keys_.flag(section, "PDOMapping");
@@ -54,13 +54,13 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
     out.flags = static_cast<std::uint32_t>(keys_.number(section, "ObjFlags", 0xFFFFFFFF).value_or(0));
     if (is_sub) {
         if (keys_.number(section, "SubNumber", 0xFF).value_or(0) != 0)
-            keys_.say(Severity::note, Topic::object, section.find("SubNumber")->at,
+            keys_.report(Severity::note, Topic::object, section.find("SubNumber")->at,
                       "'SubNumber' of " + what + " ignored: a sub-index has no sub-indices", "");
         out.extras = keys_.rest(section, known_keys);
     }
     const auto low = comparable(out.low_limit, out.data_type, 1), high = comparable(out.high_limit, out.data_type, 1);
     if (low && high && *low > *high) {
-        keys_.say(Severity::warning, Topic::value, section.find("LowLimit")->value_at,
+        keys_.report(Severity::warning, Topic::value, section.find("LowLimit")->value_at,
                   "empty range of " + what + ": " + out.low_limit + ".." + out.high_limit,
                   "are LowLimit and HighLimit exchanged?");
     } else {
@@ -68,7 +68,7 @@ Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_
              {std::pair<const char*, const std::string*>{"DefaultValue", &out.default_value}, {"ParameterValue", &out.parameter_value}}) {
             const auto number = comparable(*text, out.data_type, 1);
             if (number && ((low && *number < *low) || (high && *number > *high)))
-                keys_.say(Severity::warning, Topic::value, section.find(key)->value_at,
+                keys_.report(Severity::warning, Topic::value, section.find(key)->value_at,
                           "'" + std::string(key) + "' of " + what + " is out of range: " + *text,
                           "the range is " + (low ? out.low_limit : "any") + ".." + (high ? out.high_limit : "any"));
         }
@@ -82,7 +82,7 @@ void ObjectReader::spread(Object& out, IniSection* list, std::string Entry::* fi
     for (const auto& [number, key] : keys_.list(*list, "NrOfEntries")) {
         Entry* entry = number <= 0xFF ? out.find(static_cast<std::uint8_t>(number)) : nullptr;
         if (entry == nullptr) {
-            keys_.say(Severity::warning, Topic::count, key->at,
+            keys_.report(Severity::warning, Topic::count, key->at,
                       "[" + list->name + "] has a " + what + " for sub-index " + key->name + ", which object " + label(out.index) +
                           " does not have",
                       "sub-indices in this section are decimal");
@@ -94,7 +94,7 @@ void ObjectReader::spread(Object& out, IniSection* list, std::string Entry::* fi
         const Encoded   encoded = encode(key->value, entry->data_type, 1);
         const DataType* type = data_type(entry->data_type);
         if (!encoded && type != nullptr && type->kind < Kind::text)
-            keys_.say(Severity::warning, Topic::value, key->value_at,
+            keys_.report(Severity::warning, Topic::value, key->value_at,
                       "value of sub-index " + key->name + " of " + label(out.index) + ": " + encoded.error, "");
     }
     if (IniKey* count = list->find("NrOfEntries")) count->used = true;
@@ -128,33 +128,33 @@ void ObjectReader::check_entries(const Object& out, IniSection& section) {
     IniKey*           key = section.find("SubNumber");
     if (out.compact != 0) return;
     if (count == 0) {
-        keys_.say(Severity::warning, Topic::count, section.at,
+        keys_.report(Severity::warning, Topic::count, section.at,
                   "object " + label(out.index) + " is of type " + std::string(name_of(out.type)) + " but has no sub-indices",
                   "describe them in sections [" + label(out.index) + "sub0] and so on, or with CompactSubObj");
         return;
     }
     if (key == nullptr || key->value.empty()) {
-        keys_.say(Severity::warning, Topic::missing, section.at,
+        keys_.report(Severity::warning, Topic::missing, section.at,
                   "'SubNumber' of " + label(out.index) + " is " + (key != nullptr ? "empty" : "missing"),
                   "the file describes " + std::to_string(count) + " sub-indices; write SubNumber=" + hex(count, 1));
     } else if (const auto said = parse_number(key->value); said && said->magnitude != count) {
-        keys_.say(Severity::warning, Topic::count, key->value_at,
+        keys_.report(Severity::warning, Topic::count, key->value_at,
                   "'SubNumber' of " + label(out.index) + " is " + std::to_string(said->magnitude) + ", the file describes " +
                       std::to_string(count),
                   "sub-index 0 counts as well: write SubNumber=" + hex(count, 1));
     }
     if (out.entries.front().sub != 0) {
-        keys_.say(Severity::warning, Topic::missing, section.at, "missing sub-index 0 of " + label(out.index),
+        keys_.report(Severity::warning, Topic::missing, section.at, "missing sub-index 0 of " + label(out.index),
                   "it holds the highest sub-index of an ARRAY or RECORD");
         return;
     }
     const Entry& first = out.entries.front();
     if (first.data_type != 0x05 && first.data_type != 0)
-        keys_.say(Severity::note, Topic::object, first.at, "sub-index 0 of " + label(out.index) + " is not of type UNSIGNED8", "");
+        keys_.report(Severity::note, Topic::object, first.at, "sub-index 0 of " + label(out.index) + " is not of type UNSIGNED8", "");
     if (first.writable() || out.index == 0x1003) return;
     const Encoded highest = encode(first.default_value, 0x05, 1);
     if (highest && !highest.bytes.empty() && highest.bytes[0] != out.entries.back().sub)
-        keys_.say(Severity::note, Topic::count, first.at,
+        keys_.report(Severity::note, Topic::count, first.at,
                   "highest sub-index of " + label(out.index) + " is " + std::to_string(highest.bytes[0]) +
                       " by sub-index 0, but the file describes " + std::to_string(out.entries.back().sub),
                   "");
@@ -167,7 +167,7 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
     if (draft.object == nullptr) {
         out.type = ObjectType::record;
         out.at = !draft.subs.empty() ? draft.subs.begin()->second->at : Span{};
-        keys_.say(Severity::warning, Topic::missing, out.at, "missing section [" + prefix_ + what + "]: only its sub-indices are described",
+        keys_.report(Severity::warning, Topic::missing, out.at, "missing section [" + prefix_ + what + "]: only its sub-indices are described",
                   "read as RECORD");
     } else {
         IniSection& section = *draft.object;
@@ -189,7 +189,7 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
             out.name = keys_.text(section, "ParameterName");
             out.data_type = out.entries.back().data_type;
             if (!draft.subs.empty())
-                keys_.say(Severity::note, Topic::object, section.at,
+                keys_.report(Severity::note, Topic::object, section.at,
                           "object " + what + " has CompactSubObj and sections for some sub-indices", "the sections take precedence");
         } else if (written == ObjectType::var && said == 0) {
             Entry only = entry(section, what, false);
@@ -202,7 +202,7 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
                 check_entries(out, section);
             } else {
                 if (const auto subs = keys_.number(section, "SubNumber", 0xFF); subs && *subs > 1)
-                    keys_.say(Severity::warning, Topic::count, section.find("SubNumber")->value_at,
+                    keys_.report(Severity::warning, Topic::count, section.find("SubNumber")->value_at,
                               "'SubNumber' of " + what + " is " + std::to_string(*subs) + ", but it is a " +
                                   std::string(name_of(only.type)) + " without sub-indices",
                               "delete SubNumber, or write ObjectType=0x9 and the sub-indices");
@@ -216,11 +216,11 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
         } else {
             out.name = keys_.text(section, "ParameterName");
             if (out.name.empty())
-                keys_.say(Severity::warning, Topic::missing, section.at, "'ParameterName' of " + what + " is missing or empty",
+                keys_.report(Severity::warning, Topic::missing, section.at, "'ParameterName' of " + what + " is missing or empty",
                           "give the object a name");
             out.type = object_type(section, what, given);
             if (out.single()) {
-                keys_.say(Severity::warning, Topic::object, given ? section.find("ObjectType")->value_at : section.at,
+                keys_.report(Severity::warning, Topic::object, given ? section.find("ObjectType")->value_at : section.at,
                           "object " + what + " is a " + std::string(name_of(out.type)) + ", but the file describes sub-indices",
                           "read as RECORD; write ObjectType=0x9");
                 out.type = ObjectType::record;
@@ -268,10 +268,10 @@ std::vector<Object> ObjectReader::read() {
         using What = SectionName::What;
         if (means.what == What::other) continue;
         if (means.odd)
-            keys_.say(Severity::warning, Topic::syntax, section.at, "misspelt object section [" + section.name + "]",
+            keys_.report(Severity::warning, Topic::syntax, section.at, "misspelt object section [" + section.name + "]",
                       "write [" + prefix_ + (means.what == What::sub ? label(means.index, means.sub) : label(means.index)) + "]");
         if (means.what == What::sub && means.sub > 0xFF) {
-            keys_.say(Severity::warning, Topic::object, section.at, "invalid sub-index " + hex(means.sub, 1),
+            keys_.report(Severity::warning, Topic::object, section.at, "invalid sub-index " + hex(means.sub, 1),
                       "the range is 0..FF; the section was kept unchanged");
             continue;
         }
@@ -286,7 +286,7 @@ std::vector<Object> ObjectReader::read() {
         default: place = &draft.subs[means.sub];
         }
         if (*place != nullptr) {
-            keys_.say(Severity::warning, Topic::syntax, section.at,
+            keys_.report(Severity::warning, Topic::syntax, section.at,
                       "duplicate section [" + section.name + "]: line " + std::to_string((*place)->at.line) + " describes the same",
                       "the first one is used, this one was kept unchanged");
             continue;
@@ -298,7 +298,7 @@ std::vector<Object> ObjectReader::read() {
         if (draft.object == nullptr && draft.subs.empty()) {
             for (IniSection* section : {draft.names, draft.values, draft.denotations, draft.links})
                 if (section != nullptr)
-                    keys_.say(Severity::warning, Topic::missing, section->at,
+                    keys_.report(Severity::warning, Topic::missing, section->at,
                               "[" + section->name + "] belongs to an object that is not described",
                               "missing section [" + prefix_ + label(index) + "]; this one was kept unchanged");
             continue;

@@ -34,7 +34,7 @@ public:
 
 private:
     void missing(const char* section, Severity severity) {
-        keys_.say(severity, Topic::missing, {1, 1, 0, 0}, "missing section [" + std::string(section) + "]");
+        keys_.report(severity, Topic::missing, {1, 1, 0, 0}, "missing section [" + std::string(section) + "]");
     }
 
     void date(IniSection& section, const char* key, std::string& out) {
@@ -49,7 +49,7 @@ private:
         };
         const bool shape = out.size() == 10 && out[2] == '-' && out[5] == '-';
         if (shape && number(0, 2) >= 1 && number(0, 2) <= 12 && number(3, 2) >= 1 && number(3, 2) <= 31 && number(6, 4) >= 0) return;
-        keys_.say(Severity::note, Topic::value, at->value_at, "invalid date '" + out.substr(0, 40) + "'",
+        keys_.report(Severity::note, Topic::value, at->value_at, "invalid date '" + out.substr(0, 40) + "'",
                   "write it as mm-dd-yyyy");
     }
 
@@ -79,7 +79,7 @@ private:
         if (key == nullptr || key->value.empty() || parse_number(key->value)) return keys_.number(section, name, 0xFF).value_or(0);
         unsigned value = 0;
         const auto [end, error] = std::from_chars(key->value.data(), key->value.data() + key->value.size(), value);
-        keys_.say(Severity::note, Topic::value, key->value_at,
+        keys_.report(Severity::note, Topic::value, key->value_at,
                   "'" + key->name + "' is a number of 0..255, not '" + key->value.substr(0, 40) + "'",
                   error == std::errc() && value <= 0xFF ? "read as " + std::to_string(value) : "read as 0");
         return error == std::errc() && value <= 0xFF ? value : 0;
@@ -107,13 +107,13 @@ private:
             d.supports[i] = keys_.flag(*section, key);
         }
         if (!any)
-            keys_.say(Severity::note, Topic::missing, section->at, "no bit rate in [DeviceInfo]",
+            keys_.report(Severity::note, Topic::missing, section->at, "no bit rate in [DeviceInfo]",
                       "write BaudRate_1000=1 for a device that supports 1 Mbit/s");
         d.boot_up_master = keys_.flag(*section, "SimpleBootUpMaster");
         d.boot_up_slave = keys_.flag(*section, "SimpleBootUpSlave");
         d.granularity = static_cast<std::uint8_t>(keys_.number(*section, "Granularity", 0xFF).value_or(0));
         if (d.granularity > 64)
-            keys_.say(Severity::note, Topic::value, section->find("Granularity")->value_at,
+            keys_.report(Severity::note, Topic::value, section->find("Granularity")->value_at,
                       "invalid granularity of " + std::to_string(d.granularity) + " bits", "the range is 0..64");
         d.dynamic_channels = keys_.number(*section, "DynamicChannelsSupported", 0xFFFF).value_or(0) != 0;
         d.group_messaging = keys_.flag(*section, "GroupMessaging");
@@ -140,7 +140,7 @@ private:
         c.node_id = static_cast<std::uint8_t>(id.value_or(0));
         if (!id || *id < 1 || *id > 127) {
             IniKey* key = section->find("NodeID");
-            keys_.say(Severity::warning, key == nullptr ? Topic::missing : Topic::value, key == nullptr ? section->at : key->value_at,
+            keys_.report(Severity::warning, key == nullptr ? Topic::missing : Topic::value, key == nullptr ? section->at : key->value_at,
                       key == nullptr ? "missing 'NodeID' in [" + section->name + "]" : "invalid node ID '" + key->value + "'",
                       "the range is 1..127");
             c.node_id = 0;
@@ -149,7 +149,7 @@ private:
         c.node_reference = keys_.text(*section, "NodeRefd");
         c.baud_rate = static_cast<std::uint16_t>(keys_.number(*section, "Baudrate", 0xFFFF).value_or(0));
         if (c.baud_rate != 0 && std::find(baud_rates.begin(), baud_rates.end(), c.baud_rate) == baud_rates.end())
-            keys_.say(Severity::warning, Topic::value, section->find("Baudrate")->value_at,
+            keys_.report(Severity::warning, Topic::value, section->find("Baudrate")->value_at,
                       std::to_string(c.baud_rate) + " kbit/s is not a bit rate of CiA 301", "the rates are 10, 20, 50, 125, 250, 500, 800 and 1000");
         c.network = static_cast<std::uint32_t>(keys_.number(*section, "NetNumber", 0xFFFFFFFF).value_or(0));
         c.network_name = keys_.text(*section, "NetworkName");
@@ -198,14 +198,14 @@ private:
                 if (!index) continue;
                 const auto [at, fresh] = listed.emplace(static_cast<unsigned>(*index), key);
                 if (!fresh) {
-                    keys_.say(Severity::warning, Topic::count, key->value_at,
+                    keys_.report(Severity::warning, Topic::count, key->value_at,
                               "object " + label(static_cast<std::uint16_t>(*index)) + " is listed twice",
                               "first in line " + std::to_string(at->second->at.line));
                     continue;
                 }
                 Object* object = out_.find(static_cast<std::uint16_t>(*index));
                 if (object == nullptr) {
-                    keys_.say(Severity::warning, Topic::missing, key->value_at,
+                    keys_.report(Severity::warning, Topic::missing, key->value_at,
                               "object " + label(static_cast<std::uint16_t>(*index)) + " is listed but not described",
                               "missing section [" + label(static_cast<std::uint16_t>(*index)) + "]");
                     continue;
@@ -213,7 +213,7 @@ private:
                 object->category = list.category;
                 const Category usual = category_of(object->index);
                 if (usual != list.category && (usual == Category::manufacturer || list.category == Category::manufacturer))
-                    keys_.say(
+                    keys_.report(
                         Severity::note, Topic::count, key->value_at,
                         "object " + label(object->index) + " does not belong in [" + section->name + "]",
                         "manufacturer-specific objects are 2000..5FFF");
@@ -224,12 +224,12 @@ private:
             if (listed.count(object.index) != 0) continue;
             object.category = category_of(object.index);
             if (any && object.index >= 0x1000)
-                keys_.say(Severity::warning, Topic::count, object.at, "object " + label(object.index) + " is described but not listed",
+                keys_.report(Severity::warning, Topic::count, object.at, "object " + label(object.index) + " is described but not listed",
                           "it was read all the same; add it to [" + std::string(list_of(object.category)) + "]");
         }
         for (const std::uint16_t index : {std::uint16_t{0x1000}, std::uint16_t{0x1001}, std::uint16_t{0x1018}})
             if (out_.find(index) == nullptr && any)
-                keys_.say(Severity::warning, Topic::missing, {1, 1, 0, 0}, "missing mandatory object " + label(index));
+                keys_.report(Severity::warning, Topic::missing, {1, 1, 0, 0}, "missing mandatory object " + label(index));
     }
 
     static Category category_of(std::uint16_t index) {
@@ -249,7 +249,7 @@ private:
         for (unsigned n = 1; n <= count; ++n) {
             const std::string i = std::to_string(n);
             if (section->find("Type" + i) == nullptr && section->find("Range" + i) == nullptr) {
-                keys_.say(Severity::warning, Topic::count, section->at,
+                keys_.report(Severity::warning, Topic::count, section->at,
                           "segment " + i + " of [DynamicChannels] is counted and not described");
                 continue;
             }

@@ -32,7 +32,7 @@ class Keys {
 public:
     explicit Keys(std::vector<Message>& messages) : messages_(messages) {}
 
-    void say(Severity severity, Topic topic, Span at, std::string sentence, std::string help = "") {
+    void report(Severity severity, Topic topic, Span at, std::string sentence, std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
     /// Returns the value as written; empty if the key is missing.

@@ -102,11 +102,11 @@ std::string to_string(const Message& message) {
 }
 
 bool decode(std::string_view bytes, std::string& text, std::vector<Message>& messages) {
-    const auto say = [&](Severity severity, Topic topic, std::uint32_t line, std::string sentence, std::string help) {
+    const auto report = [&](Severity severity, Topic topic, std::uint32_t line, std::string sentence, std::string help) {
         messages.push_back({severity, topic, {line, 1, 0, 0}, std::move(sentence), std::move(help)});
     };
     const auto refuse = [&](std::string sentence, std::string help) {
-        say(Severity::error, Topic::unreadable, 0, std::move(sentence), std::move(help));
+        report(Severity::error, Topic::unreadable, 0, std::move(sentence), std::move(help));
         return false;
     };
     text.clear();
@@ -118,17 +118,17 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
     if (starts("\xFF\xFE") || starts("\xFE\xFF")) {
         bool whole = true;
         plain = from_utf16(bytes.substr(2), starts("\xFE\xFF"), whole);
-        say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text", "save it as ASCII: most tools read nothing else");
-        if (!whole) say(Severity::warning, Topic::syntax, 1, "truncated UTF-16 characters", "");
+        report(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text", "save it as ASCII: most tools read nothing else");
+        if (!whole) report(Severity::warning, Topic::syntax, 1, "truncated UTF-16 characters", "");
     } else if (bytes.size() >= 4 && bytes[1] == 0 && bytes[3] == 0 && bytes[0] != 0) {
         bool whole = true;
         plain = from_utf16(bytes, false, whole);
-        say(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text without a byte order mark",
+        report(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text without a byte order mark",
             "save it as ASCII: most tools read nothing else");
     } else {
         if (starts("\xEF\xBB\xBF")) {
             bytes.remove_prefix(3);
-            say(Severity::note, Topic::syntax, 1, "the file begins with a byte order mark",
+            report(Severity::note, Topic::syntax, 1, "the file begins with a byte order mark",
                 "some tools then miss the first section; save it without");
         }
         const std::size_t bad = first_bad_utf8(bytes);
@@ -136,14 +136,14 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
             plain = bytes;
         } else {
             plain = from_windows(bytes);
-            say(Severity::note, Topic::syntax, line_of(bytes, bad), "invalid UTF-8; the file was read as Windows-1252",
+            report(Severity::note, Topic::syntax, line_of(bytes, bad), "invalid UTF-8; the file was read as Windows-1252",
                 "CiA 306 requires ASCII");
         }
     }
     const auto zeros = static_cast<std::size_t>(std::count(plain.begin(), plain.end(), '\0'));
     if (zeros > plain.size() / 16 + 4) return refuse("not a text file", "an EDS consists of [sections] and Key=Value lines");
     if (zeros != 0) {
-        say(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')), "zero byte in the text ignored", "");
+        report(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')), "zero byte in the text ignored", "");
         std::erase(plain, '\0');
     }
     text.reserve(plain.size());
@@ -162,7 +162,7 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
             lone = true;
         }
     }
-    if (lone) say(Severity::note, Topic::syntax, 1, "lines end with a carriage return only", "");
+    if (lone) report(Severity::note, Topic::syntax, 1, "lines end with a carriage return only", "");
     // The spans point to the start of their lines.
     for (Message& message : messages) {
         std::size_t at = 0;
@@ -204,13 +204,13 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
             for (std::size_t i = line_start; i < offset; ++i) column += (text[i] & 0xC0) != 0x80;
             return Span{number, column, static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(part.size())};
         };
-        const auto say = [&](Severity severity, std::string_view part, std::string sentence, std::string help = "") {
+        const auto report = [&](Severity severity, std::string_view part, std::string sentence, std::string help = "") {
             messages.push_back({severity, Topic::syntax, place(part), std::move(sentence), std::move(help)});
         };
         const auto keep = [&](std::string comment) { (section != nullptr ? section->comments : preamble_).push_back(std::move(comment)); };
 
         if (line.size() > most_line) {
-            say(Severity::warning, line.substr(0, 1), "line of " + std::to_string(line.size()) + " bytes ignored",
+            report(Severity::warning, line.substr(0, 1), "line of " + std::to_string(line.size()) + " bytes ignored",
                 "the limit is 255 characters");
             continue;
         }
@@ -219,7 +219,7 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         const std::string_view name = trimmed(parts.name), value = parts.value;
         if (parts.kind == Parts::comment) {
             if (line[0] == '#' && line.find('=') != std::string_view::npos)
-                say(Severity::note, line.substr(0, 1), "line that begins with '#' read as a comment",
+                report(Severity::note, line.substr(0, 1), "line that begins with '#' read as a comment",
                     "comments of an EDS begin with ';'");
             keep(std::string(line));
             continue;
@@ -227,9 +227,9 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         if (parts.kind == Parts::section || parts.kind == Parts::open_section) {
             const bool closed = parts.kind == Parts::section;
             if (!closed) {
-                say(Severity::warning, line, "section name without ']'", "write [" + std::string(name) + "]");
+                report(Severity::warning, line, "section name without ']'", "write [" + std::string(name) + "]");
             } else if (!value.empty() && value[0] != ';') {
-                say(value[0] == '#' ? Severity::note : Severity::warning, value, "text after the section name ignored",
+                report(value[0] == '#' ? Severity::note : Severity::warning, value, "text after the section name ignored",
                     "write comments on lines of their own");
             }
             keys.clear();
@@ -239,21 +239,21 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
                 section = &sections_.back();
             } else {
                 section = &sections_[at->second];
-                say(Severity::warning, line, "duplicate section [" + std::string(name) + "]",
+                report(Severity::warning, line, "duplicate section [" + std::string(name) + "]",
                     "first in line " + std::to_string(section->at.line) + "; keys that are here again replace those");
                 for (std::size_t i = 0; i < section->keys.size(); ++i) keys.emplace(lower(section->keys[i].name), i);
             }
             continue;
         }
         if (parts.kind == Parts::other) {
-            say(Severity::warning, line, line[0] == '=' ? "missing key before '='" : "invalid line: neither a [section] nor Key=Value",
+            report(Severity::warning, line, line[0] == '=' ? "missing key before '='" : "invalid line: neither a [section] nor Key=Value",
                 "the line was kept as a comment; comments begin with ';'");
             keep("; " + std::string(line));
             continue;
         }
         if (section == nullptr) {
             if (!said_outside)
-                say(Severity::warning, line, "key before the first section", "the lines before the first section were kept as comments");
+                report(Severity::warning, line, "key before the first section", "the lines before the first section were kept as comments");
             said_outside = true;
             keep("; " + std::string(line));
             continue;
@@ -265,7 +265,7 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         } else {
             IniKey&    old = section->keys[at->second];
             const bool same = old.value == key.value;
-            say(same ? Severity::note : Severity::warning, name, "duplicate key '" + key.name + "' in [" + section->name + "]",
+            report(same ? Severity::note : Severity::warning, name, "duplicate key '" + key.name + "' in [" + section->name + "]",
                 same ? "both have the same value"
                      : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" + key.value + "' is used");
             old = std::move(key);

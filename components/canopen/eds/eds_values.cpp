@@ -72,12 +72,12 @@ ObjectType ObjectReader::object_type(IniSection& section, const std::string& wha
     keys_.cut_comment(*key);
     if (key->value.empty()) {
         given = false;
-        keys_.say(Severity::warning, Topic::missing, key->value_at, "'ObjectType' of " + what + " is empty", "read as 0x7 (VAR)");
+        keys_.report(Severity::warning, Topic::missing, key->value_at, "'ObjectType' of " + what + " is empty", "read as 0x7 (VAR)");
         return ObjectType::var;
     }
     for (const TypeWord& row : object_types)
         if (same_word(row.word, key->value)) {
-            keys_.say(Severity::warning, Topic::object, key->value_at, "'ObjectType' of " + what + " is a name, not a number",
+            keys_.report(Severity::warning, Topic::object, key->value_at, "'ObjectType' of " + what + " is a name, not a number",
                       "write " + hex(static_cast<unsigned>(row.type), 1));
             return row.type;
         }
@@ -85,7 +85,7 @@ ObjectType ObjectReader::object_type(IniSection& section, const std::string& wha
     for (const TypeWord& row : object_types)
         if (number && static_cast<unsigned>(row.type) == *number) return row.type;
     if (number)
-        keys_.say(Severity::warning, Topic::object, key->value_at, "unknown object type " + key->value,
+        keys_.report(Severity::warning, Topic::object, key->value_at, "unknown object type " + key->value,
                   "0x2 DOMAIN, 0x5 DEFTYPE, 0x6 DEFSTRUCT, 0x7 VAR, 0x8 ARRAY, 0x9 RECORD; read as VAR");
     given = false;
     return ObjectType::var;
@@ -96,20 +96,20 @@ std::uint16_t ObjectReader::type_of(IniSection& section, const std::string& what
     if (key != nullptr) key->used = true, keys_.cut_comment(*key);
     if (key == nullptr || key->value.empty()) {
         if (needed)
-            keys_.say(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
+            keys_.report(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
                       "'DataType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
                       "without it the object is read and written as raw bytes; write DataType=0x0007 for UNSIGNED32");
         return 0;
     }
     if (const DataType* named = data_type(std::string_view(key->value)); named != nullptr) {
-        keys_.say(Severity::warning, Topic::object, key->value_at, "'DataType' of " + what + " is a name, not a number", "write " + hex(named->code));
+        keys_.report(Severity::warning, Topic::object, key->value_at, "'DataType' of " + what + " is a name, not a number", "write " + hex(named->code));
         return named->code;
     }
     const auto number = keys_.parse(section, *key, 0xFFFF);
     if (!number) return 0;
     const auto code = static_cast<std::uint16_t>(*number);
     if (data_type(code) == nullptr && (code < 0x20 || code > 0x25F))
-        keys_.say(Severity::warning, Topic::object, key->value_at, "unknown data type " + hex(code),
+        keys_.report(Severity::warning, Topic::object, key->value_at, "unknown data type " + hex(code),
                   "the basic types are 0x0001..0x001B; 0x0005 is UNSIGNED8");
     return code;
 }
@@ -119,7 +119,7 @@ Access ObjectReader::access_of(IniSection& section, const std::string& what, boo
     if (key != nullptr) key->used = true, keys_.cut_comment(*key);
     if (key == nullptr || key->value.empty()) {
         if (needed)
-            keys_.say(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
+            keys_.report(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
                       "'AccessType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
                       "read as rw; the access types are ro, wo, rw, rwr, rww, const");
         return Access::rw;
@@ -127,11 +127,11 @@ Access ObjectReader::access_of(IniSection& section, const std::string& what, boo
     for (const AccessWord& row : access_words) {
         if (!same_word(row.word, key->value)) continue;
         if (!row.proper)
-            keys_.say(Severity::warning, Topic::object, key->value_at, "unknown access type '" + key->value + "'",
+            keys_.report(Severity::warning, Topic::object, key->value_at, "unknown access type '" + key->value + "'",
                       "read as " + std::string(name_of(row.access)));
         return row.access;
     }
-    keys_.say(Severity::warning, Topic::object, key->value_at, "unknown access type '" + key->value.substr(0, 40) + "'",
+    keys_.report(Severity::warning, Topic::object, key->value_at, "unknown access type '" + key->value.substr(0, 40) + "'",
               "read as rw; the access types are ro, wo, rw, rwr, rww, const");
     return Access::rw;
 }
@@ -150,12 +150,12 @@ void ObjectReader::value(IniSection& section, const char* name, std::string& out
     if (!encoded) {
         const auto parsed = parse_number(out);
         const bool bare_hex = number && !parsed && out.size() <= 8 && out.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
-        keys_.say(Severity::warning, Topic::value, key->value_at, it + ": " + encoded.error,
+        keys_.report(Severity::warning, Topic::value, key->value_at, it + ": " + encoded.error,
                   bare_hex ? "write 0x" + out : "the value was ignored");
         return;
     }
     const auto odd = [&](Severity severity, std::string sentence, std::string help) {
-        keys_.say(severity, Topic::value, key->value_at, std::move(sentence), std::move(help));
+        keys_.report(severity, Topic::value, key->value_at, std::move(sentence), std::move(help));
     };
     switch (encoded.spelling) {
     case Spelling::octal:

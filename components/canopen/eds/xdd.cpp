@@ -72,7 +72,7 @@ private:
         for (std::size_t i = start; i < at; ++i) out.column += (text_[i] & 0xC0) != 0x80;
         return out;
     }
-    void say(Severity severity, Topic topic, const Node& node, std::string sentence, std::string help = "") {
+    void report(Severity severity, Topic topic, const Node& node, std::string sentence, std::string help = "") {
         messages_.push_back({severity, topic, place(node), std::move(sentence), std::move(help)});
     }
 
@@ -81,7 +81,7 @@ private:
         if (text.empty()) return {};
         auto value = parse_number(hexadecimal && text.find_first_of("xX") == std::string::npos ? "0x" + text : text);
         if (!value || value->node_id || value->negative || value->magnitude > most) {
-            say(Severity::warning, Topic::value, node,
+            report(Severity::warning, Topic::value, node,
                 "'" + std::string(name) + "' is not a number of 0.." + std::to_string(most) + ": '" + text.substr(0, 60) + "'");
             return {};
         }
@@ -140,7 +140,7 @@ private:
             const std::string value = text(name);
             const auto        parsed = parse_number(value);
             if (!value.empty() && (!parsed || parsed->magnitude > 0xFFFFFFFF))
-                say(Severity::warning, Topic::value, descendant(who, name),
+                report(Severity::warning, Topic::value, descendant(who, name),
                     "'" + std::string(name) + "' is not a 32-bit number: '" + value.substr(0, 60) + "'");
             return parsed && parsed->magnitude <= 0xFFFFFFFF ? std::optional<std::uint32_t>(static_cast<std::uint32_t>(parsed->magnitude))
                                                              : std::nullopt;
@@ -167,7 +167,7 @@ private:
         if (same_word(text, "readWriteInput")) return Access::rwr;
         if (same_word(text, "readWriteOutput")) return Access::rww;
         if (same_word(text, "constant")) return Access::constant;
-        say(Severity::warning, text.empty() ? Topic::missing : Topic::object, node,
+        report(Severity::warning, text.empty() ? Topic::missing : Topic::object, node,
             text.empty() ? "'accessType' of " + what + " is missing" : "unknown access type '" + text.substr(0, 40) + "'",
             "read as rw; the access types are ro, wo, rw, rwr, rww, const");
         return Access::rw;
@@ -179,7 +179,7 @@ private:
         const auto       found = parameters_.find(attribute(node, "uniqueIDRef"));
         const Parameter* parameter = found == parameters_.end() ? nullptr : &found->second;
         if (parameter == nullptr && !attribute(node, "uniqueIDRef").empty())
-            say(Severity::warning, Topic::missing, node,
+            report(Severity::warning, Topic::missing, node,
                 what + " refers to parameter '" + attribute(node, "uniqueIDRef") + "', which is not described");
         const auto either = [&](const char* name, const std::string Parameter::* field) {
             std::string text = attribute(node, name);
@@ -190,18 +190,18 @@ private:
                                         ? "read" : either("accessType", &Parameter::access);
         out.name = either("name", &Parameter::name);
         if (out.name.empty())
-            say(Severity::warning, Topic::missing, node, "the name of " + what + " is missing", "give the object a name");
+            report(Severity::warning, Topic::missing, node, "the name of " + what + " is missing", "give the object a name");
         const auto type = number(node, "objectType", 9);
         out.type = type ? static_cast<ObjectType>(*type) : ObjectType::var;
         if (name_of(out.type) == "?") {
-            say(Severity::warning, Topic::object, node, "there is no object type " + attribute(node, "objectType"), "taken for 7, a VAR");
+            report(Severity::warning, Topic::object, node, "there is no object type " + attribute(node, "objectType"), "taken for 7, a VAR");
             out.type = ObjectType::var;
         }
         const bool value = out.type == ObjectType::var;
         out.data_type =
             static_cast<std::uint16_t>(number(node, "dataType", 0xFFFF, true).value_or(parameter != nullptr ? parameter->data_type : 0));
         if (value && out.data_type == 0)
-            say(Severity::warning, Topic::missing, node, "the data type of " + what + " is missing",
+            report(Severity::warning, Topic::missing, node, "the data type of " + what + " is missing",
                 "it can be sent and received as bytes only");
         if (out.type == ObjectType::domain && out.data_type == 0) out.data_type = 0x0F;
         if (value || !attribute(node, "accessType").empty()) out.access = access(node, allowed, what);
@@ -221,7 +221,7 @@ private:
                                          {"lower limit", &out.low_limit},
                                          {"upper limit", &out.high_limit}})
             if (const Encoded encoded = encode(*text, out.data_type, 1); !encoded)
-                say(Severity::warning, Topic::value, node, std::string(name) + " of " + what + ": " + encoded.error,
+                report(Severity::warning, Topic::value, node, std::string(name) + " of " + what + ": " + encoded.error,
                     "the value was ignored");
         return out;
     }
@@ -229,14 +229,14 @@ private:
     void object(const Node& node) {
         const auto index = number(node, "index", 0xFFFF, true);
         if (!index) {
-            say(Severity::warning, Topic::missing, node, "an object without an index was left out");
+            report(Severity::warning, Topic::missing, node, "an object without an index was left out");
             return;
         }
         Object out;
         out.index = static_cast<std::uint16_t>(*index);
         const std::string what = label(out.index);
         if (std::any_of(out_.objects.begin(), out_.objects.end(), [&](const Object& o) { return o.index == out.index; })) {
-            say(Severity::warning, Topic::object, node, "object " + what + " is described twice", "the first counts");
+            report(Severity::warning, Topic::object, node, "object " + what + " is described twice", "the first counts");
             return;
         }
         Entry own = entry_of_object(node, what, out);
@@ -251,7 +251,7 @@ private:
             if (local(child) != "CANopenSubObject") continue;
             const auto sub = number(child, "subIndex", 0xFF, true);
             if (!sub || out.find(static_cast<std::uint8_t>(*sub)) != nullptr) {
-                say(Severity::warning, Topic::object, child,
+                report(Severity::warning, Topic::object, child,
                     sub ? label(out.index, static_cast<unsigned>(*sub)) + " is described twice"
                         : "a sub-index of " + what + " without its number was left out",
                     sub ? "the first counts" : "");
@@ -268,11 +268,11 @@ private:
             own.flags = 0;
             out.entries.push_back(std::move(own));
         } else if (out.single()) {
-            say(Severity::warning, Topic::object, node,
+            report(Severity::warning, Topic::object, node,
                 "object " + what + " is a " + std::string(name_of(out.type)) + ", yet it has sub-indices", "taken for a RECORD");
             out.type = ObjectType::record;
         } else if (const auto said = number(node, "subNumber", 0x100); said && *said != out.entries.size()) {
-            say(Severity::warning, Topic::count, node,
+            report(Severity::warning, Topic::count, node,
                 "'subNumber' of " + what + " is " + std::to_string(*said) + ", the file describes " + std::to_string(out.entries.size()));
         }
         if (!out.single()) out.data_type = own.data_type;
@@ -301,7 +301,7 @@ private:
             const auto        at = std::find(baud_rates.begin(), baud_rates.end(), rate ? rate->magnitude : 0);
             if (at != baud_rates.end()) d.supports[static_cast<std::size_t>(at - baud_rates.begin())] = true;
             else if (text != "auto-baudRate")
-                say(Severity::note, Topic::value, one, "'" + text.substr(0, 40) + "' is not a bit rate of CiA 301");
+                report(Severity::note, Topic::value, one, "'" + text.substr(0, 40) + "' is not a bit rate of CiA 301");
         }
         for (Node usage = descendant(root_, "dummyUsage"), one = usage.first_child(); one; one = one.next_sibling()) {
             const std::string text = attribute(one, "entry");  // Dummy0001=0

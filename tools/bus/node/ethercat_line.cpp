@@ -102,20 +102,20 @@ public:
     /// Returns false when standard output is closed.
     bool look(std::int64_t now) {
         std::string text;
-        const auto say = [&](std::size_t n, const std::string& what) {
+        const auto report = [&](std::size_t n, const std::string& what) {
             text += fmt::format("{:9.3f} s  slave {} ({}): {}\n", static_cast<double>(now - began_) / 1e9, n, line_[n].name, what);
         };
         for (std::size_t n = 0; n < line_.size(); ++n) {
             const std::uint32_t status = status_[n];
             if (status == 0 || status == seen_[n]) continue;
             seen_[n] = status;
-            say(n, state_words(status));
+            report(n, state_words(status));
         }
         if (now - outputs_at_ >= 1'000'000'000)
             for (std::size_t n = 0; n < line_.size(); ++n)
                 if (std::string words = output_words(line_[n]); words != outputs_[n]) {
                     outputs_at_ = now;
-                    say(n, "outputs " + (outputs_[n] = std::move(words)));
+                    report(n, "outputs " + (outputs_[n] = std::move(words)));
                 }
         return text.empty() || print(text);
     }

@@ -83,24 +83,24 @@ std::string eds_text(const NodeKind& kind, const canopen::Program& program) {
     return canopen::eds::write_eds(eds);
 }
 
-/// Prints the changes of a node until `say` returns false because standard output is closed.
+/// Prints the changes of a node until `print` returns false because standard output is closed.
 class Reporter {
 public:
-    Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began, std::function<bool(const std::string&)> say)
-        : node_(node), program_(program), began_(began), say_(std::move(say)) {}
+    Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began, std::function<bool(const std::string&)> print)
+        : node_(node), program_(program), began_(began), print_(std::move(print)) {}
 
     /// Returns false when standard output is closed.
     bool look(std::int64_t now) {
         auto& device = node_.device();
-        const auto say = [&](const std::string& what) { log_.print(what, timed(what, now), now); };
+        const auto log = [&](const std::string& what) { log_.print(what, timed(what, now), now); };
         if (device.state() != state_ || device.node_id() != id_) {
             state_ = device.state(), id_ = device.node_id();
-            say(id_ == canopen::unconfigured ? "waiting for a node ID" : canopen::to_string(state_));
+            log(id_ == canopen::unconfigured ? "waiting for a node ID" : canopen::to_string(state_));
         }
         if (const auto errors = device.emcy().error_register(); errors != errors_) {
             errors_ = errors;
             const auto code = static_cast<std::uint16_t>(device.dictionary().get<std::uint32_t>(0x1003, 1, 0));
-            say(errors == 0 ? "error reset" : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_text(code)));
+            log(errors == 0 ? "error reset" : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_text(code)));
         }
         if (now - news_at_ >= 1'000'000'000) {  // outputs can change with every SYNC: print the newest once per second
             if (std::string news = program_.news(); news != news_) {
@@ -108,15 +108,15 @@ public:
                 text_ += timed(news_ = std::move(news), now) + "\n";
             }
         }
-        for (can::Rejected what; node_.link().rejected(what);) say(can::to_string(what));
+        for (can::Rejected what; node_.link().rejected(what);) log(can::to_string(what));
         if (const auto bus = node_.link().state(); bus != bus_) {
             bus_ = bus;
-            say(fmt::format("bus {}", can::to_string(bus)));
+            log(fmt::format("bus {}", can::to_string(bus)));
         }
         log_.flush(now);
         std::string text;
         text.swap(text_);
-        return say_(text);
+        return print_(text);
     }
 
     std::string end(std::int64_t now) {
@@ -147,7 +147,7 @@ private:
     canopen::Node& node_;
     const canopen::Program& program_;
     const std::int64_t began_;
-    const std::function<bool(const std::string&)> say_;
+    const std::function<bool(const std::string&)> print_;
     std::string text_;  // to be printed
     hal::MessageLog log_{"", [this](const std::string& line) { text_ += line; }};
     canopen::NmtState state_ = canopen::NmtState::initialising;
