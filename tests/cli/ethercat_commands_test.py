@@ -121,9 +121,20 @@ class Configuration(Ethercat):
         for number in range(7):
             self.assertRegex(run.stdout + run.stderr, rf"slave {number} \([-a-z]+\) is operational", "all slaves are in OP")
         self.assertIn("no faults", run.stdout + run.stderr)
-        self.assertIn("machine.ethercat: sim:machine, cycle 1000 us, 7 slaves\n  in  u32   servo.controlword  6040:0\n",
+        self.assertIn("machine.ethercat: sim:machine, cycle 1000 us, 7 slaves\n  in  u32   servo.axis-1-controlword  6040:0\n",
                       self.good("ethercat", "check", "machine.ethercat"))
         self.assertEqual(7, json.loads(self.good("ethercat", "check", "machine.ethercat", "--json"))[0]["slaves"])
+
+    def test_config_links_an_axis_to_each_drive(self):
+        self.on("config", "drives", line="servo axes=2, servo, digital_out bits=16")
+        text = (self.folder / "drives.ethercat").read_text()
+        self.assertIn("device  = cia402\naxes    = 2\noutputs = 6040, 6060, 607A, 60FF, 6071, 6840, 6860, 687A, 68FF, 6871\n", text)
+        self.assertIn("outputs = 7000:1..10 bit\n", text)
+        (self.folder / "turn.hal").write_text("source drives.hal\nadvance 1s\nsetp servo-axis-2.velocity-cmd 5000\nsetp servo-axis-1.enable TRUE\n"
+                                              "setp servo-axis-2.enable TRUE\nsetp servo-1.enable TRUE\nadvance 2s\ngetp servo-axis-1.active\n"
+                                              "getp servo-axis-1.position-fb\ngetp servo-axis-2.velocity-fb\ngetp servo-1.active\nshow fault\n")
+        run = self.run_program("sim", "turn.hal")
+        self.assertEqual((0, ["TRUE", "0", "5000", "TRUE", "no", "faults"]), (run.returncode, run.stdout.split()[:6]), run.stderr)
 
     def test_plan_shows_the_arithmetic(self):
         self.on("config", "small", line="coupler, digital_in bits=8")
@@ -131,7 +142,7 @@ class Configuration(Ethercat):
         self.assertIn("1 frame, 60 bytes: (60 + 1 x 24) x 80 ns = 6.72 us at 100 Mbit/s\n", plan)
         report = json.loads(self.good("ethercat", "plan", "small.ethercat", "--json"))[0]
         self.assertEqual((1, 60, 6720, True), (report["frames"], report["frame_bytes"], report["wire_ns"], report["fits"]))
-        text = (self.folder / "small.ethercat").read_text().replace("cycle = 1000us", "cycle = 50us")
+        text = (self.folder / "small.ethercat").read_text().replace("cycle = 1ms", "cycle = 50us")
         (self.folder / "fast.ethercat").write_text(text)
         self.assertIn("fast.ethercat: the cycle is too short; raise `cycle`", self.bad("ethercat", "plan", "fast.ethercat"))
 

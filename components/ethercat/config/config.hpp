@@ -90,4 +90,11 @@ struct Found {
 /// Returns the text of a `.ethercat` file for these slaves in order of position. It can be read without errors.
 std::string write(const std::string& link, std::int64_t cycle_ns, const std::vector<Found>& slaves);
 
+/// Returns the text of a netlist that runs the bus of the configuration `file`: its master, a component cia402 for each drive, linked and
+/// disabled, and the remaining pins as comments. `segment`: devices of ethercat_segment, or empty for a real bus.
+std::string netlist(const Bus&, const std::string& file, const std::string& segment);
+
+/// Returns "out u32   SLAVE.NAME  6041:0" with a line end, seen from the netlist: an output of the bus is an input there.
+std::string pin_line(const master::Entry&, bool output, const std::string& slave);
+
 }  // namespace hal::ethercat::config

@@ -2,8 +2,9 @@
 // Writes a `.ethercat` file for slaves found on a bus or described in an ESI.
 #include <algorithm>
 #include <cstdio>
+#include <set>
 
-#include "ethercat/config/config_text.hpp"
+#include "ethercat/config/slave_pdos.hpp"
 
 namespace hal::ethercat::config {
 
@@ -15,30 +16,102 @@ std::string hex(unsigned value) {
     return out;
 }
 
-/// Returns "KEY = 6040 u16, 607A s32" for the assigned PDOs; empty if there are none.
-std::string objects(const std::string& key, const std::vector<sii::Pdo>& pdos, bool with_types, std::string& options) {
-    std::string list;
-    unsigned sync_manager = 0xff, index = 0;
+/// Calls `use(pdo)` for each assigned PDO that shares the sync manager of the first one.
+template <class Use>
+void for_each_assigned(const std::vector<sii::Pdo>& pdos, Use use) {
+    unsigned sync_manager = 0xff;
     for (const sii::Pdo& p : pdos) {
         if (p.sync_manager == 0xff || (sync_manager != 0xff && p.sync_manager != sync_manager)) continue;
-        if (sync_manager == 0xff) sync_manager = p.sync_manager, index = p.index;
-        for (const sii::Entry& e : p.entries) {
-            if (e.bits == 0) continue;
-            const TypeWord* type = type_named(sii::type_name(e.type));
-            std::string item = address_text(e.index, e.sub);
-            if (e.index == 0) item = "gap " + std::to_string(e.bits);
-            else if (type != nullptr && type->bits == e.bits) item += with_types ? std::string(" ") + type->word : "";
-            else if (e.bits == 1 || e.bits == 8 || e.bits == 16 || e.bits == 32 || e.bits == 64) item += e.bits == 1 ? " bit" : " u" +
-                std::to_string(e.bits);
-            else item = "gap " + std::to_string(e.bits);
-            if (e.index != 0 && list.find(address_text(e.index, e.sub)) != std::string::npos) item = "gap " + std::to_string(e.bits);
-            list += (list.empty() ? "" : ", ") + item;
-        }
+        sync_manager = p.sync_manager;
+        use(p);
     }
-    if (list.empty()) return {};
-    options += key + ".sync-manager = " + std::to_string(sync_manager) + "\n" + key + ".pdo = " +
-        address_text(static_cast<std::uint16_t>(index), 0).substr(0, 4) + "\n";
-    return key + " = " + list + "\n";
+}
+
+bool has(const std::vector<sii::Pdo>& pdos, unsigned index) {
+    bool found = false;
+    for_each_assigned(pdos, [&](const sii::Pdo& p) {
+        for (const sii::Entry& e : p.entries) found = found || (e.index == index && e.sub == 0);
+    });
+    return found;
+}
+
+/// Returns the number of drives of CiA 402: each has a control word and a status word, 800h apart from those of the one before.
+unsigned axes_of(const Found& s) {
+    unsigned axes = 0;
+    while (axes < 8 && has(s.rx, 0x6040 + 0x800 * axes) && has(s.tx, 0x6041 + 0x800 * axes)) ++axes;
+    return axes;
+}
+
+/// A list of objects; consecutive sub-indices of one type become a range.
+class ObjectList {
+public:
+    explicit ObjectList(unsigned axes) : axes_(axes) {}
+    void add(const sii::Entry& e) {
+        if (e.bits == 0) return;
+        const std::string word = e.index == 0 || !listed_.insert(e.index << 8 | e.sub).second ? "" : type_of(e);
+        if (word.empty()) return append("gap " + std::to_string(e.bits));
+        const Known known = axes_ == 0 ? Known{} : profile_object(e.index, e.sub, axes_);
+        if (known.bits == e.bits) return append(address(e.index, e.sub));
+        if (range_ && e.index == last_.index && e.sub == last_.sub + 1 && word == word_) {
+            last_ = e;
+            items_.back() = address(first_.index, first_.sub) + ".." + address(0, last_.sub).substr(5) + " " + word_;
+            return;
+        }
+        append(address(e.index, e.sub) + " " + word);
+        range_ = e.sub != 0, first_ = last_ = e, word_ = word;
+    }
+    std::string text() const {
+        std::string list;
+        for (const std::string& item : items_) list += (list.empty() ? "" : ", ") + item;
+        return list;
+    }
+
+private:
+    static std::string address(std::uint16_t index, unsigned sub) {
+        char out[16];
+        std::snprintf(out, sizeof out, sub == 0 ? "%04X" : "%04X:%X", index + 0U, sub);
+        return out;
+    }
+    /// Returns the type as it is written in the file; empty: one that has no pin.
+    static std::string type_of(const sii::Entry& e) {
+        if (const TypeWord* type = type_named(sii::type_name(e.type)); type != nullptr && type->bits == e.bits) return type->word;
+        if (e.bits == 1) return "bit";
+        return e.bits == 8 || e.bits == 16 || e.bits == 32 || e.bits == 64 ? "u" + std::to_string(e.bits) : "";
+    }
+    void append(std::string item) { items_.push_back(std::move(item)), range_ = false; }
+
+    unsigned axes_;
+    std::vector<std::string> items_;
+    std::set<unsigned> listed_;
+    bool range_ = false;
+    sii::Entry first_{}, last_{};
+    std::string word_;
+};
+
+/// Returns "KEY = 6040, 607A s32" for the assigned PDOs and adds where they are to `options`; empty if there are none.
+std::string objects(const std::string& key, const std::vector<sii::Pdo>& pdos, unsigned axes, std::string& options) {
+    ObjectList list(axes);
+    const sii::Pdo* first = nullptr;
+    for_each_assigned(pdos, [&](const sii::Pdo& p) {
+        if (first == nullptr) first = &p;
+        for (const sii::Entry& e : p.entries) list.add(e);
+    });
+    if (list.text().empty()) return {};
+    options += key + ".sync-manager = " + std::to_string(first->sync_manager) + "\n" + key + ".pdo = " + address_text(first->index, 0).substr(0, 4) + "\n";
+    return key + (key == "inputs" ? "  = " : " = ") + list.text() + "\n";
+}
+
+/// Returns start-up writes that select a cyclic mode for drives whose process data has none.
+std::string modes(const Found& s, unsigned axes) {
+    std::string text;
+    for (unsigned axis = 0; axis < axes; ++axis) {
+        const unsigned offset = 0x800 * axis;
+        if (has(s.rx, 0x6060 + offset)) continue;
+        const bool velocity = has(s.rx, 0x60ff + offset);
+        if (!velocity && !has(s.rx, 0x607a + offset)) continue;
+        text += "sdo " + hex(0x6060 + offset).substr(2) + " = " + (velocity ? "9  # cyclic synchronous velocity\n" : "8  # cyclic synchronous position\n");
+    }
+    return text;
 }
 
 /// Returns how many entries each of several assigned PDOs with consecutive numbers has; 0: they differ, or there is at most one.
@@ -63,7 +136,7 @@ std::string one_line(const std::string& text) {
 }  // namespace
 
 std::string write(const std::string& link, std::int64_t cycle_ns, const std::vector<Found>& slaves) {
-    std::string out = "[bus]\nlink  = " + link + "\ncycle = " + std::to_string(cycle_ns / 1000) + "us\n";
+    std::string out = "[bus]\nlink  = " + link + "\ncycle = " + (cycle_ns % 1'000'000 == 0 ? std::to_string(cycle_ns / 1'000'000) + "ms\n" : std::to_string(cycle_ns / 1000) + "us\n");
     std::map<std::string, unsigned> names;
     for (std::size_t i = 0; i < slaves.size(); ++i) {
         const Found& s = slaves[i];
@@ -75,12 +148,13 @@ std::string write(const std::string& link, std::int64_t cycle_ns, const std::vec
         if (s.vendor != 0) out += "vendor   = " + hex(s.vendor) + "\n";
         if (s.product != 0) out += "product  = " + hex(s.product) + "\n";
         if (s.revision != 0) out += "revision = " + hex(s.revision) + "+  # or a higher one\n";
-        std::string options;
-        const bool with_types = s.esi.empty();
-        if (with_types) {
-            const std::string outputs = objects("outputs", s.rx, with_types, options), inputs = objects("inputs", s.tx, with_types,
-                options);
-            out += outputs + inputs + options;
+        if (s.esi.empty()) {
+            const unsigned axes = axes_of(s);
+            if (axes != 0) out += "device  = cia402\n";
+            if (axes > 1) out += "axes    = " + std::to_string(axes) + "\n";
+            std::string options;
+            const std::string outputs = objects("outputs", s.rx, axes, options), inputs = objects("inputs", s.tx, axes, options);
+            out += outputs + inputs + options + modes(s, axes);
             std::size_t most = 0;  // a slave with a fixed assignment keeps it
             const std::size_t each = std::max(entries_each(s.rx, most), entries_each(s.tx, most));
             if (each != 0 && most == each) out += "entries-per-pdo = " + std::to_string(each) + "\n";

@@ -165,8 +165,8 @@ TEST(EthercatConfig, Written_file_is_read_again_without_errors) {
         {{0x6040, 0, "", 6, 16, 0}}}};
     drive.tx = {{0x1a00, 3, 0, "", 0, {{0x6064, 0, "", 4, 32, 0}}}};
     const std::string text = write("eth:enp3s0", 1'000'000, {drive, drive});
-    EXPECT_TRUE(text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1000us\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = 0x402\nrevision = 0x10001+  # or a higher one\n"
-                                 "outputs = 6040:00 u16, gap 8, 7000:01 bit\ninputs = 6064:00 s32\n"))
+    EXPECT_TRUE(text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1ms\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = 0x402\nrevision = 0x10001+  # or a higher one\n"
+                                 "outputs = 6040 u16, gap 8, 7000:1 bit\ninputs  = 6064 s32\n"))
         << text;
     const Bus bus = good(text);
     ASSERT_EQ(bus.setup.slaves.size(), 2U);

@@ -14,13 +14,6 @@ namespace hal::tools {
 namespace {
 
 namespace config = ethercat::config;
-using ethercat::master::Type;
-
-const char* type_of_pin(const ethercat::master::Entry& e) {
-    if (e.scaled || e.type == Type::real32 || e.type == Type::real64) return "float";
-    constexpr const char* names[] = {"bit", "u32", "u32", "u32", "u64", "s32", "s32", "s32", "s64"};
-    return names[static_cast<std::size_t>(e.type)];
-}
 
 /// Returns a line per pin, each behind `lead`.
 std::string pin_lines(const config::Bus& bus, const std::string& lead) {
@@ -29,10 +22,7 @@ std::string pin_lines(const config::Bus& bus, const std::string& lead) {
         for (const auto& sm : s.sync_managers)
             for (const auto& pdo : sm.pdos)
                 for (const auto& e : pdo.entries)
-                    if (!e.name.empty())
-                        text += fmt::format("{}{:<3} {:<5} {}.{}  {:04X}:{:X}\n", lead, sm.output ? "in" : "out", type_of_pin(e), s.name,
-                            e.name,
-                                            e.index, e.sub);
+                    if (!e.name.empty()) text += lead + config::pin_line(e, sm.output, s.name);
     return text;
 }
 
@@ -117,15 +107,8 @@ int run_ethercat_config(const EthercatOptions& options) {
     if (!reading.good() || reading.buses.empty())
         return fail(options, "the slaves describe their process data in a way that no configuration can be made of: " +
                                  config::to_string(reading, file));
-    std::string lines = "# A start: the master of " + name + ".ethercat and its pins. See docs/ethercat-configuration.md.\n\n"
-                        "loadrt threads name1=servo-thread period1=1000000\n\n";
-    if (emulated) lines += "loadrt ethercat_segment devices=\"" + devices_of(options.emulate) + "\" link=sim:" + name + "\n";
-    lines += "loadrt ethercat config=" + name + ".ethercat\n\n# Pins ethercat.0.SLAVE.NAME, in: written by the netlist, out: read by it\n" +
-        pin_lines(reading.buses.front(), "#   ") + "\naddf ethercat.0.receive servo-thread\n# functions of the machine: here\n"
-                                                   "addf ethercat.0.transmit servo-thread\n";
-    if (emulated) lines += "addf ethercat-segment.0.update servo-thread\n";
-    lines += "\nstart\n";
-    for (const auto& [path, contents] : {std::pair(&file, &text), std::pair(&netlist, const_cast<const std::string*>(&lines))})
+    const std::string lines = config::netlist(reading.buses.front(), name + ".ethercat", emulated ? devices_of(options.emulate) : "");
+    for (const auto& [path, contents] : {std::pair(&file, &text), std::pair(&netlist, &lines)})
         if (const std::string problem = write_file(*path, *contents); !problem.empty()) return fail(options, problem);
     if (options.json)
         return print(fmt::format("{{\"configuration\":{},\"netlist\":{},\"slaves\":{}}}\n", json_string(file), json_string(netlist),
