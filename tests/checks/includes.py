@@ -51,7 +51,7 @@ ROWS = {
     "components/cia402": ["runtime/sdk"],
     "components/canopen/protocol": ["runtime/sdk", "runtime/text", "drivers/link", "components/cia402"],  # cia402: the error codes
     "components/canopen/eds": ["components/canopen/protocol"],
-    "components/canopen/master": ["components/canopen/eds"],
+    "components/canopen/master": ["components/canopen/eds", "components/fieldbus/can_timing"],
     "components/canopen/device": ["components/canopen/eds", "components/sim"],  # sim: the plants behind simulated devices
     "components/ethercat/wire": ["runtime/text"],
     "components/ethercat/esi": ["components/ethercat/wire"],
@@ -61,6 +61,7 @@ ROWS = {
     "components/ethercat/config": ["components/ethercat/master", "components/ethercat/esi", "components/cia402"],
     "components/ethercat/plugins": ["components/ethercat/config", "components/ethercat/devices"],
     "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
+    "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "drivers/link"],
     "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],

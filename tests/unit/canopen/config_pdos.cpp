@@ -15,7 +15,7 @@ TEST(CanopenConfig, a_TPDO_can_be_requested) {
     EXPECT_EQ(find(c.nodes[0], false, 2)->transmission, 252);
     const Schedule s = schedule_of(c, millisecond);
     unsigned requests = 0, answers = 0;
-    for (const plan::Message& m : s.messages)
+    for (const can_timing::Message& m : s.messages)
         if (m.id == 0x185 && m.period == 100 * millisecond) ++(m.remote ? requests : answers);
     EXPECT_EQ(requests, 1U);
     EXPECT_EQ(answers, 1U);

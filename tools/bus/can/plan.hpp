@@ -8,11 +8,13 @@
 namespace hal::tools {
 
 struct CanopenPlanOptions : Options {
-    std::string cycle = "1ms";
+    std::string cycle = "1ms", errors, bitrate;
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "configuration of the network, NAME.canopen");
+        set.words("FILE", "configuration of the network, NAME.canopen, or a recording: candump's .log, .pcapng, .pcap");
+        set.value("--errors", errors, "COUNT/TIME", "frames that are disturbed and sent again: COUNT at once, and one more in every TIME: 1/10ms");
+        set.value("--bitrate", bitrate, "RATE", "bit rate of the bus, for a recording: 500k");
         set.value("--cycle", cycle, "TIME", "period of the master's thread, for a SYNC in every cycle (default 1ms)");
         set.flag("--json", json, "print JSON");
     }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
 
 #include "link/can.hpp"
 
@@ -29,11 +30,11 @@ std::string ms(Time t) {
 
 Schedule schedule_of(const MasterConfig& config, Time cycle) {
     Schedule out;
-    out.bus = {config.bit_rate, config.data_rate};
+    out.bus = {config.bit_rate, config.data_rate, {}};
     const Time sync = config.sync == SyncMode::none ? 0 : config.sync_period != 0 ? config.sync_period : cycle;
     out.sync = sync;
     const auto add = [&](std::uint32_t cob, unsigned bytes, Time period, std::string name, Span at, bool of_sync) {
-        plan::Message m;
+        can_timing::Message m;
         m.id = cob_id(cob), m.extended = (cob & cob_extended) != 0, m.bytes = static_cast<std::uint8_t>(bytes), m.period = period;
         if (of_sync) m.deadline = sync, ++out.per_sync;
         out.messages.push_back(m);
@@ -55,7 +56,7 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
                 add(p.cob + 1, p.bytes(), p.safety->refresh, name + " inverted", p.at, false);
                 continue;
             }
-            const auto same = std::find_if(out.messages.begin(), out.messages.end(), [&](const plan::Message& m) {
+            const auto same = std::find_if(out.messages.begin(), out.messages.end(), [&](const can_timing::Message& m) {
                 return p.to_node && !m.remote && m.id == cob_id(p.cob) && m.extended == ((p.cob & cob_extended) != 0);
             });
             if (same != out.messages.end()) {  // several nodes take their parts of it
@@ -83,14 +84,16 @@ Schedule schedule_of(const MasterConfig& config, Time cycle) {
         }
     }
     if (config.heartbeat_ms != 0) add(0x700U + config.node_id, 1, config.heartbeat_ms * millisecond, "master heartbeat", config.at, false);
+    std::map<std::string, std::uint32_t> queues;
     for (const Foreign& f : config.foreign) {
-        plan::Message m{f.id, f.extended, f.remote, f.fd, f.bit_rate_switch, f.bytes, f.period, f.deadline, f.jitter};
+        can_timing::Message m{f.id, f.extended, f.remote, f.fd, f.bit_rate_switch, f.bytes, f.period, f.deadline, f.jitter};
+        if (!f.queue.empty()) m.fifo = queues.try_emplace(f.queue, static_cast<std::uint32_t>(queues.size() + 1)).first->second;
         out.messages.push_back(m);
         out.names.push_back(f.name);
         out.spans.push_back(f.at);
         out.assumed.push_back(false);
     }
-    const auto analysis = plan::analyse(out.messages, out.bus);
+    const auto analysis = can_timing::analyse(out.messages, out.bus);
     Time       together = 0;
     for (std::size_t i = 0; i < out.messages.size(); ++i)
         if (sync != 0 && out.messages[i].deadline == sync && i < out.names.size()) together += analysis.responses[i].frame;
@@ -108,7 +111,7 @@ std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const
         schedule.messages.erase(schedule.messages.begin() + at);
         schedule.names.erase(schedule.names.begin() + at);
     }
-    const auto     analysis = plan::analyse(schedule.messages, schedule.bus);
+    const auto     analysis = can_timing::analyse(schedule.messages, schedule.bus);
     std::size_t    late = schedule.messages.size();
     for (std::size_t i = 0; i < schedule.messages.size() && late == schedule.messages.size(); ++i)
         if (!analysis.responses[i].in_time) late = i;
@@ -122,7 +125,7 @@ std::vector<Message> load_messages(const MasterConfig& config, Time cycle, const
             ", and " + std::to_string(schedule.per_sync) + " frames with a SYNC take " + share + " ms of its " + ms(schedule.sync) + " ms";
     }
     std::string help = "hal canopen plan " + path + " shows the calculation and what to change";
-    if (const auto rate = plan::sufficient_bit_rate(schedule.messages, schedule.bus))
+    if (const auto rate = can_timing::sufficient_bit_rate(schedule.messages, schedule.bus))
         help = "bitrate = " + (*rate == 1'000'000 ? "1M" : std::to_string(*rate / 1000) + "k") + " is sufficient; " + help;
     return {{Severity::warning, Topic::load, config.at, std::move(sentence), std::move(help),
              "first late message: " + schedule.names[late]}};

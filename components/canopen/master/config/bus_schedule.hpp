@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "canopen/master/plan/response_time.hpp"
+#include "fieldbus/can_timing/response_time.hpp"
 #include "master_config.hpp"
 
 namespace hal::canopen::config {
 
 struct Schedule {
-    plan::Bus                  bus;
-    std::vector<plan::Message> messages;
+    can_timing::Bus                  bus;
+    std::vector<can_timing::Message> messages;
     std::vector<std::string>   names;  ///< of each message
     std::vector<Span>         spans;   ///< of their lines
     std::vector<bool> assumed;       ///< its period is not given: counted once per SYNC or cycle

@@ -103,7 +103,7 @@ void read_bus(Keys& keys, MasterConfig& to) {
     }
 }
 
-/// `0x181 drive 1, status = 8, 2ms, -, 100us`: identifier and name; bytes, period, deadline, jitter.
+/// `0x181 drive 1, status = 8, 2ms, -, 100us, drive`: identifier and name; bytes, period, deadline, jitter, queue.
 void read_foreign(const Line& line, MasterConfig& to, Report& report) {
     Foreign f;
     f.at = line.key.at;
@@ -116,9 +116,9 @@ void read_foreign(const Line& line, MasterConfig& to, Report& report) {
                             "write it in hexadecimal, as in 0x181; an extended one has eight digits");
     f.id = static_cast<std::uint32_t>(*id), f.extended = id_text.size() == 10 || f.id > 0x7ff;
     const auto fields = list_of(line.value);
-    if (fields.size() < 2 || fields.size() > 4)
-        return report.error(Topic::value, line.value.at, "invalid message: expected BYTES, PERIOD, DEADLINE, JITTER",
-                            "the last two are optional: 8, 10ms");
+    if (fields.size() < 2 || fields.size() > 5)
+        return report.error(Topic::value, line.value.at, "invalid message: expected BYTES, PERIOD, DEADLINE, JITTER, QUEUE",
+                            "the last three are optional: 8, 10ms");
     std::string bytes = lower(fields[0].text);
     if (bytes.ends_with("brs")) f.fd = f.bit_rate_switch = true, bytes.resize(bytes.size() - 3);
     else if (bytes.ends_with("fd")) f.fd = true, bytes.resize(bytes.size() - 2);
@@ -130,13 +130,14 @@ void read_foreign(const Line& line, MasterConfig& to, Report& report) {
     f.bytes = static_cast<std::uint8_t>(*length);
     Time* const           times[] = {&f.period, &f.deadline, &f.jitter};
     constexpr const char* names[] = {"period", "deadline", "jitter"};
-    for (std::size_t i = 1; i < fields.size(); ++i) {
+    for (std::size_t i = 1; i < std::min<std::size_t>(fields.size(), 4); ++i) {
         if (i > 1 && fields[i].text == "-") continue;
         const auto time = duration(fields[i].text);
         if (!time || *time > 3600 * second || (*time < microsecond && i != 3))
             return report.error(Topic::value, fields[i].at, std::string("invalid ") + names[i - 1] + " '" + fields[i].text + "'", "write 10ms, 250us or 1s");
         *times[i - 1] = *time;
     }
+    if (fields.size() == 5) f.queue = fields[4].text;
     to.foreign.push_back(std::move(f));
 }
 

@@ -102,6 +102,7 @@ struct Foreign {
     std::uint8_t  bytes = 8;
     Time          period = 0, deadline = 0, jitter = 0;
     std::string   name;
+    std::string   queue;  ///< of its node, which sends in order of arrival; empty: by priority
     Span         at{};
 };
 
