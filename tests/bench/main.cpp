@@ -6,6 +6,9 @@
 #include <fmt/core.h>
 
 #include "bench.hpp"
+#ifdef HALCYON_ETHERCAT
+#include "ethercat.hpp"
+#endif
 #include "ethernet.hpp"
 #include "linuxcnc.hpp"
 #include "machine.hpp"
@@ -35,6 +38,9 @@ constexpr Section sections[] = {
     {"ethernet", "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program", raw_ethernet},
     {"tdma", "slot jitter of a station whose clock is 200 ppm off, and a backup master that takes over", time_slots},
     {"cnc", "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
+#ifdef HALCYON_ETHERCAT
+    {"ethercat", "50 EtherCAT drives over a veth pair against a plain socket program; start, faults, and how many slaves in memory", ethercat},
+#endif
     {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
     {"vision", "markers in frames of 640 x 480: error and time", vision, true},
     {"dds", "64 pins from process to process, against a bare Fast DDS writer", dds},
