@@ -52,12 +52,18 @@ public:
             }
             const std::string who = config::slave_words(static_cast<std::uint32_t>(s), bus_.setup);
             lost_words_.push_back(who + " does not answer; its inputs keep their last values");
+            identity_words_.push_back(who + " is not the device of the configuration; it stays in INIT");
+            missing_words_.push_back(who + " is not on the bus");
+            ambiguous_words_.push_back(who + " is not unique; no slave with its number is started");
+            failed_words_.push_back(who + " did not start; it is tried again");
             clock_words_.push_back(who + " is out of step, its clock deviates by {} us");
             left_words_.push_back(who + " left its state with AL status code {x}; its outputs are off");
         }
         areas_.resize(places_.size());
         period_words_ = "the period of the thread is {} us, the cycle of the configuration " + std::to_string(bus_.setup.cycle_ns / 1000) +
                         " us; change one of them: cycle in [bus]; nothing is exchanged";
+        unknown_words_ = "a slave on " + bus_.link + " is not in the configuration";
+        nobody_words_ = "no slave answers on " + bus_.link;
         link_words_ = bus_.link + " has no link; no process data is exchanged";
         other_words_ = "another EtherCAT master sends on " + bus_.link + "; the slaves obey both";
         no_transmit_words_ = "'" + name_ + ".receive' runs, but '" + name_ + ".transmit' does not; nothing is sent; type: addf " + name_ +
@@ -84,7 +90,8 @@ public:
         master_ = std::make_unique<Master>(bus_.setup, primary_->address(), static_cast<master::Events&>(*this), *client_);
         for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
         if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
-        period_reported_ = was_fresh_ = false;
+        period_reported_ = was_fresh_ = unknown_raised_ = false;
+        failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
         unsent_ = unreceived_ = apart_ = 0;
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
@@ -182,6 +189,20 @@ private:
         if (faults_ != nullptr) faults_->raise(faults_, this, reason.c_str(), detail);
     }
 
+    /// Returns why a slave is not started; nullptr: the event is another one. [realtime]
+    const std::string* start_words(Event event, std::uint32_t slave) const noexcept {
+        switch (event) {
+        case Event::wrong_vendor:
+        case Event::wrong_product:
+        case Event::wrong_revision:
+        case Event::wrong_serial: return &identity_words_[slave];
+        case Event::slave_missing: return &missing_words_[slave];
+        case Event::duplicate_alias: return &ambiguous_words_[slave];
+        case Event::start_up_failed: return &failed_words_[slave];
+        default: return nullptr;
+        }
+    }
+
     // Events of the master. [realtime]
     void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
         if (filter_.is_new(event, slave, first, second)) reporter_.tell({event, slave, first, second});
@@ -189,6 +210,14 @@ private:
         if (event == Event::slave_lost && named) raise(lost_words_[slave]);
         if (event == Event::fell_back && named) raise(left_words_[slave], static_cast<double>(second));
         if (event == Event::dc_lost && named) raise(clock_words_[slave], static_cast<double>(first) * 1e-3);
+        if (named) {
+            const std::string* words = start_words(event, slave);
+            if (words != nullptr && failed_[slave] != event) raise(*words), failed_[slave] = event;  // not at each try
+            if (event == Event::slave_operational) failed_[slave] = event;
+        }
+        if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) raise(unknown_words_);
+        if (event == Event::scanned) unknown_raised_ = false;
+        if (event == Event::no_slaves) raise(nobody_words_);
         if (event == Event::link_lost && first == 0) raise(link_words_);
         if (event == Event::other_master) raise(other_words_);
     }
@@ -204,8 +233,9 @@ private:
     EntryPins             entries_{*this, receive_, transmit_};
     std::vector<Place>    places_;  // of the process data, in the order of areas_
     std::vector<std::span<std::uint8_t>> areas_;
-    std::vector<std::string> lost_words_, left_words_, clock_words_;
-    std::string              link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_, apart_words_;
+    std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_, missing_words_, ambiguous_words_, failed_words_;
+    std::vector<Event>       failed_;  // why a slave is not started, or slave_operational
+    std::string              unknown_words_, nobody_words_, link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_, apart_words_;
     config::EventFilter      filter_{0};
     unsigned                 unsent_ = 0, unreceived_ = 0, apart_ = 0;
     std::atomic<pthread_t>   receiver_{};
@@ -219,7 +249,7 @@ private:
     hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) { return config::event_words(h, bus_.setup, bus_.link, bus_.backup); }, 256,
                                                     [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
     const hal_faults*                    faults_ = nullptr;
-    bool                                 was_fresh_ = false, simulated_ = false, period_reported_ = false;
+    bool                                 unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
 };
 
 }  // namespace
