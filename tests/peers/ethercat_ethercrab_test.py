@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""ethercat_ethercrab_test.py HAL: the Rust crate ethercrab is master of `hal node ethercat` over a veth pair: SDO, mapping, distributed clocks, process
+data in OP. The program is built here, in build/peers/ethercrab. 77: cargo, its registry or network namespaces are missing."""
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "cli"))
+from own_network import own_network  # noqa: E402
+
+HAL = sys.argv[1]
+TARGET = HERE.parents[1] / "build" / "peers" / "ethercrab"
+
+
+def skip(why):
+    print(why)
+    sys.exit(77)
+
+
+if "HALCYON_ETHERCRAB" not in os.environ:  # before the namespace, which has no way to the registry
+    cargo = shutil.which("cargo") or shutil.which("cargo", path=str(Path.home() / ".cargo" / "bin"))
+    if not cargo:
+        skip("cargo is missing; type: apt-get install cargo, or install Rust with rustup")
+    build = subprocess.run([cargo, "build", "--release", "--locked", "--quiet", "--manifest-path", HERE / "ethercrab" / "Cargo.toml", "--target-dir", TARGET],
+                           capture_output=True, text=True)
+    if build.returncode != 0:
+        skip(f"ethercrab cannot be built here: {(build.stderr.strip().splitlines() or ['no reason given'])[-1]}")
+    os.environ["HALCYON_ETHERCRAB"] = str(TARGET / "release" / "ethercrab_master")
+if not own_network():
+    skip("no network namespaces here; run it as root, or where user namespaces are allowed")
+if subprocess.run(["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True).returncode != 0:
+    skip("no veth pairs here")
+for interface in ("m0", "s0"):
+    subprocess.run(["ip", "link", "set", interface, "up"], check=True)
+with tempfile.TemporaryDirectory(prefix="hal-ethercrab-") as folder:
+    line, output = Path(folder) / "peer.line", Path(folder) / "log"
+    line.write_text("servo\ndigital_out bits=8\ndigital_in bits=8\n")
+    with open(output, "w", encoding="utf-8") as out:
+        node = subprocess.Popen([HAL, "node", "ethercat", line, "--link", "eth:s0"], stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+    try:
+        end = time.monotonic() + 30
+        while "press Ctrl-C" not in output.read_text() and time.monotonic() < end:
+            time.sleep(0.01)
+        master = subprocess.run([os.environ["HALCYON_ETHERCRAB"], "m0"], capture_output=True, text=True, timeout=60)
+    finally:
+        node.terminate()
+        node.wait(60)
+    log = output.read_text()
+print(master.stdout + master.stderr, end="")
+checks = master.stdout.splitlines()
+checks.append("ok   outputs arrive" if "slave 1 (digital_out): outputs 10100101\n" in log else f"FAIL outputs arrive {log}")
+checks.append("ok   the line prints the state" if "slave 0 (servo): OP" in log else f"FAIL the line prints the state {log}")
+print("\n".join(checks[-2:]))
+print(f"{sum(c.startswith('ok ') for c in checks)} of {len(checks)} checks hold")
+sys.exit(0 if master.returncode == 0 and len(checks) == 13 and all(c.startswith("ok ") for c in checks) else 1)

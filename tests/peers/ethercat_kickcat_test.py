@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""ethercat_kickcat_test.py HAL: the Python package kickcat (KickCAT) is master of `hal node ethercat` over a veth pair: scan, SDO, mapping, process data
+in OP. 77: the package or network namespaces are missing."""
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
+import peers  # noqa: E402
+from own_network import own_network  # noqa: E402
+
+(kickcat,) = peers.package("kickcat")
+HAL = sys.argv[1]
+checks = []
+
+
+def check(name, holds, *seen):
+    checks.append(bool(holds))
+    print(f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}", flush=True)
+
+
+def wait_for(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.002)
+    return False
+
+
+def run(log):
+    bus = kickcat.Bus(kickcat.create_link("m0", ""))
+    bus.init(5.0)
+    slaves = bus.slaves()
+    check("three slaves", len(slaves) == 3, len(slaves))
+    servo, outputs, inputs = slaves
+    read = lambda index, sub, size: int.from_bytes(bus.read_sdo(servo, index, sub, kickcat.Access.PARTIAL, size, 2.0)[:size], "little")
+    check("vendor of 1018h", read(0x1018, 1, 4) == 0xFFFFFF, hex(read(0x1018, 1, 4)))
+    check("supported modes", read(0x6502, 0, 4) == 0x3A5, hex(read(0x6502, 0, 4)))
+    try:
+        read(0x2FFF, 0, 4)
+        check("an object that does not exist is an error", False)
+    except Exception as problem:  # its own type is not exported
+        check("an object that does not exist is an error", True, problem)
+    bus.create_mapping()
+    check("sizes of the process data", [(s.input_size, s.output_size) for s in slaves] == [(13, 13), (0, 1), (1, 0)], [(s.input_size, s.output_size) for s in slaves])
+    bus.request_state(kickcat.State.SAFE_OP)
+    bus.wait_for_state(kickcat.State.SAFE_OP, 10.0)
+    check("SAFE-OP", all(bus.get_state(s) == kickcat.State.SAFE_OP for s in slaves))
+    servo.set_output_bytes(bytes(13))
+    outputs.set_output_bytes(b"\xa5")
+    bus.process_data()
+    bus.request_state(kickcat.State.OPERATIONAL)
+    bus.wait_for_state(kickcat.State.OPERATIONAL, 10.0, bus.process_data)
+    check("OP", all(bus.get_state(s) == kickcat.State.OPERATIONAL for s in slaves))
+
+    def cycle():
+        bus.process_data()
+        time.sleep(0.001)
+        return True
+
+    check("outputs arrive", wait_for(lambda: cycle() and "slave 1 (digital_out): outputs 10100101\n" in log.read_text()), log.read_text())
+
+    def statusword_is(control, bits):
+        servo.set_output_bytes(control.to_bytes(2, "little") + b"\x09" + bytes(4) + (20_000).to_bytes(4, "little") + bytes(2))
+        cycle()
+        return int.from_bytes(servo.input_data[:2], "little") & 0x6F == bits
+
+    for name, control, status in (("ready to switch on", 6, 0x21), ("switched on", 7, 0x23), ("operation enabled", 15, 0x27)):
+        check(name, wait_for(lambda: statusword_is(control, status)), servo.input_data.hex())
+    position = lambda: int.from_bytes(servo.input_data[3:7], "little", signed=True)
+    began = position()
+    check("the drive turns", wait_for(lambda: cycle() and position() - began > 1000), began, position())
+    check("the line prints the state", "slave 0 (servo): OP" in log.read_text(), log.read_text())
+
+
+if not own_network():
+    print("no network namespaces here; run it as root, or where user namespaces are allowed")
+    sys.exit(77)
+if subprocess.run(["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True).returncode != 0:
+    print("no veth pairs here")
+    sys.exit(77)
+for interface in ("m0", "s0"):
+    subprocess.run(["ip", "link", "set", interface, "up"], check=True)
+with tempfile.TemporaryDirectory(prefix="hal-kickcat-") as folder:
+    line, output = Path(folder) / "peer.line", Path(folder) / "log"
+    line.write_text("servo\ndigital_out bits=8\ndigital_in bits=8\n")
+    with open(output, "w", encoding="utf-8") as out:
+        node = subprocess.Popen([HAL, "node", "ethercat", line, "--link", "eth:s0"], stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+    try:
+        check("the line starts", wait_for(lambda: "press Ctrl-C" in output.read_text()), output.read_text())
+        run(output)
+    finally:
+        node.terminate()
+        check("the line ends", node.wait(60) == 0)
+print(f"{sum(checks)} of {len(checks)} checks hold")
+sys.exit(0 if checks and all(checks) else 1)
