@@ -13,10 +13,11 @@
 namespace hal::ethercat {
 
 struct EthercatArguments {
-    explicit EthercatArguments(hal::Component& component) : component_(component) {}
+    EthercatArguments(hal::Component& component, const char* usual_file) : component_(component), usual_file_(usual_file) {}
 
     hal::Component&   component_;
-    hal::TextArgument file{component_, "config", "",
+    const char*       usual_file_;  ///< without `config`
+    hal::TextArgument file{component_, "config", usual_file_,
                            "configuration file NAME.ethercat, or LinuxCNC's ethercat-conf.xml; a list makes an instance of each",
                            {.per_instance = true}};
     hal::TextArgument link{component_, "link", "", "link address, overrides the configuration: eth:enp3s0, sim:NAME, …", {.per_instance = true}};
@@ -31,11 +32,8 @@ struct EthercatArguments {
     /// exception that ends the constructor once the problems are reported. [setup]
     config::Bus read() const {
         const hal::Texts texts(component_);
-        if (file.get().empty()) {
-            if (texts.offered())
-                throw std::invalid_argument("missing configuration; type: loadrt ethercat config=FILE.ethercat");
-            return {};
-        }
+        if (!texts.offered() && file.get() == usual_file_) return {};  // only its documentation is wanted
+        if (file.get().empty()) throw std::invalid_argument("missing configuration; type: loadrt ethercat config=FILE.ethercat");
         const std::string path = texts.find(file.get());
         std::string       text;
         if (!config::read_from_disk(path, text))
@@ -52,6 +50,8 @@ struct EthercatArguments {
             throw hal::ArgumentError("cycle", "cycle=" + std::to_string(cycle_ns) + ": the cycle of this format is appTimePeriod; change it in the file");
         if (cycle_ns != 0) bus.setup.cycle_ns = cycle_ns;
         if (!link.get().empty()) bus.link = link.get();
+        else if (reading.lcec && texts.offered())
+            throw hal::ArgumentError("link", "link= is missing: this format has no interface", "write link=eth:enp3s0, or link=sim:NAME for an emulated line");
         if (!backup.get().empty()) bus.backup = backup.get();
         return bus;
     }

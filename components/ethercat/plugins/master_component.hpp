@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: MIT
+// The master as a HAL component; `Names` gives it the pins and functions of `ethercat` or of `lcec`.
+#pragma once
+
+#include <pthread.h>
+
+#include <array>
+#include <atomic>
+#include <ctime>
+#include <deque>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "ethercat/config/event_filter.hpp"
+#include "ethercat/config/event_words.hpp"
+#include "ethercat/master/coe_client.hpp"
+#include "ethercat/master/mailbox.hpp"
+#include "ethercat/master/master.hpp"
+#include "ethercat/plugins/entry_pins.hpp"
+#include "ethercat/plugins/ethercat_arguments.hpp"
+#include "ethercat/wire/registers.hpp"
+#include "hal/clock.hpp"
+#include "hal/component.hpp"
+#include "hal/discipline.hpp"
+#include "hal/naming.hpp"
+#include "hal/reporter.hpp"
+
+namespace hal::ethercat {
+
+/// The largest number of slaves on a bus, beyond those of the configuration, that are identified.
+constexpr std::size_t spare_slaves = 64;
+
+template <class Names>
+class MasterComponent : public hal::Component, private master::Events {
+    using Event = master::Event;
+    using Master = master::Master;
+
+public:
+    explicit MasterComponent(const hal_host* host) : Component(host) {
+        for (std::size_t s = 0; s < bus_.setup.slaves.size(); ++s) {
+            const master::Slave& slave = bus_.setup.slaves[s];
+            slaves_.emplace_back(*this, receive_, slave.name);
+            for (std::size_t n = 0; n < slave.sync_managers.size(); ++n) {
+                std::size_t at = 0;
+                for (const master::Pdo& pdo : slave.sync_managers[n].pdos)
+                    for (const master::Entry& e : pdo.entries) {
+                        entries_.declare(slave.name + ".", e, slave.sync_managers[n].output, places_.size(), at);
+                        at += e.bits;
+                    }
+                places_.push_back({s, n});
+            }
+            const std::string who = config::slave_words(static_cast<std::uint32_t>(s), bus_.setup);
+            lost_words_.push_back(who + " does not answer; its inputs keep their last values");
+            identity_words_.push_back(who + " is not the device of the configuration; it stays in INIT");
+            missing_words_.push_back(who + " is not on the bus");
+            ambiguous_words_.push_back(who + " is not unique; no slave with its number is started");
+            failed_words_.push_back(who + " did not start; it is tried again");
+            clock_words_.push_back(who + " is out of step, its clock deviates by {} us");
+            left_words_.push_back(who + " left its state with AL status code {x}; its outputs are off");
+        }
+        areas_.resize(places_.size());
+        period_words_ = "the period of the thread is {} us, the cycle of the configuration " + std::to_string(bus_.setup.cycle_ns / 1000) +
+                        " us; change one of them: cycle in [bus]; nothing is exchanged";
+        unknown_words_ = "a slave on " + bus_.link + " is not in the configuration";
+        nobody_words_ = "no slave answers on " + bus_.link;
+        link_words_ = bus_.link + " has no link; no process data is exchanged";
+        other_words_ = "another EtherCAT master sends on " + bus_.link + "; the slaves obey both";
+        const std::string receive = Names::function(name_, Names::receive), transmit = Names::function(name_, Names::transmit);
+        no_transmit_words_ = "'" + receive + "' runs, but '" + transmit + "' does not; nothing is sent; type: addf " + transmit + " THREAD";
+        no_receive_words_ = "'" + transmit + "' runs, but '" + receive + "' does not; nothing is sent; type: addf " + receive + " THREAD";
+        apart_words_ = "'" + receive + "' and '" + transmit + "' are in different threads; nothing is sent; type: delf " + transmit +
+                       " THREAD, and add it to the thread of the other";
+    }
+
+    void start() {
+        faults_ = hal::extension<hal_faults>("hal.faults/1");
+        hal::ethernet::Options options;
+        options.types = {ethertype};
+        auto primary = hal::ethernet::open(bus_.link, options);
+        if (!primary) throw std::runtime_error(primary.problem);
+        hal::ethernet::Opened backup;
+        if (!bus_.backup.empty() && !(backup = hal::ethernet::open(bus_.backup, options))) throw std::runtime_error(backup.problem);
+        if (bus_.setup.lead == master::ClockLead::reference && has_clocks()) clock_.emplace().claim();
+        primary_ = std::move(primary.port), backup_ = std::move(backup.port);
+        simulated_ = primary_->description().simulated;
+        mailboxes_ = std::make_unique<master::Mailboxes>(bus_.setup.slaves.size() + spare_slaves);
+        client_ = std::make_unique<master::CoeClient>(*mailboxes_);
+        master_ = std::make_unique<Master>(bus_.setup, primary_->address(), static_cast<master::Events&>(*this), *client_);
+        for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
+        if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
+        period_reported_ = was_fresh_ = unknown_raised_ = false;
+        failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
+        unsent_ = unreceived_ = apart_ = 0;
+        filter_ = config::EventFilter(bus_.setup.slaves.size());
+        discipline_.lose();
+        reporter_.start();
+        master_->attach(*primary_, backup_.get());
+    }
+
+    void stop() noexcept {
+        if (primary_ && master_) release_slaves();
+        master_.reset();
+        client_.reset();
+        mailboxes_.reset();
+        clock_.reset();
+        reporter_.stop();
+        primary_.reset(), backup_.reset();
+    }
+
+    void receive(hal::Cycle cycle) noexcept {
+        if (!master_ || !fits(cycle)) return;
+        unreceived_ = 0;
+        receiver_.store(pthread_self(), std::memory_order_relaxed);
+        if (++unsent_ == tolerated_cycles) raise(no_transmit_words_);
+        master_->receive(cycle.start_ns());
+        follow(cycle);
+        bus_pins_.show(master_->status(), master_->cycles_incomplete());
+        for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n));
+        entries_.show(areas_);
+    }
+
+    void transmit(hal::Cycle cycle) noexcept {
+        if (!master_ || !fits(cycle)) return;
+        unsent_ = 0;
+        if (++unreceived_ == tolerated_cycles) raise(no_receive_words_);
+        apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
+        if (apart_ == tolerated_cycles) raise(apart_words_);
+        if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
+        entries_.take(areas_);
+        master_->transmit(cycle.start_ns());
+    }
+
+    void make_safe(hal::Cycle) noexcept {
+        if (master_) master_->set_target(State::safeop);
+    }
+
+private:
+    static constexpr unsigned tolerated_cycles = 100;  ///< without the other function, while the netlist is loaded
+    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+    struct Place {
+        std::size_t slave = 0, sync_manager = 0;
+    };
+
+    bool has_clocks() const {
+        for (const master::Slave& s : bus_.setup.slaves)
+            if (s.dc) return true;
+        return false;
+    }
+
+    /// Returns whether the thread has the period of the configuration; otherwise nothing is exchanged. [realtime]
+    bool fits(hal::Cycle cycle) noexcept {
+        if (cycle.period_ns() == bus_.setup.cycle_ns) return true;
+        if (!std::exchange(period_reported_, true)) raise(period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
+        return false;
+    }
+    /// Returns the time of the clocks of the slaves: ns since 2000-01-01. [setup]
+    static std::int64_t since_2000_ns() noexcept {
+        constexpr std::int64_t year_2000_s = 946'684'800;
+        timespec now{};
+        clock_gettime(CLOCK_REALTIME, &now);
+        return (now.tv_sec - year_2000_s) * 1'000'000'000 + now.tv_nsec;
+    }
+
+    /// Lets the threads follow the reference clock. [realtime]
+    void follow(hal::Cycle cycle) noexcept {
+        const Master::Phase phase = master_->dc_phase();
+        if (!phase.fresh) {
+            if (clock_ && was_fresh_) discipline_.lose();
+            was_fresh_ = false;
+            return;
+        }
+        was_fresh_ = true;
+        bus_pins_.phase = static_cast<std::int32_t>(phase.error_ns);
+        if (clock_) clock_->step(discipline_.follow(-phase.error_ns, cycle.period_ns(), clock_->limit_ns()));
+    }
+
+    /// Takes all slaves to INIT, where outputs are off. [setup]
+    void release_slaves() noexcept {
+        std::array<std::uint8_t, largest_frame_bytes> buffer{};
+        FrameWriter frame(buffer, primary_->address());
+        if (std::uint8_t* data = frame.add(Command::bwr, 0, at_position(0, registers::al_control), 2))
+            put<std::uint16_t>(data, static_cast<std::uint16_t>(State::init) | al_error);
+        primary_->send(frame.finish(), {}, simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
+    }
+
+    void raise(const std::string& reason, double detail = not_a_number) noexcept {
+        if (faults_ != nullptr) faults_->raise(faults_, this, reason.c_str(), detail);
+    }
+
+    /// Returns why a slave is not started; nullptr: the event is another one. [realtime]
+    const std::string* start_words(Event event, std::uint32_t slave) const noexcept {
+        switch (event) {
+        case Event::wrong_vendor:
+        case Event::wrong_product:
+        case Event::wrong_revision:
+        case Event::wrong_serial: return &identity_words_[slave];
+        case Event::slave_missing: return &missing_words_[slave];
+        case Event::duplicate_alias: return &ambiguous_words_[slave];
+        case Event::start_up_failed: return &failed_words_[slave];
+        default: return nullptr;
+        }
+    }
+
+    // Events of the master. [realtime]
+    void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
+        if (filter_.is_new(event, slave, first, second)) reporter_.tell({event, slave, first, second});
+        const bool named = slave < slaves_.size();
+        if (event == Event::slave_lost && named) raise(lost_words_[slave]);
+        if (event == Event::fell_back && named) raise(left_words_[slave], static_cast<double>(second));
+        if (event == Event::dc_lost && named) raise(clock_words_[slave], static_cast<double>(first) * 1e-3);
+        if (named) {
+            const std::string* words = start_words(event, slave);
+            if (words != nullptr && failed_[slave] != event) raise(*words), failed_[slave] = event;  // not at each try
+            if (event == Event::slave_operational) failed_[slave] = event;
+        }
+        if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) raise(unknown_words_);
+        if (event == Event::scanned) unknown_raised_ = false;
+        if (event == Event::no_slaves) raise(nobody_words_);
+        if (event == Event::link_lost && first == 0) raise(link_words_);
+        if (event == Event::other_master) raise(other_words_);
+    }
+
+    const std::string name_ = hal::own_name(Names::own);
+    EthercatArguments arguments_{*this, Names::file};
+    config::Bus       bus_ = arguments_.read();
+    hal::Function receive_{*this, Names::receive, &MasterComponent::receive, "takes the inputs of the slaves; first in the thread, whose period is the cycle",
+                           {.shared = Names::shared}};
+    hal::Function transmit_{*this, Names::transmit, &MasterComponent::transmit, "sends the outputs of the slaves, starts and watches them; last in the thread",
+                            {.shared = Names::shared}};
+    hal::Emergency emergency_{*this, &MasterComponent::make_safe, "takes the slaves to SAFE-OP, where outputs are off"};
+    typename Names::BusPins bus_pins_{*this, receive_};
+    std::deque<typename Names::SlavePins> slaves_;
+    EntryPins             entries_{*this, receive_, transmit_};
+    std::vector<Place>    places_;  // of the process data, in the order of areas_
+    std::vector<std::span<std::uint8_t>> areas_;
+    std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_, missing_words_, ambiguous_words_, failed_words_;
+    std::vector<Event>       failed_;  // why a slave is not started, or slave_operational
+    std::string              unknown_words_, nobody_words_, link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_, apart_words_;
+    config::EventFilter      filter_{0};
+    unsigned                 unsent_ = 0, unreceived_ = 0, apart_ = 0;
+    std::atomic<pthread_t>   receiver_{};
+
+    std::unique_ptr<hal::ethernet::Port> primary_, backup_;
+    std::unique_ptr<master::Mailboxes>   mailboxes_;
+    std::unique_ptr<master::CoeClient>   client_;
+    std::unique_ptr<Master>              master_;
+    std::optional<hal::DisciplinedClock> clock_;
+    hal::Discipline                      discipline_;
+    hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) { return config::event_words(h, bus_.setup, bus_.link, bus_.backup); }, 256,
+                                                    [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
+    const hal_faults*                    faults_ = nullptr;
+    bool                                 unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
+};
+
+}  // namespace hal::ethercat
