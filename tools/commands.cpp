@@ -148,6 +148,7 @@ constexpr Subcommand table[] = {
     command<EthercatPositionOptions, ON_BUS(run_ethercat_xml)>("ethercat xml", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "print a device description (ESI) of a slave from its EEPROM"),
     command<EthercatOptions, ON_BUS(run_ethercat_graph)>("ethercat graph", "ADDRESS|--emulate LINE [--json] > FILE", "draw the topology of a bus as SVG"),
     command<EthercatOptions, ON_BUS(run_ethercat_dc)>("ethercat dc", "ADDRESS|--emulate LINE [--json]", "print the deviations of the clocks of the slaves"),
+    command<EthercatDumpOptions, ON_BUS(run_ethercat_dump)>("ethercat dump", "ADDRESS|FILE [--filter WORD] [--for TIME] [--count N] [--json]", "print the datagrams of a bus or of a capture in words"),
     command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>("ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
     command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>("ethercat plan", "FILE [--json]", "compute frames, wire time, cycle time and latency of a bus"),
 #endif
@@ -177,7 +178,7 @@ constexpr Group groups[] = {
     {"can", "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
     {"canopen", "check and plan a CANopen network"},
 #ifdef HALCYON_ETHERCAT
-    {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, check, plan"},
+    {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, dump, check, plan"},
 #endif
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults; an EtherCAT line: ethercat"},

@@ -151,6 +151,32 @@ class Configuration(Ethercat):
         self.assertIn("wrong.ethercat:2:", self.bad("ethercat", "check", "wrong.ethercat"))
         self.assertIn("cannot read 'none.ethercat'", self.bad("ethercat", "plan", "none.ethercat"))
 
+    def test_dump_reads_a_capture(self):
+        datagram = lambda command, address, data, wkc, more=False: (bytes([command, 0]) + address.to_bytes(4, "little") + (len(data) | more << 15).to_bytes(2, "little") +
+                                                                    bytes(2) + data + wkc.to_bytes(2, "little"))
+        def frame(*datagrams, returned=True):
+            body = b"".join(datagrams)
+            return bytes([255] * 6 + [2 if returned else 0, 0, 0, 0, 0, 1, 0x88, 0xA4]) + (len(body) | 0x1000).to_bytes(2, "little") + body + bytes(max(0, 44 - len(body)))
+        upload = bytes([10, 0, 0, 0, 0, 0x23, 0, 0x20, 0x40, 0x41, 0x60, 0]) + bytes(20)
+        frames = [frame(datagram(1, 0xFFFF | 0x0130 << 16, bytes(6), 0), returned=False),
+                  frame(datagram(4, 0x1001 | 0x0130 << 16, bytes([0x14, 0, 0, 0, 0x1B, 0]), 1, more=True), datagram(12, 0x10000, bytes(range(20)), 3)),
+                  frame(datagram(5, 0x1001 | 0x1000 << 16, upload, 1)), bytes([255] * 12 + [8, 0]) + bytes(46), frame(datagram(4, 0x1001, bytes(4), 1))[:30]]
+        pcap = (0xA1B2C3D4).to_bytes(4, "little") + bytes([2, 0, 4, 0]) + bytes(8) + (65535).to_bytes(4, "little") + (1).to_bytes(4, "little")
+        for n, f in enumerate(frames):
+            pcap += b"".join(v.to_bytes(4, "little") for v in (1000, n * 250, len(f), len(f))) + f
+        (self.folder / "bus.pcap").write_bytes(pcap)
+        self.assertEqual("    0.000000  ->  APRD slave 1 0130  [6] 00 00 00 00 00 00  WKC 0  AL status: none\n"
+                         "    0.000250  <-  FPRD station 0x1001 0130  [6] 14 00 00 00 1B 00  WKC 1  AL status: SAFE-OP, error 0x001B, sync manager watchdog\n"
+                         "    0.000250  <-  LRW  logical 0x00010000  [20] 00 01 02 03 04 05 06 07 08 09 0A 0B 0C 0D 0E 0F …  WKC 3\n"
+                         "    0.000500  <-  FPWR station 0x1001 1000  [32] 0A 00 00 00 00 23 00 20 40 41 60 00 00 00 00 00 …  WKC 1  CoE SDO upload 0x6041:0\n"
+                         "    0.001000  malformed frame of 30 bytes\n", self.good("ethercat", "dump", "bus.pcap"))
+        rows = [json.loads(line) for line in self.good("ethercat", "dump", "bus.pcap", "--json", "--filter", "coe").splitlines() if line.startswith("{")]
+        self.assertEqual([("FPWR", 0x1000, "CoE SDO upload 0x6041:0", True)], [(r["command"], r["register"], r["meaning"], r["returned"]) for r in rows])
+        self.assertEqual(1, self.good("ethercat", "dump", "bus.pcap", "-n", "1").count("\n"))
+        (self.folder / "none.pcap").write_bytes(pcap[:24] + b"".join(v.to_bytes(4, "little") for v in (1, 0, len(frames[3]), len(frames[3]))) + frames[3])
+        self.assertEqual("hal ethercat dump: none.pcap: none of its 1 frames is an EtherCAT frame\n", self.bad("ethercat", "dump", "none.pcap"))
+        self.assertIn("'sim:x' is a segment in memory, which belongs to another process", self.bad("ethercat", "dump", "sim:x"))
+
     def test_xml_is_a_description_that_a_configuration_can_use(self):
         text = self.on("xml", "-p", 1)
         device = ElementTree.fromstring(text).find("Descriptions/Devices/Device")

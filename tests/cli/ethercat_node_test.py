@@ -69,6 +69,17 @@ class Line(Case):
     def both(self, pin, value):
         wait_until(lambda: all(self.pin(pin.replace("*", axis)) == value for axis in ("left", "right")), f"{pin} is {value}")
 
+    def test_dump_shows_what_a_command_does(self):
+        self.node()
+        dump = self.start("ethercat", "dump", "eth:m0")
+        self.start("ethercat", "dump", "eth:m0", "--filter", "nothing has this", "--for", "1s")
+        wait_until(lambda: self.good("ethercat", "upload", "eth:m0", "-p", "1", "0x1018", "1") and " CoE SDO uploaded 0x1018:1" in self.said(dump), "dump shows it")
+        self.bad("ethercat", "upload", "eth:m0", "-p", "1", "0x2fff", "0")
+        self.expect(dump, r"  <-  FPRD station 0x1002 1100  \[256\] 0A 00 .* WKC 1  CoE SDO abort 0x2FFF:0: 0x06020000, object does not exist\n")
+        self.expect(dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n")
+        self.expect(dump, r"  <-  FPWR station 0x1002 0120  \[2\] 02 00  WKC 1  AL control: PRE-OP\n")
+        self.assertEqual(0, self.end(dump))
+
     def test_watchdogs_turn_outputs_off_when_the_master_is_killed_and_a_new_one_reaches_OP(self):
         node = self.node()
         self.assertRegex(self.said(node), r"^EtherCAT line of 2 slaves on eth:s0 \(raw Ethernet\); press Ctrl-C to end\n   0  servo\n   1  servo\n")

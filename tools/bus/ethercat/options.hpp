@@ -2,6 +2,7 @@
 // Options of the `hal ethercat` commands. Compiled into `hal` for its help: no bus library here.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "cli/option_set.hpp"
@@ -68,6 +69,21 @@ struct EthercatPlanOptions : Options {
     }
 };
 
+struct EthercatDumpOptions : Options {
+    std::string filter;
+    std::int64_t for_ns = -1;  ///< -1: not given
+    std::uint64_t count = 0;   ///< 0: not given
+    bool json = false;
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS|FILE", "eth:enp3s0, or a capture of Wireshark: FILE.pcapng, FILE.pcap");
+        set.value("--filter", filter, "WORD", "only datagrams with this word in the line: FPRD, CoE, 'AL status', 0x1001");
+        set.for_how_long(for_ns, "end after 5s, 500ms … (default: on Ctrl-C)");
+        set.value("-n,--count", count, "N", "end after N datagrams");
+        set.flag("--json", json, "print a JSON object per line");
+    }
+};
+
 /// Each returns the exit code.
 int run_ethercat_scan(const EthercatOptions&);
 int run_ethercat_slaves(const EthercatOptions&);
@@ -88,6 +104,7 @@ int run_ethercat_config(const EthercatOptions&);
 int run_ethercat_xml(const EthercatPositionOptions&);
 int run_ethercat_graph(const EthercatOptions&);
 int run_ethercat_dc(const EthercatOptions&);
+int run_ethercat_dump(const EthercatDumpOptions&);
 int run_ethercat_check(const EthercatCheckOptions&);
 int run_ethercat_plan(const EthercatPlanOptions&);
 
