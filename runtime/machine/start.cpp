@@ -65,9 +65,10 @@ bool claim_clock(const hal_clock*, const hal_host* host) {
     Starting& starting = *static_cast<Starting*>(host->data);
     if (const Instance* const other = clock_leader(starting.model); other && other != &starting.instance) {
         try {
-            return starting.fail(("the threads already follow the clock of '" + other->name + "' (" + other->component->name +
-                                  "); disable clock following here or unload '" + other->name + "' first")
-                                     .c_str());
+            starting.failure = {.text = "the threads already follow the clock of '" + other->name + "' (" + other->component->name + ")",
+                                .help = "let one of them follow the threads: `clock = thread` in [bus] of an EtherCAT bus, `clock = own` of a CANopen bus; or unload '" +
+                                        other->name + "' first"};
+            return false;
         } catch (const std::bad_alloc&) {
             return starting.fail("the threads already follow the clock of another instance");
         }
