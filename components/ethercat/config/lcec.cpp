@@ -7,6 +7,7 @@
 
 #include "ethercat/config/lcec_cia402.hpp"
 #include "ethercat/esi/esi_xml.hpp"
+#include "ethercat/master/soe_client.hpp"
 
 namespace hal::ethercat::config {
 
@@ -164,9 +165,7 @@ private:
             if (name == "dcConf") dc(child, s);
             else if (name == "watchdog") watchdog(child, s);
             else if (name == "sdoConfig") sdo(child, s);
-            else if (name == "idnConfig")
-                error(Topic::line, child, "<idnConfig> is unsupported: the format has no usable state attribute",
-                    "use a .ethercat file with idn S-0-15 = 07 00");
+            else if (name == "idnConfig") idn(child, s);
             else if (name == "initCmds")
                 error(Topic::line, child, "<initCmds> is unsupported", "write an <sdoConfig> for each object");
             else if (name == "modParam") parameter(child, drive);
@@ -214,15 +213,41 @@ private:
         w.index = static_cast<std::uint16_t>(number(node, "idx", 1, 0xffff, true, true).value_or(0));
         w.complete = same_word(node.attribute("subIdx").value(), "complete");
         if (!w.complete) w.sub = static_cast<std::uint8_t>(number(node, "subIdx", 0, 0xff, true, true).value_or(0));
-        children(node, {"sdoDataRaw"}, [&](const Xml& raw) {
+        w.data = raw_data(node, "sdoDataRaw");
+        if (!w.data.empty()) s.startup.push_back(std::move(w));
+    }
+    /// LinuxCNC's lcec loads no file with this element, because it never finds `state`; here it may be missing.
+    void idn(const Xml& node, master::Slave& s) {
+        attributes(node, {"drive", "idn", "state"});
+        StartupWrite w;
+        w.protocol = StartupWrite::Protocol::soe;
+        w.line = esi::span_of(node, text_).line;
+        w.sub = static_cast<std::uint8_t>(number(node, "drive", 0, 7).value_or(0));
+        const std::string_view name = trimmed(node.attribute("idn").value()), state = trimmed(node.attribute("state").value());
+        if (const auto parsed = master::parse_idn(name)) w.index = *parsed;
+        else error(Topic::value, node, name.empty() ? "missing attribute 'idn' of <idnConfig>" : "invalid idn '" + std::string(name) +
+            "' of <idnConfig>", "write idn=\"S-0-15\" or idn=\"P-0-150\"");
+        if (state == "SAFEOP") w.before = State::op;
+        else if (!state.empty() && state != "PREOP") error(Topic::value, node, "invalid state '" + std::string(state) +
+            "' of <idnConfig>", "write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
+        w.data = raw_data(node, "idnDataRaw");
+        if (!w.data.empty()) s.startup.push_back(std::move(w));
+    }
+    /// Returns the bytes of the elements `name`; reports when there are none.
+    std::vector<std::uint8_t> raw_data(const Xml& node, const char* name) {
+        std::vector<std::uint8_t> bytes;
+        bool valid = true;
+        children(node, {name}, [&](const Xml& raw) {
             attributes(raw, {"data"});
             const auto data = esi::hex_bytes(raw.attribute("data").value());
-            if (data) w.data.insert(w.data.end(), data->begin(), data->end());
-            else error(Topic::value, raw, "invalid data '" + std::string(raw.attribute("data").value()) + "'",
+            if (data) return void(bytes.insert(bytes.end(), data->begin(), data->end()));
+            valid = false;
+            error(Topic::value, raw, "invalid data '" + std::string(raw.attribute("data").value()) + "'",
                 "write hexadecimal bytes in the order of the wire, as in data=\"E8 03\"");
         });
-        if (w.data.empty()) return error(Topic::value, node, "<sdoConfig> has no data", "write <sdoDataRaw data=\"E8 03\"/> in it");
-        s.startup.push_back(std::move(w));
+        if (bytes.empty() && valid) error(Topic::value, node, "<" + std::string(node.name()) + "> has no data", "write <" + std::string(name) +
+            " data=\"E8 03\"/> in it");
+        return bytes;
     }
     void parameter(const Xml& node, bool drive) {
         attributes(node, {"name", "value"});

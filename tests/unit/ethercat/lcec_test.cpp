@@ -81,8 +81,6 @@ TEST(Lcec, Errors_name_the_element_and_its_line) {
               "c.xml:2:2: error: unknown attribute 'alias' of <slave>; the attributes are: idx, type, name, vid, pid, configPdos, syncUnit, syncUnitCycle");
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"EL1008\"/>"),
               "c.xml:2:2: error: unsupported slave type 'EL1008'; write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"");
-    EXPECT_EQ(errors("<slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\"><idnConfig drive=\"0\" idn=\"15\"/></slave>"),
-              "c.xml:2:48: error: <idnConfig> is unsupported: the format has no usable state attribute; use a .ethercat file with idn S-0-15 = 07 00");
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"generic\" vid=\"xy\" pid=\"2\"/>"),
               "c.xml:2:2: error: invalid vid 'xy' of <slave>; write a hexadecimal number of 0..FFFFFFFF");
     EXPECT_EQ(errors("<slave idx=\"0\" type=\"basic_cia402\" vid=\"1\" pid=\"2\"><modParam name=\"enableCPS\" value=\"1\"/><modParam name=\"enableCSP\" value=\"maybe\"/></slave>"),
@@ -90,6 +88,31 @@ TEST(Lcec, Errors_name_the_element_and_its_line) {
               "c.xml:2:53: error: unsupported modParam 'enableCPS'; did you mean 'enableCSP'?");
     EXPECT_EQ(to_string(read("<x/>", "c.xml"), "c.xml"),
         "c.xml:1:2: error: the root element is 'x', not masters; the file begins with <masters>");
+}
+
+TEST(Lcec, Idn_configuration_is_written_by_SoE_in_its_state) {
+    const auto slave = [](const std::string& idns) { return "<slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\">" + idns + "</slave>"; };
+    const Reading r = read("<masters><master idx=\"0\">" + slave(
+        "<idnConfig drive=\"1\" idn=\"P-0-150\" state=\"SAFEOP\"><idnDataRaw data=\"07 00\"/><idnDataRaw data=\"0A\"/></idnConfig>"
+        "<idnConfig idn=\"S-0-15\"><idnDataRaw data=\"0700\"/></idnConfig>") + "</master></masters>", "c.xml");
+    ASSERT_EQ(to_string(r, "c.xml"), "");
+    const auto& writes = r.buses.at(0).setup.slaves.at(0).startup;
+    ASSERT_EQ(writes.size(), 2U);
+    EXPECT_EQ(writes[0].protocol, master::StartupWrite::Protocol::soe);
+    EXPECT_EQ(writes[0].index, 0x8096);
+    EXPECT_EQ(writes[0].sub, 1);
+    EXPECT_EQ(writes[0].before, State::op);
+    EXPECT_EQ(writes[0].data, (std::vector<std::uint8_t>{7, 0, 10}));
+    EXPECT_EQ(writes[1].index, 15);
+    EXPECT_EQ(writes[1].sub, 0);
+    EXPECT_EQ(writes[1].before, State::safeop) << "in PRE-OP, where no state is given";
+    EXPECT_EQ(errors(slave("<idnConfig idn=\"X-0-1\"><idnDataRaw data=\"07\"/></idnConfig>")),
+              "c.xml:2:48: error: invalid idn 'X-0-1' of <idnConfig>; write idn=\"S-0-15\" or idn=\"P-0-150\"");
+    EXPECT_EQ(errors(slave("<idnConfig idn=\"S-0-15\" state=\"OP\"><idnDataRaw data=\"07\"/></idnConfig>")),
+              "c.xml:2:48: error: invalid state 'OP' of <idnConfig>; write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
+    EXPECT_EQ(errors(slave("<idnConfig idn=\"S-0-15\"/>")), "c.xml:2:48: error: <idnConfig> has no data; write <idnDataRaw data=\"E8 03\"/> in it");
+    EXPECT_EQ(errors(slave("<idnConfig idn=\"S-0-15\"><idnDataRaw data=\"7\"/></idnConfig>")),
+              "c.xml:2:72: error: invalid data '7'; write hexadecimal bytes in the order of the wire, as in data=\"E8 03\"");
 }
 
 TEST(Lcec, Any_bytes_are_read_without_harm) {
