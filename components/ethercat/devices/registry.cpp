@@ -100,7 +100,9 @@ LineDescription read_line(std::string_view text) {
             const auto equals = words[n].text.find('=');
             const std::string key = words[n].text.substr(0, equals);
             std::string problem;
-            if (equals == std::string::npos) problem = "option '" + key + "' has no value; write " + key + "=VALUE";
+            if (equals == std::string::npos && device_row(words[n].text) != nullptr)
+                problem = "'" + words[n].text + "' is a device of its own; write it on the next line, or after a comma";
+            else if (equals == std::string::npos) problem = "option '" + key + "' has no value; write " + key + "=VALUE";
             else if (!offers(*row, key)) problem = "unknown option '" + key + "' of " + words[0].text;
             else problem = set_option(slave.options, key, std::string_view(words[n].text).substr(equals + 1));
             if (problem.empty()) continue;

@@ -15,7 +15,7 @@ struct EthercatOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS", "eth:enp3s0 or udp:HOST; not with --emulate", false);
+        set.words("ADDRESS", "eth:enp3s0; not with --emulate", false);
         declare_bus(set);
     }
 
@@ -33,7 +33,7 @@ struct EthercatPositionOptions : EthercatOptions {
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS ARG",
-                  "eth:enp3s0 or udp:HOST, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…",
+                  "eth:enp3s0, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…",
                   false);
         declare_bus(set);
         set.value("-p,--position", position, "N", "position of the slave, counted from 0; not needed for a single slave").in(0, 65535);
