@@ -23,13 +23,20 @@ struct SlavePins {
         : power(c, f, (name + ".power").c_str(), "FALSE: the slave has no power; its settings and volatile objects are lost", {.initial = true}),
           cable(c, f, (name + ".cable").c_str(), "FALSE: the cable to the slave before it is broken", {.initial = true}),
           drift(c, f, (name + ".drift").c_str(), "error of its oscillator, at most 100000", {.unit = "ppm"}),
+          reject_state(c, f, (name + ".reject-state").c_str(), "state that the slave rejects: 2 PRE-OP, 4 SAFE-OP, 8 OP; 0 none"),
+          reject_code(c, f, (name + ".reject-code").c_str(), "AL status code of that rejection, 1..65535", {.initial = 0x0012}),
+          fail_code(c, f, (name + ".leave-op").c_str(), "a change to another number than 0 drops from OP to SAFE-OP with this AL status code"),
+          mailbox_delay(c, f, (name + ".mailbox-delay").c_str(), "minimum time to a mailbox answer, at most 60", {.unit = "s"}),
           state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 no power") {}
 
     hal::In<bool>           power, cable;
     hal::In<double>         drift;
+    hal::In<std::uint32_t>  reject_state, reject_code, fail_code;
+    hal::In<double>         mailbox_delay;
     hal::Out<std::uint32_t> state;
     bool                    was_power = true, was_cable = true;
     double                  was_drift = 0;
+    std::uint32_t           was_fail = 0;
 };
 
 /// Pins of one axis of a servo drive.
@@ -111,6 +118,7 @@ public:
             if (pins.cable != pins.was_cable && line_->post({.kind = Kind::cable, .slave = n, .port = 0, .on = pins.cable})) pins.was_cable = pins.cable;
             const double drift = std::isfinite(pins.drift.get()) ? std::clamp(pins.drift.get(), -most_drift, most_drift) : 0.0;
             if (drift != pins.was_drift && line_->post({.kind = Kind::drift, .slave = n, .value = drift})) pins.was_drift = drift;
+            set_faults(pins, *line_devices_[n].firmware);
             pins.state = pins.power ? static_cast<std::uint32_t>(line_devices_[n].firmware->state()) : 0U;
         }
         for (AxisPins& pins : axes_) {
@@ -128,6 +136,22 @@ public:
 private:
     static constexpr unsigned silent_cycles = 10;
     static constexpr double   most_drift = 100'000;  ///< ppm
+    static constexpr double   most_delay = 60;       ///< s
+
+    /// Copies the pins of firmware faults. [realtime]
+    static void set_faults(SlavePins& pins, devices::Firmware& firmware) noexcept {
+        devices::FirmwareFaults& faults = firmware.faults();
+        for (const State state : {State::preop, State::safeop, State::op}) {
+            const bool rejected = pins.reject_state == static_cast<std::uint32_t>(state);
+            const std::uint32_t code = rejected ? std::clamp<std::uint32_t>(pins.reject_code, 1, 0xffff) : 0U;
+            faults.reject[state].store(static_cast<std::uint16_t>(code), std::memory_order_relaxed);
+        }
+        if (pins.fail_code != pins.was_fail && pins.fail_code != 0 && firmware.state() == State::op)
+            faults.fail.store(static_cast<std::uint16_t>(std::min<std::uint32_t>(pins.fail_code, 0xffff)), std::memory_order_relaxed);
+        pins.was_fail = pins.fail_code;
+        const double delay = std::isfinite(pins.mailbox_delay.get()) ? std::clamp(pins.mailbox_delay.get(), 0.0, most_delay) : 0.0;
+        faults.mailbox_delay_ns.store(static_cast<std::int64_t>(delay * 1e9), std::memory_order_relaxed);
+    }
 
     static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
         if (!hal::ethernet::describe(address).in_memory)
@@ -194,6 +218,7 @@ cables and devices, at the same times in every run of `hal sim`.
 
 A master on the same segment is `loadrt ethercat config=machine.ethercat link=sim:line`.
 
-Slaves are counted from 0 along the line. `slave-N.power` and `slave-N.cable` switch a slave off and break its cable. With `backup` the line is a ring
+Slaves are counted from 0 along the line. `slave-N.power` and `slave-N.cable` switch a slave off and break its cable. `slave-N.reject-state` with
+`slave-N.reject-code` makes a slave reject a state, `slave-N.leave-op` makes it leave OP, and `slave-N.mailbox-delay` makes its mailbox slow. With `backup` the line is a ring
 with both ports of the master.
 )");
