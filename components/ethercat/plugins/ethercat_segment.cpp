@@ -25,7 +25,8 @@ struct SlavePins {
           drift(c, f, (name + ".drift").c_str(), "error of its oscillator, at most 100000", {.unit = "ppm"}),
           reject_state(c, f, (name + ".reject-state").c_str(), "state that the slave rejects: 2 PRE-OP, 4 SAFE-OP, 8 OP; 0 none"),
           reject_code(c, f, (name + ".reject-code").c_str(), "AL status code of that rejection, 1..65535", {.initial = 0x0012}),
-          fail_code(c, f, (name + ".leave-op").c_str(), "a change to another number than 0 drops from OP to SAFE-OP with this AL status code"),
+          fail_code(c, f, (name + ".leave-op").c_str(),
+                    "a change to another number than 0 drops from OP to SAFE-OP with this AL status code"),
           mailbox_delay(c, f, (name + ".mailbox-delay").c_str(), "minimum time to a mailbox answer, at most 60", {.unit = "s"}),
           state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 no power") {}
 
